@@ -1,0 +1,39 @@
+# Everything is set up once in .venv from the project's own files; stamps keep it from being done twice.
+
+PYTHON ?= python3.11
+BIN    := .venv/bin
+STAMP  := .venv/installed.stamp
+
+.PHONY: demo test lint types lock clean
+
+demo: $(STAMP)
+	$(BIN)/discovery run experiments/nmv5000.toml
+	@echo "The report: runs/$$($(BIN)/python -c 'import tomllib; print(tomllib.load(open("experiments/nmv5000.toml", "rb"))["name"])')/report.html"
+
+test: $(STAMP)
+	$(BIN)/pytest -n auto
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(STAMP)
+	$(BIN)/mypy
+
+lock: $(STAMP)
+	$(BIN)/python -m pip install --quiet pip-tools
+	$(BIN)/pip-compile --quiet --extra dev --all-build-deps --generate-hashes --allow-unsafe --strip-extras \
+	    --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-emit-options --no-header \
+	    --output-file requirements.lock pyproject.toml
+
+clean:
+	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache
+
+.venv/created.stamp:
+	$(PYTHON) -m venv .venv
+	@touch $@
+
+$(STAMP): .venv/created.stamp requirements.lock pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
