@@ -1,0 +1,86 @@
+"""The command line: one function a verb, no logic, heavy imports inside the verb."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from discovery import __version__
+from discovery.errors import UserError
+
+# One thread for the linear algebra of a process: the problems are small, and several processes share the
+# cores. It has to be said before numpy is imported; what the user has set stays.
+for _library in ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "VECLIB"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+
+class _Sentences(TyperGroup):
+    """The one place where a failure becomes a sentence and an exit status."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except UserError as error:
+            typer.echo(f"error: {error}", err=True)
+            raise typer.Exit(1) from None
+        except KeyboardInterrupt:
+            typer.echo("\nstopped; nothing half-written is left, the command can be run again", err=True)
+            raise typer.Exit(130) from None
+        except OSError as error:
+            if error.filename is None:
+                raise
+            typer.echo(f"error: {error.filename}: {error.strerror}", err=True)
+            raise typer.Exit(1) from None
+
+
+app = typer.Typer(
+    cls=_Sentences,
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="A first hour: write campaign.toml beside your files, look at it with `discovery check campaign.toml`, "
+    "then write an experiment and `discovery run` it. Every verb explains itself: `discovery VERB --help`. "
+    "Exit status: 0 done, 1 the work could not be done (the message says why), 2 wrong usage.",
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"discovery {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and stop.")
+    ] = False,
+) -> None:
+    """Models of a machine tool's thermal errors, from recordings: fitted, discovered, compared, diagnosed."""
+
+
+@app.command()
+def check(
+    campaign: Annotated[Path, typer.Argument(help="A campaign file, or a folder that holds campaign.toml.")],
+) -> None:
+    """List what is wrong with the recordings of CAMPAIGN: where, and what to do about it.
+
+    An `error` keeps the recording from being used (exit status 1); a `warning` is worth a look.
+    """
+    from discovery.recordings.check import check_campaign, summary
+
+    findings = check_campaign(campaign)
+    for finding in findings:
+        typer.echo(str(finding))
+    typer.echo(summary(findings))
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    sys.exit(app())

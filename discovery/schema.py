@@ -1,0 +1,109 @@
+"""What pydantic says about a file, as one sentence a person can act on."""
+
+import types
+from difflib import get_close_matches
+from typing import Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+Key = tuple[str | int, ...]
+
+
+class Strict(BaseModel):
+    """The base of every file form: unknown keys are refused, nothing changes after reading."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+
+def sentence(schema: type[BaseModel], data: Any, error: ValidationError) -> tuple[Key, str]:
+    """The first mistake in `data`: the key where it stands and the rest of the sentence.
+
+    What a union of types complains about is told by its last branch; unknown keys come first, since a
+    misspelt key is often the cause of a missing one.
+    """
+    details = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
+    mistake = details[0]
+    key = _real_key(data, mistake["loc"])
+    return key, _explain(schema, mistake, key)
+
+
+def _real_key(data: Any, place: Key) -> Key:
+    """`place` without the names of union branches and validators that pydantic mixes in."""
+    key: Key = ()
+    for part in place:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            continue
+        key += (part,)
+    return key
+
+
+def _explain(schema: type[BaseModel], mistake: ErrorDetails, key: Key) -> str:
+    kind, given = mistake["type"], mistake["input"]
+    context = mistake.get("ctx", {})
+    if kind == "extra_forbidden":
+        return f"unknown key; {suggest(str(key[-1]), _known_keys(schema, key[:-1]))}"
+    if kind == "missing":
+        return f"the key '{mistake['loc'][-1]}' is missing"
+    if kind in ("literal_error", "enum"):
+        allowed = [word.strip().strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")]
+        return f"{given!r} is not known; {suggest(str(given), allowed)}"
+    if kind in ("value_error", "assertion_error"):
+        return str(context["error"])
+    what = mistake["msg"].replace("Input should be", "should be").removesuffix(".")
+    return f"{what}, not {_short(given)}"
+
+
+def suggest(word: str, allowed: list[str]) -> str:
+    """The known word nearest to a mistaken one, and all of them.
+
+    >>> suggest("unitt", ["role", "unit"])
+    "did you mean 'unit'? Allowed are: role, unit"
+    """
+    near = get_close_matches(word.lower(), allowed, n=1, cutoff=0.6)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    text = f"{hint}allowed are: {', '.join(allowed)}" if allowed else "none is allowed here"
+    return text.replace("? allowed", "? Allowed")
+
+
+def _known_keys(schema: Any, key: Key) -> list[str]:
+    """The keys that a table at `key` may hold."""
+    found = [schema]
+    for part in key:
+        found = [inner for one in found for inner in _step(one, part)]
+    names: dict[str, None] = {}
+    for one in found:
+        if _is_model(one):
+            names |= dict.fromkeys(field.alias or name for name, field in one.model_fields.items())
+    return list(names)
+
+
+def _step(annotation: Any, part: str | int) -> list[Any]:
+    """The types that the value of `part` may have inside a value of the type `annotation`."""
+    if _is_model(annotation):
+        inner = [
+            field.annotation for name, field in annotation.model_fields.items() if part in (name, field.alias)
+        ]
+    else:
+        inner = list(get_args(annotation)[-1:] if get_origin(annotation) is not None else [])
+    return [one for annotation in inner for one in _branches(annotation)]
+
+
+def _branches(annotation: Any) -> list[Any]:
+    """A union's members, the thing itself otherwise; names put on with Annotated are taken off."""
+    if get_origin(annotation) in (Union, types.UnionType):
+        return [one for branch in get_args(annotation) for one in _branches(branch)]
+    if hasattr(annotation, "__metadata__"):
+        return _branches(annotation.__origin__)
+    return [annotation]
+
+
+def _is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."
