@@ -43,7 +43,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="A first hour: write campaign.toml beside your files, look at it with `discovery check campaign.toml`, "
+    epilog="A first hour: write campaign.toml beside your files, check it with `discovery check campaign.toml`, "
     "then write an experiment and `discovery run` it. Every verb explains itself: `discovery VERB --help`. "
     "Exit status: 0 done, 1 the work could not be done (the message says why), 2 wrong usage.",
 )

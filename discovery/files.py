@@ -85,7 +85,7 @@ def dotted(key: Key) -> str:
 
 
 def locate(text: str, key: Key) -> int:
-    """The line, from 1, where the value of `key` stands in TOML `text`, or its nearest parent where it does not.
+    """The line, from 1, of the value of `key` in TOML `text`; that of its nearest parent where it is missing.
 
     >>> locate('name = "x"\\n[models]\\nreduced = { kind = "x" }\\n', ("models", "reduced", "kind"))
     3
@@ -161,7 +161,7 @@ def write_atomic(path: str | os.PathLike[str], content: str | bytes) -> None:
 
 
 def write_toml(path: str | os.PathLike[str], data: Mapping[str, Any]) -> None:
-    """Write `data` as TOML as a person would lay it out; see `format_toml`. Raises UserError like `write_atomic`."""
+    """Write `data` as `format_toml` lays it out. Raises UserError when the place cannot be written."""
     write_atomic(path, format_toml(data))
 
 
@@ -170,7 +170,8 @@ def format_toml(data: Mapping[str, Any]) -> str:
 
     A number keeps 12 significant digits, a value None is left out.
 
-    >>> print(format_toml({"name": "x", "channels": {"T": {"role": "temperature", "noise": 0.1 + 0.2}}}), end="")
+    >>> channels = {"T": {"role": "temperature", "noise": 0.1 + 0.2}}
+    >>> print(format_toml({"name": "x", "channels": channels}), end="")
     name = "x"
     <BLANKLINE>
     [channels]

@@ -19,8 +19,7 @@ class Strict(BaseModel):
 def sentence(schema: type[BaseModel], data: Any, error: ValidationError) -> tuple[Key, str]:
     """The first mistake in `data`: the key where it stands and the rest of the sentence.
 
-    What a union of types complains about is told by its last branch; unknown keys come first, since a
-    misspelt key is often the cause of a missing one.
+    Unknown keys come first, since a misspelt key is often the cause of a missing one.
     """
     details = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
     mistake = details[0]
