@@ -130,8 +130,10 @@ def _apply(function: str, a: list[Dual]) -> Dual:
             return Dual(np.sign(x))
         case "where":
             inside = np.not_equal(x, 0.0)
-            z = a[2].value
-            return _chain(np.where(inside, y, z), [(inside * 1.0, a[1]), (1.0 - inside, a[2])])
+            partials: dict[str, Value] = {}
+            for name in a[1].partials.keys() | a[2].partials.keys():  # selected, so that the other branch may be NaN
+                partials[name] = np.where(inside, a[1].partials.get(name, 0.0), a[2].partials.get(name, 0.0))
+            return Dual(np.where(inside, y, a[2].value), partials)
         case "min" | "max":
             pick = np.minimum if function == "min" else np.maximum
             result = a[0]

@@ -1,0 +1,297 @@
+"""A model on a recording: its trajectory, its outputs, and the sensitivities of parameters and candidate terms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import kernel
+from discovery.dynamics.grid import Grid, Memory
+from discovery.errors import UserError
+from discovery.models import Model, expanded
+from discovery.terms import Dual, degree, evaluate, names
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 30  # of Newton on the trajectory
+_TOLERANCE = 1e-8  # largest change of a state in its unit, relative to 1 + its size
+
+
+@dataclass(frozen=True)
+class System:
+    """A model bound to a grid, with index tables made once."""
+
+    model: Model  # expanded: no lag() left
+    grid: Grid
+    states: tuple[str, ...]
+    affine: bool
+    into: NDArray[np.int64]  # (terms,) index of the state
+    source: NDArray[np.int64]  # (terms,) index or -1
+    scale: Array  # (states,)
+    ends: Memory
+    nodes: Memory
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Solution of a system: states on all nodes and the linearisation around them."""
+
+    system: System
+    values: Mapping[str, float]
+    x: Array  # (T, n)
+    which: NDArray[np.int64]
+    e: Array
+    w0: Array
+    w1: Array
+
+    def at_ends(self) -> dict[str, Array | float]:
+        """States, channels and parameters at the interval ends, ready for `evaluate`."""
+        return {**self.system.grid.ends, **self.values, **_state_ends(self.system, self.x)}
+
+    def at_nodes(self) -> dict[str, Array | float]:
+        """States, channels and parameters at the nodes, ready for `evaluate`."""
+        states = {name: self.x[:, i] for i, name in enumerate(self.system.states)}
+        return {**self.system.grid.nodes, **self.values, **states}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A piece of forcing: a heat flow (or rate) that enters `into` and leaves `source`, at the interval ends (2K,).
+
+    Pieces with the same `owner` add up to one sensitivity column.
+    """
+
+    owner: int
+    into: str
+    series: Array
+    source: str | None = None
+
+
+def make_system(model: Model, grid: Grid) -> System:
+    """Bind a model to a grid."""
+    model = expanded(model)
+    states = tuple(model.states)
+    index = {name: i for i, name in enumerate(states)}
+    variables = frozenset(states)
+    return System(
+        model=model,
+        grid=grid,
+        states=states,
+        affine=all(degree(term.expression, variables) <= 1 for term in model.terms),
+        into=np.array([index[term.into] for term in model.terms], dtype=np.int64),
+        source=np.array([index[term.source] if term.source else -1 for term in model.terms], dtype=np.int64),
+        scale=np.array([model.states[name].scale for name in states]),
+        ends=Memory(grid, True),
+        nodes=Memory(grid, False),
+    )
+
+
+def start_values(system: System, values: Mapping[str, float]) -> Array:
+    """Declared start values (n,): an expression at the first instant, or the first reading of the state's channel."""
+    first = {name: float(series[0]) for name, series in system.grid.nodes.items()}
+    for i, name in enumerate(system.grid.outputs):
+        read = system.grid.readings[:, i]
+        read = read[np.isfinite(read)]
+        if len(read):
+            first[name] = float(read[0])
+    known: dict[str, float] = {**first, **values}
+    out = np.zeros(len(system.states))
+    for i, name in enumerate(system.states):
+        start = system.model.states[name].start
+        if start is None:
+            out[i] = first.get(name, 0.0)
+            continue
+        try:
+            out[i] = float(np.mean(evaluate(start, known, memory=None).value))
+        except KeyError as missing:
+            raise UserError(
+                f"model '{system.model.name}': the start of state '{name}' needs {missing}, "
+                f"which recording '{system.grid.recording}' does not give"
+            ) from None
+    return out
+
+
+def _state_ends(system: System, x: Array) -> dict[str, Array]:
+    out = {}
+    for i, name in enumerate(system.states):
+        both = np.empty(2 * (len(x) - 1))
+        both[0::2], both[1::2] = x[:-1, i], x[1:, i]
+        out[name] = both
+    return out
+
+
+def _linearise(system: System, values: Mapping[str, float], x: Array) -> tuple[Array, Array, Array]:
+    """State matrices (K, n, n) and forcing left over at both interval ends, (K, n) each, around a trajectory."""
+    count, n = len(system.grid.step), len(system.states)
+    env = {**system.grid.ends, **values, **_state_ends(system, x)}
+    rates = np.zeros((2 * count, n))
+    a = np.zeros((count, n, n))
+    variables = frozenset(system.states)
+    for term, i, j in zip(system.model.terms, system.into, system.source, strict=True):
+        dual = evaluate(term.expression, env, variables, system.ends)
+        rates[:, i] += system.scale[i] * dual.value
+        if j >= 0:
+            rates[:, j] -= system.scale[j] * dual.value
+        for name, partial in dual.partials.items():
+            if np.ndim(partial):
+                flat = np.asarray(partial)
+                mean: Array | float = 0.5 * (flat[0::2] + flat[1::2])
+            else:
+                mean = float(partial)
+            s = system.states.index(name)
+            a[:, i, s] += system.scale[i] * mean
+            if j >= 0:
+                a[:, j, s] -= system.scale[j] * mean
+    g0 = rates[0::2] - np.matmul(a, x[:-1, :, None])[:, :, 0]
+    g1 = rates[1::2] - np.matmul(a, x[1:, :, None])[:, :, 0]
+    return a, g0, g1
+
+
+def simulate(
+    system: System,
+    values: Mapping[str, float],
+    start: Array | None = None,
+    guess: Array | None = None,
+) -> Trajectory:
+    """Free run of a model on a recording.
+
+    Args:
+        values: parameter values by name.
+        start: (n,) start values; default the declared ones.
+        guess: (T, n) trajectory to start Newton from (nonlinear terms only).
+
+    Raises:
+        UserError: the trajectory runs away or does not settle.
+    """
+    first = start_values(system, values) if start is None else start
+    x = np.tile(first, (len(system.grid.time), 1)) if guess is None else guess
+    for _ in range(1 if system.affine else _ROUNDS):
+        with np.errstate(all="ignore"):
+            a, g0, g1 = _linearise(system, values, x)
+        which, e, w0, w1 = kernel.transitions(a, system.grid.step)
+        new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
+        if not np.isfinite(new).all():
+            raise UserError(
+                f"model '{system.model.name}' runs away on recording '{system.grid.recording}'; "
+                "check signs, bounds and start values of its parameters"
+            )
+        change = np.max(np.abs(new - x) / (1.0 + np.abs(new)))
+        x = new
+        if change < _TOLERANCE:
+            break
+    return Trajectory(system, dict(values), x, which, e, w0, w1)
+
+
+def outputs(trajectory: Trajectory, wrt: frozenset[str] = frozenset()) -> list[Dual]:
+    """Outputs of the grid on all nodes (values (T,)), with derivatives by the names of `wrt`."""
+    system = trajectory.system
+    env = trajectory.at_nodes()
+    found = []
+    for name in system.grid.outputs:
+        expression = system.model.outputs.get(name)
+        if expression is not None:
+            found.append(evaluate(expression, env, wrt, system.nodes))
+        elif name in system.states:
+            found.append(Dual(env[name], {name: 1.0} if name in wrt else {}))
+        else:
+            raise UserError(f"model '{system.model.name}' has no output '{name}'; give it one under [outputs]")
+    return found
+
+
+def predict(trajectory: Trajectory) -> Array:
+    """Outputs at the reading instants, (R, Y)."""
+    read, count = trajectory.system.grid.read, len(trajectory.system.grid.time)
+    columns = [np.broadcast_to(dual.value, (count,))[read] for dual in outputs(trajectory)]
+    return np.column_stack(columns)
+
+
+def output_matrix(trajectory: Trajectory) -> Array:
+    """dy/dx at the reading instants, (R, Y, n)."""
+    system = trajectory.system
+    read, count = system.grid.read, len(system.grid.time)
+    out = np.zeros((len(read), len(system.grid.outputs), len(system.states)))
+    for y, dual in enumerate(outputs(trajectory, frozenset(system.states))):
+        for name, partial in dual.partials.items():
+            out[:, y, system.states.index(name)] = np.broadcast_to(partial, (count,))[read]
+    return out
+
+
+def sensitivities(
+    trajectory: Trajectory,
+    parameters: Sequence[str],
+    starts: Sequence[str] = (),
+    candidates: Sequence[Column] = (),
+    count: int | None = None,
+) -> Array:
+    """dy/d(everything) at the reading instants, (R, Y, M).
+
+    Columns stand in this order: `parameters`, `starts` (start values of states), candidate owners 0, 1, ...
+
+    Args:
+        parameters: names of parameters.
+        starts: names of states whose start value moves.
+        candidates: forcing pieces of candidate terms.
+        count: number of candidate owners; default the largest owner plus one.
+    """
+    system = trajectory.system
+    n, steps = len(system.states), len(system.grid.step)
+    owners = count if count is not None else max((c.owner for c in candidates), default=-1) + 1
+    total = len(parameters) + len(starts) + owners
+    owner: list[int] = []
+    into: list[int] = []
+    source: list[int] = []
+    series: list[Array] = []
+    wanted = frozenset(parameters)
+    if parameters:
+        env = trajectory.at_ends()
+        for term, i, j in zip(system.model.terms, system.into, system.source, strict=True):
+            if wanted.isdisjoint(names(term.expression)):
+                continue
+            dual = evaluate(term.expression, env, wanted, system.ends)
+            for name, partial in dual.partials.items():
+                owner.append(parameters.index(name))
+                into.append(i)
+                source.append(j)
+                series.append(np.broadcast_to(partial, (2 * steps,)))
+    for column in candidates:
+        owner.append(len(parameters) + len(starts) + column.owner)
+        into.append(system.states.index(column.into))
+        source.append(system.states.index(column.source) if column.source else -1)
+        series.append(np.broadcast_to(column.series, (2 * steps,)))
+    start = np.zeros((n, total))
+    for k, name in enumerate(starts):
+        start[system.states.index(name), len(parameters) + k] = 1.0
+    for i, state in enumerate(system.model.states.values()):  # a start that a parameter sets, unless it moves freely
+        if state.start is not None and not wanted.isdisjoint(names(state.start)) and state.name not in starts:
+            first = {name: float(series[0]) for name, series in system.grid.nodes.items()}
+            for name, slope in evaluate(state.start, {**first, **trajectory.values}, wanted).partials.items():
+                start[i, parameters.index(name)] = float(np.mean(slope))
+    stacked = np.array(series).reshape(len(series), steps, 2)
+    left = np.ascontiguousarray(stacked[:, :, 0].T)
+    right = np.ascontiguousarray(stacked[:, :, 1].T)
+    into_index = np.array(into, dtype=np.int64)
+    source_index = np.array(source, dtype=np.int64)
+    read = system.grid.read.astype(np.int64)
+    s = kernel.columns(
+        trajectory.which,
+        trajectory.e,
+        trajectory.w0,
+        trajectory.w1,
+        start,
+        np.array(owner, dtype=np.int64),
+        into_index,
+        system.scale[into_index],
+        source_index,
+        system.scale[source_index],
+        left,
+        right,
+        read,
+    )
+    dy = np.einsum("ryn,rnm->rym", output_matrix(trajectory), s)
+    for y, dual in enumerate(outputs(trajectory, wanted) if parameters else []):
+        for name, partial in dual.partials.items():
+            dy[:, y, parameters.index(name)] += np.broadcast_to(partial, (len(system.grid.time),))[system.grid.read]
+    return dy

@@ -1,0 +1,8 @@
+"""Fitting: parameters of a model from several recordings at once, with intervals that can be trusted."""
+
+from discovery.fitting.fit import Fit, fit_model
+from discovery.fitting.heldout import predict_recording
+from discovery.fitting.noise import Noise, estimate_noise
+from discovery.fitting.problem import Problem, Unknown, make_problem
+
+__all__ = ["Fit", "Noise", "Problem", "Unknown", "estimate_noise", "fit_model", "make_problem", "predict_recording"]

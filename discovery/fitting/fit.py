@@ -1,0 +1,217 @@
+"""Output-error fit: the model runs freely, its outputs are compared with the readings where they were taken."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import Grid, Trajectory
+from discovery.fitting.noise import Noise, whiten, white_noise
+from discovery.fitting.problem import Problem, make_problem
+from discovery.models import Model
+from discovery.recordings import Campaign
+
+Array = NDArray[np.float64]
+Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
+
+Z95 = 1.959963984540054
+_UNSEEN = 1e-4  # share of a column's length that the other unknowns leave; below it the readings do not tell it
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model and what is known about its numbers."""
+
+    problem: Problem
+    theta: Array  # (U,)
+    covariance: Array  # (U, U)
+    noise: Noise
+    trajectories: tuple[Trajectory, ...]
+    cost: float  # half the sum of squared whitened residuals and priors
+    unidentified: tuple[str, ...]  # one sentence for each parameter that these recordings do not tell
+    seconds: float
+
+    @property
+    def model(self) -> Model:
+        """The model with the values found and their 95 % intervals."""
+        return _fitted_model(self)
+
+    @property
+    def standard_errors(self) -> Array:
+        """(U,) standard errors."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    def residuals(self) -> dict[str, Array]:
+        """Readings minus model by recording, (R, Y)."""
+        return {t.system.grid.recording: self.problem.residual(t) for t in self.trajectories}
+
+
+def fit_model(
+    model: Model,
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str] | None = None,
+    *,
+    noise: Noise | None = None,
+    loss: Loss = "linear",
+    grids: Mapping[str, Grid] | None = None,
+    max_rounds: int = 60,
+) -> Fit:
+    """Fit the free parameters and start values of a model to recordings.
+
+    Minimises the sum over recordings of rho(L (y - y_model)) plus ((x0 - start)/start_sd)^2, where L whitens with the
+    noise model. Without `noise` the reading noise is the channel's `noise` where the campaign states it, else it is
+    estimated from the residual.
+
+    Args:
+        model: start values, bounds and which parameters are free.
+        recordings: names of the recordings to fit; nothing else is looked at.
+        outputs: measured channels to compare; default all that model and campaign share.
+        noise: covariance of what the model leaves; default white.
+        loss: "soft_l1", "huber" or "cauchy" bound the pull of outliers (scipy.optimize.least_squares).
+        grids: grids to share between fits.
+        max_rounds: of Levenberg-Marquardt.
+    """
+    began = clock.perf_counter()
+    problem = make_problem(model, campaign, recordings, outputs, grids)
+    stated = {name: campaign.channels[name].noise for name in problem.outputs}
+    theta = problem.start
+    given = noise is not None
+    current = noise or white_noise(problem.outputs, stated, [s.grid.readings for s in problem.systems])
+    rounds = 1 if given else 3
+    solution = None
+    for k in range(rounds):
+        solution = _solve(problem, theta, current, loss, max_rounds if k == rounds - 1 or k == 0 else 15)
+        theta = solution.theta
+        if given or k == rounds - 1:
+            break
+        updated = white_noise(problem.outputs, stated, [problem.residual(t) for t in solution.trajectories])
+        settled = max(abs(np.log(a / b)) for a, b in zip(updated.white, current.white, strict=True)) < 0.02
+        current = updated
+        if settled:
+            break
+    assert solution is not None
+    covariance, lost = _covariance(problem, solution.jacobian, theta)
+    if not given and loss == "linear":
+        # Stated noise is a claim about the sensor, not about the model: intervals follow the larger of the two.
+        # (With estimated noise the factor is one by construction.)
+        freedom = max(1, sum(int(s.grid.measured.sum()) for s in problem.systems) - len(theta))
+        covariance = covariance * max(1.0, 2 * solution.cost / freedom)
+    return Fit(
+        problem, theta, covariance, current, solution.trajectories, solution.cost, tuple(lost), clock.perf_counter() - began
+    )
+
+
+@dataclass(frozen=True)
+class _Solution:
+    theta: Array
+    trajectories: tuple[Trajectory, ...]
+    jacobian: Array
+    cost: float
+
+
+def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds: int) -> _Solution:
+    from scipy.optimize import least_squares
+
+    low, high = problem.bounds
+    guesses: dict[str, Array] = {}
+    last: dict[bytes, tuple[Array, tuple[Trajectory, ...]]] = {}
+
+    def run(x: Array) -> tuple[Array, tuple[Trajectory, ...]]:
+        key = x.tobytes()
+        if key not in last:
+            trajectories = tuple(problem.run(s, x, guesses.get(s.grid.recording)) for s in problem.systems)
+            for t in trajectories:
+                guesses[t.system.grid.recording] = t.x
+            parts = [whiten(t, noise, problem.residual(t)[:, :, None])[:, 0] for t in trajectories]
+            last.clear()
+            last[key] = (np.concatenate([*parts, _prior_residual(problem, x)]), trajectories)
+        return last[key]
+
+    def jacobian(x: Array) -> Array:
+        parts = [whiten(t, noise, -problem.jacobian(t)) for t in run(x)[1]]
+        return np.concatenate([*parts, _prior_jacobian(problem)])
+
+    # scipy refuses a start on the bound's wrong side by rounding, and moves one that lies on it inside
+    x0 = np.clip(theta, low, high)
+    if len(x0):
+        result = least_squares(
+            lambda x: run(x)[0],
+            x0,
+            jac=jacobian,
+            bounds=(low, high),
+            x_scale="jac",
+            loss=loss,
+            max_nfev=max_rounds,
+            ftol=1e-9,
+            xtol=1e-9,
+            gtol=1e-9,
+        )
+        x0 = result.x
+    residual, trajectories = run(x0)
+    return _Solution(x0, trajectories, jacobian(x0), 0.5 * float(residual @ residual))
+
+
+def _prior_residual(problem: Problem, theta: Array) -> Array:
+    return np.array([(theta[i] - u.start) / u.spread for i, u in enumerate(problem.unknowns) if u.spread])
+
+
+def _prior_jacobian(problem: Problem) -> Array:
+    rows = [(i, u.spread) for i, u in enumerate(problem.unknowns) if u.spread]
+    out = np.zeros((len(rows), len(problem.unknowns)))
+    for r, (i, spread) in enumerate(rows):
+        out[r, i] = 1.0 / float(spread)
+    return out
+
+
+def _covariance(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array, list[str]]:
+    """Gauss-Newton covariance and a sentence for each parameter that the readings do not tell."""
+    low, high = problem.bounds
+    total = len(problem.unknowns)
+    length = np.linalg.norm(jacobian, axis=0)
+    sentences = []
+    seen = length > 0
+    scaled = jacobian[:, seen] / length[seen]
+    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-12, hermitian=True)
+    covariance = np.zeros((total, total))
+    index = np.flatnonzero(seen)
+    covariance[np.ix_(index, index)] = inverse / np.outer(length[seen], length[seen])
+    for i, u in enumerate(problem.unknowns):
+        if u.is_start:
+            continue
+        where = f" in recording '{u.recording}'" if u.recording else ""
+        if not seen[i]:
+            sentences.append(f"{u.name}{where} has no effect on any reading: it cannot be found from these recordings")
+            covariance[i, i] = np.inf
+            continue
+        share = 1.0 / np.sqrt(max(inverse[np.searchsorted(index, i), np.searchsorted(index, i)], 1.0))
+        error = np.sqrt(covariance[i, i])
+        if share < _UNSEEN:
+            sentences.append(f"{u.name}{where} cannot be told apart from other parameters with these recordings")
+        elif error * Z95 > max(abs(theta[i]), 1e-12) and not (np.isfinite(low[i]) and theta[i] <= low[i] + 1e-9):
+            sentences.append(f"{u.name}{where} is not determined: its 95 % interval is wider than its value")
+    return covariance, sentences
+
+
+def _fitted_model(fit: Fit) -> Model:
+    model = fit.problem.model
+    errors = fit.standard_errors
+    parameters = dict(model.parameters)
+    for i, u in enumerate(fit.problem.unknowns):
+        if u.is_start:
+            continue
+        p = parameters[u.name]
+        value = float(fit.theta[i])
+        if u.recording is not None:
+            values = {**p.values, u.recording: value}
+            parameters[u.name] = replace(p, values=values, value=float(np.mean(list(values.values()))), low=None, high=None)
+            continue
+        half = Z95 * float(errors[i])
+        interval = (max(value - half, p.min), min(value + half, p.max)) if np.isfinite(half) else (None, None)
+        parameters[u.name] = replace(p, value=value, low=interval[0], high=interval[1])
+    return replace(model, parameters=parameters)

@@ -1,0 +1,259 @@
+"""What a model leaves in the readings: white reading noise, slow sensor noise, and small random heat at the bodies.
+
+All three are one linear Gaussian state-space model around a trajectory,
+
+    z = (dx, w, v):   dx' = A dx + w/C,   w_i and v_j first-order noise,   residual = H dx + v + white,
+
+so a Kalman filter whitens residuals and sensitivity columns alike in one pass (Sarkka & Solin, Applied Stochastic
+Differential Equations, 2019, ch. 10) and gives the likelihood of the variances. `w` is held between readings: its
+time constant is hours, readings come in minutes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from discovery.dynamics import Trajectory
+from discovery.dynamics.kernel import between
+from discovery.dynamics.system import output_matrix
+
+Array = NDArray[np.float64]
+
+SLOW_TIME = 2 * 3600.0  # s, time constant of slow sensor noise
+HEAT_TIME = 3 * 3600.0  # s, time constant of small random heat
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations: white (Y,) and slow (Y,) in the unit of each output, heat (n,) in W or rate per time unit."""
+
+    outputs: tuple[str, ...]
+    white: tuple[float, ...]
+    slow: tuple[float, ...] = ()
+    heat: Mapping[str, float] | None = None
+    slow_time: float = SLOW_TIME
+    heat_time: float = HEAT_TIME
+
+    @property
+    def is_white(self) -> bool:
+        """Whether whitening is a plain division."""
+        return not any(self.slow) and not any((self.heat or {}).values())
+
+
+def white_noise(outputs: Sequence[str], stated: Mapping[str, float | None], residuals: Sequence[Array]) -> Noise:
+    """White noise with the stated standard deviations; where none is stated, that of the residuals (or readings)."""
+    white = []
+    for j, name in enumerate(outputs):
+        series = np.concatenate([r[:, j][np.isfinite(r[:, j])] for r in residuals])
+        found = float(np.sqrt(np.mean(series**2))) if len(series) else 1.0
+        white.append(float(stated.get(name) or max(found, 1e-9)))
+    return Noise(tuple(outputs), tuple(white))
+
+
+@njit(cache=True)
+def _filter(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, data):  # type: ignore[no-untyped-def]
+    """Whitened data (R * Y rows in reading order, unmeasured rows zero) and half the log-determinant."""
+    readings, outs, n = h.shape
+    m = data.shape[2]
+    nh, nv = heat.shape[0], slow.shape[0]
+    size = n + nh + nv
+    z = np.zeros((size, m))
+    p = np.zeros((size, size))
+    for i in range(nh):
+        p[n + i, n + i] = heat[i] ** 2
+    for j in range(nv):
+        p[n + nh + j, n + nh + j] = slow[j] ** 2
+    out = np.zeros((readings, outs, m))
+    logdet = 0.0
+    gain = np.zeros(size)
+    hr = np.zeros(size)
+    ph = np.zeros(size)
+    fz = np.zeros((size, size))
+    for r in range(readings):
+        if r > 0:
+            fz[:] = 0.0
+            for i in range(n):
+                for j in range(n):
+                    fz[i, j] = f[r - 1, i, j]
+                for j in range(nh):
+                    fz[i, n + j] = b[r - 1, i, j]
+            for j in range(nh):
+                fz[n + j, n + j] = heat_decay[r - 1]
+            for j in range(nv):
+                fz[n + nh + j, n + nh + j] = slow_decay[r - 1]
+            z = fz @ z
+            p = fz @ p @ fz.T
+            for j in range(nh):
+                p[n + j, n + j] += heat[j] ** 2 * (1.0 - heat_decay[r - 1] ** 2)
+            for j in range(nv):
+                p[n + nh + j, n + nh + j] += slow[j] ** 2 * (1.0 - slow_decay[r - 1] ** 2)
+        for y in range(outs):  # white noise is independent by output: update one at a time
+            if not measured[r, y]:
+                continue
+            for i in range(size):
+                hr[i] = 0.0
+            for i in range(n):
+                hr[i] = h[r, y, i]
+            if nv:
+                hr[n + nh + y] = 1.0
+            s = white[y] ** 2
+            for i in range(size):
+                total = 0.0
+                for j in range(size):
+                    total += p[i, j] * hr[j]
+                ph[i] = total
+            for i in range(size):
+                s += hr[i] * ph[i]
+            root = np.sqrt(s)
+            logdet += np.log(root)
+            for i in range(size):
+                gain[i] = ph[i] / s
+            for c in range(m):
+                innovation = data[r, y, c]
+                for i in range(size):
+                    innovation -= hr[i] * z[i, c]
+                out[r, y, c] = innovation / root
+                for i in range(size):
+                    z[i, c] += gain[i] * innovation
+            for i in range(size):
+                for j in range(size):
+                    p[i, j] -= gain[i] * ph[j]
+    return out, logdet
+
+
+@dataclass(frozen=True)
+class Filter:
+    """The parts of the whitening filter that do not depend on the variances, made once for a trajectory."""
+
+    states: tuple[str, ...]
+    f: Array
+    b: Array  # response to held heat in W
+    h: Array
+    step: Array
+    measured: NDArray[np.bool_]
+
+    def apply(self, noise: Noise, data: Array) -> tuple[Array, float]:
+        """Whitened columns (measured readings, M) of data (R, Y, M), and half the log-determinant of the covariance."""
+        heat = np.array([(noise.heat or {}).get(name, 0.0) for name in self.states])
+        slow = np.array(noise.slow or ())
+        clean = np.where(self.measured[:, :, None], data, 0.0)
+        white = np.array(noise.white)
+        if noise.is_white:
+            flat = (clean / white[None, :, None])[self.measured]
+            return flat, float(np.sum(np.log(white)[None, :] * self.measured))
+        active = heat > 0
+        out, logdet = _filter(
+            self.f,
+            np.ascontiguousarray(self.b[:, :, active]),
+            self.h,
+            self.measured,
+            white,
+            slow if slow.any() else np.zeros(0),
+            heat[active],
+            np.exp(-self.step / noise.slow_time),
+            np.exp(-self.step / noise.heat_time),
+            np.ascontiguousarray(clean),
+        )
+        return out[self.measured], float(logdet)
+
+
+def make_filter(trajectory: Trajectory) -> Filter:
+    """Filter of a trajectory."""
+    system = trajectory.system
+    read = system.grid.read.astype(np.int64)
+    f, b = between(trajectory.which, trajectory.e, trajectory.w0, trajectory.w1, read)
+    return Filter(
+        system.states,
+        f,
+        b * system.scale[None, None, :],
+        output_matrix(trajectory),
+        np.diff(system.grid.time[read]),
+        system.grid.measured,
+    )
+
+
+def whiten(trajectory: Trajectory, noise: Noise, data: Array) -> Array:
+    """Whitened columns (measured readings, M) of data (R, Y, M)."""
+    if noise.is_white:
+        measured = trajectory.system.grid.measured
+        return np.asarray((np.where(measured[:, :, None], data, 0.0) / np.array(noise.white)[None, :, None])[measured])
+    return make_filter(trajectory).apply(noise, data)[0]
+
+
+def log_likelihood(filters: Sequence[Filter], noise: Noise, residuals: Sequence[Array], columns: Sequence[Array], prior: Array) -> float:
+    """Restricted log-likelihood: the unknowns behind `columns` are integrated out.
+
+    Args:
+        residuals: (R, Y) by recording.
+        columns: (R, Y, U) by recording, sensitivities of the unknowns.
+        prior: (U,) precision (1/sd^2) of each unknown, 0 for none.
+    """
+    total, rows = 0.0, []
+    for part, residual, column in zip(filters, residuals, columns, strict=True):
+        white, logdet = part.apply(noise, np.concatenate([residual[:, :, None], column], axis=2))
+        rows.append(white)
+        total -= logdet
+    stacked = np.concatenate(rows)
+    r, x = stacked[:, 0], stacked[:, 1:]
+    scale = np.maximum(np.linalg.norm(x, axis=0), 1e-12)
+    x = x / scale
+    gram = x.T @ x + np.diag(prior / scale**2) + 1e-9 * np.eye(x.shape[1])
+    chol = np.linalg.cholesky(gram)
+    solved = np.linalg.solve(chol, x.T @ r)
+    return total - 0.5 * float(r @ r - solved @ solved) - float(np.sum(np.log(np.diag(chol))))
+
+
+def estimate_noise(
+    filters: Sequence[Filter],
+    start: Noise,
+    residuals: Sequence[Array],
+    columns: Sequence[Array],
+    prior: Array,
+    *,
+    stated: Mapping[str, float | None],
+    heat_limit: Mapping[str, float],
+    slow_limit: float = 0.6,
+) -> Noise:
+    """Variances by restricted maximum likelihood.
+
+    The white part stays within a tenth of what the campaign states; slow noise stays below `slow_limit` times the white
+    part and heat below `heat_limit`: that much is the everyday state of a machine, more is a mismatch.
+
+    Args:
+        heat_limit: largest heat by state, in W (or rate per time unit).
+    """
+    from scipy.optimize import minimize
+
+    outs = len(start.outputs)
+    names = tuple(heat_limit)
+
+    def unpack(v: Array) -> Noise:
+        white = np.exp(v[:outs])
+        share = 1.0 / (1.0 + np.exp(-v[outs : outs + 1]))
+        level = 1.0 / (1.0 + np.exp(-v[outs + 1]))
+        heat = {name: float(level * heat_limit[name]) for name in names}
+        return replace(
+            start,
+            white=tuple(float(w) for w in white),
+            slow=tuple(float(slow_limit * share[0] * w) for w in white),
+            heat=heat,
+        )
+
+    def objective(v: Array) -> float:
+        noise = unpack(v)
+        penalty = 0.0
+        for j, name in enumerate(start.outputs):
+            given = stated.get(name)
+            if given:
+                penalty += 0.5 * ((v[j] - np.log(given)) / 0.05) ** 2
+        penalty += 0.5 * float(np.sum((v[outs:] / 4.0) ** 2))
+        return penalty - log_likelihood(filters, noise, residuals, columns, prior)
+
+    v0 = np.concatenate([np.log(start.white), [-1.5, -1.5]])
+    result = minimize(objective, v0, method="L-BFGS-B", options={"maxiter": 25, "ftol": 1e-7})
+    return unpack(result.x)

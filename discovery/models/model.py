@@ -1,0 +1,137 @@
+"""A model: states, terms, outputs and parameters, whoever wrote it down."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from discovery.terms import Apply, Expression, Name, Number, Term, names, substitute
+from discovery.terms.expression import rewrite
+
+TIME_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A number of the model: given, bounded or found.
+
+    `value` is the start value before a fit and the estimate after it, `low` and `high` its 95 % interval. With
+    `per_recording` every recording has its own, kept in `values`.
+    """
+
+    value: float
+    unit: str = "1"
+    min: float = -math.inf
+    max: float = math.inf
+    fixed: bool = False
+    per_recording: bool = False
+    low: float | None = None
+    high: float | None = None
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    def at(self, recording: str) -> float:
+        """Value in a recording; the common value where the recording has none of its own."""
+        return self.values.get(recording, self.value)
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A state. With a capacity [J/K] its terms are heat flows in W, without it rates in `unit` per time unit.
+
+    `start` is an expression of channels and parameters at the first instant, or None: the first reading of the
+    channel of that name. `start_sd` is the spread that a fit allows around it (0: exact).
+    `scale` turns the sum of its terms into unit per second.
+    """
+
+    name: str
+    unit: str = "degC"
+    capacity: float | None = None
+    start: Expression | None = Number(0.0)
+    start_sd: float = 0.5
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Model:
+    """dx/dt = sum of terms, y = outputs(x, u)."""
+
+    name: str
+    parameters: Mapping[str, Parameter]
+    states: Mapping[str, State]
+    terms: tuple[Term, ...]
+    outputs: Mapping[str, Expression]
+    time_unit: str = "s"
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that a fit may move."""
+        return tuple(name for name, parameter in self.parameters.items() if not parameter.fixed)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names that are neither state nor parameter nor `time`: channels of the campaign."""
+        used: set[str] = set()
+        for expression in self.expressions():
+            used |= names(expression)
+        own = set(self.states) | set(self.parameters) | {"time"}
+        return tuple(sorted(used - own))
+
+    def expressions(self) -> list[Expression]:
+        """Right-hand sides and outputs."""
+        return [*(term.expression for term in self.terms), *self.outputs.values()]
+
+    def values(self, recording: str = "") -> dict[str, float]:
+        """Parameter values in a recording."""
+        return {name: parameter.at(recording) for name, parameter in self.parameters.items()}
+
+    def with_terms(
+        self,
+        *terms: Term,
+        parameters: Mapping[str, Parameter] | None = None,
+        states: Mapping[str, State] | None = None,
+        outputs: Mapping[str, Expression] | None = None,
+    ) -> Model:
+        """The model with terms, parameters and states added and outputs replaced."""
+        return replace(
+            self,
+            terms=self.terms + terms,
+            parameters={**self.parameters, **(parameters or {})},
+            states={**self.states, **(states or {})},
+            outputs={**self.outputs, **(outputs or {})},
+        )
+
+    def with_values(self, values: Mapping[str, float]) -> Model:
+        """The model with other parameter values (intervals dropped)."""
+        parameters = {
+            name: replace(parameter, value=float(values[name]), low=None, high=None) if name in values else parameter
+            for name, parameter in self.parameters.items()
+        }
+        return replace(self, parameters=parameters)
+
+
+def expanded(model: Model) -> Model:
+    """The model with every lag(e, tau) written out as a hidden state: tau ds/dt = e - s, s(0) = e(0).
+
+    One mechanism then serves its dynamics, its sensitivities to e and to tau, its report and its export.
+    Equal lags share one state.
+    """
+    found: dict[Apply, str] = {}
+
+    def rule(apply: Apply) -> Expression | None:
+        if apply.function != "lag":
+            return None
+        return Name(found.setdefault(apply, f"lag_{len(found) + 1}"))
+
+    terms = tuple(replace(term, expression=rewrite(term.expression, rule)) for term in model.terms)
+    outputs = {name: rewrite(expression, rule) for name, expression in model.outputs.items()}
+    if not found:
+        return model
+    states, extra = dict(model.states), []
+    for apply, name in found.items():
+        inner, tau = apply.arguments
+        starts = {s: state.start for s, state in states.items() if state.start is not None}
+        spread = max((states[s].start_sd for s in names(inner) if s in states), default=0.0)
+        states[name] = State(name, "", None, substitute(inner, starts), spread, 1.0)
+        extra.append(Term(f"{name} follows", name, Apply("/", (Apply("-", (inner, Name(name))), tau))))
+    return replace(model, states=states, terms=terms + tuple(extra), outputs=outputs)

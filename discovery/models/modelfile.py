@@ -1,0 +1,177 @@
+"""Model files: read, and write back with the values found."""
+
+from __future__ import annotations
+
+import keyword
+import math
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from discovery.errors import UserError
+from discovery.files import locate, read_toml, write_toml
+from discovery.models.model import TIME_UNITS, Model, Parameter, State
+from discovery.terms import Expression, Term, names, parse, text
+from discovery.terms.expression import FUNCTIONS
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+
+class ParameterForm(_Strict):
+    """One line of [parameters]."""
+
+    start: float = Field(1.0, description="start value; in a fitted model the value found")
+    unit: str = Field("1", description="unit that pint knows")
+    min: float = Field(-math.inf, description="smallest value that a fit may give")
+    max: float = Field(math.inf, description="largest value that a fit may give")
+    fixed: bool = Field(False, description="true: given, not fitted")
+    per: Literal["recording"] | None = Field(None, description='"recording": a value of its own in each recording')
+    low: float | None = Field(None, description="lower end of the 95 % interval (written by a fit)")
+    high: float | None = Field(None, description="upper end of the 95 % interval (written by a fit)")
+    values: dict[str, float] = Field(default_factory=dict, description="values by recording (written by a fit)")
+
+
+class StateForm(_Strict):
+    """One line of [states]."""
+
+    unit: str = Field("degC", description="unit of the state")
+    capacity: float | None = Field(None, gt=0, description="heat capacity in J/K; its terms are then heat flows in W")
+    start: float | str | None = Field(None, description="number or expression; without it the first reading, else 0")
+    start_sd: float | None = Field(None, ge=0, description="spread of the start value; default 0.5 K or 1 um")
+
+
+class TermForm(_Strict):
+    """One [[terms]] entry."""
+
+    name: str = Field("", description="how reports call it")
+    into: str = Field(description="the state it enters")
+    source: str | None = Field(None, alias="from", description="the state it leaves")
+    expression: str | float = Field(description="formula")
+    effect: str = Field("", description="word of the catalogue (written by a diagnosis)")
+
+
+class ModelForm(_Strict):
+    """A model file."""
+
+    name: str = ""
+    time_unit: Literal["s", "min", "h", "d"] = "s"
+    parameters: dict[str, ParameterForm] = Field(default_factory=dict)
+    states: dict[str, StateForm]
+    terms: list[TermForm] = Field(default_factory=list)
+    outputs: dict[str, str | float] = Field(default_factory=dict)
+
+
+def read_model(path: Path) -> Model:
+    """Model of a file in the form of contract section 2.
+
+    Raises:
+        UserError: a mistake in the file, with file, line and key.
+    """
+    form = read_toml(path, ModelForm)
+    source = Path(path).read_text(encoding="utf-8-sig")
+
+    def at(*key: str | int) -> str:
+        line = locate(source, key)
+        return f"{path}{f', line {line}' if line else ''}, key {'.'.join(str(part) for part in key)}"
+
+    for kind in ("parameters", "states"):
+        for name in getattr(form, kind):
+            if not name.isidentifier() or keyword.iskeyword(name) or name in FUNCTIONS or name == "time":
+                raise UserError(f"{at(kind, name)}: '{name}' cannot name a {kind[:-1]}; use letters, digits and _ and no reserved word")
+    for name in form.parameters.keys() & form.states.keys():
+        raise UserError(f"{at('parameters', name)}: '{name}' is also a state; rename one of them")
+
+    parameters = {}
+    for name, entry in form.parameters.items():
+        if entry.min > entry.max:
+            raise UserError(f"{at('parameters', name)}: min {entry.min:g} is above max {entry.max:g}")
+        if not entry.min <= entry.start <= entry.max and not entry.fixed:
+            raise UserError(f"{at('parameters', name)}: start {entry.start:g} lies outside min {entry.min:g} and max {entry.max:g}")
+        parameters[name] = Parameter(
+            entry.start, entry.unit, entry.min, entry.max, entry.fixed, entry.per == "recording", entry.low, entry.high, entry.values
+        )
+    states = {}
+    per_unit = 1.0 / TIME_UNITS[form.time_unit]
+    for name, state in form.states.items():
+        start: Expression | None = None if state.start is None else parse(state.start, at("states", name, "start"))
+        spread = state.start_sd if state.start_sd is not None else (0.5 if state.unit in ("degC", "K", "kelvin") else 1.0)
+        scale = 1.0 / state.capacity if state.capacity else per_unit
+        states[name] = State(name, state.unit, state.capacity, start, spread, scale)
+    terms = []
+    for i, term in enumerate(form.terms):
+        for key, state_name in (("into", term.into), ("from", term.source)):
+            if state_name is not None and state_name not in states:
+                raise UserError(f"{at('terms', i, key)}: '{state_name}' is not a state; states are {', '.join(states)}")
+        terms.append(
+            Term(term.name or f"term {i + 1}", term.into, parse(term.expression, at("terms", i, "expression")), term.source, term.effect)
+        )
+    outputs = {name: parse(expression, at("outputs", name)) for name, expression in form.outputs.items()}
+    return Model(form.name or Path(path).stem, parameters, states, tuple(terms), outputs, form.time_unit)
+
+
+def check_names(model: Model, known: set[str], path: Path | str) -> None:
+    """Refuse a model that uses a name which is neither its own nor a channel of the campaign.
+
+    Raises:
+        UserError: naming the unknown name and where it stands.
+    """
+    own = set(model.states) | set(model.parameters) | {"time"} | known
+    places = [(f"term '{term.name}'", term.expression) for term in model.terms]
+    places += [(f"output '{name}'", expression) for name, expression in model.outputs.items()]
+    places += [(f"start of '{s.name}'", s.start) for s in model.states.values() if s.start is not None]
+    for place, expression in places:
+        for name in sorted(names(expression) - own):
+            raise UserError(
+                f"{path}, {place}: '{name}' is neither a state or parameter of the model nor a channel of the campaign "
+                f"({', '.join(sorted(known))}); mend the name or add the channel"
+            )
+
+
+def model_document(model: Model) -> dict[str, Any]:
+    """The model as the nested mapping that its file holds."""
+
+    def number(value: float) -> float:
+        return float(f"{value:.10g}")
+
+    def finite(entries: dict[str, Any]) -> dict[str, Any]:
+        return {key: value for key, value in entries.items() if value is not None and value not in (math.inf, -math.inf)}
+
+    parameters = {}
+    for name, p in model.parameters.items():
+        entry = finite({"start": number(p.value), "unit": p.unit, "min": p.min, "max": p.max})
+        entry |= {"fixed": True} if p.fixed else {}
+        entry |= {"per": "recording"} if p.per_recording else {}
+        entry |= finite({"low": p.low and number(p.low), "high": p.high and number(p.high)})
+        entry |= {"values": {key: number(value) for key, value in p.values.items()}} if p.values else {}
+        parameters[name] = entry
+    states = {
+        name: finite({"unit": s.unit, "capacity": s.capacity, "start": s.start and text(s.start), "start_sd": s.start_sd})
+        for name, s in model.states.items()
+    }
+    terms = [
+        {
+            "name": term.name,
+            "into": term.into,
+            **({"from": term.source} if term.source else {}),
+            "expression": text(term.expression),
+            **({"effect": term.effect} if term.effect else {}),
+        }
+        for term in model.terms
+    ]
+    outputs = {name: text(expression) for name, expression in model.outputs.items()}
+    return {
+        "name": model.name,
+        "time_unit": model.time_unit,
+        "parameters": parameters,
+        "states": states,
+        "terms": terms,
+        "outputs": outputs,
+    }
+
+
+def write_model(path: Path, model: Model) -> None:
+    """Write a model file that `read_model` reads back to the same model."""
+    write_toml(path, model_document(model))
