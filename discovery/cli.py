@@ -43,7 +43,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="A first hour: write campaign.toml beside your files, check it with `discovery check campaign.toml`, "
+    epilog="A first hour: write campaign.toml beside your files, `discovery check` it, "
     "then write an experiment and `discovery run` it. Every verb explains itself: `discovery VERB --help`. "
     "Exit status: 0 done, 1 the work could not be done (the message says why), 2 wrong usage.",
 )
@@ -80,6 +80,54 @@ def check(
     typer.echo(summary(findings))
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(1)
+
+
+@app.command()
+def record(
+    out: Annotated[Path, typer.Option("--out", help="Folder of the campaign that is written.")],
+    campaign: Annotated[
+        str | None, typer.Option(help="Record a whole known campaign, e.g. nmv5000; no other option but --out counts.")
+    ] = None,
+    recordings: Annotated[
+        int, typer.Option(min=1, max=100, help="How many recordings, each with the next seed.")
+    ] = 1,
+    cycle: Annotated[
+        str,
+        typer.Option(
+            help="Test cycle: fit, validation, dry, flow, environment, fluid, internal or warm_up (600 rpm, then rest)."
+        ),
+    ] = "fit",
+    seed: Annotated[int, typer.Option(min=0, help="Everything random comes from it.")] = 1,
+    hours: Annotated[float, typer.Option(help="Length of a recording.")] = 72.0,
+    nozzle_height: Annotated[float, typer.Option(help="Nozzle above the table, mm.")] = 50.0,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=SIZE or NAME@BODY=SIZE or NAME@BODY+BODY=SIZE; may be repeated. NAME=help lists them."),
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME@CHANNEL=SIZE: a fault of the measuring chain, in the first recording; may be repeated."),
+    ] = None,
+    conceal: Annotated[bool, typer.Option("--conceal", help="Draw an effect by seed and do not say which.")] = False,
+    reveal: Annotated[bool, typer.Option("--reveal", help="Put the answer into the folder, too.")] = False,
+) -> None:
+    """Record the virtual machine: a rotary table of five bodies under cutting fluid, with R-Test readings.
+
+    The same options give the same files, bit for bit. What was concealed is written beside the folder, as OUT.answer.json.
+
+    \b
+    discovery record --out runs/plain --recordings 2
+    discovery record --effect radiation=0.5 --nozzle-height 100 --seed 3 --out runs/radiating
+    discovery record --conceal --seed 7 --recordings 3 --out runs/riddle
+    discovery record --campaign nmv5000 --out datasets/nmv5000
+    """
+    from discovery.virtual.command import orders_of, record_orders
+
+    title, orders = orders_of(
+        campaign, recordings, cycle, seed, hours, nozzle_height, effect or [], fault or [], conceal
+    )
+    for line in record_orders(out, title, orders, reveal=reveal, envelope=campaign is None):
+        typer.echo(line)
 
 
 if __name__ == "__main__":

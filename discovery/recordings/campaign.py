@@ -1,0 +1,155 @@
+"""A campaign in memory: channels and recordings in canonical units, the files' oddities left behind."""
+
+import os
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.errors import UserError
+from discovery.files import dotted, locate, read_text, read_toml
+from discovery.recordings.campaignfile import CampaignForm, ChannelForm, RecordingForm, campaign_path
+from discovery.recordings.clockcheck import clock_findings
+from discovery.recordings.columns import Columns
+from discovery.recordings.reading import read_columns
+from discovery.recordings.roles import ROLES, Between
+from discovery.recordings.units import Conversion, UnitError, conversion
+from discovery.schema import suggest
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """`unit` is the canonical one, `noise` (standard deviation of a reading) is in it."""
+
+    name: str
+    role: str
+    unit: str
+    noise: float | None
+    between: Between
+
+    @property
+    def measured(self) -> bool:
+        """Whether this is read now and then and compared with models, not fed to them."""
+        return ROLES[self.role].measured
+
+
+@dataclass(frozen=True)
+class Recording:
+    """`time` (T,): seconds since the first stamp, increasing. `values`: each (T,), NaN: not measured.
+
+    `origin`: ISO 8601 instant of time 0 when the file had instants. `start`: seconds of time 0 on the file's
+    clock, so that a stamp in the file is start + time.
+    """
+
+    name: str
+    time: FloatArray
+    values: Mapping[str, FloatArray]
+    note: str = ""
+    origin: str | None = None
+    start: float = 0.0
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """The recordings of one machine."""
+
+    name: str
+    channels: Mapping[str, Channel]
+    recordings: Mapping[str, Recording]
+    path: Path = field(default=Path())
+
+
+def load_campaign(path: str | os.PathLike[str], only: Collection[str] | None = None) -> Campaign:
+    """The campaign at `path` (the file or its folder) in canonical units; with `only`, those recordings.
+
+    Raises UserError with file, line and what to do: mistakes in the campaign file, an unknown unit, a missing
+    column, text in number cells, time that does not increase.
+    """
+    path = campaign_path(Path(path))
+    form = read_toml(path, CampaignForm)
+    conversions = {name: _conversion(path, name, channel) for name, channel in form.channels.items()}
+    channels = {name: make_channel(name, one, conversions[name]) for name, one in form.channels.items()}
+    for name in only or ():
+        if name not in form.recordings:
+            raise UserError(f"{path}: no recording '{name}'; {suggest(name, list(form.recordings))}")
+    recordings = {
+        name: _load(path, name, one, form.channels, conversions)
+        for name, one in form.recordings.items()
+        if only is None or name in only
+    }
+    return Campaign(form.name, MappingProxyType(channels), MappingProxyType(recordings), path)
+
+
+def make_channel(name: str, form: ChannelForm, to: Conversion) -> Channel:
+    """A channel in its canonical unit; noise is a difference, so it takes the factor alone."""
+    noise = None if form.noise is None else form.noise * abs(to.factor)
+    return Channel(name, form.role, to.unit, noise, form.between or ROLES[form.role].between)
+
+
+def wanted_columns(form: RecordingForm, channels: Mapping[str, ChannelForm]) -> dict[str, str]:
+    """Channel to column, of those that are to be read from the file."""
+    return {name: one.column or name for name, one in channels.items() if name not in form.set}
+
+
+def channel_values(
+    columns: Columns, form: RecordingForm, channels: Mapping[str, ChannelForm], to: Mapping[str, Conversion]
+) -> dict[str, FloatArray]:
+    """Each channel that the file or `set` gives, (T,), in its canonical unit."""
+    raw = {
+        name: columns.values[column]
+        for name, column in wanted_columns(form, channels).items()
+        if column in columns.values
+    }
+    raw |= {name: np.full(columns.time.shape, value) for name, value in form.set.items() if name in channels}
+    return {
+        name: to[name].factor * raw[name] + to[name].offset for name in channels if name in raw and name in to
+    }
+
+
+def _conversion(path: Path, name: str, form: ChannelForm) -> Conversion:
+    try:
+        return conversion(form.unit, form.role)
+    except UnitError as error:
+        key = ("channels", name, "unit")
+        raise UserError(f"{path}, line {locate(read_text(path), key)}: {dotted(key)}: {error}") from None
+
+
+def _load(
+    path: Path,
+    name: str,
+    form: RecordingForm,
+    channels: Mapping[str, ChannelForm],
+    conversions: Mapping[str, Conversion],
+) -> Recording:
+    file = path.parent / form.file
+    wanted = wanted_columns(form, channels)
+    unknown = next((channel for channel in form.set if channel not in channels), None)
+    if unknown is not None:
+        key = ("recordings", name, "set", unknown)
+        hint = f"no such channel; {suggest(unknown, list(channels))}"
+        raise UserError(f"{path}, line {locate(read_text(path), key)}: {dotted(key)}: {hint}")
+    columns, findings = read_columns(file, list(wanted.values()))
+    if columns is not None and not columns.runs_forward:
+        findings = findings + clock_findings(file, columns)
+    for finding in findings:
+        if finding.severity == "error":
+            raise UserError(finding.sentence)
+    if columns is None:
+        raise UserError(f"{file}: cannot be read; see `discovery check {path}`")
+    for channel, column in wanted.items():
+        if column not in columns.values:
+            do = f"{suggest(column, list(columns.header))}; or say set = {{ {channel} = ... }} in {path}"
+            raise UserError(f"{file}, line 1: no column '{column}'; {do}")
+    return Recording(
+        name,
+        columns.time - columns.time[0],
+        MappingProxyType(channel_values(columns, form, channels, conversions)),
+        form.note,
+        columns.origin,
+        float(columns.time[0]),
+    )

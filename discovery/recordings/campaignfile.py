@@ -1,0 +1,63 @@
+"""The form of `campaign.toml`."""
+
+import keyword
+import re
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from discovery.recordings.roles import Between, Role
+from discovery.schema import Strict
+
+_FUNCTIONS = ("abs", "min", "max", "exp", "log", "sqrt", "sign", "where", "tanh", "delay", "lag", "play")
+
+
+def _channel_name(name: str) -> str:
+    if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII) or keyword.iskeyword(name):
+        raise ValueError(
+            "a channel's name is a word of letters, digits and _, since expressions use it; choose one, and say"
+            f' column = "{name}" where the header of the files has to stay'
+        )
+    if name in ("time", *_FUNCTIONS):
+        raise ValueError("this word has a meaning of its own in expressions; choose another name")
+    return name
+
+
+def _recording_name(name: str) -> str:
+    if not re.fullmatch(r"\w[\w.+-]*", name):
+        raise ValueError("a recording's name becomes a file name: use letters, digits, _ . + -")
+    return name
+
+
+class ChannelForm(Strict):
+    """One line of [channels]."""
+
+    role: Role
+    unit: str = Field(description="a unit that pint knows")
+    noise: float | None = Field(None, gt=0, description="standard deviation of a reading, in the unit")
+    between: Between | None = Field(None, description="what the value does between stamps")
+    column: str | None = Field(None, description="the header in the files, when it is not the channel's name")
+
+
+class RecordingForm(Strict):
+    """One line of [recordings]."""
+
+    file: str = Field(
+        min_length=1, description="CSV (plain or gzip) or Parquet, relative to the campaign file"
+    )
+    set: dict[str, float] = Field(default={}, description="channels that are constant in this recording")
+    note: str = ""
+
+
+class CampaignForm(Strict):
+    """The whole file."""
+
+    name: str
+    channels: dict[Annotated[str, AfterValidator(_channel_name)], ChannelForm] = Field(min_length=1)
+    recordings: dict[Annotated[str, AfterValidator(_recording_name)], RecordingForm] = Field(min_length=1)
+
+
+def campaign_path(path: Path) -> Path:
+    """The campaign file itself when its folder is named."""
+    return path / "campaign.toml" if path.is_dir() else path

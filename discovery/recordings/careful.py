@@ -1,0 +1,192 @@
+"""The careful way into a CSV file: cell by cell, and everything that is wrong with its text is found."""
+
+import codecs
+import csv
+import math
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from discovery.recordings.clock import is_instant, parse_instant, seconds_between
+from discovery.recordings.columns import EMPTY_CELLS, TIME, Columns, FloatArray
+from discovery.recordings.finding import Finding
+
+_SEPARATORS = {",": "a comma", ";": "a semicolon", "\t": "a tab", "|": "a bar"}
+_DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+_EXPORT = "export it with a comma between the columns and a point in numbers"
+
+
+@dataclass
+class _Troubles:
+    """Findings about one file; the same trouble in many cells is told once, by its first and a count."""
+
+    file: Path
+    found: list[Finding] = field(default_factory=list)
+    cells: dict[str, list[Finding]] = field(default_factory=dict)
+
+    def error(self, line: int | None, what: str, do: str) -> None:
+        self.found.append(Finding("error", self.file, line, what, do))
+
+    def cell(self, kind: str, line: int, what: str, do: str) -> None:
+        self.cells.setdefault(kind, []).append(Finding("error", self.file, line, what, do))
+
+    def all(self) -> list[Finding]:
+        told = [
+            replace(same[0], what=same[0].what + (f" (and {len(same) - 1} more like it)" if same[1:] else ""))
+            for same in self.cells.values()
+        ]
+        return self.found + told
+
+
+def read_careful_csv(
+    path: Path, data: bytes, wanted: Collection[str]
+) -> tuple[Columns | None, list[Finding]]:
+    """What can be read of a CSV text whatever it holds, and all that is wrong with its text.
+
+    The columns are None when there is no header with a time column or no row. Never raises.
+    """
+    troubles = _Troubles(path)
+    text = _decode(data, troubles)
+    rows = _rows(text, troubles)
+    if not rows:
+        troubles.error(None, "the file is empty", "record again, or take the recording out of the campaign")
+        return None, troubles.all()
+    header = tuple(name.strip() for name in rows[0][1])
+    for name in dict.fromkeys(header):
+        if header.count(name) > 1:
+            troubles.error(
+                rows[0][0], f"{header.count(name)} columns are named '{name}'", "rename or delete one"
+            )
+    if TIME not in header:
+        do = f"name the column of stamps '{TIME}'; the columns are {', '.join(header)[:200]}"
+        troubles.error(rows[0][0], f"no column '{TIME}'", do)
+        return None, troubles.all()
+    body = [row for row in rows[1:] if _is_whole(row, header, troubles)]
+    columns = _columns(header, body, [name for name in wanted if name in header], troubles)
+    return columns, troubles.all()
+
+
+def _decode(data: bytes, troubles: _Troubles) -> str:
+    for mark, name in ((codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
+        if data.startswith(mark):
+            troubles.error(None, "the text is UTF-16", "save the file as UTF-8")
+            return data.decode(name, errors="replace")
+    if b"\0" in data:
+        line = data[: data.index(b"\0")].count(b"\n") + 1
+        troubles.error(line, "a zero byte: not a text", "export the file again as CSV text (UTF-8)")
+        return data.replace(b"\0", b"").decode("utf-8", errors="replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        letter = data[error.start : error.start + 1].decode("latin-1")
+        what = f"not UTF-8 text (perhaps Latin-1, where the byte is '{letter}')"
+        troubles.error(line, what, "save the file as UTF-8")
+        return data.decode("latin-1")
+
+
+def _rows(text: str, troubles: _Troubles) -> list[tuple[int, list[str]]]:
+    """The lines that hold something, cut into cells, with their numbers."""
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    separator = max(_SEPARATORS, key=first.count) if "," not in first else ","
+    if separator != "," and first.count(separator):
+        troubles.error(1, f"the columns are separated by {_SEPARATORS[separator]}", _EXPORT)
+    reader = csv.reader(text.splitlines(keepends=True), delimiter=separator)
+    rows: list[tuple[int, list[str]]] = []
+    try:
+        rows.extend((reader.line_num, row) for row in reader if any(cell.strip() for cell in row))
+    except csv.Error as error:
+        troubles.error(reader.line_num, f"cannot be cut into cells ({error})", _EXPORT)
+    return rows
+
+
+def _is_whole(row: tuple[int, list[str]], header: Sequence[str], troubles: _Troubles) -> bool:
+    line, cells = row
+    if len(cells) == len(header):
+        return True
+    many = len(cells) > len(header)
+    do = "look for a decimal comma or a comma in a text" if many else "look for a line that was cut off"
+    kind = "long row" if many else "short row"
+    troubles.cell(kind, line, f"{len(cells)} cells under {len(header)} columns", do)
+    return False
+
+
+def _columns(
+    header: tuple[str, ...], body: list[tuple[int, list[str]]], wanted: list[str], troubles: _Troubles
+) -> Columns | None:
+    place = {name: header.index(name) for name in (TIME, *wanted)}
+    stamps = [(line, cells[place[TIME]].strip(), cells) for line, cells in body]
+    instants = bool(stamps) and is_instant(next((text for _, text, _ in stamps if text), ""))
+    kept = [
+        (line, stamp, cells)
+        for line, text, cells in stamps
+        if (stamp := _stamp(text, line, instants, troubles)) is not None
+    ]
+    if not kept:
+        troubles.error(None, "no row with a stamp", "record again, or take the recording out of the campaign")
+        return None
+    time, origin = _clock([stamp for _, stamp, _ in kept], kept[0][0], troubles)
+    values = {
+        name: np.array([_number(cells[place[name]].strip(), name, line, troubles) for line, _, cells in kept])
+        for name in wanted
+    }
+    return Columns(header, time, values, np.array([line for line, _, _ in kept]), origin)
+
+
+def _stamp(text: str, line: int, instants: bool, troubles: _Troubles) -> float | datetime | None:
+    if text in EMPTY_CELLS:
+        troubles.cell("no stamp", line, "no stamp in the column time", "fill it in or delete the line")
+        return None
+    try:
+        return parse_instant(text) if instants else _finite(text)
+    except ValueError:
+        kind = "ISO 8601 instant" if instants else "number of seconds"
+        do = "write all stamps as seconds, or all as instants like 2026-03-01T08:00:00"
+        troubles.cell("stamp", line, f"the stamp '{_short(text)}' is no {kind}", do)
+        return None
+
+
+def _number(text: str, name: str, line: int, troubles: _Troubles) -> float:
+    """A cell as a number; NaN where it is empty or none."""
+    if text in EMPTY_CELLS:
+        return math.nan
+    try:
+        return _finite(text)
+    except ValueError:
+        if _DECIMAL_COMMA.fullmatch(text):
+            do = "write numbers with a decimal point"
+            troubles.cell(f"comma {name}", line, f"'{name}' is '{text}' with a decimal comma", do)
+        else:
+            do = "write a number, or leave the cell empty where nothing was measured"
+            troubles.cell(f"text {name}", line, f"'{name}' is '{_short(text)}', not a number", do)
+        return math.nan
+
+
+def _finite(text: str) -> float:
+    """A plain finite number; ValueError otherwise (Python's own 1_000 and infinity are none)."""
+    value = float(text)
+    if "_" in text or not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 30 else f"{text[:27]}..."
+
+
+def _clock(
+    stamps: Sequence[float | datetime], line: int, troubles: _Troubles
+) -> tuple[FloatArray, str | None]:
+    instants = [stamp for stamp in stamps if isinstance(stamp, datetime)]
+    if not instants:
+        return np.array(stamps, dtype=np.float64), None
+    try:
+        return seconds_between(instants), instants[0].isoformat()
+    except ValueError as error:
+        troubles.error(line, str(error), "write the zone at every stamp, or at none")
+        naive = [instant.replace(tzinfo=None) for instant in instants]
+        return seconds_between(naive), naive[0].isoformat()

@@ -1,0 +1,35 @@
+"""What a file of a recording holds, before roles and units: columns of numbers and their lines."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+TIME = "time"
+EMPTY_CELLS = ("", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-")  # not measured
+
+
+@dataclass(frozen=True)
+class Columns:
+    """`header`: all names in the file. `time` (T,): seconds on the file's clock, in the order of the file.
+
+    `values`: the wanted columns, each (T,), NaN where not measured. `lines` (T,): where each row stands.
+    `origin`: the instant at which `time` is 0, when the file has instants.
+    """
+
+    header: tuple[str, ...]
+    time: FloatArray
+    values: Mapping[str, FloatArray]
+    lines: NDArray[np.int64]
+    origin: str | None = None
+
+    @property
+    def runs_forward(self) -> bool:
+        return bool(self.time.size and np.isfinite(self.time).all() and (np.diff(self.time) > 0).all())
+
+    @property
+    def is_finite(self) -> bool:
+        return not any(np.isinf(column).any() for column in self.values.values())

@@ -1,0 +1,38 @@
+"""From a file to columns: quick when the file is as it should be, careful when it is not."""
+
+import gzip
+import zlib
+from collections.abc import Collection
+from pathlib import Path
+
+from discovery.recordings.careful import read_careful_csv
+from discovery.recordings.columns import Columns
+from discovery.recordings.finding import Finding
+from discovery.recordings.quick import read_parquet, read_quick_csv
+
+PARQUET_SUFFIXES = (".parquet", ".pq")
+
+
+def read_columns(path: Path, wanted: Collection[str]) -> tuple[Columns | None, list[Finding]]:
+    """The wanted columns of a CSV (plain or gzip) or Parquet file, and what is wrong with its text.
+
+    A wanted column that the file does not have is left out; the columns are None when nothing is readable.
+    """
+    if path.suffix in PARQUET_SUFFIXES:
+        try:
+            return read_parquet(path, wanted), []
+        except ValueError as error:
+            return None, [Finding("error", path, None, str(error), "write the file again")]
+    try:
+        data = path.read_bytes()
+        if data[:2] == b"\x1f\x8b":
+            data = gzip.decompress(data)
+    except (OSError, EOFError, zlib.error, ValueError) as error:
+        what = (
+            "there is no such file" if isinstance(error, FileNotFoundError) else f"cannot be read ({error})"
+        )
+        return None, [Finding("error", path, None, what, "put it there or correct the campaign file")]
+    columns = read_quick_csv(data, wanted)
+    if columns is not None and columns.runs_forward and columns.is_finite:
+        return columns, []
+    return read_careful_csv(path, data, wanted)

@@ -1,0 +1,111 @@
+"""Units are met here and nowhere else: values leave as plain floats in the canonical unit of their role.
+
+Canonical: degC, rpm, W, mm, um, um/m, l/min, 1. A heat load or cooling power without dimension (a heater in
+percent) and an "other input" keep the unit they have.
+"""
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from discovery.recordings.roles import ROLES
+
+if TYPE_CHECKING:
+    import pint
+
+# What needs no look into pint's tables, which take a third of a second to load.
+_COMMON = frozenset({"1", "percent", "degC", "K", "W", "rpm", "mm", "um", "um/m", "l/min", "s", "A", "V"})
+_SPELLING = re.compile(r"[\w°µμΩ%/*^ .()²³⁻¹-]{1,40}")
+_HUGE_POWER = re.compile(r"(\*\*|\^)\s*-?\d{2}")
+_MISTAKEN = {"C": "degC", "c": "degC", "F": "degF", "u/min": "rpm", "U/min": "rpm", "µ": "um", "l/m": "l/min"}
+
+
+class UnitError(ValueError):
+    """A unit that is unknown or cannot belong to the role; the text says which are allowed."""
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """canonical value = factor * value + offset; a difference (noise) takes the factor alone."""
+
+    unit: str
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+@lru_cache(maxsize=256)
+def conversion(unit: str, role: str) -> Conversion:
+    """How values in `unit` become the canonical unit of `role`.
+
+    Raises UnitError: unknown to pint, or of a dimension that the role does not have.
+
+    >>> conversion("kW", "heat load")
+    Conversion(unit='W', factor=1000.0, offset=0.0)
+    >>> conversion("1/min", "rotation speed")
+    Conversion(unit='rpm', factor=1.0, offset=0.0)
+    """
+    facts = ROLES[role]
+    if unit in facts.units or (unit in _COMMON and not facts.units):
+        return Conversion(unit)
+    if facts.plain and unit in ("1", "percent", "%"):
+        return Conversion("1" if unit == "1" else "percent")
+    try:
+        given = _parse(unit)
+    except Exception:  # pint's parser fails in many ways: tokens, recursion, attributes, division by zero
+        raise UnitError(f"the unit '{unit}' is not known; {_allowed(unit, role)}") from None
+    if not facts.units or (facts.plain and given.dimensionless):
+        return Conversion(unit)
+    if role == "rotation speed":
+        given = _per_revolution(given)
+    try:
+        canonical = next(name for name in facts.units if given.is_compatible_with(_pint(name)))
+        return _affine(given, canonical)
+    except Exception:  # no canonical unit of this dimension, or a difference of temperatures
+        problem = f"the unit '{unit}' cannot be that of a channel of role '{role}'"
+        raise UnitError(f"{problem}; {_allowed(unit, role)}") from None
+
+
+def _affine(given: "pint.Unit", canonical: str) -> Conversion:
+    def convert(value: float) -> float:
+        return float(_registry().Quantity(value, given).to(_pint(canonical)).magnitude)
+
+    offset = convert(0.0)
+    if offset == 0.0:
+        return Conversion(canonical, convert(1.0))
+    # rounded: 0 degF is 255.372222... K on the way, and the last digits get lost there
+    factor = (convert(1000.0) - offset) / 1000.0
+    return Conversion(canonical, float(f"{factor:.12g}"), float(f"{offset:.12g}"))
+
+
+def _per_revolution(given: "pint.Unit") -> "pint.Unit":
+    """1/min and Hz of a rotation count revolutions, where pint would count radians."""
+    angles = ("radian", "degree", "revolution", "turn", "grade")
+    turns = any(angle in str(name) for name in given._units for angle in angles)
+    return given if turns else given * _registry().Unit("revolution")
+
+
+def _parse(unit: str) -> "pint.Unit":
+    if not _SPELLING.fullmatch(unit) or _HUGE_POWER.search(unit):
+        raise ValueError(unit)
+    given: pint.Unit = _registry().Unit(_pint(unit))
+    return given
+
+
+def _pint(unit: str) -> str:
+    return "dimensionless" if unit == "1" else unit
+
+
+def _allowed(unit: str, role: str) -> str:
+    units = ROLES[role].units
+    names = f"{' or '.join(units)}, or what converts to it" if units else "any unit that pint knows"
+    if unit in _MISTAKEN:
+        return f"did you mean '{_MISTAKEN[unit]}'? Allowed is {names}"
+    return f"allowed is {names}"
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
