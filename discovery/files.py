@@ -50,14 +50,14 @@ def read_toml(path: str | os.PathLike[str], schema: type[Schema]) -> Schema:
     """
     from pydantic import ValidationError
 
-    from discovery.schema import sentence
+    from discovery.schema import sentences
 
     text = read_text(path)
     data = parse_toml(text, path)
     try:
         return schema.model_validate(data)
     except ValidationError as error:
-        key, what = sentence(schema, data, error)
+        key, what = sentences(schema, data, error)[0]
         name = f"{dotted(key)}: " if key else ""
         raise UserError(f"{path}, line {locate(text, key)}: {name}{what}") from None
 

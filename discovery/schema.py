@@ -16,15 +16,19 @@ class Strict(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
 
 
-def sentence(schema: type[BaseModel], data: Any, error: ValidationError) -> tuple[Key, str]:
-    """The first mistake in `data`: the key where it stands and the rest of the sentence.
+def sentences(schema: type[BaseModel], data: Any, error: ValidationError) -> list[tuple[Key, str]]:
+    """Every mistake in `data`: the key where it stands, and the rest of the sentence.
 
-    Unknown keys come first, since a misspelt key is often the cause of a missing one.
+    Unknown keys come first, since a misspelt key is often the cause of a missing one. Of the branches of a
+    union that all complain about one value, the first is told.
     """
     details = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
-    mistake = details[0]
-    key = _real_key(data, mistake["loc"])
-    return key, _explain(schema, mistake, key)
+    told: dict[tuple[Key, str | int | None], tuple[Key, str]] = {}
+    for mistake in details:
+        key = _real_key(data, mistake["loc"])
+        missing = mistake["loc"][-1] if mistake["type"] == "missing" else None
+        told.setdefault((key, missing), (key, _explain(schema, mistake, key)))
+    return list(told.values())
 
 
 def _real_key(data: Any, place: Key) -> Key:

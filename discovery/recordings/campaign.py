@@ -134,7 +134,7 @@ def _load(
         hint = f"no such channel; {suggest(unknown, list(channels))}"
         raise UserError(f"{path}, line {locate(read_text(path), key)}: {dotted(key)}: {hint}")
     columns, findings = read_columns(file, list(wanted.values()))
-    if columns is not None and not columns.runs_forward:
+    if columns is not None:
         findings = findings + clock_findings(file, columns)
     for finding in findings:
         if finding.severity == "error":

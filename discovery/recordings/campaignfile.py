@@ -16,7 +16,7 @@ _FUNCTIONS = ("abs", "min", "max", "exp", "log", "sqrt", "sign", "where", "tanh"
 def _channel_name(name: str) -> str:
     if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII) or keyword.iskeyword(name):
         raise ValueError(
-            "a channel's name is a word of letters, digits and _, since expressions use it; choose one, and say"
+            "a channel's name is a word of letters, digits and _ (expressions use it); choose one, and say"
             f' column = "{name}" where the header of the files has to stay'
         )
     if name in ("time", *_FUNCTIONS):

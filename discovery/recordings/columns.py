@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+Lines = NDArray[np.int64]
 
 TIME = "time"
 EMPTY_CELLS = ("", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-")  # not measured
@@ -23,7 +24,7 @@ class Columns:
     header: tuple[str, ...]
     time: FloatArray
     values: Mapping[str, FloatArray]
-    lines: NDArray[np.int64]
+    lines: Lines
     origin: str | None = None
 
     @property

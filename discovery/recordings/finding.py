@@ -32,3 +32,12 @@ class Finding:
 
     def __str__(self) -> str:
         return f"{self.severity}: {self.sentence}"
+
+
+def more(count: int) -> str:
+    """What is added to the first of `count` findings of one kind.
+
+    >>> more(1), more(3)
+    ('', ' (and 2 more like it)')
+    """
+    return f" (and {count - 1} more like it)" if count > 1 else ""

@@ -1,0 +1,141 @@
+"""Everything that is wrong with a campaign: the campaign file first, then recording by recording."""
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from discovery.files import Key, dotted, locate, parse_toml, read_text
+from discovery.recordings.campaign import Channel, channel_values, make_channel, wanted_columns
+from discovery.recordings.campaignfile import CampaignForm, RecordingForm, campaign_path
+from discovery.recordings.clockcheck import clock_findings
+from discovery.recordings.columns import TIME, Columns
+from discovery.recordings.finding import Finding
+from discovery.recordings.inputcheck import input_findings
+from discovery.recordings.reading import read_columns
+from discovery.recordings.units import Conversion, UnitError, conversion
+from discovery.recordings.valuecheck import few_findings, frozen_findings, range_findings
+from discovery.schema import sentences, suggest
+
+
+def check_campaign(path: str | os.PathLike[str]) -> list[Finding]:
+    """All findings about the campaign at `path` (the file or its folder), in the order of the files.
+
+    Raises UserError when the campaign file itself is missing, no text or no TOML.
+    """
+    path = campaign_path(Path(path))
+    text = read_text(path)
+    data = parse_toml(text, path)
+    form, findings = _form(path, text, data)
+    if form is None:
+        return findings
+    conversions = {}
+    for name, channel in form.channels.items():
+        try:
+            conversions[name] = conversion(channel.unit, channel.role)
+        except UnitError as error:
+            findings.append(_in_campaign(path, text, ("channels", name, "unit"), str(error)))
+    for name, recording in form.recordings.items():
+        for constant in recording.set:
+            if constant not in data["channels"]:
+                what = f"no such channel; {suggest(constant, list(form.channels))}"
+                findings.append(_in_campaign(path, text, ("recordings", name, "set", constant), what))
+        findings.extend(_recording_findings(path, form, recording, conversions))
+    return findings
+
+
+def summary(findings: list[Finding]) -> str:
+    """One line about all findings."""
+    errors = sum(finding.severity == "error" for finding in findings)
+    warnings = len(findings) - errors
+    if not findings:
+        return "nothing is wrong with these recordings"
+    return f"{errors} error{'s' * (errors != 1)}, {warnings} warning{'s' * (warnings != 1)}"
+
+
+def _form(path: Path, text: str, data: dict[str, Any]) -> tuple[CampaignForm | None, list[Finding]]:
+    """The campaign without its faulty channels and recordings, and the faults; None when little is left."""
+    try:
+        return CampaignForm.model_validate(data), []
+    except ValidationError as error:
+        mistakes = sentences(CampaignForm, data, error)
+    findings = [_in_campaign(path, text, key, what) for key, what in mistakes]
+    try:
+        return CampaignForm.model_validate(_without(data, [key for key, _ in mistakes])), findings
+    except ValidationError:
+        return None, findings
+
+
+def _without(data: dict[str, Any], keys: list[Key]) -> dict[str, Any]:
+    """`data` without the keys, cut off at the second word: a whole channel, a whole recording."""
+    kept = {key: dict(value) if isinstance(value, dict) else value for key, value in data.items()}
+    for key in keys:
+        table = kept if len(key) == 1 else kept.get(str(key[0])) if key else None
+        if isinstance(table, dict):
+            table.pop(str(key[:2][-1]), None)
+    return kept
+
+
+def _in_campaign(path: Path, text: str, key: Key, what: str) -> Finding:
+    problem, _, do = what.partition("; ")
+    name = f"{dotted(key)}: " if key else ""
+    return Finding("error", path, locate(text, key), name + problem, do or "correct it")
+
+
+def _recording_findings(
+    path: Path, form: CampaignForm, recording: RecordingForm, conversions: Mapping[str, Conversion]
+) -> list[Finding]:
+    file = path.parent / recording.file
+    wanted = wanted_columns(recording, form.channels)
+    columns, findings = read_columns(file, list(wanted.values()))
+    if columns is None:
+        return findings
+    findings.extend(_header_findings(file, columns, form, recording))
+    findings.extend(clock_findings(file, columns))
+    channels = {
+        name: make_channel(name, one, conversions[name])
+        for name, one in form.channels.items()
+        if name in conversions
+    }
+    findings.extend(_content_findings(file, columns, channels, recording, form, conversions))
+    return findings
+
+
+def _header_findings(
+    file: Path, columns: Columns, form: CampaignForm, recording: RecordingForm
+) -> Iterator[Finding]:
+    for channel, column in wanted_columns(recording, form.channels).items():
+        if column not in columns.header:
+            do = f"add it, or say set = {{ {channel} = ... }}; the columns are {', '.join(columns.header)}"
+            yield Finding("error", file, 1, f"no column '{column}'", do)
+    declared = {one.column or name for name, one in form.channels.items()}
+    for name in dict.fromkeys(columns.header):
+        if name not in declared and name != TIME:
+            what = f"the column '{name}' is not among the channels"
+            yield Finding(
+                "warning", file, 1, what, "it is not used; declare it in the campaign file if it matters"
+            )
+    for name in recording.set:
+        if name in columns.header:
+            what = f"'{name}' is a column here and a constant in the campaign file"
+            yield Finding("warning", file, 1, what, "the constant is used; take one of the two away")
+
+
+def _content_findings(
+    file: Path,
+    columns: Columns,
+    channels: Mapping[str, Channel],
+    recording: RecordingForm,
+    form: CampaignForm,
+    conversions: Mapping[str, Conversion],
+) -> Iterator[Finding]:
+    values = channel_values(columns, recording, form.channels, conversions)
+    for name, column in values.items():
+        yield from range_findings(file, columns.lines, channels[name], column)
+        if name not in recording.set:
+            yield from frozen_findings(file, columns.lines, channels[name], column)
+            if channels[name].measured:
+                yield from few_findings(file, channels[name], column)
+    yield from input_findings(file, columns, channels, values)

@@ -1,0 +1,84 @@
+"""Inputs: are they known where they are needed."""
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.recordings.campaign import Channel
+from discovery.recordings.columns import Columns, FloatArray
+from discovery.recordings.finding import Finding, more
+
+_GAP = 20.0  # a stretch of so many usual steps without a value is a gap
+
+
+def input_findings(
+    file: Path, columns: Columns, channels: Mapping[str, Channel], values: Mapping[str, FloatArray]
+) -> Iterator[Finding]:
+    """Inputs without any value (an error) or with long empty stretches, and readings in those (warnings)."""
+    uncovered = {}
+    for name, column in values.items():
+        if channels[name].measured:
+            continue
+        known = np.isfinite(column)
+        if not known.any():
+            do = f"measure it, or say set = {{ {name} = ... }} in the campaign file"
+            yield Finding("error", file, None, f"the input '{name}' has no value at all", do)
+            continue
+        gaps = _gaps(columns.time, known)
+        yield from _told(file, columns, channels[name], gaps)
+        uncovered[name] = _inside(gaps, columns.time.size) & ~known
+    for name, column in values.items():
+        if channels[name].measured:
+            yield from _alone(file, columns, name, np.isfinite(column), uncovered)
+
+
+def _gaps(time: FloatArray, known: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last row of each long stretch of rows without a value."""
+    rows = np.flatnonzero(known)
+    usual = float(np.median(np.diff(time[rows]))) if rows.size > 1 else 0.0
+    edges = np.concatenate([[-1], rows, [known.size]])
+    gaps = []
+    for before, after in pairwise(edges):
+        if after - before > 1:
+            length = time[min(after, known.size - 1)] - time[max(before, 0)]
+            if length > _GAP * usual:
+                gaps.append((int(before) + 1, int(after) - 1))
+    return gaps
+
+
+def _told(file: Path, columns: Columns, channel: Channel, gaps: list[tuple[int, int]]) -> Iterator[Finding]:
+    if not gaps:
+        return
+    first, last = gaps[0]
+    length = columns.time[last] - columns.time[first]
+    what = f"the input '{channel.name}' is empty for {length:g} s, up to line {columns.lines[last]}"
+    bridge = "the line between the values around it" if channel.between == "linear" else "the value before it"
+    do = f"{bridge} is used there; fill it in, or split the recording"
+    if first == 0:
+        do = "the first known value is used there; cut the beginning off"
+    yield Finding("warning", file, int(columns.lines[first]), what + more(len(gaps)), do)
+
+
+def _inside(gaps: list[tuple[int, int]], size: int) -> NDArray[np.bool_]:
+    inside = np.zeros(size, dtype=np.bool_)
+    for first, last in gaps:
+        inside[first : last + 1] = True
+    return inside
+
+
+def _alone(
+    file: Path,
+    columns: Columns,
+    name: str,
+    readings: NDArray[np.bool_],
+    uncovered: Mapping[str, NDArray[np.bool_]],
+) -> Iterator[Finding]:
+    rows = {one: np.flatnonzero(readings & empty) for one, empty in uncovered.items()}
+    for one, alone in rows.items():
+        if alone.size:
+            what = f"{alone.size} of {readings.sum()} readings of '{name}' stand where '{one}' is not known"
+            do = f"record '{one}' as long as the readings, or leave these readings out"
+            yield Finding("warning", file, int(columns.lines[alone[0]]), what, do)

@@ -1,0 +1,77 @@
+"""Values: what the role can be, sensors that stand still, too few readings."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from discovery.recordings.campaign import Channel
+from discovery.recordings.columns import FloatArray, Lines
+from discovery.recordings.finding import Finding, more
+from discovery.recordings.roles import ROLES
+
+FEW = 20  # readings: fewer carry no model
+_STANDS = 5.0  # a sensor that stands still so many times longer than chance explains
+_SENSORS = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature", "error")
+
+
+def range_findings(file: Path, lines: Lines, channel: Channel, column: FloatArray) -> Iterator[Finding]:
+    """Values that the role cannot have (errors) or seldom has (warnings). `column` (T,): canonical unit."""
+    limits = ROLES[channel.role].ranges.get(channel.unit)
+    if limits is None:
+        return
+    unit = f" {channel.unit}" if channel.unit != "1" else ""
+    do = f"check its unit and the sensor; usual is {limits.usual[0]:g} to {limits.usual[1]:g}{unit}"
+    impossible = _outside(column, limits.possible)
+    if impossible.size:
+        what = f"'{channel.name}' is {column[impossible[0]]:g}{unit}, no {channel.role} can be that"
+        yield Finding("error", file, int(lines[impossible[0]]), what + more(impossible.size), do)
+    unusual = np.setdiff1d(_outside(column, limits.usual), impossible)
+    if unusual.size:
+        what = (
+            f"'{channel.name}' is {column[unusual[0]]:g}{unit}, unusual for a channel of role {channel.role}"
+        )
+        yield Finding("warning", file, int(lines[unusual[0]]), what + more(unusual.size), do)
+
+
+def _outside(column: FloatArray, limits: tuple[float, float]) -> Lines:
+    return np.flatnonzero((column < limits[0]) | (column > limits[1]))  # NaN is neither
+
+
+def frozen_findings(file: Path, lines: Lines, channel: Channel, column: FloatArray) -> Iterator[Finding]:
+    """A sensor that repeats one value far longer than it does elsewhere in the recording.
+
+    When a reading differs from the one before with probability p, the longest run of equal readings among n
+    is about ln(n)/p (Erdos and Renyi 1970); several times that is a sensor that stands still.
+    """
+    known = np.flatnonzero(np.isfinite(column))
+    if channel.role not in _SENSORS or known.size < FEW:
+        return
+    readings = column[known]
+    ends = np.append(np.flatnonzero(np.diff(readings) != 0.0), known.size - 1)
+    lengths = np.diff(ends, prepend=-1)
+    if lengths.size == 1:
+        what = f"'{channel.name}' is {readings[0]:g} in all {known.size} readings"
+        do = "check the sensor; if it is a constant, say so with set = { ... } in the campaign file"
+        yield Finding("warning", file, int(lines[known[0]]), what, do)
+        return
+    longest = int(np.argmax(lengths))
+    others = known.size - lengths[longest]
+    changes = (lengths.size - 1) / max(others, 1)
+    if lengths[longest] > _STANDS * np.log(known.size) / changes + FEW:
+        first, last = known[ends[longest] - lengths[longest] + 1], known[ends[longest]]
+        what = (
+            f"'{channel.name}' stands still at {column[first]:g} for {lengths[longest]} readings,"
+            f" up to line {lines[last]}, and changes every {1 / changes:.2g} readings elsewhere"
+        )
+        yield Finding(
+            "warning", file, int(lines[first]), what, "check the sensor; empty the cells if it hung"
+        )
+
+
+def few_findings(file: Path, channel: Channel, column: FloatArray) -> Iterator[Finding]:
+    """A measured channel with so few readings that no model can be judged by them."""
+    count = int(np.isfinite(column).sum())
+    if count < FEW:
+        what = f"'{channel.name}' has {count or 'no'} reading{'' if count == 1 else 's'}"
+        yield Finding("warning", file, None, what, f"record longer: at least {FEW} readings carry a model")
