@@ -86,34 +86,33 @@ def check(
 def record(
     out: Annotated[Path, typer.Option("--out", help="Folder of the campaign that is written.")],
     campaign: Annotated[
-        str | None, typer.Option(help="Record a whole known campaign, e.g. nmv5000; no other option but --out counts.")
+        str | None,
+        typer.Option(help="Record a known campaign, e.g. nmv5000; no other option but --out counts."),
     ] = None,
     recordings: Annotated[
         int, typer.Option(min=1, max=100, help="How many recordings, each with the next seed.")
     ] = 1,
     cycle: Annotated[
         str,
-        typer.Option(
-            help="Test cycle: fit, validation, dry, flow, environment, fluid, internal or warm_up (600 rpm, then rest)."
-        ),
+        typer.Option(help="fit, validation, dry, flow, environment, fluid, internal or warm_up."),
     ] = "fit",
     seed: Annotated[int, typer.Option(min=0, help="Everything random comes from it.")] = 1,
     hours: Annotated[float, typer.Option(help="Length of a recording.")] = 72.0,
     nozzle_height: Annotated[float, typer.Option(help="Nozzle above the table, mm.")] = 50.0,
     effect: Annotated[
         list[str] | None,
-        typer.Option(help="NAME=SIZE or NAME@BODY=SIZE or NAME@BODY+BODY=SIZE; may be repeated. NAME=help lists them."),
+        typer.Option(help="NAME[@BODY[+BODY]]=SIZE, may be repeated; --effect help lists them."),
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="NAME@CHANNEL=SIZE: a fault of the measuring chain, in the first recording; may be repeated."),
+        typer.Option(help="NAME[@CHANNEL]=SIZE: a fault of measuring, in the first recording."),
     ] = None,
-    conceal: Annotated[bool, typer.Option("--conceal", help="Draw an effect by seed and do not say which.")] = False,
-    reveal: Annotated[bool, typer.Option("--reveal", help="Put the answer into the folder, too.")] = False,
+    conceal: Annotated[bool, typer.Option("--conceal", help="Hide an effect drawn by seed.")] = False,
+    reveal: Annotated[bool, typer.Option("--reveal", help="Put the answer into OUT, too.")] = False,
 ) -> None:
     """Record the virtual machine: a rotary table of five bodies under cutting fluid, with R-Test readings.
 
-    The same options give the same files, bit for bit. What was concealed is written beside the folder, as OUT.answer.json.
+    The same options give the same files, bit for bit. What was concealed stands in OUT.answer.json.
 
     \b
     discovery record --out runs/plain --recordings 2

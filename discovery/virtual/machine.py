@@ -8,8 +8,8 @@ Five thermally uniform bodies stand on a machine bed and are flooded from a sump
     T_bed'   = (T_env - T_bed)/tau_bed
 
 Sources: [S] Mayr et al., "Compensation of cutting fluid influences on five axis machine tools".
-[J] judgement, chosen so that a 72 h cycle has the uncompensated errors of that paper's Table 3. The values are
-plausible, they are not identified from the real machine.
+[J] judgement, chosen so that a 72 h cycle has the uncompensated errors of that paper's Table 3. They are
+plausible, not identified from the real machine.
 """
 
 from __future__ import annotations

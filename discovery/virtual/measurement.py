@@ -60,7 +60,7 @@ def observe(cycle: Cycle, run: Trajectory, rng: np.random.Generator, chain: Chai
     """The recording of one run. Rows: every minute (inputs) and every reading (errors), merged by time."""
     per = round(INTERVAL_S / cycle.step_s)
     rows = len(cycle.speed) // per
-    stamps = np.arange(rows) * INTERVAL_S
+    stamps = np.arange(rows, dtype=np.float64) * INTERVAL_S
 
     def mean(x: Array) -> Array:
         return np.asarray(x[: rows * per].reshape(rows, per).mean(axis=1))
