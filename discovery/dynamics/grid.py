@@ -105,6 +105,16 @@ class Memory:
         slope = -np.diff(now) / self.grid.step
         return np.repeat(mean, 2), np.repeat(slope, 2)
 
+    def lagged(self, value: Array, time_constant: float) -> Array:
+        """First-order lag of a series along the instants of this memory, settled at the start."""
+        step = self.grid.step
+        if self.at_ends:
+            ends = np.ascontiguousarray(np.broadcast_to(value, (2 * len(step),)), dtype=float)
+            return np.asarray(kernel.lag_ends(ends, step, time_constant))
+        nodes = np.broadcast_to(value, (len(self.grid.time),)).astype(float)
+        lagged = kernel.lag_ends(_interleave(nodes[:-1], nodes[1:]), step, time_constant)
+        return np.concatenate((lagged[:1], lagged[1::2]))
+
     def play(self, value: Array, width: float) -> tuple[Array, Ints, Array]:
         """Play operator along the instants of this memory."""
         count = 2 * len(self.grid.step) if self.at_ends else len(self.grid.time)
@@ -143,12 +153,16 @@ def make_grid(
         values = data.values.get(name)
         known = np.isfinite(values) if values is not None else np.zeros(len(data.time), dtype=bool)
         if values is None or not known.any():
-            raise UserError(f"{campaign.path}: recording '{recording}' has no value of '{name}', which the model needs as an input")
+            raise UserError(
+                f"{campaign.path}: recording '{recording}' has no value of '{name}', which the model needs as an input"
+            )
         samples[name] = Samples(data.time[known], values[known], campaign.channels[name].between == "linear")
         if np.ptp(values[known]) > 0:
             stamps |= known
     missing = np.full(len(data.time), np.nan)
-    table = np.column_stack([data.values.get(name, missing) for name in outputs]) if outputs else missing[:, None]
+    table = (
+        np.column_stack([data.values.get(name, missing) for name in outputs]) if outputs else missing[:, None]
+    )
     taken = np.isfinite(table).any(axis=1)
     stamps |= taken
     stamps[[0, -1]] = True
@@ -157,7 +171,9 @@ def make_grid(
     gaps = np.diff(time)
     if (gaps > max_step).any():
         extra = [
-            np.linspace(t, t + gap, int(np.ceil(gap / max_step)) + 1)[1:-1] for t, gap in zip(time[:-1], gaps, strict=True) if gap > max_step
+            np.linspace(t, t + gap, int(np.ceil(gap / max_step)) + 1)[1:-1]
+            for t, gap in zip(time[:-1], gaps, strict=True)
+            if gap > max_step
         ]
         time = np.sort(np.concatenate([time, *extra]))
     return Grid(recording, time, samples, outputs, np.searchsorted(time, read_time), table[taken])

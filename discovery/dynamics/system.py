@@ -197,7 +197,9 @@ def outputs(trajectory: Trajectory, wrt: frozenset[str] = frozenset()) -> list[D
         elif name in system.states:
             found.append(Dual(env[name], {name: 1.0} if name in wrt else {}))
         else:
-            raise UserError(f"model '{system.model.name}' has no output '{name}'; give it one under [outputs]")
+            raise UserError(
+                f"model '{system.model.name}' has no output '{name}'; give it one under [outputs]"
+            )
     return found
 
 
@@ -264,7 +266,9 @@ def sensitivities(
     start = np.zeros((n, total))
     for k, name in enumerate(starts):
         start[system.states.index(name), len(parameters) + k] = 1.0
-    for i, state in enumerate(system.model.states.values()):  # a start that a parameter sets, unless it moves freely
+    for i, state in enumerate(
+        system.model.states.values()
+    ):  # a start that a parameter sets, unless it moves freely
         if state.start is not None and not wanted.isdisjoint(names(state.start)) and state.name not in starts:
             first = {name: float(series[0]) for name, series in system.grid.nodes.items()}
             for name, slope in evaluate(state.start, {**first, **trajectory.values}, wanted).partials.items():
@@ -293,5 +297,7 @@ def sensitivities(
     dy = np.einsum("ryn,rnm->rym", output_matrix(trajectory), s)
     for y, dual in enumerate(outputs(trajectory, wanted) if parameters else []):
         for name, partial in dual.partials.items():
-            dy[:, y, parameters.index(name)] += np.broadcast_to(partial, (len(system.grid.time),))[system.grid.read]
+            dy[:, y, parameters.index(name)] += np.broadcast_to(partial, (len(system.grid.time),))[
+                system.grid.read
+            ]
     return dy

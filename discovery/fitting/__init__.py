@@ -5,4 +5,13 @@ from discovery.fitting.heldout import predict_recording
 from discovery.fitting.noise import Noise, estimate_noise
 from discovery.fitting.problem import Problem, Unknown, make_problem
 
-__all__ = ["Fit", "Noise", "Problem", "Unknown", "estimate_noise", "fit_model", "make_problem", "predict_recording"]
+__all__ = [
+    "Fit",
+    "Noise",
+    "Problem",
+    "Unknown",
+    "estimate_noise",
+    "fit_model",
+    "make_problem",
+    "predict_recording",
+]

@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 
 Z95 = 1.959963984540054
-_UNSEEN = 1e-4  # share of a column's length that the other unknowns leave; below it the readings do not tell it
+_UNSEEN = (
+    1e-4  # share of a column's length that the other unknowns leave; below it the readings do not tell it
+)
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,8 @@ def fit_model(
     noise: Noise | None = None,
     loss: Loss = "linear",
     grids: Mapping[str, Grid] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    belief: float | None = None,
     max_rounds: int = 60,
 ) -> Fit:
     """Fit the free parameters and start values of a model to recordings.
@@ -75,10 +79,11 @@ def fit_model(
         noise: covariance of what the model leaves; default white.
         loss: "soft_l1", "huber" or "cauchy" bound the pull of outliers (scipy.optimize.least_squares).
         grids: grids to share between fits.
+        priors, belief: as in `make_problem`.
         max_rounds: of Levenberg-Marquardt.
     """
     began = clock.perf_counter()
-    problem = make_problem(model, campaign, recordings, outputs, grids)
+    problem = make_problem(model, campaign, recordings, outputs, grids, priors, belief)
     stated = {name: campaign.channels[name].noise for name in problem.outputs}
     theta = problem.start
     given = noise is not None
@@ -103,7 +108,14 @@ def fit_model(
         freedom = max(1, sum(int(s.grid.measured.sum()) for s in problem.systems) - len(theta))
         covariance = covariance * max(1.0, 2 * solution.cost / freedom)
     return Fit(
-        problem, theta, covariance, current, solution.trajectories, solution.cost, tuple(lost), clock.perf_counter() - began
+        problem,
+        theta,
+        covariance,
+        current,
+        solution.trajectories,
+        solution.cost,
+        tuple(lost),
+        clock.perf_counter() - began,
     )
 
 
@@ -130,12 +142,12 @@ def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds:
                 guesses[t.system.grid.recording] = t.x
             parts = [whiten(t, noise, problem.residual(t)[:, :, None])[:, 0] for t in trajectories]
             last.clear()
-            last[key] = (np.concatenate([*parts, _prior_residual(problem, x)]), trajectories)
+            last[key] = (np.concatenate([*parts, problem.prior_rows(x)[0]]), trajectories)
         return last[key]
 
     def jacobian(x: Array) -> Array:
         parts = [whiten(t, noise, -problem.jacobian(t)) for t in run(x)[1]]
-        return np.concatenate([*parts, _prior_jacobian(problem)])
+        return np.concatenate([*parts, problem.prior_rows(x)[1]])
 
     # scipy refuses a start on the bound's wrong side by rounding, and moves one that lies on it inside
     x0 = np.clip(theta, low, high)
@@ -157,18 +169,6 @@ def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds:
     return _Solution(x0, trajectories, jacobian(x0), 0.5 * float(residual @ residual))
 
 
-def _prior_residual(problem: Problem, theta: Array) -> Array:
-    return np.array([(theta[i] - u.start) / u.spread for i, u in enumerate(problem.unknowns) if u.spread])
-
-
-def _prior_jacobian(problem: Problem) -> Array:
-    rows = [(i, u.spread) for i, u in enumerate(problem.unknowns) if u.spread]
-    out = np.zeros((len(rows), len(problem.unknowns)))
-    for r, (i, spread) in enumerate(rows):
-        out[r, i] = 1.0 / float(spread)
-    return out
-
-
 def _covariance(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array, list[str]]:
     """Gauss-Newton covariance and a sentence for each parameter that the readings do not tell."""
     low, high = problem.bounds
@@ -186,14 +186,20 @@ def _covariance(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array,
             continue
         where = f" in recording '{u.recording}'" if u.recording else ""
         if not seen[i]:
-            sentences.append(f"{u.name}{where} has no effect on any reading: it cannot be found from these recordings")
+            sentences.append(
+                f"{u.name}{where} has no effect on any reading: it cannot be found from these recordings"
+            )
             covariance[i, i] = np.inf
             continue
         share = 1.0 / np.sqrt(max(inverse[np.searchsorted(index, i), np.searchsorted(index, i)], 1.0))
         error = np.sqrt(covariance[i, i])
         if share < _UNSEEN:
-            sentences.append(f"{u.name}{where} cannot be told apart from other parameters with these recordings")
-        elif error * Z95 > max(abs(theta[i]), 1e-12) and not (np.isfinite(low[i]) and theta[i] <= low[i] + 1e-9):
+            sentences.append(
+                f"{u.name}{where} cannot be told apart from other parameters with these recordings"
+            )
+        elif error * Z95 > max(abs(theta[i]), 1e-12) and not (
+            np.isfinite(low[i]) and theta[i] <= low[i] + 1e-9
+        ):
             sentences.append(f"{u.name}{where} is not determined: its 95 % interval is wider than its value")
     return covariance, sentences
 
@@ -209,7 +215,9 @@ def _fitted_model(fit: Fit) -> Model:
         value = float(fit.theta[i])
         if u.recording is not None:
             values = {**p.values, u.recording: value}
-            parameters[u.name] = replace(p, values=values, value=float(np.mean(list(values.values()))), low=None, high=None)
+            parameters[u.name] = replace(
+                p, values=values, value=float(np.mean(list(values.values()))), low=None, high=None
+            )
             continue
         half = Z95 * float(errors[i])
         interval = (max(value - half, p.min), min(value + half, p.max)) if np.isfinite(half) else (None, None)

@@ -17,7 +17,12 @@ Array = NDArray[np.float64]
 
 
 def predict_recording(
-    model: Model, campaign: Campaign, recording: str, outputs: Sequence[str], white: Sequence[float] | None = None, grid: Grid | None = None
+    model: Model,
+    campaign: Campaign,
+    recording: str,
+    outputs: Sequence[str],
+    white: Sequence[float] | None = None,
+    grid: Grid | None = None,
 ) -> Trajectory:
     """Free run of a model on a recording, zeroed on its first reading as a controller would be.
 
@@ -29,7 +34,9 @@ def predict_recording(
         white: (Y,) reading noise that weighs the first reading against the declared start; default 1 um each.
     """
     model = expanded(model)
-    used = set().union(*(names(s.start) for s in model.states.values() if s.start is not None)) & set(campaign.channels)
+    used = set().union(*(names(s.start) for s in model.states.values() if s.start is not None)) & set(
+        campaign.channels
+    )
     grid = grid or make_grid(campaign, recording, sorted((set(model.inputs) | used) - set(outputs)), outputs)
     system = make_system(model, grid)
     values = model.values(recording)

@@ -45,7 +45,9 @@ class Noise:
         return not any(self.slow) and not any((self.heat or {}).values())
 
 
-def white_noise(outputs: Sequence[str], stated: Mapping[str, float | None], residuals: Sequence[Array]) -> Noise:
+def white_noise(
+    outputs: Sequence[str], stated: Mapping[str, float | None], residuals: Sequence[Array]
+) -> Noise:
     """White noise with the stated standard deviations; where none is stated, that of the residuals (or readings)."""
     white = []
     for j, name in enumerate(outputs):
@@ -181,11 +183,19 @@ def whiten(trajectory: Trajectory, noise: Noise, data: Array) -> Array:
     """Whitened columns (measured readings, M) of data (R, Y, M)."""
     if noise.is_white:
         measured = trajectory.system.grid.measured
-        return np.asarray((np.where(measured[:, :, None], data, 0.0) / np.array(noise.white)[None, :, None])[measured])
+        return np.asarray(
+            (np.where(measured[:, :, None], data, 0.0) / np.array(noise.white)[None, :, None])[measured]
+        )
     return make_filter(trajectory).apply(noise, data)[0]
 
 
-def log_likelihood(filters: Sequence[Filter], noise: Noise, residuals: Sequence[Array], columns: Sequence[Array], prior: Array) -> float:
+def log_likelihood(
+    filters: Sequence[Filter],
+    noise: Noise,
+    residuals: Sequence[Array],
+    columns: Sequence[Array],
+    prior: Array,
+) -> float:
     """Restricted log-likelihood: the unknowns behind `columns` are integrated out.
 
     Args:

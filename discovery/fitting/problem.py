@@ -8,7 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid, System, Trajectory, make_grid, make_system, sensitivities, simulate, start_values
+from discovery.dynamics import (
+    Grid,
+    System,
+    Trajectory,
+    make_grid,
+    make_system,
+    sensitivities,
+    simulate,
+    start_values,
+)
 from discovery.dynamics.system import predict
 from discovery.models import Model, expanded
 from discovery.recordings import Campaign
@@ -27,7 +36,8 @@ class Unknown:
     start: float
     low: float
     high: float
-    spread: float | None = None  # of a start value: standard deviation of its prior
+    prior: tuple[float, float] | None = None  # mean and standard deviation
+    belief: float | None = None  # the start value is believed within a factor exp(belief), with heavy tails
 
 
 @dataclass(frozen=True)
@@ -57,6 +67,24 @@ class Problem:
         """Indices of the unknowns that act in a recording."""
         return [i for i, u in enumerate(self.unknowns) if u.recording in (None, system.grid.recording)]
 
+    def prior_rows(self, theta: Array) -> tuple[Array, Array]:
+        """What priors and beliefs add to the least squares: residual (K,) and its derivative (K, U)."""
+        rows: list[float] = []
+        slopes: list[tuple[int, float]] = []
+        for i, u in enumerate(self.unknowns):
+            if u.prior:
+                mean, sd = u.prior
+                rows.append((theta[i] - mean) / sd)
+                slopes.append((i, 1.0 / sd))
+            elif u.belief:
+                residual, slope = _belief(float(theta[i]), u.start, u.belief)
+                rows.append(residual)
+                slopes.append((i, slope))
+        jacobian = np.zeros((len(rows), len(self.unknowns)))
+        for k, (i, slope) in enumerate(slopes):
+            jacobian[k, i] = slope
+        return np.array(rows), jacobian
+
     def values(self, system: System, theta: Array) -> dict[str, float]:
         """Parameter values in a recording."""
         out = self.model.values(system.grid.recording)
@@ -85,7 +113,9 @@ class Problem:
         parameters = [self.unknowns[i].name for i in mine if not self.unknowns[i].is_start]
         starts = [self.unknowns[i].name for i in mine if self.unknowns[i].is_start]
         dy = sensitivities(trajectory, parameters, starts)
-        ordered = [i for i in mine if not self.unknowns[i].is_start] + [i for i in mine if self.unknowns[i].is_start]
+        ordered = [i for i in mine if not self.unknowns[i].is_start] + [
+            i for i in mine if self.unknowns[i].is_start
+        ]
         out = np.zeros((*dy.shape[:2], len(self.unknowns)))
         out[:, :, ordered] = dy
         return out
@@ -97,17 +127,24 @@ def make_problem(
     recordings: Sequence[str],
     outputs: Sequence[str] | None = None,
     grids: Mapping[str, Grid] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    belief: float | None = None,
 ) -> Problem:
     """Bind a model to recordings and lay out its unknowns.
 
     Args:
         outputs: measured channels to compare; default every output of the model that the campaign measures.
         grids: grids made before, by recording (a model with the same inputs may share them).
+        priors: (mean, standard deviation) by parameter.
+        belief: believe positive start values within a factor exp(belief), with heavy tails; default not at all.
     """
+    priors = priors or {}
     model = expanded(model)
     if outputs is None:
         outputs = [name for name in (*model.outputs, *model.states) if name in campaign.channels]
-    used = set().union(*(names(s.start) for s in model.states.values() if s.start is not None)) & set(campaign.channels)
+    used = set().union(*(names(s.start) for s in model.states.values() if s.start is not None)) & set(
+        campaign.channels
+    )
     inputs = sorted((set(model.inputs) | used) - set(outputs))
     systems = []
     for recording in recordings:
@@ -119,12 +156,33 @@ def make_problem(
     for name in model.free:
         p = model.parameters[name]
         if p.per_recording:
-            unknowns += [Unknown(name, r, False, p.at(r), p.min, p.max) for r in recordings]
+            own = (
+                [r for r in recordings if r in p.values] if p.values else recordings
+            )  # the others keep the common value
+            unknowns += [Unknown(name, r, False, p.at(r), p.min, p.max, priors.get(name)) for r in own]
         else:
-            unknowns.append(Unknown(name, None, False, p.value, p.min, p.max))
+            believed = belief if name not in priors and p.value > 0 and p.min >= 0 else None
+            unknowns.append(Unknown(name, None, False, p.value, p.min, p.max, priors.get(name), believed))
     for system in systems:
         declared = start_values(system, model.values(system.grid.recording))
         for state, value in zip(system.model.states.values(), declared, strict=True):
             if state.start_sd > 0:
-                unknowns.append(Unknown(state.name, system.grid.recording, True, float(value), -np.inf, np.inf, state.start_sd))
+                unknowns.append(
+                    Unknown(
+                        state.name, system.grid.recording, True, float(value), -np.inf, np.inf, state.start_sd
+                    )
+                )
     return Problem(model, tuple(systems), tuple(unknowns))
+
+
+def _belief(value: float, start: float, width: float) -> tuple[float, float]:
+    """Residual and slope of a heavy-tailed (Student, 4 degrees of freedom) belief in the logarithm of a parameter.
+
+    A third of the start value is added to both, so that a parameter may go to zero.
+    """
+    shift = start / 3
+    u = float(np.log((max(value, 0.0) + shift) / (start + shift))) / width
+    freedom = 4.0
+    residual = float(np.sign(u) * np.sqrt((freedom + 1) * np.log1p(u * u / freedom)))
+    outer = (freedom + 1) * u / (freedom + u * u) / residual if abs(u) > 1e-6 else float(np.sqrt((freedom + 1) / freedom))
+    return residual, outer / (width * (max(value, 0.0) + shift))

@@ -1,5 +1,15 @@
 """Models: hand-built and discovered ones meet here as the same sparse sum of terms."""
 
 from discovery.models.model import Model, Parameter, State, expanded
+from discovery.models.modelfile import check_names, model_document, read_model, write_model
 
-__all__ = ["Model", "Parameter", "State", "expanded"]
+__all__ = [
+    "Model",
+    "Parameter",
+    "State",
+    "check_names",
+    "expanded",
+    "model_document",
+    "read_model",
+    "write_model",
+]

@@ -104,7 +104,9 @@ class Model:
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The model with other parameter values (intervals dropped)."""
         parameters = {
-            name: replace(parameter, value=float(values[name]), low=None, high=None) if name in values else parameter
+            name: replace(parameter, value=float(values[name]), low=None, high=None)
+            if name in values
+            else parameter
             for name, parameter in self.parameters.items()
         }
         return replace(self, parameters=parameters)

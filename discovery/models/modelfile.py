@@ -28,18 +28,26 @@ class ParameterForm(_Strict):
     min: float = Field(-math.inf, description="smallest value that a fit may give")
     max: float = Field(math.inf, description="largest value that a fit may give")
     fixed: bool = Field(False, description="true: given, not fitted")
-    per: Literal["recording"] | None = Field(None, description='"recording": a value of its own in each recording')
+    per: Literal["recording"] | None = Field(
+        None, description='"recording": a value of its own in each recording'
+    )
     low: float | None = Field(None, description="lower end of the 95 % interval (written by a fit)")
     high: float | None = Field(None, description="upper end of the 95 % interval (written by a fit)")
-    values: dict[str, float] = Field(default_factory=dict, description="values by recording (written by a fit)")
+    values: dict[str, float] = Field(
+        default_factory=dict, description="values by recording (written by a fit)"
+    )
 
 
 class StateForm(_Strict):
     """One line of [states]."""
 
     unit: str = Field("degC", description="unit of the state")
-    capacity: float | None = Field(None, gt=0, description="heat capacity in J/K; its terms are then heat flows in W")
-    start: float | str | None = Field(None, description="number or expression; without it the first reading, else 0")
+    capacity: float | None = Field(
+        None, gt=0, description="heat capacity in J/K; its terms are then heat flows in W"
+    )
+    start: float | str | None = Field(
+        None, description="number or expression; without it the first reading, else 0"
+    )
     start_sd: float | None = Field(None, ge=0, description="spread of the start value; default 0.5 K or 1 um")
 
 
@@ -80,7 +88,9 @@ def read_model(path: Path) -> Model:
     for kind in ("parameters", "states"):
         for name in getattr(form, kind):
             if not name.isidentifier() or keyword.iskeyword(name) or name in FUNCTIONS or name == "time":
-                raise UserError(f"{at(kind, name)}: '{name}' cannot name a {kind[:-1]}; use letters, digits and _ and no reserved word")
+                raise UserError(
+                    f"{at(kind, name)}: '{name}' cannot name a {kind[:-1]}; use letters, digits and _ and no reserved word"
+                )
     for name in form.parameters.keys() & form.states.keys():
         raise UserError(f"{at('parameters', name)}: '{name}' is also a state; rename one of them")
 
@@ -89,24 +99,48 @@ def read_model(path: Path) -> Model:
         if entry.min > entry.max:
             raise UserError(f"{at('parameters', name)}: min {entry.min:g} is above max {entry.max:g}")
         if not entry.min <= entry.start <= entry.max and not entry.fixed:
-            raise UserError(f"{at('parameters', name)}: start {entry.start:g} lies outside min {entry.min:g} and max {entry.max:g}")
+            raise UserError(
+                f"{at('parameters', name)}: start {entry.start:g} lies outside min {entry.min:g} and max {entry.max:g}"
+            )
         parameters[name] = Parameter(
-            entry.start, entry.unit, entry.min, entry.max, entry.fixed, entry.per == "recording", entry.low, entry.high, entry.values
+            entry.start,
+            entry.unit,
+            entry.min,
+            entry.max,
+            entry.fixed,
+            entry.per == "recording",
+            entry.low,
+            entry.high,
+            entry.values,
         )
     states = {}
     per_unit = 1.0 / TIME_UNITS[form.time_unit]
     for name, state in form.states.items():
-        start: Expression | None = None if state.start is None else parse(state.start, at("states", name, "start"))
-        spread = state.start_sd if state.start_sd is not None else (0.5 if state.unit in ("degC", "K", "kelvin") else 1.0)
+        start: Expression | None = (
+            None if state.start is None else parse(state.start, at("states", name, "start"))
+        )
+        spread = (
+            state.start_sd
+            if state.start_sd is not None
+            else (0.5 if state.unit in ("degC", "K", "kelvin") else 1.0)
+        )
         scale = 1.0 / state.capacity if state.capacity else per_unit
         states[name] = State(name, state.unit, state.capacity, start, spread, scale)
     terms = []
     for i, term in enumerate(form.terms):
         for key, state_name in (("into", term.into), ("from", term.source)):
             if state_name is not None and state_name not in states:
-                raise UserError(f"{at('terms', i, key)}: '{state_name}' is not a state; states are {', '.join(states)}")
+                raise UserError(
+                    f"{at('terms', i, key)}: '{state_name}' is not a state; states are {', '.join(states)}"
+                )
         terms.append(
-            Term(term.name or f"term {i + 1}", term.into, parse(term.expression, at("terms", i, "expression")), term.source, term.effect)
+            Term(
+                term.name or f"term {i + 1}",
+                term.into,
+                parse(term.expression, at("terms", i, "expression")),
+                term.source,
+                term.effect,
+            )
         )
     outputs = {name: parse(expression, at("outputs", name)) for name, expression in form.outputs.items()}
     return Model(form.name or Path(path).stem, parameters, states, tuple(terms), outputs, form.time_unit)
@@ -137,7 +171,11 @@ def model_document(model: Model) -> dict[str, Any]:
         return float(f"{value:.10g}")
 
     def finite(entries: dict[str, Any]) -> dict[str, Any]:
-        return {key: value for key, value in entries.items() if value is not None and value not in (math.inf, -math.inf)}
+        return {
+            key: value
+            for key, value in entries.items()
+            if value is not None and value not in (math.inf, -math.inf)
+        }
 
     parameters = {}
     for name, p in model.parameters.items():
@@ -148,7 +186,14 @@ def model_document(model: Model) -> dict[str, Any]:
         entry |= {"values": {key: number(value) for key, value in p.values.items()}} if p.values else {}
         parameters[name] = entry
     states = {
-        name: finite({"unit": s.unit, "capacity": s.capacity, "start": s.start and text(s.start), "start_sd": s.start_sd})
+        name: finite(
+            {
+                "unit": s.unit,
+                "capacity": s.capacity,
+                "start": s.start and text(s.start),
+                "start_sd": s.start_sd,
+            }
+        )
         for name, s in model.states.items()
     }
     terms = [

@@ -33,6 +33,9 @@ class Memory(Protocol):
     def delayed(self, channel: str, seconds: float) -> tuple[Array, Array]:
         """Channel `seconds` ago, and its derivative with respect to `seconds`."""
 
+    def lagged(self, value: Array, time_constant: float) -> Array:
+        """First-order lag that starts settled."""
+
     def play(self, value: Array, width: float) -> tuple[Array, NDArray[np.intp], Array]:
         """Play operator: output, index of the instant it follows, sign of the contact (0 at rest)."""
 
@@ -69,6 +72,10 @@ def evaluate(
             assert memory is not None
             value, slope = memory.delayed(channel, float(np.mean(duration.value)))
             return Dual(value, {name: slope * partial for name, partial in duration.partials.items()})
+        case Apply(function="lag", arguments=(inner, tau)) if memory is not None:
+            # A model's own lags are states (models.expanded); this one serves candidates, seen along a given trajectory.
+            series = np.asarray(evaluate(inner, values, memory=memory).value, dtype=float)
+            return Dual(memory.lagged(series, float(np.mean(evaluate(tau, values, memory=memory).value))))
         case Apply(function="play", arguments=(inner, width)):
             return _play(evaluate(inner, values, wrt, memory), evaluate(width, values, wrt, memory), memory)
         case Apply(function=function, arguments=arguments):
@@ -131,7 +138,9 @@ def _apply(function: str, a: list[Dual]) -> Dual:
         case "where":
             inside = np.not_equal(x, 0.0)
             partials: dict[str, Value] = {}
-            for name in a[1].partials.keys() | a[2].partials.keys():  # selected, so that the other branch may be NaN
+            for name in (
+                a[1].partials.keys() | a[2].partials.keys()
+            ):  # selected, so that the other branch may be NaN
                 partials[name] = np.where(inside, a[1].partials.get(name, 0.0), a[2].partials.get(name, 0.0))
             return Dual(np.where(inside, y, a[2].value), partials)
         case "min" | "max":
@@ -142,8 +151,6 @@ def _apply(function: str, a: list[Dual]) -> Dual:
                 first = np.equal(value, result.value) * 1.0
                 result = _chain(value, [(first, result), (1.0 - first, other)])
             return result
-        case "lag":
-            raise ValueError("lag() is a hidden state: Model.expanded() replaces it before evaluation")
     raise ValueError(f"unknown function {function}")
 
 

@@ -97,7 +97,9 @@ def parse(source: str | float, where: str = "expression") -> Expression:
     if isinstance(source, (int, float)):
         return _number(float(source), where)
     if len(source) > MAX_LENGTH:
-        raise UserError(f"{where}: the expression has {len(source)} characters, at most {MAX_LENGTH} are read; split it")
+        raise UserError(
+            f"{where}: the expression has {len(source)} characters, at most {MAX_LENGTH} are read; split it"
+        )
     try:
         tree = ast.parse(source.strip(), mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
@@ -118,7 +120,9 @@ def _number(value: float, where: str) -> Number:
 def _convert(node: ast.AST, source: str, where: str, counter: list[int], depth: int) -> Expression:
     counter[0] += 1
     if counter[0] > MAX_NODES or depth > MAX_DEPTH:
-        raise UserError(f"{where}: '{source[:60]}' is too large (at most {MAX_NODES} parts, {MAX_DEPTH} deep); split it")
+        raise UserError(
+            f"{where}: '{source[:60]}' is too large (at most {MAX_NODES} parts, {MAX_DEPTH} deep); split it"
+        )
 
     def down(child: ast.AST) -> Expression:
         return _convert(child, source, where, counter, depth + 1)
@@ -143,7 +147,9 @@ def _convert(node: ast.AST, source: str, where: str, counter: list[int], depth: 
         case ast.Compare(left=left, ops=ops, comparators=comparators):
             items = [down(left), *(down(item) for item in comparators)]
             pairs: list[Expression] = [
-                Apply(_COMPARE[type(op)], (items[i], items[i + 1])) for i, op in enumerate(ops) if type(op) in _COMPARE
+                Apply(_COMPARE[type(op)], (items[i], items[i + 1]))
+                for i, op in enumerate(ops)
+                if type(op) in _COMPARE
             ]
             if len(pairs) == len(ops):  # a < b < c holds where both hold
                 result = pairs[0]
@@ -153,12 +159,16 @@ def _convert(node: ast.AST, source: str, where: str, counter: list[int], depth: 
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
             fewest, most = FUNCTIONS[name]
             if not fewest <= len(args) <= most:
-                raise UserError(f"{where}: {name}() takes {fewest} arguments, '{source[:60]}' gives it {len(args)}")
+                raise UserError(
+                    f"{where}: {name}() takes {fewest} arguments, '{source[:60]}' gives it {len(args)}"
+                )
             if name == "delay" and not isinstance(args[0], ast.Name):
                 raise UserError(f"{where}: delay() takes a channel and seconds, as in delay(T_fluid, 600)")
             return Apply(name, tuple(down(arg) for arg in args))
         case ast.Call(func=ast.Name(id=name)):
-            raise UserError(f"{where}: unknown function {name}() in '{source[:60]}'; known: {', '.join(sorted(FUNCTIONS))}")
+            raise UserError(
+                f"{where}: unknown function {name}() in '{source[:60]}'; known: {', '.join(sorted(FUNCTIONS))}"
+            )
         case _:
             pass
     fragment = ast.get_source_segment(source.strip(), node) if hasattr(node, "lineno") else None
@@ -251,12 +261,20 @@ def _text(expression: Expression, number: Callable[[float], str]) -> tuple[str, 
             level = _PRECEDENCE[function]
             left_text, left_level = _text(left, number)
             right_text, right_level = _text(right, number)
-            left_open = left_level < level or (function == "**" and left_level <= level) or level == 1 == left_level
-            right_open = right_level < level or (function in ("-", "/") and right_level <= level) or level == 1 == right_level
+            left_open = (
+                left_level < level or (function == "**" and left_level <= level) or level == 1 == left_level
+            )
+            right_open = (
+                right_level < level
+                or (function in ("-", "/") and right_level <= level)
+                or level == 1 == right_level
+            )
             right_open = right_open or right_level == 4
             left_text = f"({left_text})" if left_open else left_text
             right_text = f"({right_text})" if right_open else right_text
             tight = function in ("*", "/", "**")
-            return (f"{left_text}{function}{right_text}" if tight else f"{left_text} {function} {right_text}"), level
+            return (
+                f"{left_text}{function}{right_text}" if tight else f"{left_text} {function} {right_text}"
+            ), level
         case Apply(function=function, arguments=arguments):
             return f"{function}({', '.join(_text(argument, number)[0] for argument in arguments)})", 6

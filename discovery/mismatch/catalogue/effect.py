@@ -1,0 +1,104 @@
+"""What the catalogue knows of an effect: a formula with holes for bodies and channels, and what is plausible."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Group = Literal["cutting fluid", "drive and cooling", "air and structure", "measuring chain", "user"]
+
+# Where an effect can act. A word per rule of hypotheses.py; nothing is offered where it cannot act.
+Place = Literal[
+    "body",  # any body
+    "fluid-free body",  # a body that the model leaves dry
+    "wet body",  # a body that the model couples to the fluid
+    "driven body",  # a body that receives drive losses
+    "air body",  # a body that the model couples to the air
+    "pair",  # two bodies without a path between them in the model
+    "any pair",  # two bodies, linked or not
+    "link",  # two bodies that the model links
+    "fluid terms",  # every term in which the fluid temperature stands
+    "cooling terms",  # every term in which the cooling power stands
+    "output",  # one error, all recordings
+    "output of a recording",  # one error in one recording
+    "inputs of a recording",  # every input in one recording
+    "recording",  # all errors of one recording
+]
+
+# Variables that a formula may use, and the role of the channel that stands for each
+ROLE_OF = {
+    "ambient": "ambient temperature",
+    "fluid": "fluid temperature",
+    "flow": "fluid flow",
+    "speed": "rotation speed",
+    "load": "heat load",
+    "cooling": "cooling power",
+    "coolant": "coolant temperature",
+    "height": "nozzle height",
+    "other_input": "other input",
+}
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """The number that switches the effect on: the formula is linear in it and zero at zero.
+
+    `plausible` is the spread of sizes seen on machines of this class (one standard deviation), `sign` +1 or -1 where
+    physics fixes it, 0 where it does not. `fixed`: the effect is on or off, its size sits in the shape parameters.
+    """
+
+    name: str
+    unit: str
+    plausible: float
+    sign: int = 1
+    fixed: float | None = None
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A parameter inside the formula: a grid for the search, bounds for the refinement."""
+
+    name: str
+    unit: str
+    grid: tuple[float, ...]
+    low: float
+    high: float
+    fixed: bool = False  # searched on the grid alone
+
+
+@dataclass(frozen=True)
+class Example:
+    """A worked example: values of the names in the formula, and what it gives."""
+
+    values: Mapping[str, float]
+    expected: float
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One entry of the catalogue.
+
+    `formula` is a heat flow [W] into `body` (and out of `other` where it names one), or what an output shows more.
+    For "fluid terms" and "cooling terms" it is what the replaced channel becomes; for outputs `y` is the error
+    without the effect. Where states have no capacity (phenomenological models) the same formula is a rate.
+    """
+
+    word: str
+    title: str
+    group: Group
+    place: Place
+    formula: str
+    amplitude: Amplitude
+    source: str
+    signature: str
+    confused_with: tuple[str, ...] = ()
+    shapes: tuple[Shape, ...] = ()
+    prior: float = 1.0  # weight against the other entries
+    one_recording: bool = False  # its size belongs to one recording (an event, a fault)
+    examples: tuple[Example, ...] = field(default=())
+
+    @property
+    def is_physics(self) -> bool:
+        """False for faults of the measuring chain."""
+        return self.group != "measuring chain"

@@ -1,0 +1,17 @@
+"""The table accelerates the film; half of the power heats it, half is dissipated where it lands."""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+
+EFFECT = Effect(
+    word="film_drag",
+    title="Drag of the film",
+    group="cutting fluid",
+    place="body",
+    formula="q_d*flow*(speed/1000)**m",
+    amplitude=Amplitude("q_d", "W", 80.0),
+    shapes=(Shape("m", "1", (2.0,), 1.6, 2.4),),
+    signature="heat with the square of the speed, only while the pump runs",
+    confused_with=("friction_speed",),
+    source="momentum balance: P = m'(w r)^2, 41 to 82 W at 600 rpm, 164 to 327 W at 1200 rpm for 10 to 20 l/min",
+    examples=(Example({"q_d": 80.0, "flow": 1.0, "speed": 500.0, "m": 2.0}, 20.0),),
+)

@@ -1,0 +1,21 @@
+"""Bearing and seal friction as a function of speed, beyond the share of the drive power in the model."""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+
+EFFECT = Effect(
+    word="friction_speed",
+    title="Friction that follows the speed",
+    group="drive and cooling",
+    place="driven body",
+    formula="P_f*(speed/1000)**m",
+    amplitude=Amplitude("P_f", "W", 60.0),
+    shapes=(Shape("m", "1", (1.0, 1.6), 0.8, 2.2),),
+    signature="heat in bearings and drive that the drive power does not account for, a smooth power of the speed",
+    confused_with=(
+        "viscosity_temperature",
+        "windage",
+        "film_drag",
+    ),
+    source="Palmgren: (M_c + M_v n^(2/3)) n, i.e. an effective exponent of 1 to 5/3",
+    examples=(Example({"P_f": 50.0, "speed": 500.0, "m": 1.0}, 25.0),),
+)

@@ -1,0 +1,19 @@
+"""Free convection: a film coefficient that grows with the temperature difference."""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+
+EFFECT = Effect(
+    word="natural_convection",
+    title="Natural convection",
+    group="air and structure",
+    place="air body",
+    formula="h_nat*abs(ambient - body)**0.3*(ambient - body)",
+    amplitude=Amplitude("h_nat", "W/K", 4.0),
+    signature="loss to the air grows faster than the temperature difference: slower tail near equilibrium",
+    confused_with=(
+        "radiation",
+        "air_convection",
+    ),
+    source="Churchill-Chu, McAdams: h grows with the 1/4 to 1/3 power of the temperature difference, 1.9 to 4.2 W/m2K for 1 to 10 K",
+    examples=(Example({"h_nat": 4.0, "ambient": 22.0, "body": 23.0}, -4.0),),
+)

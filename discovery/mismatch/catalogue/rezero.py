@@ -1,0 +1,18 @@
+"""All errors of a recording jump at the same instant and stay."""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+
+EFFECT = Effect(
+    word="rezero",
+    title="Device set to zero",
+    group="measuring chain",
+    place="recording",
+    formula="zero*where(time >= t_zero, 1, 0)",
+    amplitude=Amplitude("zero", "um", 5.0, 0),
+    shapes=(Shape("t_zero", "s", (0.0,), 0.0, 1e9, True),),
+    signature="all errors jump between two readings and stay",
+    confused_with=("sensor_offset",),
+    source="the R-Test is set to zero again within a recording",
+    one_recording=True,
+    examples=(Example({"zero": 3.0, "time": 700.0, "t_zero": 600.0}, 3.0),),
+)

@@ -1,0 +1,20 @@
+"""Convection to the air that grows with the speed of the table."""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+
+EFFECT = Effect(
+    word="rotating_air_convection",
+    title="Air moved by rotation",
+    group="air and structure",
+    place="body",
+    formula="hR_air*(speed/1000)**m*(ambient - body)",
+    amplitude=Amplitude("hR_air", "W/K", 8.0),
+    shapes=(Shape("m", "1", (0.5, 1.0), 0.3, 1.2),),
+    signature="heat loss to the air that grows with speed, wet or dry",
+    confused_with=(
+        "air_convection",
+        "natural_convection",
+    ),
+    source="rotating disk: Nu = 0.36 Re^0.5 laminar, Re^0.8 turbulent; 5 to 47 W/m2K up to 1200 rpm",
+    examples=(Example({"hR_air": 8.0, "speed": 1000.0, "m": 0.5, "ambient": 22.0, "body": 27.0}, -40.0),),
+)

@@ -1,0 +1,20 @@
+"""One error drifts in a straight line through one recording."""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+
+EFFECT = Effect(
+    word="sensor_drift",
+    title="Drift of a sensor",
+    group="measuring chain",
+    place="output of a recording",
+    formula="drift*time/86400",
+    amplitude=Amplitude("drift", "um/day", 2.0, 0),
+    signature="one error runs away in a straight line, unrelated to any input",
+    confused_with=(
+        "bed_memory",
+        "wear",
+    ),
+    source="displacement sensors and their electronics: 0.5 to 1 um a day",
+    one_recording=True,
+    examples=(Example({"drift": 1.0, "time": 43200.0}, 0.5),),
+)

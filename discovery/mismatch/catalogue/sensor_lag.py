@@ -1,0 +1,19 @@
+"""One error is read through a first-order lag."""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Shape
+
+EFFECT = Effect(
+    word="sensor_lag",
+    title="Lag of a sensor",
+    group="measuring chain",
+    place="output",
+    formula="on*(lag(y, t_lag) - y)",
+    amplitude=Amplitude("on", "1", 1.0, 1, 1.0),
+    shapes=(Shape("t_lag", "s", (20.0, 60.0, 180.0, 600.0, 1800.0), 1.0, 7200.0),),
+    signature="one error follows late and smoothed",
+    confused_with=(
+        "clock_shift",
+        "second_thermal_mass",
+    ),
+    source="sensors behind a wall or in a housing: 30 to 300 s",
+)

@@ -1,0 +1,21 @@
+"""One error jumps at an instant of one recording and stays there."""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+
+EFFECT = Effect(
+    word="sensor_offset",
+    title="Offset of a sensor",
+    group="measuring chain",
+    place="output of a recording",
+    formula="offset*where(time >= t_step, 1, 0)",
+    amplitude=Amplitude("offset", "um", 4.0, 0),
+    shapes=(Shape("t_step", "s", (0.0,), 0.0, 1e9, True),),
+    signature="one error jumps between two readings and stays, the others do not",
+    confused_with=(
+        "unmeasured_heat",
+        "rezero",
+    ),
+    source="a nest or sensor that was touched: one direction jumps and stays",
+    one_recording=True,
+    examples=(Example({"offset": 4.0, "time": 5000.0, "t_step": 3600.0}, 4.0),),
+)

@@ -1,0 +1,285 @@
+"""Where each effect of the catalogue could act in a given model: one hypothesis per effect, place and shape."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+from discovery.mismatch.catalogue.effect import ROLE_OF, Effect
+from discovery.models import Model, Parameter
+from discovery.recordings import Channel
+from discovery.terms import Apply, Expression, Name, Term, names, parse, substitute
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect at a place with its shape parameters at given values.
+
+    `terms` enter states, `shown` is what outputs show in addition; both hold the amplitudes and shapes as parameters.
+    """
+
+    effect: Effect
+    states: tuple[str, ...]
+    amplitudes: tuple[str, ...]
+    terms: tuple[Term, ...] = ()
+    shown: Mapping[str, Expression] = field(default_factory=dict)
+    output: str | None = None
+    recording: str | None = None
+    shapes: Mapping[str, float] = field(default_factory=dict)  # parameter name -> value
+    channels: tuple[str, ...] = ()
+    cost: float = 0.0  # log of the number of instants that were searched for it
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...], str | None, str | None, tuple[str, ...]]:
+        """What the hypothesis claims, whatever its shape values."""
+        return (self.effect.word, self.states, self.output, self.recording, self.channels)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """States, or outputs for what happens in the measuring chain."""
+        return self.states or ((self.output,) if self.output else tuple(self.shown))
+
+    def at(self, shapes: Mapping[str, float]) -> Hypothesis:
+        """The same claim with other shape values."""
+        return replace(self, shapes={**self.shapes, **shapes})
+
+    def added_to(self, model: Model, start: Mapping[str, float] | None = None) -> Model:
+        """The model with the effect, its amplitudes starting at `start` (default: a tenth of plausible)."""
+        start = start or {}
+        amplitude = self.effect.amplitude
+        parameters = {}
+        for name in self.amplitudes:
+            low = 0.0 if amplitude.sign > 0 else -float("inf")
+            high = 0.0 if amplitude.sign < 0 else float("inf")
+            value = start.get(
+                name,
+                amplitude.fixed
+                if amplitude.fixed is not None
+                else 0.1 * amplitude.plausible * (amplitude.sign or 1),
+            )
+            parameters[name] = self._parameter(value, amplitude.unit, low, high, amplitude.fixed is not None)
+        for (name, value), shape in zip(self.shapes.items(), self.effect.shapes, strict=True):
+            parameters[name] = self._parameter(
+                start.get(name, value), shape.unit, shape.low, shape.high, shape.fixed
+            )
+        outputs = {}
+        for name, extra in self.shown.items():
+            outputs[name] = Apply("+", (model.outputs.get(name, Name(name)), extra))
+        return model.with_terms(*self.terms, parameters=parameters, outputs=outputs)
+
+    def _parameter(self, value: float, unit: str, low: float, high: float, fixed: bool) -> Parameter:
+        if self.recording is None:
+            return Parameter(value, unit, low, high, fixed)
+        # An event of one recording: the common value 0 keeps it out of every other one.
+        return Parameter(
+            0.0, unit, min(low, 0.0), max(high, 0.0), fixed, True, values={self.recording: value}
+        )
+
+
+def hypotheses(
+    model: Model,
+    channels: Mapping[str, Channel],
+    outputs: Iterable[str],
+    recordings: Iterable[str],
+    effects: Iterable[Effect],
+) -> list[Hypothesis]:
+    """Every effect at every place where it can act, at every point of its shape grid.
+
+    Effects whose place in time has to be searched (windows, steps) come with their first shape values; `events.py`
+    finds the instants.
+    """
+    found: list[Hypothesis] = []
+    for effect in effects:
+        for claim in _claims(effect, model, channels, tuple(outputs), tuple(recordings)):
+            grids = [
+                [(name, value) for value in shape.grid]
+                for name, shape in zip(claim.shapes, effect.shapes, strict=True)
+            ]
+            found += [claim.at(dict(point)) for point in product(*grids)]
+    return found
+
+
+def _claims(
+    effect: Effect,
+    model: Model,
+    channels: Mapping[str, Channel],
+    outputs: tuple[str, ...],
+    recordings: tuple[str, ...],
+) -> Iterator[Hypothesis]:
+    formula = parse(effect.formula, f"effect {effect.word}")
+    used = names(formula)
+    wanted = [variable for variable in ROLE_OF if variable in used]
+    choices = [
+        [name for name, c in channels.items() if c.role == ROLE_OF[variable] and _drives(name, model)]
+        for variable in wanted
+    ]
+    several = any(len(choice) > 1 for choice in choices)
+    runs: tuple[str | None, ...] = recordings if effect.one_recording else (None,)
+    if effect.word == "wear":
+        runs = recordings[1:]  # what is common to all recordings is the model's own parameter
+    for chosen in product(*choices):
+        binding: dict[str, Expression] = {v: Name(c) for v, c in zip(wanted, chosen, strict=True)}
+        for states, source_terms, shown in _places(effect, model, outputs, channels):
+            for run in runs:
+                tag = [
+                    *(chosen if several else ()),
+                    *(states or shown[:1] if len(shown) == 1 or states else ()),
+                    *((run,) if run else ()),
+                ]
+                yield _claim(
+                    effect,
+                    model,
+                    formula,
+                    binding,
+                    states,
+                    source_terms,
+                    shown,
+                    run,
+                    tag,
+                    channels,
+                    chosen if several else (),
+                )
+
+
+def _drives(name: str, model: Model) -> bool:
+    """A channel may stand in a hypothesis unless the model predicts it."""
+    return name not in model.states and name not in model.outputs
+
+
+def _claim(
+    effect: Effect,
+    model: Model,
+    formula: Expression,
+    binding: dict[str, Expression],
+    states: tuple[str, ...],
+    replaced: tuple[Term, ...],
+    shown: tuple[str, ...],
+    run: str | None,
+    tag: list[str],
+    channels: Mapping[str, Channel],
+    chosen: tuple[str, ...],
+) -> Hypothesis:
+    suffix = "_".join(tag)
+
+    def own(name: str, extra: str = "") -> str:
+        full = "_".join(part for part in (name, extra, suffix) if part)
+        while full in model.parameters or full in model.states or full in channels:
+            full += "_x"
+        return full
+
+    shape_names = {shape.name: own(shape.name) for shape in effect.shapes}
+    rename: dict[str, Expression] = {short: Name(full) for short, full in shape_names.items()}
+    shapes = {full: effect.shapes[i].grid[0] for i, full in enumerate(shape_names.values())}
+    base = {**binding, **rename}
+    several = len(shown) > 1
+    amplitudes = (
+        [own(effect.amplitude.name, output) for output in shown] if several else [own(effect.amplitude.name)]
+    )
+    amplitude = Name(amplitudes[0])
+    terms: list[Term] = []
+    extra: dict[str, Expression] = {}
+    if (
+        replaced
+    ):  # a channel is replaced in terms of the model: amplitude * (term with the new channel - term)
+        fresh = substitute(formula, base)
+        for term in replaced:
+            if effect.place == "inputs of a recording":
+                swaps = {
+                    c: substitute(formula, {**base, "input": Name(c)})
+                    for c in names(term.expression) & set(channels)
+                }
+            else:
+                swaps = {c: fresh for c in names(term.expression) & names(fresh) & set(channels)}
+            changed = substitute(term.expression, swaps)
+            difference = Apply("*", (amplitude, Apply("-", (changed, term.expression))))
+            terms.append(
+                Term(f"{effect.title}: {term.name}", term.into, difference, term.source, effect.word)
+            )
+    elif shown:
+        for name, size in zip(shown, amplitudes if several else amplitudes * len(shown), strict=True):
+            y = model.outputs.get(name, Name(name))
+            extra[name] = substitute(formula, {**base, "y": y, effect.amplitude.name: Name(size)})
+    else:
+        bodies = {"body": Name(states[0]), **({"other": Name(states[1])} if len(states) > 1 else {})}
+        expression = substitute(formula, {**base, **bodies, effect.amplitude.name: amplitude})
+        place = " and ".join(states)
+        terms.append(
+            Term(
+                f"{effect.title}, {place}",
+                states[0],
+                expression,
+                states[1] if len(states) > 1 else None,
+                effect.word,
+            )
+        )
+    return Hypothesis(
+        effect,
+        states,
+        tuple(amplitudes),
+        tuple(terms),
+        extra,
+        shown[0] if len(shown) == 1 else None,
+        run,
+        shapes,
+        chosen,
+    )
+
+
+def _places(
+    effect: Effect, model: Model, outputs: tuple[str, ...], channels: Mapping[str, Channel]
+) -> Iterator[tuple[tuple[str, ...], tuple[Term, ...], tuple[str, ...]]]:
+    """(states, terms in which a channel is replaced, outputs) of each place."""
+    bodies = [
+        name
+        for name, state in model.states.items()
+        if not name.startswith("lag_") and (state.capacity or not _has_bodies(model))
+    ]
+    role = {name: channel.role for name, channel in channels.items()}
+    linked = {frozenset((t.into, t.source)) for t in model.terms if t.source}
+
+    def fed(wanted: str) -> list[str]:
+        return [
+            b
+            for b in bodies
+            if any(
+                b in (t.into, t.source) and any(role.get(n) == wanted for n in names(t.expression))
+                for t in model.terms
+            )
+        ]
+
+    match effect.place:
+        case "body":
+            yield from (((b,), (), ()) for b in bodies)
+        case "fluid-free body":
+            wet = fed("fluid temperature")
+            yield from (((b,), (), ()) for b in bodies if b not in wet)
+        case "wet body":
+            yield from (((b,), (), ()) for b in fed("fluid temperature"))
+        case "driven body":
+            yield from (((b,), (), ()) for b in fed("heat load"))
+        case "air body":
+            yield from (((b,), (), ()) for b in fed("ambient temperature"))
+        case "pair" | "any pair" | "link":
+            for i, a in enumerate(bodies):
+                for b in bodies[i + 1 :]:
+                    is_link = frozenset((a, b)) in linked
+                    if effect.place == "any pair" or is_link == (effect.place == "link"):
+                        yield (a, b), (), ()
+        case "fluid terms" | "cooling terms":
+            wanted = "fluid temperature" if effect.place == "fluid terms" else "cooling power"
+            terms = tuple(t for t in model.terms if any(role.get(n) == wanted for n in names(t.expression)))
+            if terms:
+                yield tuple(dict.fromkeys(t.into for t in terms)), terms, ()
+        case "inputs of a recording":
+            terms = tuple(t for t in model.terms if names(t.expression) & set(channels))
+            if terms:
+                yield (), terms, ()
+        case "output" | "output of a recording":
+            yield from (((), (), (name,)) for name in outputs)
+        case "recording":
+            yield (), (), outputs
+
+
+def _has_bodies(model: Model) -> bool:
+    return any(state.capacity for state in model.states.values())
