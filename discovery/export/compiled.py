@@ -1,0 +1,209 @@
+"""An exported model as three straight-line programs: start values, rates with their Jacobian, outputs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from discovery.errors import UserError
+from discovery.export.differentiate import Node, compile_expression
+from discovery.export.program import Builder, Program
+from discovery.models import Model, expanded
+from discovery.terms import Apply, Expression, Name, names
+from discovery.terms.expression import rewrite
+
+MAX_DELAY_STEPS = 20_000  # a controller keeps every one of them
+
+
+@dataclass(frozen=True)
+class Delay:
+    """An input `whole + part` steps ago; `part` is below 1."""
+
+    input: int
+    whole: int
+    part: float
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A model ready to be stepped or printed.
+
+    Results of the programs:
+        start:   x (n), plays (P)
+        rates:   dx/dt (n), nonzeros of A = d(dx/dt)/dx, plays (P)
+        outputs: y (Y), plays (P)
+    """
+
+    name: str
+    step_s: float
+    inputs: tuple[str, ...]
+    states: tuple[str, ...]
+    outputs: tuple[str, ...]
+    delays: tuple[Delay, ...]
+    plays: int
+    nonzeros: tuple[tuple[int, int], ...]  # (row, column) of the Jacobian
+    start: Program
+    rates: Program
+    results: Program
+
+
+@dataclass
+class _Running:
+    """Memory of a running model: delays and plays are loads; the plays' new values are collected."""
+
+    delays: Mapping[Apply, int]
+    plays: Mapping[Apply, int]
+    moved: dict[int, int] = field(default_factory=dict)
+
+    def delayed(self, build: Builder, expression: Apply) -> int:
+        return build.load("delayed", self.delays[expression])
+
+    def played(self, build: Builder, expression: Apply, inner: int, width: int) -> tuple[int, int]:
+        slot, half = self.plays[expression], build.apply("abs", width)
+        below, above = build.apply("-", inner, half), build.apply("+", inner, half)
+        value = build.apply("max", below, build.apply("min", above, build.load("played", slot)))
+        self.moved[slot] = value
+        return value, build.apply("max", build.apply("==", value, below), build.apply("==", value, above))
+
+
+@dataclass
+class _AtStart:
+    """Memory at the first instant: the input was always as it is, a play rests in the middle."""
+
+    inputs: Mapping[str, Node]
+
+    def delayed(self, build: Builder, expression: Apply) -> int:  # noqa: ARG002
+        channel = expression.arguments[0]
+        assert isinstance(channel, Name)
+        return self.inputs[channel.id].value
+
+    def played(self, build: Builder, expression: Apply, inner: int, width: int) -> tuple[int, int]:  # noqa: ARG002
+        return inner, build.constant(1.0)
+
+
+def model_inputs(model: Model) -> tuple[str, ...]:
+    """Channels that the model reads, those of its start values included, in the order of every target."""
+    model = expanded(model)
+    used = set(model.inputs)
+    for state in model.states.values():
+        used |= names(state.start) if state.start is not None else set()
+    return tuple(sorted(used - set(model.states) - set(model.parameters) - {"time"}))
+
+
+def compile_model(model: Model, step_s: float) -> Compiled:
+    """The programs of a model with its parameters at their values and a fixed step [s].
+
+    Raises:
+        UserError: a delay that is no constant, is negative, or is longer than a controller can keep.
+    """
+    model = expanded(model)
+    inputs, states = model_inputs(model), tuple(model.states)
+    build = Builder()
+    common = {name: Node(build.constant(p.value)) for name, p in model.parameters.items()}
+    fed = {name: Node(build.load("input", i)) for i, name in enumerate(inputs)}
+    delays, plays = _with_memory(model, build, {**common, **fed}, inputs, step_s)
+    kept = {apply: k for k, apply in enumerate(delays)}
+    slots = {apply: k for k, apply in enumerate(plays)}
+
+    # the start: states from channels and parameters, plays at rest
+    rest = _AtStart(fed)
+    zero = Node(build.constant(0.0))
+    known = {**dict.fromkeys(states, zero), **common, **fed, "time": zero}
+    first = {
+        name: Node(compile_expression(build, state.start, known, rest).value) if state.start is not None else zero
+        for name, state in model.states.items()
+    }
+    known |= first
+    at_rest = [compile_expression(build, apply, known, rest).value for apply in plays]
+    start = build.program([*(first[name].value for name in states), *at_rest])
+
+    # one step: everything from the running state
+    running = _Running(kept, slots)
+    one = build.constant(1.0)
+    env = {**common, **fed, "time": Node(build.load("time"))}
+    env |= {name: Node(build.load("state", i), {name: one}) for i, name in enumerate(states)}
+    nodes = [compile_expression(build, term.expression, env, running) for term in model.terms]
+    rates, jacobian = [], {}
+    for i, name in enumerate(states):
+        scale = build.constant(model.states[name].scale)
+        entering = [node for node, term in zip(nodes, model.terms, strict=True) if term.into == name]
+        leaving = [node for node, term in zip(nodes, model.terms, strict=True) if term.source == name]
+        rates.append(_net(build, scale, [n.value for n in entering], [n.value for n in leaving]))
+        for j, other in enumerate(states):
+            gain = _net(
+                build,
+                scale,
+                [n.partials[other] for n in entering if other in n.partials],
+                [n.partials[other] for n in leaving if other in n.partials],
+            )
+            if build.constant_of(gain) != 0.0:
+                jacobian[i, j] = gain
+    read = [compile_expression(build, expression, env, running).value for expression in model.outputs.values()]
+    for apply in plays:
+        compile_expression(build, apply, env, running)
+    moved = [running.moved[k] for k in range(len(plays))]
+    return Compiled(
+        model.name,
+        step_s,
+        inputs,
+        states,
+        tuple(model.outputs),
+        tuple(delays.values()),
+        len(plays),
+        tuple(jacobian),
+        start,
+        build.program([*rates, *jacobian.values(), *moved]),
+        build.program([*read, *moved]),
+    )
+
+
+def _net(build: Builder, scale: int, entering: list[int], leaving: list[int]) -> int:
+    total = build.sum(entering)
+    for node in leaving:
+        total = build.apply("-", total, node)
+    return build.apply("*", scale, total)
+
+
+def _with_memory(
+    model: Model, build: Builder, known: Mapping[str, Node], inputs: tuple[str, ...], step_s: float
+) -> tuple[dict[Apply, Delay], list[Apply]]:
+    """Delays and plays of a model, each once; inner plays before outer ones."""
+    delays: dict[Apply, Delay] = {}
+    plays: dict[Apply, None] = {}
+
+    def visit(apply: Apply) -> Expression | None:
+        if apply.function == "play":
+            plays.setdefault(apply)
+        if apply.function == "delay" and apply not in delays:
+            delays[apply] = _delay(model, build, apply, known, inputs, step_s)
+        return None
+
+    for expression in model.expressions():
+        rewrite(expression, visit)
+    return delays, list(plays)
+
+
+def _delay(
+    model: Model, build: Builder, apply: Apply, known: Mapping[str, Node], inputs: tuple[str, ...], step_s: float
+) -> Delay:
+    channel, duration = apply.arguments
+    assert isinstance(channel, Name)
+    if channel.id not in inputs:
+        raise UserError(f"model '{model.name}': delay({channel.id}, ...) is not of an input; only a channel can be delayed")
+    seconds = None
+    if names(duration) <= set(model.parameters):
+        seconds = build.constant_of(compile_expression(build, duration, known, _AtStart({})).value)
+    if seconds is None or not math.isfinite(seconds) or seconds < 0.0:
+        raise UserError(
+            f"model '{model.name}': the delay of {channel.id} must be a number of seconds from 0 up to be exported; "
+            "it may hold parameters, no states and no channels"
+        )
+    steps = seconds / step_s
+    if steps > MAX_DELAY_STEPS:
+        raise UserError(
+            f"model '{model.name}': the delay of {channel.id} is {seconds:.0f} s, {steps:.0f} steps of {step_s:g} s; "
+            f"a controller keeps at most {MAX_DELAY_STEPS}: export with a longer step"
+        )
+    whole = math.floor(steps)
+    return Delay(inputs.index(channel.id), whole, steps - whole)
