@@ -129,5 +129,35 @@ def record(
         typer.echo(line)
 
 
+@app.command()
+def run(
+    experiment: Annotated[Path, typer.Argument(help="An experiment file, e.g. experiments/nmv5000.toml.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder of the results [runs/NAME].")] = None,
+) -> None:
+    """Do the main job: fit, discover, cross-validate, compare, diagnose, report, export.
+
+    The folder of results is written as a whole at the end; an interrupted run leaves nothing behind.
+    """
+    from discovery.experiment import run as run_experiment
+    from discovery.progress import shown
+    from discovery.summary import summary
+
+    with shown() as progress:
+        folder = run_experiment(experiment, out, progress)
+    for line in summary(folder):
+        typer.echo(line)
+
+
+@app.command()
+def compare(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders of results.")],
+) -> None:
+    """Put the models of several runs side by side: rms of each error, recording by recording."""
+    from discovery.summary import comparison
+
+    for line in comparison(runs):
+        typer.echo(line)
+
+
 if __name__ == "__main__":
     sys.exit(app())

@@ -51,12 +51,17 @@ def _explain(schema: type[BaseModel], mistake: ErrorDetails, key: Key) -> str:
     if kind == "missing":
         return f"the key '{mistake['loc'][-1]}' is missing"
     if kind in ("literal_error", "enum"):
-        allowed = [word.strip().strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")]
-        return f"{given!r} is not known; {suggest(str(given), allowed)}"
+        return f"{given!r} is not known; {suggest(str(given), _quoted(context['expected']))}"
+    if kind == "union_tag_invalid":
+        return f"kind {context['tag']!r} is not known; {suggest(context['tag'], _quoted(context['expected_tags']))}"
     if kind in ("value_error", "assertion_error"):
         return str(context["error"])
     what = mistake["msg"].replace("Input should be", "should be").removesuffix(".")
     return f"{what}, not {_short(given)}"
+
+
+def _quoted(listing: str) -> list[str]:
+    return [word.strip().strip("'") for word in listing.replace(" or ", ", ").split(", ")]
 
 
 def suggest(word: str, allowed: list[str]) -> str:

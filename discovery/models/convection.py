@@ -165,7 +165,7 @@ def validity(
 
 
 # Parameters that a model with eqs. (1) to (5) spelt out in its expressions goes by.
-SYMBOLS = ("Re", "nu_f", "r_d")
+SYMBOLS = ("Re", "nu", "r_d")
 
 
 def validity_of_model(model: Model, campaign: Campaign, recordings: Sequence[str]) -> list[str]:
@@ -175,4 +175,4 @@ def validity_of_model(model: Model, campaign: Campaign, recordings: Sequence[str
         return []
     fastest = max(float(np.nanmax(campaign.recordings[r].values[speeds[0]])) for r in recordings)
     p = model.values()
-    return validity(ekman(p["nu_f"], rad_per_s(fastest), p["r_d"]), p["Re"], fastest)
+    return validity(ekman(p["nu"], rad_per_s(fastest), p["r_d"]), p["Re"], fastest)

@@ -1,0 +1,111 @@
+"""Cross-validation over the recordings to fit: whole recordings left out, and blocks of hours left out.
+
+Held-out recordings take no part. What is left out here is refitted without, then predicted; it says how far the figures of
+the fit can be trusted before anything unseen is looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.evaluation.criteria import criteria
+from discovery.fitting import fit_model, predict_recording
+from discovery.models import Model
+from discovery.recordings import Campaign, Recording
+
+Array = NDArray[np.float64]
+Window = tuple[float, float]  # s, from and up to
+
+MOST_FOLDS = 4  # recordings are left out in groups when there are more
+
+
+@dataclass(frozen=True, slots=True)
+class Fold:
+    """What is left out of one fit: whole recordings, or a window of each recording."""
+
+    name: str
+    recordings: tuple[str, ...] = ()
+    windows: Mapping[str, Window] | None = None
+
+
+def folds(campaign: Campaign, recordings: Sequence[str], blocks: int = 3) -> list[Fold]:
+    """Leave one recording (or group of recordings) out, where there are two or more; then by blocks of time."""
+    out = []
+    if len(recordings) > 1:
+        groups = [tuple(recordings[i::MOST_FOLDS]) for i in range(min(MOST_FOLDS, len(recordings)))]
+        out += [Fold(", ".join(group), recordings=group) for group in groups]
+    for k in range(blocks):
+        windows = {}
+        for name in recordings:
+            span = float(campaign.recordings[name].time[-1])
+            windows[name] = (k * span / blocks, (k + 1) * span / blocks if k + 1 < blocks else np.inf)
+        out.append(Fold(f"block {k + 1} of {blocks}", windows=windows))
+    return out
+
+
+def cross_validate(model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> dict[str, dict[str, float]]:
+    """rms of each output on what was left out, pooled over the folds: {"recordings": {...}, "blocks": {...}}.
+
+    The structure of the model stays; its parameters are fitted anew from where they are.
+    """
+    left: dict[str, list[Array]] = {}
+    for fold in folds(campaign, recordings):
+        for rows in _left_over(model, campaign, recordings, outputs, fold):
+            left.setdefault("blocks" if fold.windows else "recordings", []).append(rows)
+    return {
+        kind: {name: criteria(np.concatenate([r[:, y] for r in rows])).rms for y, name in enumerate(outputs)}
+        for kind, rows in left.items()
+    }
+
+
+def _left_over(model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], fold: Fold) -> Iterator[Array]:
+    """Readings minus model (R, Y) where the fit did not see them, NaN elsewhere."""
+    if fold.windows is None:
+        kept = [name for name in recordings if name not in fold.recordings]
+        seen = replace(campaign, recordings={name: campaign.recordings[name] for name in kept})
+        fit = fit_model(model, seen, kept, outputs, max_rounds=15)
+        for name in fold.recordings:
+            trajectory = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)
+            yield fit.problem.residual(trajectory)
+        return
+    masked = {name: _mask(campaign.recordings[name], outputs, fold.windows[name]) for name in recordings}
+    fit = fit_model(model, replace(campaign, recordings=masked), recordings, outputs, max_rounds=15)
+    for trajectory in fit.trajectories:
+        name = trajectory.system.grid.recording
+        whole = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)
+        rows = fit.problem.residual(whole)
+        time = whole.system.grid.time[whole.system.grid.read]
+        low, high = fold.windows[name]
+        yield np.where(((time >= low) & (time < high))[:, None], rows, np.nan)
+
+
+def _mask(recording: Recording, outputs: Sequence[str], window: Window) -> Recording:
+    """The recording with the readings of a window taken away; its inputs stay, since the machine went on."""
+    hidden = (recording.time >= window[0]) & (recording.time < window[1])
+    values = {name: np.where(hidden, np.nan, v) if name in outputs else v for name, v in recording.values.items()}
+    return replace(recording, values=values)
+
+
+def parts_of_the_paper(campaign: Campaign, fit: Sequence[str], held_out: Sequence[str]) -> dict[str, str]:
+    """Which recording plays which part of the paper: "test cycle", "2. test cycle", "left side", "100 mm".
+
+    The left nozzle is told by a channel of role nozzle side or by its name, the 100 mm by a nozzle height of 100.
+    """
+    left = [name for name in held_out if "left" in name.lower() or _constant(campaign, name, "nozzle side")]
+    high = [name for name in held_out if name not in left and (_constant(campaign, name, "nozzle height") or 0.0) > 75.0]
+    plain = [name for name in held_out if name not in left and name not in high]
+    parts = {"test cycle": fit, "2. test cycle": plain, "left side": left, "100 mm": high}
+    return {part: names[0] for part, names in parts.items() if names}
+
+
+def _constant(campaign: Campaign, recording: str, role: str) -> float | None:
+    """Mean of the first channel of a role."""
+    for channel in campaign.channels.values():
+        values = campaign.recordings[recording].values.get(channel.name)
+        if channel.role == role and values is not None and np.isfinite(values).any():
+            return float(np.nanmean(values))
+    return None

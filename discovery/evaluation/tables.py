@@ -1,0 +1,96 @@
+"""Tables 1 and 3 of the paper: the same layout, our figures with the paper's beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from discovery.evaluation.paper import EQUATION, TABLE_1, TABLE_1_COLUMNS, TABLE_3
+
+CRITERIA = {"peak": "P_V", "mean": "M_V", "variance": "Q_M"}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of words and numbers, ready to be printed; a cell of None is empty."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str | float | None, ...], ...]
+
+
+def table_1(results: Mapping[str, Any], model: str, recordings: Mapping[str, str]) -> Table:
+    """Table 1: improvement [%] of the arithmetic mean by one model, one column for each part of the paper.
+
+    Args:
+        results: content of results.json.
+        recordings: column of the paper -> recording that plays its part (see `crossvalidation.roles`).
+    """
+    found = results["models"][model]["recordings"]
+    header = ["Error"]
+    for column in TABLE_1_COLUMNS:
+        header += [f"{column} ({recordings[column]})" if column in recordings else column, "paper"]
+    rows = []
+    for error in _errors(found):
+        row: list[str | float | None] = [error]
+        for k, column in enumerate(TABLE_1_COLUMNS):
+            entry = found.get(recordings.get(column, ""), {}).get(error)
+            row += [entry and entry["improvement"]["mean"], TABLE_1[error][k] if error in TABLE_1 else None]
+        rows.append(tuple(row))
+    return Table(f"Reduction of the arithmetic mean by '{model}' [%] (Table 1)", tuple(header), tuple(rows))
+
+
+def table_3(results: Mapping[str, Any], recording: str, models: Sequence[str] | None = None) -> Table:
+    """Table 3: P_V, M_V, Q_M and rms of each error on one recording, uncompensated and left over by each model.
+
+    Beside the uncompensated rows and those of equations (8) and (9) stand the figures that the paper prints.
+    """
+    chosen = [
+        name for name in models or results["models"] if recording in results["models"][name]["recordings"]
+    ]
+    found = {name: results["models"][name]["recordings"][recording] for name in chosen}
+    header = ("Error", "", *(word for short in CRITERIA.values() for word in (short, "paper")), "rms")
+    rows: list[tuple[str | float | None, ...]] = []
+    for error in dict.fromkeys(error for entries in found.values() for error in entries):
+        having = [name for name in chosen if error in found[name]]
+        rows.append(_row(error, "uncompensated", found[having[0]][error]["uncompensated"], "uncompensated"))
+        equations = {name: EQUATION.get(str(results["models"][name].get("kind"))) for name in having}
+        for name in having:
+            rows.append(_row(error, name, found[name][error], equations[name]))
+        for name in having:
+            equation = equations[name] and f"{equations[name]} %"
+            rows.append(_row(error, f"improvement {name} [%]", found[name][error]["improvement"], equation))
+    return Table(f"Recording '{recording}' (Table 3)", header, tuple(rows))
+
+
+def _row(
+    error: str, label: str, ours: Mapping[str, float], paper: str | None
+) -> tuple[str | float | None, ...]:
+    printed = TABLE_3.get(error, {}).get(paper or "", (None, None, None))
+    cells: list[str | float | None] = []
+    for key, figure in zip(CRITERIA, printed, strict=True):
+        cells += [ours[key], figure]
+    return (error, label, *cells, ours["rms"])
+
+
+def _errors(recordings: Mapping[str, Any]) -> list[str]:
+    return list(dict.fromkeys(error for entries in recordings.values() for error in entries))
+
+
+def as_text(table: Table) -> str:
+    """The table in plain characters, for a terminal."""
+    lines = [table.header, *(tuple(_cell(cell) for cell in row) for row in table.rows)]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(table.header))]
+    body = [
+        "  ".join(
+            cell.rjust(w) if i > 1 else cell.ljust(w)
+            for i, (cell, w) in enumerate(zip(line, widths, strict=True))
+        )
+        for line in lines
+    ]
+    return "\n".join([table.title, *(line.rstrip() for line in body)])
+
+
+def _cell(cell: str | float | None) -> str:
+    return "" if cell is None else cell if isinstance(cell, str) else f"{cell:.3g}"

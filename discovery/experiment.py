@@ -1,0 +1,177 @@
+"""The main job, top to bottom: load, fit, predict, judge, cross-validate, diagnose, write."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.errors import UserError
+from discovery.evaluation import evaluate
+from discovery.evaluation.crossvalidation import cross_validate
+from discovery.experimentfile import (
+    Experiment,
+    FileEntry,
+    ModelEntry,
+    ReducedEntry,
+    SuperpositionEntry,
+    load_experiment,
+    only,
+    separate,
+)
+from discovery.fitting import Fit, fit_model, predict_recording
+from discovery.fitting.sequential import fit_one_at_a_time
+from discovery.fitting.starts import warm_start
+from discovery.models import Model
+from discovery.models.convection import validity_of_model
+from discovery.models.dimensions import check_dimensions
+from discovery.models.reduced import reduced
+from discovery.models.superposition import superposition
+from discovery.progress import Progress, silent
+from discovery.results import default_folder, staged, write_run
+from discovery.sparse.options import SparseOptions
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Free run of a model on a recording, at its readings: time (R,) in s, readings and predicted (R, Y)."""
+
+    outputs: tuple[str, ...]
+    time: Array
+    readings: Array
+    predicted: Array
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A model of the experiment, whatever its kind, with what became of it."""
+
+    name: str
+    kind: str
+    fit: Fit
+    predictions: Mapping[str, Prediction]  # by recording
+    cross_validation: Mapping[str, Mapping[str, float]]
+    report: Mapping[str, Any]  # what the search has to say
+    notes: tuple[str, ...]
+    seconds: float
+
+    @property
+    def model(self) -> Model:
+        """The fitted model."""
+        return self.fit.model
+
+    def scores(self) -> dict[str, dict[str, Any]]:
+        """Criteria by recording and output."""
+        return {
+            recording: {name: evaluate(p.readings[:, y], p.predicted[:, y]) for y, name in enumerate(p.outputs)}
+            for recording, p in self.predictions.items()
+        }
+
+
+def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
+    """Do what an experiment file says and write the results folder.
+
+    Args:
+        path: the experiment file.
+        out: folder of the results; default runs/<experiment name>. It is replaced as a whole at the very end, so an
+            interrupted run leaves what was there before.
+        progress: told what begins.
+
+    Returns:
+        The folder.
+
+    Raises:
+        UserError: a mistake in a file, or a model that cannot be fitted.
+    """
+    began = clock.perf_counter()
+    progress("reading the recordings")
+    experiment = load_experiment(path)
+    folder = out or default_folder(experiment.name)
+    with staged(folder) as temporary:
+        fitted = {}
+        for name, entry in experiment.form.models.items():
+            fitted[name] = fit_entry(experiment, name, entry, progress)
+        document = diagnosis(experiment, progress)
+        seconds = clock.perf_counter() - began
+        progress("writing the report")
+        write_run(temporary, experiment, fitted, document, seconds)
+    return folder
+
+
+def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Progress = silent) -> Fitted:
+    """One model: start values, fit, cross-validation on the fit recordings alone; then free runs on everything."""
+    began = clock.perf_counter()
+    progress(f"fitting {name}")
+    model, report = starting_model(experiment, name, entry)
+    outputs = [y for y in experiment.outputs_of(entry) if y in model.outputs or y in model.states]
+    if not outputs:
+        raise UserError(
+            f"{experiment.path}: model '{name}' gives none of the outputs {', '.join(experiment.outputs)}; "
+            "write them under [outputs] of the model"
+        )
+    fit = fit_model(model, experiment.fitting, experiment.fit, outputs, loss=getattr(entry, "loss", "linear"))
+    validation: Mapping[str, Mapping[str, float]] = {}
+    if experiment.form.cross_validate:
+        progress(f"cross-validating {name}")
+        validation = cross_validate(fit.model, experiment.fitting, experiment.fit, outputs)
+    seconds = clock.perf_counter() - began
+    predictions = {r: predict(fit, experiment, r) for r in (*experiment.fit, *experiment.held_out)}
+    notes = [*fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]
+    notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
+    return Fitted(name, entry.kind, fit, predictions, validation, report, tuple(notes), seconds)
+
+
+def starting_model(experiment: Experiment, name: str, entry: ModelEntry) -> tuple[Model, dict[str, Any]]:
+    """The model that a fit starts from, and what a search reports. From here on nothing asks for the kind."""
+    campaign, recordings = experiment.fitting, experiment.fit
+    inputs, outputs = experiment.inputs(entry), experiment.outputs_of(entry)
+    report: dict[str, Any] = {}
+    match entry:
+        case FileEntry():
+            return experiment.model_file(name), report
+        case ReducedEntry():
+            model = warm_start(reduced(inputs, outputs, campaign.channels), campaign, recordings, outputs)
+        case SuperpositionEntry(separate=None):
+            model = warm_start(superposition(inputs, outputs, campaign.channels), campaign, recordings, outputs)
+        case SuperpositionEntry():
+            alone = only(experiment.campaign, {one for names in separate(entry).values() for one in names})
+            model = fit_one_at_a_time(alone, separate(entry), outputs)
+        case SparseOptions():
+            model, report = discovered(experiment, entry)
+    return replace(model, name=name), report
+
+
+def discovered(experiment: Experiment, options: SparseOptions) -> tuple[Model, dict[str, Any]]:
+    """What the sparse search finds on the fit recordings."""
+    from discovery.sparse import discover
+
+    if options.built_on_file:
+        options = options.model_copy(update={"baseline": str(experiment.path.parent / options.baseline)})
+    found = discover(experiment.fitting, experiment.fit, experiment.outputs, options)
+    return found.model, dict(found.report)
+
+
+def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
+    """Free run with the fitted model, zeroed on the first reading as on a controller."""
+    outputs = fit.problem.outputs
+    trajectory = predict_recording(fit.model, experiment.campaign, recording, outputs, fit.noise.white)
+    grid = trajectory.system.grid
+    return Prediction(outputs, grid.time[grid.read], grid.readings, grid.readings - fit.problem.residual(trajectory))
+
+
+def diagnosis(experiment: Experiment, progress: Progress = silent) -> dict[str, Any] | None:
+    """The content of diagnosis.json, where the experiment asks what a model leaves out."""
+    if experiment.form.mismatch is None:
+        return None
+    from discovery.mismatch import diagnose
+
+    progress(f"looking for what {experiment.form.mismatch.model} leaves out")
+    document: dict[str, Any] = diagnose(experiment, progress).document()
+    return document

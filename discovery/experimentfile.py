@@ -1,0 +1,239 @@
+"""The experiment file: which recordings are fitted, which stay unseen, which models compete."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import AfterValidator, Discriminator, Field, Tag
+
+from discovery.errors import UserError
+from discovery.files import dotted, locate, read_text, read_toml
+from discovery.fitting.fit import Loss
+from discovery.models import Model, check_names, read_model
+from discovery.recordings import Campaign, load_campaign
+from discovery.recordings.campaignfile import CampaignForm, campaign_path
+from discovery.schema import Strict, suggest
+from discovery.sparse.options import SparseOptions
+
+_INPUT_ROLES = ("ambient temperature", "heat load", "fluid temperature")  # of eqs. (8) and (9), in the paper's order
+
+
+def _file_name(name: str) -> str:
+    if not re.fullmatch(r"\w[\w .+-]*", name):
+        raise ValueError(f"'{name}' becomes the name of a file: use letters, digits, space, _ . + -")
+    return name
+
+
+class FileEntry(Strict):
+    """A model that somebody wrote down."""
+
+    kind: Literal["file"] = "file"
+    file: str = Field(min_length=1, description="model file, relative to the experiment file")
+    outputs: list[str] | None = Field(None, min_length=1, description="default: those of the experiment")
+    loss: Loss = Field("linear", description="how outliers pull")
+
+
+class ReducedEntry(Strict):
+    """Equation (9)."""
+
+    kind: Literal["reduced"]
+    inputs: list[str] | None = Field(None, min_length=1, description="default by role, as in the paper")
+    outputs: list[str] | None = Field(None, min_length=1, description="default: those of the experiment")
+    loss: Loss = Field("linear", description="how outliers pull")
+
+
+class SuperpositionEntry(Strict):
+    """Equation (8), all influences together, or one after the other from recordings of their own."""
+
+    kind: Literal["superposition"]
+    inputs: list[str] | None = Field(None, min_length=1, description="default by role, as in the paper")
+    outputs: list[str] | None = Field(None, min_length=1, description="default: those of the experiment")
+    separate: dict[str, Annotated[list[str], Field(min_length=1)]] | None = Field(
+        None, min_length=1, description="input -> its recordings; fitted in this order, one input after the other"
+    )
+    loss: Loss = Field("linear", description="how outliers pull")
+
+
+def _kind(entry: Any) -> str:
+    return str(entry.get("kind", "file") if isinstance(entry, Mapping) else getattr(entry, "kind", "file"))
+
+
+ModelEntry = FileEntry | ReducedEntry | SuperpositionEntry | SparseOptions
+TaggedEntry = Annotated[
+    Annotated[FileEntry, Tag("file")]
+    | Annotated[ReducedEntry, Tag("reduced")]
+    | Annotated[SuperpositionEntry, Tag("superposition")]
+    | Annotated[SparseOptions, Tag("sindy")],
+    Discriminator(_kind),
+]
+
+
+class MismatchForm(Strict):
+    """[mismatch]: the model whose missing physics is looked for."""
+
+    model: str
+
+
+class ExportForm(Strict):
+    """[export]: the model that goes to the machine, and the forms it takes."""
+
+    model: str
+    to: list[Literal["json", "c", "fmu", "st"]] = Field(["json"], min_length=1)
+
+
+class ExperimentForm(Strict):
+    """The whole file."""
+
+    name: Annotated[str, AfterValidator(_file_name)]
+    campaign: str = Field(description="campaign file or its folder, relative to the experiment file")
+    outputs: list[str] | None = Field(None, min_length=1, description="default: every channel of role error")
+    fit: list[str] = Field(min_length=1, description="recordings that fits may see")
+    held_out: list[str] = Field([], description="recordings that nothing sees before the end")
+    cross_validate: bool = Field(True, description="leave recordings and blocks out of the fit, one after the other")
+    models: dict[Annotated[str, AfterValidator(_file_name)], TaggedEntry] = Field(min_length=1)
+    mismatch: MismatchForm | None = None
+    export: ExportForm | None = None
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An experiment with its recordings loaded.
+
+    Whatever fits, chooses or sets a threshold gets `fitting`, which holds the recordings to fit and no other:
+    the held-out ones are not there to be looked at.
+    """
+
+    form: ExperimentForm
+    path: Path
+    campaign: Campaign  # everything, for free runs at the end
+    outputs: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the experiment."""
+        return self.form.name
+
+    @property
+    def fit(self) -> tuple[str, ...]:
+        """Recordings to fit."""
+        return tuple(self.form.fit)
+
+    @property
+    def held_out(self) -> tuple[str, ...]:
+        """Recordings that no fit sees."""
+        return tuple(self.form.held_out)
+
+    @cached_property
+    def fitting(self) -> Campaign:
+        """The campaign as fits see it."""
+        return only(self.campaign, self.fit)
+
+    def inputs(self, entry: ModelEntry) -> list[str]:
+        """Inputs of a built model: those stated, else the first channel of each role that the paper uses."""
+        stated = getattr(entry, "inputs", None)
+        if stated:
+            return list(stated)
+        channels = self.campaign.channels.values()
+        first = [next((c.name for c in channels if c.role == role), None) for role in _INPUT_ROLES]
+        return [name for name in first if name] or [c.name for c in channels if not c.measured]
+
+    def outputs_of(self, entry: ModelEntry) -> list[str]:
+        """Outputs that a model is built for, or compared on."""
+        return list(getattr(entry, "outputs", None) or self.outputs)
+
+    def model_file(self, name: str) -> Model:
+        """The model that entry `name` reads from its file, checked against the campaign. Raises UserError."""
+        path = self.path.parent / cast(FileEntry, self.form.models[name]).file
+        model = read_model(path)
+        check_names(model, set(self.campaign.channels), path)
+        return model
+
+
+def only(campaign: Campaign, names: Collection[str]) -> Campaign:
+    """The campaign with the recordings of these names alone."""
+    return replace(campaign, recordings={name: campaign.recordings[name] for name in campaign.recordings if name in names})
+
+
+def load_experiment(path: str | os.PathLike[str]) -> Experiment:
+    """The experiment at `path` with its campaign.
+
+    Raises UserError: a mistake in the experiment, the campaign or a recording, with file, line and what to do.
+    """
+    path = Path(path)
+    form = read_toml(path, ExperimentForm)
+    campaign = load_campaign(path.parent / form.campaign, only=_recordings(path, form))
+    outputs = form.outputs or [c.name for c in campaign.channels.values() if c.role == "error"]
+    if not outputs:
+        raise UserError(
+            f'{path}: no channel of {campaign.path} has the role "error"; say outputs = [...] '
+            f"with some of {', '.join(c.name for c in campaign.channels.values() if c.measured) or 'its channels'}"
+        )
+    _check(path, form, campaign, outputs)
+    return Experiment(form, path, campaign, tuple(outputs))
+
+
+def _recordings(path: Path, form: ExperimentForm) -> list[str]:
+    """The recordings to load. Raises UserError where the campaign does not have one of them."""
+    known = list(read_toml(campaign_path(path.parent / form.campaign), CampaignForm).recordings)
+    named: dict[str, tuple[str, ...]] = {name: ("fit",) for name in form.fit}
+    named |= {name: ("held_out",) for name in form.held_out}
+    for model, entry in form.models.items():
+        for names in separate(entry).values():
+            named |= {name: ("models", model) for name in names if name not in named}
+    for name, key in named.items():
+        if name not in known:
+            raise _mistake(path, key, f"no recording '{name}'; {suggest(name, known)}")
+    return list(named)
+
+
+def separate(entry: ModelEntry) -> Mapping[str, list[str]]:
+    """Input -> recordings of its own, where a superposition names them."""
+    return (isinstance(entry, SuperpositionEntry) and entry.separate) or {}
+
+
+def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collection[str]) -> None:
+    """What a schema cannot say: names that must exist elsewhere. Raises UserError."""
+    channels = list(campaign.channels)
+    measured = [name for name in channels if campaign.channels[name].measured]
+    both = [name for name in form.fit if name in form.held_out]
+    if both:
+        raise _mistake(path, ("held_out",), f"'{both[0]}' stands in fit too; what is fitted cannot be held out")
+    for name in outputs:
+        if name not in measured:
+            raise _mistake(path, ("outputs",), f"'{name}' is no measured channel; {suggest(name, measured)}")
+    for model, entry in form.models.items():
+        key = ("models", model)
+        for name in [*(getattr(entry, "inputs", None) or []), *separate(entry)]:
+            if name not in channels:
+                raise _mistake(path, key, f"no channel '{name}'; {suggest(name, channels)}")
+        for name in getattr(entry, "outputs", None) or []:
+            if name not in outputs:
+                raise _mistake(path, key, f"'{name}' is no output of the experiment; {suggest(name, list(outputs))}")
+        for name in {name for names in separate(entry).values() for name in names} & set(form.held_out):
+            raise _mistake(path, key, f"separate: '{name}' is held out; a fit must not see it")
+    for section in ("mismatch", "export"):
+        chosen = getattr(form, section)
+        if chosen and chosen.model not in form.models:
+            raise _mistake(path, (section, "model"), f"no model '{chosen.model}'; {suggest(chosen.model, list(form.models))}")
+
+
+def _mistake(path: Path, key: tuple[str | int, ...], what: str) -> UserError:
+    return UserError(f"{path}, line {locate(read_text(path), key)}: {dotted(key)}: {what}")
+
+
+def input_files(experiment: Experiment) -> Mapping[str, Path]:
+    """Every file that the experiment reads, by the name that it has in the results."""
+    campaign = experiment.campaign.path
+    files = {experiment.path.name: experiment.path, campaign.name: campaign}
+    form = read_toml(campaign, CampaignForm)
+    files |= {form.recordings[name].file: campaign.parent / form.recordings[name].file for name in experiment.campaign.recordings}
+    for entry in experiment.form.models.values():
+        if isinstance(entry, FileEntry):
+            files[entry.file] = experiment.path.parent / entry.file
+    return files

@@ -1,0 +1,198 @@
+"""The results folder: results.json, models, predictions, report; written beside its place and moved there at the end."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import math
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import discovery
+from discovery.errors import UserError
+from discovery.evaluation.crossvalidation import parts_of_the_paper
+from discovery.experimentfile import Experiment, input_files
+from discovery.files import write_atomic
+from discovery.models import Model, write_model
+from discovery.models.equations import equations
+
+if TYPE_CHECKING:
+    from discovery.experiment import Fitted
+
+_PACKAGES = ("numpy", "scipy", "numba", "pandas", "scikit-learn", "pysindy", "pint")
+
+
+def default_folder(experiment: str) -> Path:
+    """Where results go unless the user says otherwise."""
+    return Path("runs") / experiment
+
+
+@contextmanager
+def staged(folder: Path) -> Iterator[Path]:
+    """A temporary folder beside `folder` that takes its place when the block ends well, and vanishes when not.
+
+    Raises UserError: `folder` exists and holds something else than the results of a run, or cannot be written.
+    """
+    _refuse_foreign(folder)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({error.strerror}); choose another place with --out") from None
+    try:
+        temporary.chmod(0o755)
+        yield temporary
+        old = None
+        if folder.exists():
+            old = temporary.with_name(f"{temporary.name}.old")
+            folder.replace(old)
+        temporary.replace(folder)
+        if old:
+            shutil.rmtree(old)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _refuse_foreign(folder: Path) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise UserError(f"{folder}: this is a file; name a folder with --out")
+    content = {entry.name for entry in folder.iterdir()}
+    if content and not content & {"results.json", "diagnosis.json"}:
+        raise UserError(f"{folder}: this folder holds something else than results; name another one with --out")
+
+
+def write_run(
+    folder: Path, experiment: Experiment, fitted: Mapping[str, Fitted], diagnosis: Mapping[str, Any] | None, seconds: float
+) -> None:
+    """Everything that a run leaves behind."""
+    write_json(folder / "results.json", results_document(experiment, fitted, seconds))
+    if diagnosis is not None:
+        write_json(folder / "diagnosis.json", diagnosis)
+    for name, one in fitted.items():
+        write_model(folder / "models" / f"{name}.toml", one.model)
+    for recording in (*experiment.fit, *experiment.held_out):
+        write_atomic(folder / "predictions" / f"{recording}.csv", predictions_table(recording, fitted))
+    if experiment.form.export:
+        from discovery.export import export_model
+
+        wanted = experiment.form.export
+        for form in wanted.to:
+            export_model(folder, wanted.model, form)
+    from discovery.report import write_report
+
+    write_report(folder)
+
+
+def results_document(experiment: Experiment, fitted: Mapping[str, Fitted], seconds: float) -> dict[str, Any]:
+    """The content of results.json."""
+    channels = experiment.campaign.channels
+    return {
+        "experiment": experiment.name,
+        "campaign": experiment.campaign.name,
+        "fit": list(experiment.fit),
+        "held_out": list(experiment.held_out),
+        "outputs": list(experiment.outputs),
+        "units": {name: channels[name].unit for name in experiment.outputs},
+        "noise": {name: channels[name].noise for name in experiment.outputs},
+        "parts": parts_of_the_paper(experiment.campaign, experiment.fit, experiment.held_out),
+        "models": {name: model_entry(one) for name, one in fitted.items()},
+        "seconds": seconds,
+        "versions": versions(),
+        "inputs": {name: _sha256(path) for name, path in input_files(experiment).items()},
+    }
+
+
+def model_entry(one: Fitted) -> dict[str, Any]:
+    """One model in results.json; with terms and parameters of the model as it stands, equation by equation."""
+    model = one.model
+    return {
+        "kind": one.kind,
+        "terms": len(model.terms),
+        "parameters": len(model.free),
+        "seconds": one.seconds,
+        "equations": equations(model),
+        "recordings": one.scores(),
+        "cross_validation": one.cross_validation,
+        "values": parameter_values(model),
+        "noise": dict(zip(one.fit.noise.outputs, one.fit.noise.white, strict=True)),
+        "notes": list(one.notes),
+        **({"search": one.report} if one.report else {}),
+    }
+
+
+def parameter_values(model: Model) -> dict[str, dict[str, Any]]:
+    """Value, 95 % interval and unit of each parameter."""
+    found = {}
+    for name, p in model.parameters.items():
+        entry: dict[str, Any] = {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
+        found[name] = entry | ({"fixed": True} if p.fixed else {}) | ({"recordings": dict(p.values)} if p.values else {})
+    return found
+
+
+def predictions_table(recording: str, fitted: Mapping[str, Fitted]) -> str:
+    """CSV with a row for each reading: time, then each output as read, then OUTPUT|MODEL as predicted."""
+    measured: dict[str, dict[float, float]] = {}
+    predicted: dict[str, dict[float, float]] = {}
+    for name, one in fitted.items():
+        p = one.predictions[recording]
+        stamps = [float(t) for t in p.time]
+        for y, output in enumerate(p.outputs):
+            measured[output] = measured.get(output, {}) | dict(zip(stamps, p.readings[:, y].tolist(), strict=True))
+            predicted[f"{output}|{name}"] = dict(zip(stamps, p.predicted[:, y].tolist(), strict=True))
+    columns = measured | predicted
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["time", *columns])
+    for t in sorted({t for column in columns.values() for t in column}):
+        writer.writerow([f"{t:.10g}", *(_cell(column.get(t, math.nan)) for column in columns.values())])
+    return text.getvalue()
+
+
+def _cell(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.6g}"
+
+
+def versions() -> dict[str, str]:
+    """Of Python, of the workbench and of the packages that its figures depend on."""
+    found = {"python": sys.version.split()[0], "discovery": discovery.__version__}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """JSON with six significant digits and null for what is not a number."""
+    write_atomic(path, json.dumps(_plain(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float):
+        return float(f"{value:.6g}") if math.isfinite(value) else None
+    return value

@@ -1,0 +1,71 @@
+"""What a run found, in a few lines for the terminal; several runs side by side."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from discovery.errors import UserError
+from discovery.evaluation.tables import Table, as_text
+from discovery.files import read_text
+
+
+def summary(folder: Path) -> Iterator[str]:
+    """rms of each model on each recording, the notes, and where the report is."""
+    results = read_results(folder)
+    for recording in (*results["fit"], *results["held_out"]):
+        yield as_text(rms_table({"": results}, recording))
+        yield ""
+    for name, model in results["models"].items():
+        for note in model["notes"]:
+            yield f"note, {name}: {note}"
+    yield f"{results['seconds']:.0f} s; the report: {folder / 'report.html'}"
+
+
+def comparison(folders: Sequence[Path]) -> Iterator[str]:
+    """Models of several runs side by side, one table for each recording that any of them predicted.
+
+    Raises UserError: fewer than two runs, or a folder without results.
+    """
+    if len(folders) < 2:
+        raise UserError("compare takes two or more runs, as in `discovery compare runs/one runs/two`")
+    runs = {str(folder): read_results(folder) for folder in folders}
+    recordings = dict.fromkeys(name for one in runs.values() for name in (*one["fit"], *one["held_out"]))
+    for recording in recordings:
+        yield as_text(rms_table(runs, recording))
+        yield ""
+
+
+def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
+    """rms of each output, a row for each model that predicted the recording; the uncompensated errors first."""
+    rows: list[tuple[str | float | None, ...]] = []
+    outputs = list(dict.fromkeys(name for one in runs.values() for name in one["outputs"]))
+    parts = set()
+    for run, results in runs.items():
+        parts.add("held out" if recording in results["held_out"] else "fitted")
+        entries = {name: m["recordings"].get(recording, {}) for name, m in results["models"].items()}
+        if not any(entries.values()):
+            continue
+        raw = {y: e["uncompensated"]["rms"] for entry in entries.values() for y, e in entry.items()}
+        label = f"{run}: " if run else ""
+        rows.append((f"{label}uncompensated", "", *(raw.get(y) for y in outputs)))
+        for name, entry in entries.items():
+            size = f"{results['models'][name]['terms']} terms"
+            rows.append((label + name, size, *(entry[y]["rms"] if y in entry else None for y in outputs)))
+    units = {y: one["units"].get(y, "") for one in runs.values() for y in one["outputs"]}
+    header = ("rms", "", *(f"{y} [{units[y]}]" for y in outputs))
+    return Table(f"Recording '{recording}' ({' / '.join(sorted(parts))})", header, tuple(rows))
+
+
+def read_results(folder: Path) -> dict[str, Any]:
+    """Content of a run's results.json. Raises UserError where there is none."""
+    path = Path(folder) / "results.json"
+    if not path.is_file():
+        raise UserError(f"{folder}: no results.json there; name the folder of a finished `discovery run`")
+    try:
+        results: dict[str, Any] = json.loads(read_text(path))
+    except json.JSONDecodeError as error:
+        raise UserError(f"{path}, line {error.lineno}: not valid JSON ({error.msg}); make the run again") from None
+    return results
