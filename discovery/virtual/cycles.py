@@ -114,8 +114,11 @@ def _steps(rng: Draw, n: int, low_h: float, high_h: float, level: Callable[[], f
 
 
 def _random_speed(rng: Draw, n: int) -> Array:
-    """Random speed pattern: one twelfth at rest, else 300 to 1200 rpm."""
-    return _steps(rng, n, 0.3, 4.0, lambda: 0.0 if rng.uniform() < 0.08 else float(rng.integers(300, 1200)))
+    """Random speed pattern: jobs of 6 to 18 h, each with its own range of speeds, one twelfth of the time at rest."""
+    job = _steps(rng, n, 6, 18, lambda: float(rng.integers(400, 1200)))
+    around = _steps(rng, n, 0.3, 3.0, lambda: float(rng.integers(-300, 300)))
+    rest = _steps(rng, n, 0.3, 3.0, lambda: float(rng.uniform() < 0.08))
+    return np.where(rest > 0, 0.0, np.clip(job + around, 100.0, 1200.0))
 
 
 def _pump(rng: Draw, n: int) -> Array:

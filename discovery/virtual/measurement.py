@@ -43,10 +43,15 @@ CHANNELS: dict[str, tuple[str, str, int]] = {
 class Chain:
     """The measuring chain in its everyday state."""
 
-    white: tuple[float, float, float, float] = (0.45, 0.45, 0.45, 1.4)  # um, um, um, um/m: noise of a reading
-    slow: float = 0.4  # slow noise as a share of `white` ...
+    white: tuple[float, float, float, float] = (
+        0.4,
+        0.4,
+        0.4,
+        1.0,
+    )  # um, um, um, um/m: noise of a reading, mean of two turns
+    slow: float = 0.3  # slow noise as a share of `white` ...
     slow_tau_s: float = 2 * HOUR  # ... and its correlation time
-    heat_w: float = 2.0  # random heat at every body that no channel shows ...
+    heat_w: float = 1.0  # random heat at every body that no channel shows ...
     heat_tau_s: float = 3 * HOUR  # ... and its correlation time
     temperature_sd: float = 0.03  # K
 

@@ -9,9 +9,8 @@ TITLE = "virtual NMV 5000, cutting fluid"
 
 # The nozzle on the left throws most of the fluid onto the structure: B-Body 1 and 2 are splashed.
 LEFT = (
-    Request("fluid_convection", 12.0, ("b_body_1",)),
-    Request("fluid_convection", 5.0, ("b_body_2",)),
-    Request("rim_detachment", 0.4, ("c_body_1",)),
+    Request("fluid_convection", 0.8, ("b_body_1",)),
+    Request("fluid_convection", 0.4, ("b_body_2",)),
 )
 
 ORDERS = (

@@ -60,7 +60,7 @@ def take(order: Order) -> Taken:
         order.machine,
         sizes(order.effects),
         heat=heat + everyday_heat(everyday, n, cycle.step_s, order.chain),
-        start=cycle.air[0] + initial.normal(0.0, 0.2, 5),
+        start=cycle.air[0] + initial.normal(0.0, 0.1, 5),
         age=order.age,
     )
     columns = observe(cycle, run, reading, order.chain)
