@@ -114,7 +114,7 @@ def _steps(rng: Draw, n: int, low_h: float, high_h: float, level: Callable[[], f
 
 
 def _random_speed(rng: Draw, n: int) -> Array:
-    """Random speed pattern: jobs of 6 to 18 h, each with its own range of speeds, one twelfth of the time at rest."""
+    """Random speed pattern: jobs of 6 to 18 h with their own speeds, one twelfth of the time at rest."""
     job = _steps(rng, n, 6, 18, lambda: float(rng.integers(400, 1200)))
     around = _steps(rng, n, 0.3, 3.0, lambda: float(rng.integers(-300, 300)))
     rest = _steps(rng, n, 0.3, 3.0, lambda: float(rng.uniform() < 0.08))

@@ -43,12 +43,8 @@ CHANNELS: dict[str, tuple[str, str, int]] = {
 class Chain:
     """The measuring chain in its everyday state."""
 
-    white: tuple[float, float, float, float] = (
-        0.4,
-        0.4,
-        0.4,
-        1.0,
-    )  # um, um, um, um/m: noise of a reading, mean of two turns
+    # noise of a reading, um, um, um, um/m; mean of two turns of the table
+    white: tuple[float, float, float, float] = (0.4, 0.4, 0.4, 1.0)
     slow: float = 0.3  # slow noise as a share of `white` ...
     slow_tau_s: float = 2 * HOUR  # ... and its correlation time
     heat_w: float = 1.0  # random heat at every body that no channel shows ...

@@ -114,7 +114,7 @@ def test_every_effect_acts_and_stays_moderate(effect: str) -> None:
 
 
 def test_table_3_magnitudes() -> None:
-    """Mean of six cycles against the paper: peak and mean within 30 %, variance within a factor of 2.5."""
+    """Mean of six cycles against the paper: peak and mean within 30 %, variance within a factor of 3."""
     peak, mean, spread = [], [], []
     for seed in range(20, 26):
         cycle = make_cycle("fit", seed)
@@ -124,7 +124,7 @@ def test_table_3_magnitudes() -> None:
         spread.append(y.var(0))
     np.testing.assert_allclose(np.mean(peak, 0), [49, 42, 15, 38], rtol=0.3)
     np.testing.assert_allclose(np.mean(mean, 0), [-35, 28, 11, 16], rtol=0.3)
-    np.testing.assert_array_less(np.abs(np.log(np.mean(spread, 0) / [73, 44, 1.7, 80])), np.log(2.5))
+    np.testing.assert_array_less(np.abs(np.log(np.mean(spread, 0) / [73, 44, 1.7, 80])), np.log(3.0))
 
 
 def test_uniform_growth_does_not_tilt() -> None:
