@@ -1,0 +1,62 @@
+"""What a discovery hands back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from discovery.models import Model
+
+
+@dataclass(frozen=True)
+class PathPoint:
+    """One size on the way from sparse to rich: error on what was left out, in the unit of the outputs."""
+
+    outputs: tuple[str, ...]
+    terms: int
+    left_out_rms: float
+    fit_rms: float
+    chosen: bool
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """A discovered model and the evidence for it."""
+
+    model: Model
+    path: tuple[PathPoint, ...]
+    stability: Mapping[str, float]  # "E_Y0C: P_cool through 3600 s" -> share of block bootstraps that keep it
+    report: dict[str, Any]
+
+
+def merged(name: str, parts: Sequence[Model]) -> Model:
+    """Models of separate outputs side by side in one; equal time units, no shared names."""
+    first = parts[0]
+    for part in parts[1:]:
+        first = first.with_terms(*part.terms, parameters=part.parameters, states=part.states, outputs=part.outputs)
+    return replace(first, name=name)
+
+
+def joined(name: str, parts: Sequence[Discovery], seconds: float) -> Discovery:
+    """Discoveries of separate outputs as one."""
+    path = tuple(point for part in parts for point in part.path)
+    stability = {label: share for part in parts for label, share in part.stability.items()}
+    report = {
+        "groups": [part.report for part in parts],
+        "path": [
+            {
+                "outputs": list(point.outputs),
+                "terms": point.terms,
+                "left_out_rms": round(point.left_out_rms, 4),
+                "fit_rms": round(point.fit_rms, 4),
+                "chosen": point.chosen,
+                "names": list(point.names),
+            }
+            for point in path
+        ],
+        "stability": {label: round(share, 3) for label, share in stability.items()},
+        "seconds": round(seconds, 2),
+    }
+    return Discovery(merged(name, [part.model for part in parts]), path, stability, report)

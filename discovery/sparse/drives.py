@@ -1,0 +1,91 @@
+"""What can drive a model, from the roles of the recorded channels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from discovery.errors import UserError
+from discovery.recordings import Campaign
+
+AMBIENT = "ambient temperature"
+FLOW = "fluid flow"
+MEASURED = ("error", "temperature", "applied correction")
+TEMPERATURES = (AMBIENT, "fluid temperature", "coolant temperature")
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Channels that may drive a model, by role, and the temperature that stands for zero."""
+
+    by_role: dict[str, tuple[str, ...]]
+    reference: float  # degC
+    gate: str | None  # expression, 0 to 1, of a flow that goes on and off in these recordings
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All of them."""
+        return tuple(name for names in self.by_role.values() for name in names)
+
+    def of(self, *roles: str) -> tuple[str, ...]:
+        """Channels of some roles."""
+        return tuple(name for role in roles for name in self.by_role.get(role, ()))
+
+
+def make_inputs(campaign: Campaign, recordings: Sequence[str], asked: Sequence[str] | None) -> Inputs:
+    """Inputs that were asked for, or every one that moves within or between the recordings.
+
+    Raises:
+        UserError: an input that the campaign does not have, or that is an output.
+    """
+    for name in asked or ():
+        if name not in campaign.channels:
+            raise UserError(
+                f"{campaign.path}: the discovery asks for the input '{name}', which is no channel of the campaign "
+                f"({', '.join(campaign.channels)}); mend the name under inputs"
+            )
+        if campaign.channels[name].role in MEASURED:
+            raise UserError(
+                f"{campaign.path}: '{name}' has the role {campaign.channels[name].role} and cannot drive a model; "
+                "take it out of inputs"
+            )
+    values = {}
+    for name, channel in campaign.channels.items():
+        if channel.role in MEASURED or (asked is not None and name not in asked):
+            continue
+        found = [_known(campaign, recording, name) for recording in recordings]
+        if all(len(piece) for piece in found):
+            values[name] = np.concatenate(found)
+    moving = {name for name, series in values.items() if np.ptp(series) > 0}
+    by_role: dict[str, tuple[str, ...]] = {}
+    for name in values:
+        role = campaign.channels[name].role
+        if name in moving or (asked is not None and role != FLOW):
+            by_role[role] = (*by_role.get(role, ()), name)
+    air = [values[name] for name in by_role.get(AMBIENT, ())]
+    flow = by_role.get(FLOW, ())
+    most = float(np.max(values[flow[0]])) if flow else 1.0
+    gate = (flow[0] if most <= 1.0 else f"{flow[0]}/{most:g}") if flow else None
+    return Inputs(by_role, float(np.round(np.mean(air[0]), 1)) if air else 20.0, gate)
+
+
+def _known(campaign: Campaign, recording: str, name: str) -> np.ndarray:  # type: ignore[type-arg]
+    series = campaign.recordings[recording].values.get(name)
+    return np.empty(0) if series is None else series[np.isfinite(series)]
+
+
+def mass_drives(inputs: Inputs) -> list[str]:
+    """Expressions that may drive a hidden mass: zero at the reference, temperatures also gated by the pump."""
+    reference = f"{inputs.reference:g}"
+    found = [f"{name} - {reference}" for name in inputs.of(*TEMPERATURES)]
+    others = [
+        name for role, names in inputs.by_role.items() if role not in (*TEMPERATURES, FLOW) for name in names
+    ]
+    found += others
+    if inputs.gate:
+        found += [f"{inputs.gate}*({name} - {reference})" for name in inputs.of(*TEMPERATURES)]
+        found += [f"{inputs.gate}*{name}" for name in inputs.of("heat load")]
+        found.append(inputs.gate)
+    return found

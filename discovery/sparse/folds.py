@@ -1,0 +1,70 @@
+"""What is left out: folds over recordings (or blocks of a single one), and the choice of a size by them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+_MOST_FOLDS = 4
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Contiguous pieces of the recordings, in their order. `of` holds for each recording the block of each reading."""
+
+    of: tuple[Ints, ...]  # (R,) each
+    recording: Ints  # (B,) index of the recording
+
+    @property
+    def count(self) -> int:
+        """Number of blocks."""
+        return len(self.recording)
+
+
+def make_blocks(times: Sequence[Array], count: int) -> Blocks:
+    """Cut recordings with readings at `times` [s] into about `count` blocks of equal duration, at least one each.
+
+    A single recording gets at least eight, so that it can be left out in parts.
+    """
+    spans = [max(float(t[-1] - t[0]), 1.0) if len(t) else 1.0 for t in times]
+    width = sum(spans) / count
+    of, recording, first = [], [], 0
+    for i, (t, span) in enumerate(zip(times, spans, strict=True)):
+        pieces = max(8 if len(times) == 1 else 1, round(span / width))
+        share = (t - t[0]) / span if len(t) else t
+        of.append(first + np.minimum((share * pieces).astype(np.intp), pieces - 1))
+        recording += [i] * pieces
+        first += pieces
+    return Blocks(tuple(of), np.array(recording, dtype=np.intp))
+
+
+def make_folds(blocks: Blocks) -> list[Ints]:
+    """Blocks left out in each fold: one recording at a time (several when there are many), else a quarter of the one."""
+    recordings = int(blocks.recording.max()) + 1
+    if recordings == 1:
+        return list(np.array_split(np.arange(blocks.count), _MOST_FOLDS))
+    folds = min(recordings, _MOST_FOLDS)
+    return [np.flatnonzero(blocks.recording % folds == k) for k in range(folds)]
+
+
+def choose(errors: Array, tolerance: float) -> int:
+    """The sparsest row whose error on what was left out is within `tolerance` standard errors of the best.
+
+    The standard error is that of the paired difference over blocks, so it also holds where residuals are coloured.
+
+    Args:
+        errors: (sizes, B) mean squared error of each left-out block, sparsest model first.
+    """
+    best = int(np.argmin(errors.mean(axis=1)))
+    for row in range(best):
+        difference = errors[row] - errors[best]
+        spread = difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
+        if difference.mean() <= tolerance * spread:
+            return row
+    return best

@@ -1,0 +1,81 @@
+"""What a user may say about a discovery, in an experiment file: `discovered = { kind = "sindy", ... }`."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+FAMILIES = ("linear", "pump", "speed", "coupling", "radiation", "natural", "second mass")
+
+
+class SparseOptions(BaseModel):
+    """Options of one discovered model; the defaults serve a machine tool and a temperature laboratory alike."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: Literal["sindy"] = "sindy"
+    inputs: tuple[str, ...] | None = Field(
+        None, description="channels that terms may use; default every input that moves in the recordings to fit"
+    )
+    baseline: str = Field("eq9", description='"eq9", or a gray-box model file whose terms are built upon')
+    keep_baseline: bool = Field(False, description="true: the baseline's terms are always in; false: free to leave")
+    form: Literal["auto", "masses", "rates"] = Field(
+        "auto",
+        description='"masses": hidden thermal masses driven by the inputs; "rates": terms in the rates of the '
+        'outputs (or of the states of a baseline file); "auto": masses for errors, rates for anything else',
+    )
+    library: tuple[str, ...] | None = Field(
+        None,
+        description=f"families ({', '.join(FAMILIES)}) or expressions of channels and states; y is the output itself",
+    )
+    into: tuple[str, ...] | None = Field(
+        None, description="states of a baseline file that candidates may enter; default all"
+    )
+    max_terms: int = Field(15, ge=1, le=60, description="most terms of one output")
+    max_masses: int = Field(4, ge=1, le=12, description="most hidden masses of one error")
+    time_constants: tuple[float, ...] = Field(
+        (900.0, 1800.0, 3600.0, 7200.0, 14400.0, 28800.0, 57600.0),
+        description="grid of time constants of the hidden masses [s]",
+        min_length=1,
+    )
+    pump_ratios: tuple[float, ...] = Field(
+        (1.0, 2.0, 4.0, 8.0),
+        description="how many times quicker a hidden mass may answer while the pump runs",
+        min_length=1,
+    )
+    bounds: dict[str, tuple[float, float]] = Field(
+        default_factory=dict,
+        description="smallest and largest coefficient of a term, by its expression; [0, inf] is a sign",
+    )
+    optimiser: Literal["elimination", "stlsq", "ssr", "sr3"] = Field(
+        "elimination", description="our own search, or an optimiser of PySINDy"
+    )
+    tolerance: float = Field(
+        1.0, ge=0, description="standard errors by which a sparser model may be worse on what was left out"
+    )
+    blocks: int = Field(24, ge=4, le=500, description="blocks that the recordings are cut into for bootstraps")
+    bootstraps: int = Field(40, ge=0, le=1000, description="block bootstraps for the stability of each term")
+    refine: bool = Field(True, description="fit all numbers of the chosen model by output error at the end")
+    seed: int = Field(0, ge=0, description="of the bootstraps")
+
+    @field_validator("time_constants", "pump_ratios")
+    @classmethod
+    def _positive(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        if any(not 0 < value < 1e9 for value in values):
+            raise ValueError("every entry must be a positive number")
+        return tuple(sorted(set(values)))
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for name, (low, high) in self.bounds.items():
+            if not low <= high:
+                raise ValueError(f"the bounds of '{name}' are {low:g} and {high:g}: the smaller one comes first")
+        if self.form == "masses" and self.baseline != "eq9":
+            raise ValueError("a baseline file is built upon by rates; leave out form = \"masses\"")
+        return self
+
+    @property
+    def built_on_file(self) -> bool:
+        """Whether the baseline is a model file."""
+        return self.baseline != "eq9"
