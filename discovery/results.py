@@ -21,6 +21,7 @@ import numpy as np
 import discovery
 from discovery.errors import UserError
 from discovery.evaluation.crossvalidation import parts_of_the_paper
+from discovery.evaluation.shares import term_shares
 from discovery.experimentfile import Experiment, input_files
 from discovery.files import write_atomic
 from discovery.models import Model, write_model
@@ -123,6 +124,7 @@ def model_entry(one: Fitted) -> dict[str, Any]:
         "parameters": len(model.free),
         "seconds": one.seconds,
         "equations": equations(model),
+        "shares": term_shares(one.fit),
         "recordings": one.scores(),
         "cross_validation": one.cross_validation,
         "values": parameter_values(model),
