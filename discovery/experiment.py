@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.dynamics.system import predict as model_outputs
 from discovery.errors import UserError
 from discovery.evaluation import evaluate
 from discovery.evaluation.crossvalidation import cross_validate
@@ -47,6 +48,12 @@ class Prediction:
     time: Array
     readings: Array
     predicted: Array
+    reference: Array  # (Y,) what would be assumed without a model: no error, or the first temperature
+
+    def scores(self) -> dict[str, dict[str, Any]]:
+        """Criteria by output."""
+        columns = zip(self.outputs, self.readings.T, self.predicted.T, self.reference, strict=True)
+        return {name: evaluate(read, predicted, float(zero)) for name, read, predicted, zero in columns}
 
 
 @dataclass(frozen=True)
@@ -66,13 +73,6 @@ class Fitted:
     def model(self) -> Model:
         """The fitted model."""
         return self.fit.model
-
-    def scores(self) -> dict[str, dict[str, Any]]:
-        """Criteria by recording and output."""
-        return {
-            recording: {name: evaluate(p.readings[:, y], p.predicted[:, y]) for y, name in enumerate(p.outputs)}
-            for recording, p in self.predictions.items()
-        }
 
 
 def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
@@ -163,7 +163,13 @@ def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
     outputs = fit.problem.outputs
     trajectory = predict_recording(fit.model, experiment.campaign, recording, outputs, fit.noise.white)
     grid = trajectory.system.grid
-    return Prediction(outputs, grid.time[grid.read], grid.readings, grid.readings - fit.problem.residual(trajectory))
+    reference = np.zeros(len(outputs))
+    for y, name in enumerate(outputs):
+        taken = grid.readings[grid.measured[:, y], y]
+        if experiment.campaign.channels[name].role == "temperature" and len(taken):
+            reference[y] = taken[0]
+    predicted = model_outputs(trajectory)
+    return Prediction(outputs, grid.time[grid.read], grid.readings, predicted, reference)
 
 
 def diagnosis(experiment: Experiment, progress: Progress = silent) -> dict[str, Any] | None:

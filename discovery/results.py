@@ -125,7 +125,7 @@ def model_entry(one: Fitted) -> dict[str, Any]:
         "seconds": one.seconds,
         "equations": equations(model),
         "shares": term_shares(one.fit),
-        "recordings": one.scores(),
+        "recordings": {name: prediction.scores() for name, prediction in one.predictions.items()},
         "cross_validation": one.cross_validation,
         "values": parameter_values(model),
         "noise": dict(zip(one.fit.noise.outputs, one.fit.noise.white, strict=True)),

@@ -55,17 +55,18 @@ def improvement(before: Criteria, after: Criteria) -> dict[str, float]:
     return {key: 100.0 * (1.0 - abs(now[key]) / abs(was[key])) if was[key] else math.nan for key in was}
 
 
-def evaluate(reading: Array, prediction: Array) -> dict[str, Any]:
+def evaluate(reading: Array, prediction: Array, reference: float = 0.0) -> dict[str, Any]:
     """Everything that results say about one error of one model on one recording.
 
     Args:
         reading: (N,) measured error, NaN where it was not read.
         prediction: (N,) what the model gives at the same instants.
+        reference: what would be assumed without a model: 0 for an error, the first reading for a temperature.
 
     Returns:
         rms, peak, mean, variance of reading minus prediction, r2 (share of the error's variance explained),
         the same of the `uncompensated` error, and the `improvement` in percent.
     """
-    left, raw = criteria(reading - prediction), criteria(reading)
+    left, raw = criteria(reading - prediction), criteria(reading - reference)
     r2 = 1.0 - left.rms**2 / raw.variance if raw.variance > 0 else math.nan
     return {**asdict(left), "r2": r2, "uncompensated": asdict(raw), "improvement": improvement(raw, left)}

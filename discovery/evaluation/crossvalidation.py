@@ -84,9 +84,16 @@ def _left_over(model: Model, campaign: Campaign, recordings: Sequence[str], outp
 
 
 def _mask(recording: Recording, outputs: Sequence[str], window: Window) -> Recording:
-    """The recording with the readings of a window taken away; its inputs stay, since the machine went on."""
+    """The recording with the readings of a window taken away, save the first one, on which models are zeroed.
+
+    Inputs stay: the machine went on.
+    """
     hidden = (recording.time >= window[0]) & (recording.time < window[1])
-    values = {name: np.where(hidden, np.nan, v) if name in outputs else v for name, v in recording.values.items()}
+    values = dict(recording.values)
+    for name in outputs:
+        series = np.array(values[name])
+        series[hidden & (np.cumsum(np.isfinite(series)) > 1)] = np.nan
+        values[name] = series
     return replace(recording, values=values)
 
 

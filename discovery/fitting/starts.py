@@ -85,7 +85,7 @@ def _parts(model: Model) -> dict[str, _Part] | None:
 
 
 def _grid_of_times(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> Array:
-    """Time constants in s between the distance of readings and a third of the longest recording."""
+    """Time constants in s between a quarter of the distance of readings and a third of the longest recording."""
     spans, steps = [], []
     for recording in recordings:
         data = campaign.recordings[recording]
@@ -96,7 +96,7 @@ def _grid_of_times(campaign: Campaign, recordings: Sequence[str], outputs: Seque
         if len(taken) > 1:
             steps.append(float(np.median(np.diff(taken))))
     longest = max(spans)
-    shortest = min(max(min(steps, default=longest / 100), longest / 1000), longest / 10)
+    shortest = min(max(min(steps, default=longest / 100) / 4, longest / 2000), longest / 10)
     return np.geomspace(shortest, longest / 3, _COUNT)
 
 
@@ -155,9 +155,7 @@ def _best(
         rest = target - a @ solved
         return float(rest @ rest), solved / size
 
-    # alike time constants make influences alike: every second of the grid is enough to tell them apart
-    choices = range(0, len(taus), 1 if len(parts) == 1 else 2)
-    best = min(product(choices, repeat=len(parts)), key=lambda chosen: misfit(chosen)[0])
+    best = min(product(range(len(taus)), repeat=len(parts)), key=lambda chosen: misfit(chosen)[0])
     solved = list(misfit(best)[1])
     hour = TIME_UNITS[model.time_unit]
     found: dict[str, float] = {}

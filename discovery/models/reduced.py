@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from discovery.models.model import Model, Parameter, State
+from discovery.models.model import TIME_UNITS, Model, Parameter, State
 from discovery.recordings import Channel
-from discovery.terms import Apply, Expression, Name, Number, Term
+from discovery.terms import Apply, Name, Term
 
 TIME_UNIT = "h"  # rates per hour: a machine's poles are then between 0.1 and 10
-POLE_MAX = -1e-4  # 1/h, a time constant of more than a year is no model of heat
+POLE_MAX = -0.01  # 1/h: slower than 100 h is a drift that no recording tells from an offset
 
 
 def reduced(inputs: Sequence[str], outputs: Sequence[str], channels: Mapping[str, Channel]) -> Model:
@@ -33,7 +33,9 @@ def reduced(inputs: Sequence[str], outputs: Sequence[str], channels: Mapping[str
     terms: list[Term] = []
     for output in outputs:
         unit = channels[output].unit
-        states[output] = error_state(output, channels[output], None)
+        # it starts at its first reading, which is known to the noise of a reading
+        spread = max(1.0, channels[output].noise or 0.0)
+        states[output] = State(output, unit, None, None, spread, 1.0 / TIME_UNITS[TIME_UNIT])
         pole = f"p1_{output}"
         parameters[pole] = Parameter(-0.5, f"1/{TIME_UNIT}", max=POLE_MAX)
         terms.append(Term(f"{output} itself", output, Apply("*", (Name(pole), Name(output)))))
@@ -45,11 +47,6 @@ def reduced(inputs: Sequence[str], outputs: Sequence[str], channels: Mapping[str
         parameters[zero] = Parameter(0.0, rate_unit(unit))
         terms.append(Term(f"zero balance of {output}", output, Name(zero)))
     return Model("reduced, eq. (9)", parameters, states, tuple(terms), {}, TIME_UNIT)
-
-
-def error_state(name: str, channel: Channel, start: Expression | None = Number(0.0)) -> State:
-    """A state that is (part of) an error; its start is known to the noise of a reading, at least to 1 of its unit."""
-    return State(name, channel.unit, None, start, max(1.0, channel.noise or 0.0), 1.0 / 3600.0)
 
 
 def rate_unit(of: str, per: str = "1", power: int = 1) -> str:

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from discovery.models.model import Model, Parameter, State
-from discovery.models.reduced import POLE_MAX, TIME_UNIT, error_state, rate_unit
+from discovery.models.model import TIME_UNITS, Model, Parameter, State
+from discovery.models.reduced import POLE_MAX, TIME_UNIT, rate_unit
 from discovery.recordings import Channel
 from discovery.terms import Apply, Expression, Name, Number, Term
 
@@ -43,8 +43,10 @@ def superposition(inputs: Sequence[str], outputs: Sequence[str], channels: Mappi
             parameters[pole] = Parameter(-0.5, f"1/{TIME_UNIT}", max=POLE_MAX)
             parameters[gain] = Parameter(0.0, rate_unit(unit, of))
             parameters[zero] = Parameter(-REFERENCE if of == "degC" else 0.0, of, fixed=k > 0)
-            # the first influence takes up what was there at the start; no other one is known to have acted before
-            states[state] = error_state(state, channels[output], Name(output) if k == 0 else Number(0.0))
+            # The first influence takes up the first reading as it is. Free starts would be free offsets of whichever
+            # influence turns out slow, found in the fit and missing in every prediction.
+            start = Name(output) if k == 0 else Number(0.0)
+            states[state] = State(state, unit, None, start, 0.0, 1.0 / TIME_UNITS[TIME_UNIT])
             terms.append(Term(f"{state} itself", state, Apply("*", (Name(pole), Name(state)))))
             shifted = Apply("+", (Name(channel), Name(zero)))
             terms.append(Term(f"{channel} on {output}", state, Apply("*", (Name(gain), shifted))))
