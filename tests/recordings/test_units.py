@@ -1,0 +1,73 @@
+"""Units, against figures from the definitions."""
+
+import math
+
+import pytest
+
+from discovery.recordings.roles import ROLES
+from discovery.recordings.units import UnitError, conversion
+
+
+@pytest.mark.parametrize(
+    ("unit", "role", "given", "value", "canonical"),
+    [
+        ("degF", "ambient temperature", 212.0, 100.0, "degC"),
+        ("K", "temperature", 273.15, 0.0, "degC"),
+        ("mK", "temperature", 300e3, 26.85, "degC"),
+        ("°C", "fluid temperature", 20.0, 20.0, "degC"),
+        ("kW", "heat load", 1.2, 1200.0, "W"),
+        ("percent", "heat load", 40.0, 40.0, "percent"),
+        ("%", "heat load", 40.0, 40.0, "percent"),
+        ("%", "fluid flow", 50.0, 0.5, "1"),
+        ("m^3/h", "fluid flow", 0.6, 10.0, "l/min"),
+        ("1/min", "rotation speed", 600.0, 600.0, "rpm"),
+        ("Hz", "rotation speed", 10.0, 600.0, "rpm"),
+        ("rad/s", "rotation speed", 2 * math.pi, 60.0, "rpm"),
+        ("deg/s", "rotation speed", 360.0, 60.0, "rpm"),
+        ("mm", "error", 0.01, 10.0, "um"),
+        ("nm", "applied correction", 500.0, 0.5, "um"),
+        ("urad", "error", 3.0, 3.0, "um/m"),
+        ("mm/m", "error", 0.02, 20.0, "um/m"),
+        ("arcsec", "error", 1.0, math.pi / 180 / 3600 * 1e6, "um/m"),
+        ("inch", "nozzle height", 2.0, 50.8, "mm"),
+        ("bar", "other input", 6.0, 6.0, "bar"),
+        ("J/kg/K", "other input", 6.0, 6.0, "J/kg/K"),
+    ],
+)
+def test_values_become_canonical(unit: str, role: str, given: float, value: float, canonical: str) -> None:
+    to = conversion(unit, role)
+    assert to.unit == canonical
+    assert to.factor * given + to.offset == pytest.approx(value, rel=1e-11, abs=1e-9)
+
+
+def test_a_difference_takes_the_factor_alone() -> None:
+    assert conversion("degF", "temperature").factor == pytest.approx(5 / 9, rel=1e-11)
+    assert conversion("K", "temperature").factor == 1.0
+
+
+@pytest.mark.parametrize(
+    ("unit", "role", "said"),
+    [
+        ("C", "temperature", "did you mean 'degC'?"),
+        ("degC", "error", "allowed is um or um/m"),
+        ("delta_degC", "temperature", "cannot be that"),
+        ("A", "heat load", "cannot be that"),
+        ("foo", "other input", "not known"),
+        ("", "error", "not known"),
+        ("9**9**9**9", "other input", "not known"),
+        ("__import__('os')", "other input", "not known"),
+        ("m" * 1000, "other input", "not known"),
+    ],
+)
+def test_refuses_what_cannot_be(unit: str, role: str, said: str) -> None:
+    with pytest.raises(UnitError, match=said.replace("?", r"\?")):
+        conversion(unit, role)
+
+
+def test_canonical_units_are_their_own() -> None:
+    for role, facts in ROLES.items():
+        for unit in facts.units:
+            assert conversion(unit, role).unit == unit
+            assert (conversion(unit, role).factor, conversion(unit, role).offset) == (1.0, 0.0)
+        for unit in facts.ranges:
+            assert conversion(unit, role).unit == unit

@@ -1,0 +1,86 @@
+"""The command line: quick help, failures as sentences, exit statuses."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import discovery
+from discovery.cli import app
+from discovery.errors import UserError
+
+runner = CliRunner()
+
+
+def test_help_is_quick_and_imports_nothing_heavy() -> None:
+    code = (
+        "import sys, discovery.cli\n"
+        "try: discovery.cli.app(['--help'])\n"
+        "except SystemExit: pass\n"
+        "print(sorted({'numpy', 'pandas', 'scipy', 'pydantic', 'matplotlib', 'pint'} & set(sys.modules)))"
+    )
+    began = time.perf_counter()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert time.perf_counter() - began < 2.0  # 0.1 s on a quiet machine
+    assert done.stdout.strip().endswith("[]")
+    assert "check" in done.stdout
+
+
+def test_version() -> None:
+    result = runner.invoke(app, ["--version"])
+    assert result.exit_code == 0
+    assert result.stdout == f"discovery {discovery.__version__}\n"
+
+
+@pytest.mark.parametrize("arguments", [["chekc"], ["check"], ["check", "--loud", "x"]])
+def test_wrong_usage_is_2(arguments: list[str]) -> None:
+    assert runner.invoke(app, arguments).exit_code == 2
+
+
+def test_a_mistake_is_a_sentence_and_1(tmp_path: Path) -> None:
+    result = runner.invoke(app, ["check", str(tmp_path / "none.toml")])
+    assert result.exit_code == 1
+    assert result.stderr == f"error: {tmp_path / 'none.toml'}: there is no such file\n"
+    assert result.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("failure", "status", "said"),
+    [
+        (UserError("this is wrong; do that"), 1, "error: this is wrong; do that"),
+        (KeyboardInterrupt(), 130, "stopped"),
+        (PermissionError(13, "Permission denied", "runs/x"), 1, "error: runs/x: Permission denied"),
+    ],
+)
+def test_failures(failure: BaseException, status: int, said: str) -> None:
+    # the same group class as the real command line, around a verb that fails
+    small = typer.Typer(cls=app.info.cls, pretty_exceptions_enable=False)
+
+    @small.callback()
+    def main() -> None: ...
+
+    @small.command()
+    def fail() -> None:
+        raise failure
+
+    result = runner.invoke(small, ["fail"])
+    assert result.exit_code == status
+    assert result.stderr.strip().startswith(said)
+
+
+@pytest.mark.parametrize(("given", "seen"), [(None, "1"), ("3", "3")])
+def test_one_thread_a_process_unless_the_user_says_otherwise(given: str | None, seen: str) -> None:
+    environment = {key: value for key, value in os.environ.items() if not key.endswith("_NUM_THREADS")}
+    environment |= {"OMP_NUM_THREADS": given} if given else {}
+    code = (
+        "import discovery.cli, os; print(os.environ['OMP_NUM_THREADS'], os.environ['OPENBLAS_NUM_THREADS'])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == [seen, "1"]
