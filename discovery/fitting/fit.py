@@ -64,6 +64,7 @@ def fit_model(
     grids: Mapping[str, Grid] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
     belief: float | None = None,
+    guess: Mapping[str, float] | None = None,
     max_rounds: int = 60,
 ) -> Fit:
     """Fit the free parameters and start values of a model to recordings.
@@ -80,12 +81,13 @@ def fit_model(
         loss: "soft_l1", "huber" or "cauchy" bound the pull of outliers (scipy.optimize.least_squares).
         grids: grids to share between fits.
         priors, belief: as in `make_problem`.
+        guess: parameter values to begin from, where they differ from the model's start values.
         max_rounds: of Levenberg-Marquardt.
     """
     began = clock.perf_counter()
     problem = make_problem(model, campaign, recordings, outputs, grids, priors, belief)
     stated = {name: campaign.channels[name].noise for name in problem.outputs}
-    theta = problem.start
+    theta = np.array([(guess or {}).get(u.name, u.start) if not u.is_start else u.start for u in problem.unknowns])
     given = noise is not None
     current = noise or white_noise(problem.outputs, stated, [s.grid.readings for s in problem.systems])
     rounds = 1 if given else 3

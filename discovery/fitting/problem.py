@@ -167,10 +167,9 @@ def make_problem(
         declared = start_values(system, model.values(system.grid.recording))
         for state, value in zip(system.model.states.values(), declared, strict=True):
             if state.start_sd > 0:
+                prior = (float(value), state.start_sd)
                 unknowns.append(
-                    Unknown(
-                        state.name, system.grid.recording, True, float(value), -np.inf, np.inf, state.start_sd
-                    )
+                    Unknown(state.name, system.grid.recording, True, float(value), -np.inf, np.inf, prior)
                 )
     return Problem(model, tuple(systems), tuple(unknowns))
 

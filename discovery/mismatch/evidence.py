@@ -14,8 +14,6 @@ from discovery.mismatch.signatures import signatures
 
 Array = NDArray[np.float64]
 
-VISIBLE = 0.03  # share of a signature that must survive a refit; below it the recordings cannot tell
-
 
 @dataclass(frozen=True)
 class Score:
@@ -87,7 +85,7 @@ def scores(board: Board) -> list[Score]:
             size = tuple(float(s) for s in solved)
         length = board.lengths[v][mine].max()
         share = float(np.sqrt(gram_diagonal[mine].max()) / length) if length > 0 else 0.0
-        out.append(Score(h, gain if share > VISIBLE else min(gain, 0.0), t, size, share))
+        out.append(Score(h, gain if share > 0 else 0.0, t, size, share))
     return out
 
 

@@ -268,11 +268,13 @@ def _places(
                         yield (a, b), (), ()
         case "fluid terms" | "cooling terms":
             wanted = "fluid temperature" if effect.place == "fluid terms" else "cooling power"
-            terms = tuple(t for t in model.terms if any(role.get(n) == wanted for n in names(t.expression)))
+            terms = tuple(
+                t for t in model.terms if not t.effect and any(role.get(n) == wanted for n in names(t.expression))
+            )
             if terms:
                 yield tuple(dict.fromkeys(t.into for t in terms)), terms, ()
         case "inputs of a recording":
-            terms = tuple(t for t in model.terms if names(t.expression) & set(channels))
+            terms = tuple(t for t in model.terms if not t.effect and names(t.expression) & set(channels))
             if terms:
                 yield (), terms, ()
         case "output" | "output of a recording":

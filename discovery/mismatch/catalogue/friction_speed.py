@@ -9,13 +9,13 @@ EFFECT = Effect(
     place="driven body",
     formula="P_f*(speed/1000)**m",
     amplitude=Amplitude("P_f", "W", 60.0),
-    shapes=(Shape("m", "1", (1.0, 1.6), 0.8, 2.2),),
+    shapes=(Shape("m", "1", (1.0, 1.5, 2.0, 2.5), 0.8, 3.0),),
     signature="heat in bearings and drive that the drive power does not account for, a smooth power of the speed",
     confused_with=(
         "viscosity_temperature",
         "windage",
         "film_drag",
     ),
-    source="Palmgren: (M_c + M_v n^(2/3)) n, i.e. an effective exponent of 1 to 5/3",
+    source="Palmgren: (M_c + M_v n^(2/3)) n, viscous seals n^2: an effective exponent of 1 to 2",
     examples=(Example({"P_f": 50.0, "speed": 500.0, "m": 1.0}, 25.0),),
 )

@@ -1,19 +1,23 @@
 """Viscous friction that falls as the oil warms up."""
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="viscosity_temperature",
     title="Oil gets thinner",
     group="drive and cooling",
     place="driven body",
-    formula="P_v*speed/1000*exp(-0.03*(body - 22))",
+    formula="P_v*(speed/1000)**m*exp(-k_oil*(body - 22))",
     amplitude=Amplitude("P_v", "W", 80.0),
+    shapes=(
+        Shape("m", "1", (1.67, 2.0), 1.0, 2.5),
+        Shape("k_oil", "1/K", (0.03, 0.06), 0.01, 0.12),
+    ),
     signature="friction is largest at a cold start and falls as the body warms up",
     confused_with=(
         "friction_speed",
         "thermal_preload",
     ),
-    source="Palmgren M_v ~ nu^(2/3) with d ln(nu)/dT = -0.045/K: friction falls by 3 % per kelvin",
-    examples=(Example({"P_v": 80.0, "speed": 1000.0, "body": 22.0}, 80.0),),
+    source="Palmgren M_v ~ nu^(2/3) with d ln(nu)/dT = -0.045/K: friction falls by 3 % per kelvin or more with stiff grease",
+    examples=(Example({"P_v": 80.0, "speed": 1000.0, "m": 2.0, "k_oil": 0.03, "body": 22.0}, 80.0),),
 )

@@ -1,0 +1,161 @@
+"""What a diagnosis works on: the recordings it may see, the noise it has to expect, and how large effects can be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import Grid, make_grid
+from discovery.fitting import Fit, Noise, fit_model
+from discovery.mismatch.catalogue.effect import Effect
+from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.lens import Lens
+from discovery.mismatch.signatures import heat_rms
+from discovery.models import Model
+from discovery.recordings import Campaign
+from discovery.terms import evaluate
+
+Array = NDArray[np.float64]
+
+BELIEF = 0.5  # a hand-built model's start values are believed within a factor of about two
+EVERYDAY_HEAT = 4.0  # W rms at a body that no machine is free of
+BUSY_FLOW = 100.0  # W; a model whose largest heat flow is smaller has a smaller everyday heat
+SLOW_LIMIT = 0.55  # everyday slow sensor noise, as a share of the reading noise
+
+
+@dataclass(frozen=True)
+class Context:
+    """Everything that stays the same while hypotheses are tried."""
+
+    campaign: Campaign
+    model: Model
+    recordings: tuple[str, ...]
+    outputs: tuple[str, ...]
+    grids: Mapping[str, Grid]
+    effects: tuple[Effect, ...]
+    baseline: Fit
+    settings: tuple[Noise, ...]  # everyday noise, from none to the limit
+    heat_limit: Mapping[str, float]
+    flows: Mapping[str, float]  # largest heat flow (or rate) by state, rms
+    belief: float | None
+
+    def spread(self, h: Hypothesis) -> tuple[float, ...]:
+        """Prior standard deviation of each amplitude: what is plausible, but no more than the model's own flows."""
+        size = h.effect.amplitude.plausible
+        if h.effect.amplitude.fixed is not None:
+            return (size,) * len(h.amplitudes)
+        if h.shown:
+            unit = [self.campaign.channels[name].unit for name in h.shown]
+            level = dict(zip(self.settings[0].outputs, self.settings[0].white, strict=True))
+            return tuple(
+                size if u in ("um", "um/m") or h.effect.amplitude.unit == "1" else min(size, 10 * level[name])
+                for u, name in zip(unit, h.shown, strict=True)
+            )[: len(h.amplitudes)]
+        trajectory = self.baseline.trajectories[0]
+        values = {**trajectory.at_ends(), **h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
+        unit_flow = max(
+            float(np.sqrt(np.mean(np.square(evaluate(t.expression, values, memory=trajectory.system.ends).value))))
+            for t in h.terms
+        )
+        largest = max(self.flows.values())
+        return (min(size, largest / unit_flow) if unit_flow > 0 else size,) * len(h.amplitudes)
+
+
+def make_context(
+    campaign: Campaign, model: Model, recordings: Sequence[str], outputs: Sequence[str], effects: Sequence[Effect]
+) -> Context:
+    """Fit the baseline jointly and find the noise levels that tests must reckon with.
+
+    Only `recordings` are looked at.
+    """
+    inputs = [
+        name
+        for name, channel in campaign.channels.items()
+        if name not in outputs
+        and channel.role not in ("error", "applied correction")
+        and all(np.isfinite(campaign.recordings[r].values.get(name, np.array([np.nan]))).any() for r in recordings)
+    ]
+    grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
+    physical = any(state.capacity for state in model.states.values())
+    belief = BELIEF if physical else None
+    fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
+    flows = _flows(fit)
+    largest = max(flows.values(), default=1.0)
+    limit = {
+        name: EVERYDAY_HEAT * min(1.0, largest / BUSY_FLOW) if state.capacity else 0.04 * flows.get(name, 0.0)
+        for name, state in fit.problem.model.states.items()
+        if not name.startswith("lag_")
+    }
+    duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
+    white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)
+    settings = tuple(
+        replace(
+            white,
+            slow=tuple(share * w for w in white.white),
+            heat={name: level * value for name, value in limit.items()},
+        )
+        for share in (0.0, 0.5 * SLOW_LIMIT, SLOW_LIMIT)
+        for level in (0.0, 0.35, 0.9)
+    )
+    return Context(
+        campaign, model, tuple(recordings), tuple(outputs), grids, tuple(effects), fit, settings, limit, flows, belief
+    )
+
+
+def _flows(fit: Fit) -> dict[str, float]:
+    flows: dict[str, float] = {}
+    for trajectory in fit.trajectories:
+        for term in trajectory.system.model.terms:
+            size = heat_rms(trajectory, term.expression)
+            for state in (term.into, term.source):
+                if state:
+                    flows[state] = max(flows.get(state, 0.0), size)
+    return flows
+
+
+def reading_noise(fit: Fit, stated: Mapping[str, float | None], limit: Mapping[str, float], duration: float) -> Noise:
+    """White reading noise: what is stated, else the most likely level beside slow noise and heat of any size.
+
+    Heat far above the everyday level is offered, so that a mismatch passes for heat and not for reading noise. Time
+    constants of everyday noise are 2 and 3 h, or a fixed share of shorter recordings.
+    """
+    outputs = fit.problem.outputs
+    known = np.array([stated.get(name) is not None for name in outputs])
+    slow_time, heat_time = min(7200.0, duration / 36), min(10800.0, duration / 24)
+    best, lowest = np.array(fit.noise.white), np.inf
+    if not known.all():
+        lens = Lens(fit)
+        for share in (0.0, 0.5 * SLOW_LIMIT, SLOW_LIMIT):
+            for level in (0.0, 0.3, 1.0, 3.0, 10.0, 30.0):
+                heat = {name: level * value for name, value in limit.items()}
+                white, cost = _white_beside(lens, known, share, heat, slow_time, heat_time)
+                if cost < lowest:
+                    best, lowest = white, cost
+    return Noise(outputs, tuple(float(w) for w in best), (), None, slow_time, heat_time)
+
+
+def _white_beside(
+    lens: Lens, known: NDArray[np.bool_], share: float, heat: Mapping[str, float], slow_time: float, heat_time: float
+) -> tuple[Array, float]:
+    """White level (Y,) that makes the innovations unit variance beside given slow noise and heat; its -log likelihood."""
+    outputs = lens.fit.problem.outputs
+    white = np.array(lens.fit.noise.white)
+    cost = np.inf
+    for _ in range(4):
+        noise = Noise(outputs, tuple(white), tuple(share * white), heat, slow_time, heat_time)
+        squares, counts, cost = np.zeros(len(outputs)), np.zeros(len(outputs)), 0.0
+        for part, residual in zip(lens.filters, lens.residuals, strict=True):
+            z, logdet = part.apply(noise, residual[:, :, None])
+            innovation = np.full(residual.shape, np.nan)
+            innovation[part.measured] = np.clip(z[:, 0], -4.0, 4.0)  # single wrong readings do not count in full
+            squares += np.nansum(innovation**2, axis=0)
+            counts += part.measured.sum(axis=0)
+            cost += logdet + 0.5 * float(np.nansum(innovation**2))
+        factor = np.where(known, 1.0, np.sqrt(squares / np.maximum(counts, 1)))
+        white = white * np.maximum(factor, 0.2)
+        if np.all(np.abs(factor - 1) < 0.01):
+            break
+    return white, cost
