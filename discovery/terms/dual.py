@@ -62,24 +62,30 @@ def evaluate(
     >>> d.value.tolist(), d.partials["x"].tolist(), d.partials["a"].tolist()
     ([3.0, 12.0], [6.0, 12.0], [1.0, 4.0])
     """
+    with np.errstate(all="ignore"):  # what is undefined is NaN or infinite; the caller sees a trajectory run away
+        return _evaluate(expression, values, wrt, memory)
+
+
+def _evaluate(expression: Expression, values: Mapping[str, Value], wrt: frozenset[str], memory: Memory | None) -> Dual:
     match expression:
         case Number(value=number):
-            return Dual(number)
+            return Dual(np.float64(number))  # numpy's numbers divide by zero without a crash
         case Name(id=name):
-            return Dual(values[name], {name: 1.0} if name in wrt else {})
+            value = values[name]
+            return Dual(np.float64(value) if np.ndim(value) == 0 else value, {name: 1.0} if name in wrt else {})
         case Apply(function="delay", arguments=(Name(id=channel), seconds)):
-            duration = evaluate(seconds, values, wrt, memory)
+            duration = _evaluate(seconds, values, wrt, memory)
             assert memory is not None
-            value, slope = memory.delayed(channel, float(np.mean(duration.value)))
-            return Dual(value, {name: slope * partial for name, partial in duration.partials.items()})
+            late, slope = memory.delayed(channel, float(np.mean(duration.value)))
+            return Dual(late, {name: slope * partial for name, partial in duration.partials.items()})
         case Apply(function="lag", arguments=(inner, tau)) if memory is not None:
             # A model's own lags are states (models.expanded); this one serves candidates, seen along a given trajectory.
             series = np.asarray(evaluate(inner, values, memory=memory).value, dtype=float)
             return Dual(memory.lagged(series, float(np.mean(evaluate(tau, values, memory=memory).value))))
         case Apply(function="play", arguments=(inner, width)):
-            return _play(evaluate(inner, values, wrt, memory), evaluate(width, values, wrt, memory), memory)
+            return _play(_evaluate(inner, values, wrt, memory), _evaluate(width, values, wrt, memory), memory)
         case Apply(function=function, arguments=arguments):
-            return _apply(function, [evaluate(argument, values, wrt, memory) for argument in arguments])
+            return _apply(function, [_evaluate(argument, values, wrt, memory) for argument in arguments])
 
 
 def _chain(value: Value, pieces: list[tuple[Value, Dual]]) -> Dual:
@@ -156,12 +162,11 @@ def _apply(function: str, a: list[Dual]) -> Dual:
 
 def _power(base: Dual, exponent: Dual) -> Dual:
     x, p = np.asarray(base.value, dtype=float), exponent.value
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        value = np.power(x, p)
-        # 0**p has no slope to speak of for 0 < p < 1; a finite one keeps Newton steps finite.
-        floor = np.where(np.abs(x) < 1e-9, 1e-9, x)
-        slope = p * np.power(floor, np.asarray(p) - 1.0) if base.partials else 0.0
-        growth = np.where(x > 0, value * np.log(np.where(x > 0, x, 1.0)), 0.0) if exponent.partials else 0.0
+    value = np.power(x, p)
+    # 0**p has no slope to speak of for 0 < p < 1; a finite one keeps Newton steps finite.
+    floor = np.where(np.abs(x) < 1e-9, 1e-9, x)
+    slope = p * np.power(floor, np.asarray(p) - 1.0) if base.partials else 0.0
+    growth = np.where(x > 0, value * np.log(np.where(x > 0, x, 1.0)), 0.0) if exponent.partials else 0.0
     return _chain(value if value.ndim else float(value), [(slope, base), (growth, exponent)])
 
 
