@@ -151,11 +151,62 @@ def run(
 @app.command()
 def compare(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders of results.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Write a page on them: FILE.html, or a folder.")
+    ] = None,
 ) -> None:
     """Put the models of several runs side by side: rms of each error, recording by recording."""
     from discovery.summary import comparison
 
     for line in comparison(runs):
+        typer.echo(line)
+    if out:
+        from discovery.report import write_comparison
+
+        typer.echo(write_comparison(runs, out))
+
+
+@app.command()
+def report(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A folder of results.")],
+    figures: Annotated[
+        bool, typer.Option("--figures", help="Also write RUN/figures/*.svg and *.pdf.")
+    ] = False,
+) -> None:
+    """Write the report of RUN anew: one page that opens offline."""
+    from discovery.report import write_figures, write_report
+
+    typer.echo(write_report(run))
+    if figures:
+        written = write_figures(run)
+        typer.echo(f"{written[0].parent}: {len(written)} figures")
+
+
+@app.command()
+def export(
+    run: Annotated[Path, typer.Argument(help="Folder of a finished run.")],
+    model: Annotated[str, typer.Option(help="Name of one of its models.")],
+    to: Annotated[list[str], typer.Option(help="json, c, fmu, fmu3 or st; may be repeated.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder of the files [RUN/export/MODEL].")] = None,
+    campaign: Annotated[Path | None, typer.Option(help="Campaign file [the one of the run].")] = None,
+    step: Annotated[float, typer.Option(help="Fixed internal step, s.")] = 10.0,
+    states: Annotated[int | None, typer.Option(help="Reduce the model to so many states first.")] = None,
+    sign: Annotated[
+        Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs; made when there is none yet.")
+    ] = None,
+) -> None:
+    """Export a fitted model for the compensation runtime, proved equal to the Python model before it is written.
+
+    \b
+    discovery export "runs/cutting fluid" --model thermobalance --to c --to fmu
+    discovery export "runs/cutting fluid" --model thermobalance --to json --sign machine.pem
+    """
+    from discovery.export import export_run
+    from discovery.export.seal import private_key
+
+    key = private_key(sign) if sign else None
+    done = export_run(run, model, to, out, campaign=campaign, step_s=step, states=states, key=key)
+    for line in done.lines():
         typer.echo(line)
 
 

@@ -1,0 +1,176 @@
+"""The first screen: the answer in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from discovery.report.ranking import cells, is_discovered, mean_improvement, ranked, ratio
+from discovery.report.run import Run, pretty_unit
+from discovery.report.text import listed, number, percent, words
+
+_VERDICTS = {
+    "no mismatch": "Nothing is missing that these recordings could show",
+    "missing physics": "Physics is missing",
+    "measurement fault": "The measurement is at fault, not the physics",
+    "unexplained": "Something is missing that the catalogue does not explain",
+}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """`headline`: one sentence. `points`: what supports it. `figures`: (figure, caption) pairs to show large."""
+
+    headline: str
+    points: tuple[str, ...]
+    figures: tuple[tuple[str, str], ...]
+    physics: str = ""  # the verdict of the diagnosis in one sentence
+    physics_points: tuple[str, ...] = ()
+
+
+def answer(run: Run) -> Answer:
+    """What the run says, in words and in few figures."""
+    headline, points, figures = _models(run)
+    physics, physics_points = _physics(run.diagnosis)
+    if not headline:
+        headline, physics = physics, ""
+    return Answer(headline, tuple(points), tuple(figures), physics, tuple(physics_points))
+
+
+def _models(run: Run) -> tuple[str, list[str], list[tuple[str, str]]]:
+    order = [model for model in ranked(run) if cells(run, model)]
+    if not order:
+        return "", [], []
+    best = order[0]
+    unseen = run.held_out
+    where = (
+        f"on the unseen recording{'s' * (len(unseen) > 1)} {listed([f'“{name}”' for name in unseen])}"
+        if unseen
+        else "on the recordings it was fitted to"
+    )
+    made = "the discovered model" if is_discovered(run, best) else "the hand-built model"
+    rivals = [model for model in order[1:] if math.isfinite(ratio(run, best, model))]
+    headline = f"{made.capitalize()} “{best}” predicts best {where}."
+    points = []
+    improved = mean_improvement(run, best)
+    figures = []
+    if math.isfinite(improved):
+        points.append(
+            f"It removes {number(improved, 2)} % of the thermal error (rms, mean over {_count(run, best)})."
+        )
+        figures.append((f"{number(improved, 2)} %", f"of the error removed by {best}, unseen recordings"))
+    compared = [f"{_less(ratio(run, best, model))} {_name(run, model)}" for model in rivals]
+    if compared:
+        points.append(f"It leaves {listed(compared)}.")
+    figures += [
+        (_less(ratio(run, best, model), short=True), f"rms left by {best} against {model}")
+        for model in [m for m in rivals if not is_discovered(run, m)][:2]
+    ]
+    worst = _worst(run, best)
+    if worst:
+        points.append(worst)
+    if not unseen:
+        points.append(
+            "No recording was held out: these figures say how well the models fit, not how well they predict."
+        )
+    return headline, points, figures
+
+
+def _name(run: Run, model: str) -> str:
+    return f"“{model}”{'' if is_discovered(run, model) else ' (hand-built)'}"
+
+
+def _less(share: float, short: bool = False) -> str:
+    if 0.995 < share < 1.005:
+        return "0 %" if short else "as much as"
+    change = f"{100 * abs(share - 1):.0f} %"
+    if short:
+        return f"{'−' if share < 1 else '+'}{change}"
+    return f"{change} {'less than' if share < 1 else 'more than'}"
+
+
+def _count(run: Run, model: str) -> str:
+    pairs = cells(run, model)
+    recordings, outputs = {r for r, _ in pairs}, {o for _, o in pairs}
+    return f"{len(outputs)} error{'s' * (len(outputs) != 1)} and {len(recordings)} recording{'s' * (len(recordings) != 1)}"
+
+
+def _worst(run: Run, model: str) -> str:
+    scored = {
+        key: score["improvement"]["rms"]
+        for key, score in cells(run, model).items()
+        if score.get("improvement", {}).get("rms") is not None
+    }
+    if len(scored) < 2:
+        return ""
+    (low_r, low_o), low = min(scored.items(), key=lambda item: item[1])
+    (high_r, high_o), high = max(scored.items(), key=lambda item: item[1])
+    return f"Between {number(low, 2)} % ({low_o} on {low_r}) and {number(high, 2)} % ({high_o} on {high_r}) of each error is removed."
+
+
+def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
+    if not diagnosis:
+        return "", []
+    verdict = str(diagnosis.get("verdict", ""))
+    found = diagnosis.get("physics") or []
+    model = diagnosis.get("model", "the model")
+    lead = _VERDICTS.get(verdict, verdict.capitalize())
+    sentence = f"{lead} in “{model}”"
+    if found:
+        sentence += f": {listed([_effect(one) for one in found])}"
+    points = [_size(one) for one in found if one.get("parameters")]
+    p_value = diagnosis.get("detection", {}).get("p_value")
+    if p_value is not None:
+        chance = "less than 1 in 1000" if p_value < 1e-3 else f"p = {number(p_value, 2)}"
+        points.append(f"Chance that a complete model would look this wrong: {chance}.")
+    points += _proof(diagnosis)
+    rivals = [
+        one for one in diagnosis.get("alternatives") or [] if one.get("log_evidence_below_best", 99) < 3
+    ]
+    if rivals:
+        points.append(
+            f"These recordings cannot tell it from {listed([_effect(one) for one in rivals], 'or')}."
+        )
+    return sentence + ".", points
+
+
+def _effect(one: Mapping[str, Any]) -> str:
+    states = listed([str(state) for state in one.get("states", [])])
+    sure = one.get("probability")
+    text = f"{words(str(one.get('effect', 'unknown')))}{f' at {states}' if states else ''}"
+    return text + (f" ({percent(sure)} sure)" if sure is not None else "")
+
+
+def _size(one: Mapping[str, Any]) -> str:
+    sizes = [
+        f"{name} = {number(p.get('value'))} {pretty_unit(str(p.get('unit', '')))}".rstrip()
+        + (
+            f" (95 %: {number(p['low'])} to {number(p['high'])})"
+            if p.get("low") is not None and p.get("high") is not None
+            else ""
+        )
+        for name, p in one["parameters"].items()
+    ]
+    return f"Size of {words(str(one.get('effect')))}: {listed(sizes)}."
+
+
+def _proof(diagnosis: Mapping[str, Any]) -> list[str]:
+    improvement = diagnosis.get("improvement") or {}
+    points = []
+    held = {
+        name: s
+        for name, s in (improvement.get("held_out") or {}).items()
+        if s.get("rms_before") is not None and s.get("rms_after") is not None
+    }
+    if held:
+        each = [f"{number(s['rms_before'])} → {number(s['rms_after'])} on {name}" for name, s in held.items()]
+        points.append(
+            f"Repaired, it leaves on unseen recordings (rms, in units of the reading noise or as stated): {listed(each)}."
+        )
+    if improvement.get("explained") is not None:
+        points.append(
+            f"The repair closes {percent(improvement['explained'])} of the gap that can be closed there."
+        )
+    return points

@@ -1,0 +1,240 @@
+/* Charts of the report: plain SVG with zoom, hover and keyboard; no library, no network. */
+(() => {
+  "use strict";
+  const SVG = "http://www.w3.org/2000/svg";
+  const LEFT = 62, RIGHT = 14, TOP = 10, GAP = 20, BOTTOM = 40;
+  const source = document.getElementById("data");
+  if (!source) return;
+  const data = JSON.parse(source.textContent);
+  const views = [], zoom = {}, hidden = new Set();
+
+  const element = (name, attributes = {}, parent = null, text = null) => {
+    const made = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+    if (text !== null) made.textContent = text;
+    if (parent) parent.appendChild(made);
+    return made;
+  };
+  const show = (value) => {
+    if (!Number.isFinite(value)) return "–";
+    const digits = Math.abs(value) >= 100 ? 0 : Math.abs(value) >= 10 ? 1 : Math.abs(value) >= 1 ? 2 : 3;
+    return Number(value.toFixed(digits)).toString().replace("-", "−");
+  };
+  const steps = (low, high, count, isHours) => {
+    const raw = (high - low) / Math.max(count, 1);
+    const power = 10 ** Math.floor(Math.log10(raw));
+    let step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw);
+    if (isHours && raw > 0.9) step = [1, 2, 3, 6, 12, 24, 48, 96, 168].find((k) => k >= raw) || step;
+    const found = [];
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; k++) found.push(k * step);
+    return found;
+  };
+  const nearest = (xs, x) => {
+    let low = 0, high = xs.length - 1;
+    while (high - low > 1) { const mid = (low + high) >> 1; if (xs[mid] < x) low = mid; else high = mid; }
+    return Math.abs(xs[low] - x) <= Math.abs(xs[high] - x) ? low : high;
+  };
+  const visible = (series) => !hidden.has(series.name);
+
+  class View {
+    constructor(figure, chart) {
+      this.figure = figure; this.chart = chart; this.cursor = null;
+      this.box = figure.querySelector(".plot");
+      this.readout = figure.querySelector(".readout");
+      this.reset = figure.querySelector(".reset");
+      this.key = chart.group || chart.key;
+      const all = chart.panels.flatMap((p) => p.series.map((s) => ({ ...s, xs: data.arrays[s.x] })));
+      this.panels = chart.panels.map((p) => ({ ...p, series: p.series.map((s) => ({ ...s, xs: data.arrays[s.x] })) }));
+      const bars = all.filter((s) => s.kind === "bars");
+      const pad = bars.length && bars[0].xs.length > 1 ? (bars[0].xs[1] - bars[0].xs[0]) / 2 : 0;
+      const ends = all.filter((s) => s.xs.length);
+      this.full = [Math.min(...ends.map((s) => s.xs[0])) - pad, Math.max(...ends.map((s) => s.xs[s.xs.length - 1])) + pad];
+      if (!(this.full[1] > this.full[0])) this.full = [this.full[0] - 1, this.full[0] + 1];
+      this.listen();
+    }
+    get domain() { return zoom[this.key] || this.full; }
+    at(x) { const [a, b] = this.domain; return LEFT + ((x - a) / (b - a)) * (this.width - LEFT - RIGHT); }
+    from(pixel) { const [a, b] = this.domain; return a + ((pixel - LEFT) / (this.width - LEFT - RIGHT)) * (b - a); }
+
+    draw() {
+      const width = this.box.clientWidth;
+      if (!width) return;
+      this.width = Math.max(width, 260);
+      const small = Boolean(this.figure.closest(".small"));
+      const heights = this.panels.map((_, i) => (small ? 150 : i ? 110 : 210));
+      this.height = TOP + heights.reduce((a, b) => a + b, 0) + GAP * (heights.length - 1) + BOTTOM;
+      const svg = element("svg", { viewBox: `0 0 ${this.width} ${this.height}`, "aria-hidden": "true", focusable: "false" });
+      let top = TOP;
+      this.areas = this.panels.map((panel, i) => {
+        const area = { panel, top, height: heights[i], last: i === heights.length - 1 };
+        this.panel(svg, area);
+        top += heights[i] + GAP;
+        return area;
+      });
+      element("text", { class: "label", x: (LEFT + this.width - RIGHT) / 2, y: this.height - 4, "text-anchor": "middle" }, svg, this.chart.x);
+      this.layer = element("g", { class: "cursor" }, svg);
+      this.brush = element("rect", { class: "brush", y: TOP, height: this.height - TOP - BOTTOM, width: 0, x: 0 }, svg);
+      this.box.replaceChildren(svg);
+      this.reset.hidden = !zoom[this.key];
+    }
+    range(panel) {
+      const [a, b] = this.domain;
+      let low = Infinity, high = -Infinity;
+      for (const s of panel.series.filter(visible)) {
+        const lows = s.low || s.y, highs = s.high || s.y;
+        for (let i = 0; i < s.xs.length; i++) {
+          if (s.xs[i] < a || s.xs[i] > b) continue;
+          if (lows[i] < low) low = lows[i];
+          if (highs[i] > high) high = highs[i];
+        }
+      }
+      if (panel.zero) { low = Math.min(low, 0); high = Math.max(high, 0); }
+      if (!Number.isFinite(low)) return [-1, 1];
+      const pad = (high - low) * 0.06 || Math.abs(high) * 0.1 || 1;
+      return [low - pad, high + pad];
+    }
+    panel(svg, area) {
+      const { panel, top, height } = area, [low, high] = this.range(panel), bottom = top + height;
+      area.y = (value) => bottom - ((value - low) / (high - low)) * height;
+      const clip = `clip-${this.chart.key}-${top}`.replace(/[^A-Za-z0-9-]/g, "_");
+      const rect = element("rect", { x: LEFT, y: top, width: this.width - LEFT - RIGHT, height }, element("clipPath", { id: clip }, svg));
+      rect.setAttribute("class", "clip");
+      for (const [from, to, why] of this.chart.shades) {
+        const x1 = Math.max(this.at(from), LEFT), x2 = Math.min(this.at(to), this.width - RIGHT);
+        if (x2 > x1) element("title", {}, element("rect", { class: "shade", x: x1, y: top, width: x2 - x1, height }, svg), why);
+      }
+      for (const tick of steps(low, high, height / 42, false)) {
+        const y = area.y(tick);
+        element("line", { class: Math.abs(tick) < 1e-12 && panel.zero ? "zero" : "grid", x1: LEFT, x2: this.width - RIGHT, y1: y, y2: y }, svg);
+        element("text", { class: "tick", x: LEFT - 7, y: y + 4, "text-anchor": "end" }, svg, show(tick));
+      }
+      for (const tick of steps(...this.domain, (this.width - LEFT - RIGHT) / 55, this.chart.x.includes("[h]"))) {
+        const x = this.at(tick);
+        element("line", { class: "grid", x1: x, x2: x, y1: top, y2: bottom }, svg);
+        if (area.last) element("text", { class: "tick", x, y: bottom + 17, "text-anchor": "middle" }, svg, show(tick));
+      }
+      const inside = element("g", { "clip-path": `url(#${clip})` }, svg);
+      for (const s of panel.series.filter(visible)) this.series(inside, s, area);
+      for (const [name, x] of Object.entries(this.chart.marks)) {
+        element("line", { class: "mark", x1: this.at(x), x2: this.at(x), y1: top, y2: bottom }, svg);
+        element("text", { class: "tick", x: this.at(x) + 5, y: top + 14 }, svg, name);
+      }
+      element("rect", { class: "frame", x: LEFT, y: top, width: this.width - LEFT - RIGHT, height }, svg);
+      const middle = top + height / 2;
+      element("text", { class: "label", x: 13, y: middle, "text-anchor": "middle", transform: `rotate(-90 13 ${middle})` }, svg, panel.label);
+    }
+    series(parent, s, area) {
+      const y = area.y, look = `c-${s.color} ${s.kind}${area.panel.zero ? " below" : ""}`;
+      const path = (ys) => s.xs.map((x, i) => `${this.at(x).toFixed(1)},${y(ys[i]).toFixed(1)}`);
+      if (s.kind === "band") element("polygon", { class: look, points: [...path(s.low), ...path(s.high).reverse()].join(" ") }, parent);
+      else if (s.kind === "points") {
+        const size = s.xs.length > 700 ? 1.3 : 1.9;
+        const d = path(s.y).map((p) => { const [a, b] = p.split(","); return `M${a - size},${b}a${size},${size} 0 1,0 ${2 * size},0a${size},${size} 0 1,0 ${-2 * size},0`; });
+        element("path", { class: look, d: d.join("") }, parent);
+      } else if (s.kind === "bars") {
+        const wide = Math.max(2, 0.6 * Math.abs(this.at(s.xs[1] ?? s.xs[0] + 1) - this.at(s.xs[0])));
+        s.xs.forEach((x, i) => element("rect", { class: look, x: this.at(x) - wide / 2, width: wide, y: Math.min(y(0), y(s.y[i])), height: Math.abs(y(0) - y(s.y[i])) }, parent));
+      } else element("polyline", { class: look, points: path(s.y).join(" ") }, parent);
+    }
+    point(x, spoken) {
+      if (!this.layer) return;
+      const lead = this.panels[0].series.filter((s) => visible(s) && s.xs.length && s.kind !== "band");
+      if (!lead.length) return;
+      x = lead[0].xs[nearest(lead[0].xs, x)];
+      this.cursor = x;
+      this.layer.replaceChildren();
+      element("line", { x1: this.at(x), x2: this.at(x), y1: TOP, y2: this.height - BOTTOM }, this.layer);
+      const said = [`${this.chart.x.split(" [")[0]} ${show(x)} ${(/\[(.*)\]/.exec(this.chart.x) || ["", ""])[1]}`];
+      for (const area of this.areas) {
+        const parts = [];
+        for (const s of area.panel.series.filter((s) => visible(s) && s.xs.length && s.kind !== "band")) {
+          const i = nearest(s.xs, x);
+          element("circle", { class: `c-${s.color}`, cx: this.at(s.xs[i]), cy: area.y(s.y[i]), r: 3.6 }, this.layer);
+          parts.push(`${s.name} ${show(s.y[i])}`);
+        }
+        said.push(`${area.panel.label}: ${parts.join(", ")}`);
+      }
+      this.readout.setAttribute("aria-live", spoken ? "polite" : "off");
+      this.readout.textContent = said.join(" · ");
+    }
+    zoomTo(domain) {
+      if (domain) {
+        const [a, b] = [Math.max(domain[0], this.full[0]), Math.min(domain[1], this.full[1])];
+        if (b - a < (this.full[1] - this.full[0]) * 1e-4) return;
+        zoom[this.key] = [a, b];
+      } else delete zoom[this.key];
+      for (const view of views) if (view.key === this.key) view.draw();
+    }
+    listen() {
+      let start = null;
+      const pixel = (event) => event.clientX - this.box.getBoundingClientRect().left;
+      this.box.addEventListener("pointerdown", (event) => { if (event.button === 0) { start = pixel(event); this.box.setPointerCapture(event.pointerId); } });
+      this.box.addEventListener("pointermove", (event) => {
+        const x = pixel(event);
+        if (start !== null && Math.abs(x - start) > 4) {
+          this.brush.setAttribute("x", Math.min(x, start)); this.brush.setAttribute("width", Math.abs(x - start));
+        } else this.point(this.from(x), false);
+      });
+      this.box.addEventListener("pointerup", (event) => {
+        const x = pixel(event);
+        if (start !== null && Math.abs(x - start) > 8) this.zoomTo([this.from(Math.min(x, start)), this.from(Math.max(x, start))]);
+        start = null;
+      });
+      this.box.addEventListener("pointercancel", () => { start = null; if (this.brush) this.brush.setAttribute("width", 0); });
+      this.box.addEventListener("dblclick", () => this.zoomTo(null));
+      this.reset.addEventListener("click", () => { this.zoomTo(null); this.box.focus(); });
+      this.box.addEventListener("keydown", (event) => {
+        const [a, b] = this.domain, span = b - a, here = this.cursor ?? (a + b) / 2;
+        const lead = this.panels[0].series[0].xs, index = nearest(lead, here);
+        const moves = {
+          ArrowLeft: () => (event.shiftKey ? this.zoomTo([a - span / 4, b - span / 4]) : this.point(lead[Math.max(0, index - 1)], true)),
+          ArrowRight: () => (event.shiftKey ? this.zoomTo([a + span / 4, b + span / 4]) : this.point(lead[Math.min(lead.length - 1, index + 1)], true)),
+          Home: () => this.point(a, true), End: () => this.point(b, true),
+          "+": () => this.zoomTo([here - span / 4, here + span / 4]),
+          "-": () => (span * 2 >= this.full[1] - this.full[0] ? this.zoomTo(null) : this.zoomTo([here - span, here + span])),
+          0: () => this.zoomTo(null), Escape: () => this.zoomTo(null),
+        };
+        const act = moves[event.key === "=" ? "+" : event.key];
+        if (act) { event.preventDefault(); act(); if (this.cursor !== null) this.point(this.cursor, true); }
+      });
+    }
+  }
+
+  const drawAll = () => views.forEach((view) => view.draw());
+  for (const figure of document.querySelectorAll("figure[data-chart]")) {
+    const chart = data.charts.find((one) => one.key === figure.dataset.chart);
+    if (chart) views.push(new View(figure, chart));
+  }
+  for (const button of document.querySelectorAll("button[data-series]")) {
+    button.addEventListener("click", () => {
+      const name = button.dataset.series, on = hidden.has(name);
+      if (on) hidden.delete(name); else hidden.add(name);
+      for (const same of document.querySelectorAll("button[data-series]")) if (same.dataset.series === name) same.setAttribute("aria-pressed", on);
+      drawAll();
+    });
+  }
+  for (const button of document.querySelectorAll('button[data-series][aria-pressed="false"]')) hidden.add(button.dataset.series);
+  for (const choice of document.querySelectorAll("input[data-shows]")) {
+    const apply = () => {
+      for (const one of document.querySelectorAll(`input[name="${choice.name}"]`)) document.getElementById(one.dataset.shows).classList.toggle("off", !one.checked);
+      drawAll();
+    };
+    choice.addEventListener("change", apply);
+    if (choice.checked) apply();
+  }
+  const theme = document.getElementById("theme");
+  if (theme) theme.addEventListener("click", () => {
+    const chosen = document.documentElement.dataset.theme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    document.documentElement.dataset.theme = chosen === "dark" ? "light" : "dark";
+  });
+  let last = 0;
+  new ResizeObserver(() => { const now = document.body.clientWidth; if (now !== last) { last = now; drawAll(); } }).observe(document.body);
+  window.addEventListener("beforeprint", () => {
+    const off = [...document.querySelectorAll(".off")];
+    off.forEach((one) => one.classList.remove("off"));
+    drawAll();
+    window.addEventListener("afterprint", () => { off.forEach((one) => one.classList.add("off")); drawAll(); }, { once: true });
+  });
+  for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", drawAll);
+  drawAll();
+})();

@@ -1,0 +1,351 @@
+"""The report: one HTML file that is complete in itself."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from discovery import __version__
+from discovery.evaluation import paper
+from discovery.files import write_atomic
+from discovery.report import equations, mismatch, series
+from discovery.report.answer import answer
+from discovery.report.chart import Chart, Panel, Series, payload
+from discovery.report.printed import Line, Printed, paper_tables, summary
+from discovery.report.ranking import is_discovered, ranked
+from discovery.report.run import Run, load_run
+from discovery.report.text import counted, listed, number, percent
+
+_HERE = Path(__file__).parent
+_BUDGET = 150_000  # numbers that all curves of a page may hold together, about 1 MB
+_MOST_CURVES = 6  # more than that cannot be told apart
+
+
+def write_report(run_dir: Path) -> Path:
+    """Write ``report.html`` of a run folder: one file, no network, below 3 MB.
+
+    What the folder does not hold (diagnosis, predictions, a discovered model) does not show.
+
+    Raises:
+        UserError: no results there, or a file that cannot be read.
+    """
+    run = load_run(Path(run_dir))
+    path = run.folder / "report.html"
+    write_atomic(path, render(run))
+    return path
+
+
+def render(run: Run) -> str:
+    """The page of a run as HTML."""
+    order = shown_models(run)
+    curves = series.prediction_charts(run, order)
+    groups = [
+        _group(run, recording, [c for c in curves if c.group == recording]) for recording in run.recordings
+    ]
+    missing, residual, found = mismatch.section(run), _residual(run, order), _discovery(run, order)
+    charts = [*curves]
+    for part in (missing, found, residual):
+        charts += part["charts"] if part else []
+    tables = paper_tables(run)
+    shown = 2 if tables and "Table 1" in tables[0].title else 1  # the other recordings fold away
+    view: dict[str, Any] = {
+        "title": f"{run.name}: report",
+        "eyebrow": _eyebrow(run),
+        "answer": answer(run),
+        "predictions": groups,
+        "shaded": any(chart.shades for chart in curves),
+        "curves": _legend(run, order, curves),
+        "summary": summary(run),
+        "tables": tables[:shown],
+        "more_tables": tables[shown:],
+        "paper": paper.SOURCE if set(run.outputs) & set(paper.TABLE_3) else "",
+        "diagnosis": missing,
+        "network": mismatch.network(run),
+        "models": [_model(run, name) for name in _detailed(run)],
+        "discovery": found,
+        "residual": residual,
+        "quality": _quality(run),
+        "reproduce": _reproduce(run),
+    }
+    return fill("page.html.j2", view, charts)
+
+
+def charts_of(run: Run) -> list[Chart]:
+    """Every chart of a run's page."""
+    order = shown_models(run)
+    charts = series.prediction_charts(run, order)
+    for part in (mismatch.section(run), _discovery(run, order), _residual(run, order)):
+        charts += part["charts"] if part else []
+    return charts
+
+
+def fill(template: str, view: Mapping[str, Any], charts: Sequence[Chart]) -> str:
+    """A template with its view, style, script and the data of its charts."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    curves = sum(len(panel.series) for chart in charts for panel in chart.panels)
+    most = int(np.clip(_BUDGET / max(curves, 1) / 2, 120, 1500))
+    data = json.dumps(payload(list(charts), most), separators=(",", ":"), allow_nan=False).replace(
+        "<", "\\u003c"
+    )
+    return environment.get_template(template).render(
+        **view,
+        contents=_contents(view),
+        version=__version__,
+        css=Markup((_HERE / "page.css").read_text("utf-8")),
+        script=Markup((_HERE / "charts.js").read_text("utf-8")),
+        data=Markup(data),
+    )
+
+
+def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
+    parts = [
+        ("predictions", "Measured, predicted"), ("summary", "Models compared"), ("diagnosis", "What was left out"),
+        ("network", "Thermal network"), ("models", ""), ("discovery", "How it was found"),
+        ("residual", "What is left"), ("quality", "The recordings"), ("reproduce", "Reproduce"),
+    ]  # fmt: skip
+    anchors = {"summary": "comparison", "diagnosis": "mismatch"}
+    out = [("answer", "The answer")]
+    for key, name in parts:
+        if key == "models":
+            out += [
+                (f"model-{index}", f"Model “{m['name']}”") for index, m in enumerate(view["models"], start=1)
+            ]
+        elif view.get(key):
+            out.append((anchors.get(key, key), name))
+    return out
+
+
+def shown_models(run: Run) -> list[str]:
+    """Models with predictions, best first, as many as can be told apart."""
+    having = list(dict.fromkeys(model for p in run.predictions.values() for model in p.models))
+    order = [model for model in ranked(run) if model in having]
+    return [*order, *(model for model in having if model not in order)][:_MOST_CURVES]
+
+
+def _legend(run: Run, order: Sequence[str], curves: Sequence[Chart]) -> list[dict[str, Any]]:
+    if not curves:
+        return []
+    noise = any(one.color == "noise" for chart in curves for panel in chart.panels for one in panel.series)
+    hand = [name for name in order[1:] if not is_discovered(run, name)] or list(order[1:])
+    first = {*order[:1], *hand[:1]}  # more curves at once hide each other
+    items = [{"name": "measured", "color": "measured", "on": True}]
+    items += [{"name": name, "color": str(index), "on": name in first} for index, name in enumerate(order)]
+    return items + ([{"name": "reading noise, ±2σ", "color": "noise", "on": True}] if noise else [])
+
+
+def _group(run: Run, recording: str, charts: list[Chart]) -> dict[str, Any]:
+    tag = (
+        "unseen" if recording in run.held_out else "fitted" if recording in run.results.get("fit", []) else ""
+    )
+    note = (run.results.get("notes") or {}).get(recording, "")
+    return {"name": recording, "tag": tag, "note": note, "charts": charts}
+
+
+def _eyebrow(run: Run) -> str:
+    parts = [run.name]
+    if run.results.get("fit"):
+        parts.append(f"fitted to {listed(run.results['fit'])}")
+    if run.held_out:
+        parts.append(f"judged on {listed(run.held_out)}, which no fit, choice or threshold has seen")
+    return " · ".join(parts)
+
+
+def _detailed(run: Run) -> list[str]:
+    """The models whose equations are worth a section: best, best discovered, diagnosed and repaired ones."""
+    order = [name for name in ranked(run) if name in run.models] or list(run.models)
+    wanted = [*order[:1], *[name for name in order if is_discovered(run, name)][:1]]
+    diagnosed = (run.diagnosis or {}).get("model")
+    wanted += [
+        name
+        for name in run.models
+        if name in (diagnosed, "repaired") or any(term.effect for term in run.models[name].terms)
+    ]
+    return list(dict.fromkeys(wanted))
+
+
+def _model(run: Run, name: str) -> dict[str, Any]:
+    model = run.models[name]
+    entry = run.results.get("models", {}).get(name, {})
+    shares = entry.get("shares") or {}
+    count = f"{counted(len(model.states), 'state')}, {counted(len(model.terms), 'term')}, {counted(len(model.free), 'free parameter')}"
+    rates = (
+        ""
+        if model.time_unit == "s" or any(s.capacity for s in model.states.values())
+        else f" Time in {model.time_unit}."
+    )
+    return {
+        "name": name,
+        "about": f"{count}.{rates}",
+        "equations": equations.equations(model),
+        "rows": equations.rows(model, shares),
+        "shares": bool(shares),
+        "largest": max(shares.values(), default=1.0) or 1.0,
+        "share_note": "Share of the effect: what the errors would lose without the term, to first order; all terms together are 100 %.",
+        "others": equations.other_values(model),
+        "capacities": equations.capacities(model),
+        "notes": entry.get("notes") or [],
+    }
+
+
+def _discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
+    names = [
+        name for name in order or ranked(run) if run.results.get("models", {}).get(name, {}).get("search")
+    ]
+    if not names:
+        return None
+    charts: list[Chart] = []
+    tables: list[Printed] = []
+    for name in names:
+        entry = run.results["models"][name]["search"]
+        charts += _pareto(name, entry.get("pareto") or [])
+        if entry.get("stability"):
+            shares = (
+                entry["stability"].items()
+                if isinstance(entry["stability"], Mapping)
+                else [(s["term"], s["share"]) for s in entry["stability"]]
+            )
+            rows = tuple(
+                Line((str(term), percent(share))) for term, share in sorted(shares, key=lambda pair: -pair[1])
+            )
+            tables.append(
+                Printed(
+                    f"{name}: how often each term is chosen when the search is repeated on parts of the data",
+                    ("Term", "Chosen"),
+                    rows,
+                )
+            )
+    about = "Each further term must earn its place on data that the choice has not used. Terms that are chosen again and again do not depend on which hours were recorded."
+    return {"about": about, "charts": charts, "tables": tables}
+
+
+def _pareto(name: str, points: Sequence[Mapping[str, Any]]) -> list[Chart]:
+    if len(points) < 2:
+        return []
+    key = next((k for k in ("error", "rms", "score", "cv") if k in points[0]), None)
+    if key is None:
+        return []
+    points = sorted(points, key=lambda p: p["terms"])
+    x, y = np.array([float(p["terms"]) for p in points]), np.array([float(p[key]) for p in points])
+    chosen = next((float(p["terms"]) for p in points if p.get("chosen")), None)
+    lines: tuple[Series, ...] = (
+        Series("cross-validated error", x, y, "line", "0"),
+        Series("each size", x, y, "points", "0"),
+    )
+    if all(p.get("spread") is not None for p in points):
+        spread = np.array([float(p["spread"]) for p in points])
+        lines = (Series("± standard error", x, y, "band", "0", y - spread, y + spread), *lines)
+    marks = {"chosen": chosen} if chosen is not None else {}
+    return [
+        Chart(
+            f"pareto-{name}",
+            f"{name}: error against size",
+            "terms [-]",
+            (Panel("error, cross-validated [noise]", lines),),
+            marks=marks,
+        )
+    ]
+
+
+def _residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
+    recording = next((r for r in run.recordings if r in run.held_out), next(iter(run.recordings), None))
+    if recording is None or not order:
+        return None
+    model = order[0]
+    rows = series.residual_table(run, model, recording)
+    if not rows:
+        return None
+    keys = ("rms", "ratio", "mean", "memory", "largest", "beyond", "count")
+    lines = tuple(
+        Line((f"{row['output']} [{row['unit'] or '-'}]", *(number(row[k]) for k in keys))) for row in rows
+    )
+    header = (
+        "Error",
+        "rms",
+        "rms / noise",
+        "mean",
+        "correlation of neighbours",
+        "largest",
+        "beyond 3σ [%]",
+        "readings",
+    )
+    return {
+        "about": f"What “{model}” leaves on {recording}. If only sensor noise were left, neighbours would not be alike and bars would stay inside the band.",
+        "table": Printed(f"Left over on {recording}", header, lines),
+        "charts": series.residual_charts(run, model, recording),
+    }
+
+
+def _quality(run: Run) -> dict[str, Any] | None:
+    rows = []
+    for recording in run.recordings:
+        data = run.predictions[recording]
+        for output, readings in data.readings.items():
+            read = data.time[np.isfinite(readings)]
+            if not len(read):
+                continue
+            every = float(np.median(np.diff(read))) if len(read) > 1 else math.nan
+            gap = float(np.max(np.diff(read))) if len(read) > 1 else math.nan
+            known = readings[np.isfinite(readings)]
+            span = f"{number(float(known.min()))} to {number(float(known.max()))} {run.unit(output)}"
+            rows.append(
+                Line(
+                    (
+                        recording,
+                        output,
+                        number(len(read), 6),
+                        _duration(float(read[-1] - read[0])),
+                        _duration(every),
+                        _duration(gap),
+                        span,
+                    )
+                )
+            )
+    findings = [str(line) for line in run.results.get("findings") or run.results.get("quality") or []]
+    if not rows and not findings:
+        return None
+    header = ("Recording", "Error", "Readings", "Over", "Usually every", "Longest gap", "Range")
+    return {
+        "tables": [Printed("Readings", header, tuple(rows), frozenset({1, 6}))] if rows else [],
+        "findings": findings,
+    }
+
+
+def _duration(seconds: float) -> str:
+    if not math.isfinite(seconds):
+        return "–"
+    for size, unit in ((3600, "h"), (60, "min")):
+        if seconds >= 2 * size:
+            return f"{number(seconds / size)} {unit}"
+    return f"{number(seconds)} s"
+
+
+def _reproduce(run: Run) -> dict[str, Any]:
+    versions, inputs = (
+        run.results.get("versions") or {"discovery": __version__},
+        run.results.get("inputs") or {},
+    )
+    rows = [Line((name, str(one))) for name, one in versions.items()]
+    rows += [Line((f"{name}, sha256", str(digest)[:16])) for name, digest in inputs.items()]
+    for name in ("results.json", "diagnosis.json"):
+        path = run.folder / name
+        if path.exists():
+            rows.append(Line((f"{name}, sha256", hashlib.sha256(path.read_bytes()).hexdigest()[:16])))
+    if run.results.get("seconds"):
+        rows.append(Line(("computing time", f"{number(run.results['seconds'])} s")))
+    return {
+        "command": run.results.get("command", ""),
+        "table": Printed(
+            "Versions, and hashes of what went in", ("What", "Value"), tuple(rows), frozenset({1})
+        ),
+    }

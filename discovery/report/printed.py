@@ -1,0 +1,103 @@
+"""Tables as the page prints them: every cell a text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from discovery.evaluation import tables
+from discovery.report.ranking import cells, is_discovered, kind, mean_improvement, ranked, ratio
+from discovery.report.run import Run
+from discovery.report.text import number
+
+
+@dataclass(frozen=True)
+class Line:
+    """A row; `look` is a class of the style sheet."""
+
+    cells: tuple[str, ...]
+    look: str = ""
+    repeated: str = ""  # the first cell, where it is printed only once for several rows
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A table of texts; `left` are the columns (from 0) that are aligned left."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[Line, ...]
+    left: frozenset[int] = field(default_factory=frozenset)
+
+
+def printed(table: tables.Table, left: Sequence[int] = ()) -> Printed:
+    """A table of the evaluation with a line above each new first cell."""
+    rows, before = [], None
+    for row in table.rows:
+        texts = [cell if isinstance(cell, str) else "" if cell is None else number(cell) for cell in row]
+        new = texts[0] != before
+        before = texts[0]
+        rows.append(Line(tuple(texts), "first") if new else Line(("", *texts[1:]), repeated=texts[0]))
+    return Printed(table.title, table.header, tuple(rows), frozenset(left))
+
+
+def summary(run: Run) -> Printed | None:
+    """Models, best first, with what they improve on unseen recordings and what they cost."""
+    order = [model for model in ranked(run) if cells(run, model)]
+    if not order:
+        return None
+    recordings = list(dict.fromkeys(r for model in order for r, _ in cells(run, model)))
+    header = (
+        "Model",
+        "Kind",
+        "Terms",
+        "Parameters",
+        *(f"{r}: rms removed [%]" for r in recordings),
+        "left against best",
+        "Fit [s]",
+    )
+    rows = []
+    for model in order:
+        entry = run.results["models"][model]
+        share = ratio(run, model, order[0])
+        improved = [number(mean_improvement(run, model, r), 2) for r in recordings]
+        made = f"{kind(run, model)}{' (discovered)' if is_discovered(run, model) else ''}"
+        size = [number(entry.get("terms")), number(entry.get("parameters"))]
+        times = "–" if not math.isfinite(share) else f"× {number(share, 3)}"
+        rows.append(
+            Line(
+                (model, made, *size, *improved, times, number(entry.get("seconds"), 2)),
+                "best" if model == order[0] else "",
+            )
+        )
+    return Printed("Mean improvement over all errors", header, tuple(rows), frozenset({1}))
+
+
+def paper_tables(run: Run) -> list[Printed]:
+    """Table 3 for each recording that was compared, unseen ones first, and Table 1 for a hand-built thermobalance."""
+    found = run.results.get("models", {})
+    recordings = list(dict.fromkeys([*run.held_out, *run.results.get("fit", [])]))
+    scored = [r for r in recordings if any(r in model.get("recordings", {}) for model in found.values())]
+    order = ranked(run)
+    out = [printed(tables.table_3(run.results, r, order), left=[1]) for r in scored]
+    parts = run.results.get("parts") or _parts(run)
+    for model in order:
+        if "thermobalance" in (model, kind(run, model)) and found[model].get("recordings") and parts:
+            out.insert(0, printed(tables.table_1(run.results, model, parts)))
+            break
+    return out
+
+
+def _parts(run: Run) -> dict[str, str]:
+    """Which recording plays which part of Table 1: first fitted, first unseen, first whose name says left."""
+    left = next(
+        (name for name in [*run.held_out, *run.results.get("fit", [])] if "left" in name.lower()), None
+    )
+    fit = next(iter(run.results.get("fit", [])), None)
+    second = next((name for name in run.held_out if name != left), None)
+    return {
+        part: name
+        for part, name in {"test cycle": fit, "2. test cycle": second, "left side": left}.items()
+        if name
+    }

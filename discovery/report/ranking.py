@@ -1,0 +1,78 @@
+"""Which model is best on what no fit has seen, and by how much."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from discovery.report.run import Run
+
+HAND_BUILT = ("reduced", "superposition", "file", "thermobalance", "convection")
+
+
+def kind(run: Run, model: str) -> str:
+    """The kind of a model as the experiment names it; the name itself where results do not say."""
+    return str(run.results["models"].get(model, {}).get("kind") or model)
+
+
+def is_discovered(run: Run, model: str) -> bool:
+    """Whether a model was found from data and not written by hand."""
+    word = kind(run, model)
+    return word.startswith(("sindy", "discovered", "sparse")) or (
+        word not in HAND_BUILT and "discover" in model
+    )
+
+
+def cells(run: Run, model: str) -> dict[tuple[str, str], Mapping[str, Any]]:
+    """Scores of a model by (recording, error), held-out recordings only (all where none is held out)."""
+    found = run.results["models"][model].get("recordings", {})
+    wanted = [r for r in run.held_out if r in found] or list(found)
+    return {(r, output): score for r in wanted for output, score in found[r].items()}
+
+
+def ratio(run: Run, model: str, other: str | None) -> float:
+    """Geometric mean over held-out recordings and errors of rms(model)/rms(other), NaN where nothing is shared.
+
+    With `other` None it is the error without compensation. A ratio has no unit, so that um and um/m can be averaged.
+    """
+    mine = cells(run, model)
+    theirs = (
+        {key: score["uncompensated"] for key, score in mine.items() if "uncompensated" in score}
+        if other is None
+        else cells(run, other)
+    )
+    logs = [
+        math.log(mine[key]["rms"] / theirs[key]["rms"])
+        for key in mine
+        if key in theirs and _positive(mine[key].get("rms")) and _positive(theirs[key].get("rms"))
+    ]
+    return math.exp(sum(logs) / len(logs)) if logs else math.nan
+
+
+def _positive(value: object) -> bool:
+    return isinstance(value, int | float) and math.isfinite(value) and value > 0
+
+
+def ranked(run: Run) -> list[str]:
+    """Models, best first: by their rms on held-out recordings relative to no compensation; unscored ones last."""
+    models = list(run.results.get("models", {}))
+    if not models:
+        return []
+    reference = models[0]
+    scores = {model: ratio(run, model, reference) for model in models}
+    return sorted(models, key=lambda model: scores[model] if math.isfinite(scores[model]) else math.inf)
+
+
+def mean_improvement(run: Run, model: str, recording: str | None = None) -> float:
+    """Mean over errors (and held-out recordings) of the improvement of the rms [%]; NaN where there is none."""
+    found = [
+        score["improvement"]["rms"]
+        for (name, _), score in cells(run, model).items()
+        if recording in (None, name) and _is_number(score.get("improvement", {}).get("rms"))
+    ]
+    return sum(found) / len(found) if found else math.nan
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and math.isfinite(value)

@@ -1,0 +1,141 @@
+"""Charts of a run: measured, predicted and left over, and what the left over looks like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.report.chart import Chart, Panel, Series
+from discovery.report.run import Predictions, Run
+from discovery.report.text import number, with_unit
+
+Array = NDArray[np.float64]
+
+
+def time_axis(time: Array) -> tuple[Array, str, float]:
+    """Time in hours or minutes, the label, and the seconds of one unit."""
+    scale, unit = (3600.0, "h") if len(time) and time[-1] - time[0] > 3 * 3600 else (60.0, "min")
+    return time / scale, f"time [{unit}]", scale
+
+
+def prediction_charts(run: Run, models: Sequence[str]) -> list[Chart]:
+    """One chart for each recording and error: readings and models above, reading minus model below."""
+    return [
+        _prediction_chart(run, recording, output, models)
+        for recording in run.recordings
+        for output in run.predictions[recording].readings
+    ]
+
+
+def _prediction_chart(run: Run, recording: str, output: str, models: Sequence[str]) -> Chart:
+    data = run.predictions[recording]
+    x, label, scale = time_axis(data.time)
+    unit = run.unit(output)
+    above = [Series("measured", x, data.readings[output], "points", "measured")]
+    below = []
+    noise = run.noise(output)
+    if noise:
+        read = x[np.isfinite(data.readings[output])]
+        flat = np.zeros_like(read)
+        below.append(
+            Series("reading noise, ±2σ", read, flat, "band", "noise", flat - 2 * noise, flat + 2 * noise)
+        )
+    for index, model in enumerate(models):
+        if output in data.models.get(model, {}):
+            above.append(Series(model, x, data.models[model][output], "line", str(index)))
+            below.append(Series(model, x, data.left_over(model, output), "line", str(index)))
+    return Chart(
+        f"{recording}-{output}",
+        f"{output} on {recording}",
+        label,
+        (
+            Panel(with_unit(output, unit), tuple(above)),
+            Panel(with_unit("left over", unit), tuple(below), zero=True),
+        ),
+        _windows(run, recording, scale),
+        group=recording,
+    )
+
+
+def _windows(run: Run, recording: str, scale: float) -> tuple[tuple[float, float, str], ...]:
+    found = (run.diagnosis or {}).get("location", {}).get("windows", [])
+    shades = []
+    for window in found:
+        if window.get("recording") == recording:
+            heat, state = window.get("heat_W"), window.get("state")
+            why = (
+                "mismatch"
+                + (f" at {state}" if state else "")
+                + (f", {number(heat)} W" if heat is not None else "")
+            )
+            shades.append((window["start_s"] / scale, window["end_s"] / scale, why))
+    return tuple(shades)
+
+
+def residual_charts(run: Run, model: str, recording: str) -> list[Chart]:
+    """Autocorrelation of what a model leaves, one chart for each error."""
+    charts = []
+    data = run.predictions[recording]
+    for output in data.readings:
+        if output not in data.models.get(model, {}):
+            continue
+        left = _known(data, model, output)
+        if len(left) < 12:
+            continue
+        correlation = autocorrelation(left, min(40, len(left) // 3))
+        lag = np.arange(1.0, len(correlation) + 1)
+        edge = np.full_like(lag, 1.96 / np.sqrt(len(left)))
+        band = Series("white noise, 95 %", lag, np.zeros_like(lag), "band", "noise", -edge, edge)
+        bars = Series("autocorrelation", lag, correlation, "bars", "0")
+        charts.append(
+            Chart(
+                f"acf-{output}",
+                f"{output}: memory of what is left",
+                "lag [readings]",
+                (Panel("autocorrelation [-]", (band, bars), zero=True),),
+            )
+        )
+    return charts
+
+
+def _known(data: Predictions, model: str, output: str) -> Array:
+    left = data.left_over(model, output)
+    return left[np.isfinite(left)]
+
+
+def autocorrelation(values: Array, lags: int) -> Array:
+    """Sample autocorrelation at lags 1..lags, (lags,) (Box & Jenkins, r_k = c_k/c_0)."""
+    centred = values - values.mean()
+    total = float(centred @ centred) or 1.0
+    return np.array([float(centred[k:] @ centred[:-k]) / total for k in range(1, lags + 1)])
+
+
+def residual_table(run: Run, model: str, recording: str) -> list[dict[str, Any]]:
+    """What is left of each error in figures: rms against noise, mean, memory, largest."""
+    rows: list[dict[str, Any]] = []
+    data = run.predictions[recording]
+    for output in data.readings:
+        if output not in data.models.get(model, {}):
+            continue
+        left = _known(data, model, output)
+        if len(left) < 12:
+            continue
+        spread = float(np.std(left)) or 1.0
+        rms, noise = float(np.sqrt(np.mean(left**2))), run.noise(output)
+        rows.append(
+            {
+                "output": output,
+                "unit": run.unit(output),
+                "rms": rms,
+                "ratio": rms / noise if noise else None,
+                "mean": float(left.mean()),
+                "memory": float(autocorrelation(left, 1)[0]),
+                "largest": float(np.abs(left).max()),
+                "beyond": 100 * float(np.mean(np.abs(left - left.mean()) > 3 * spread)),
+                "count": len(left),
+            }
+        )
+    return rows

@@ -1,0 +1,145 @@
+"""What a reader meets: reports opened in a real browser. ``make browser-test``
+
+    python tests/browser/check.py AXE REPORT... [--pictures FOLDER]
+
+AXE is axe.min.js of the package axe-core. Needs Chromium and its driver (Debian: chromium, chromium-driver).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from driver import Browser, browser
+
+WIDTHS = (1440, 800)
+
+
+def check(page: Path, axe: str, session: Browser, pictures: Path | None) -> list[str]:
+    """Sentences on everything that is wrong with a page."""
+    wrong = [f"{page.stat().st_size} bytes are more than 3 MB"] if page.stat().st_size > 3_000_000 else []
+    session.send("POST", "/url", {"url": "about:blank"})
+    session.log("browser")
+    session.log("performance")
+    for width in WIDTHS:
+        for scheme in ("light", "dark"):
+            session.size(width, 900, scheme)
+            session.open(page)
+            where = f"{width} px, {scheme}"
+            wrong += [f"{where}: {line}" for line in _figures(session) + _rules(session, axe)]
+            if session.run("return document.documentElement.scrollWidth > innerWidth"):
+                wrong.append(f"{where}: wider than the window")
+            if pictures:
+                session.screenshot(pictures / f"{page.parent.name}-{page.stem}-{width}-{scheme}.png")
+    wrong += _keyboard(session) + _zoom(session)
+    if pictures:
+        session.pdf(pictures / f"{page.parent.name}-{page.stem}.pdf")
+    wrong += [
+        f"console: {entry['message']}"
+        for entry in session.log("browser")
+        if entry["level"] in ("SEVERE", "WARNING")
+    ]
+    return wrong + _requests(session, page)
+
+
+def _figures(session: Browser) -> list[str]:
+    empty = session.run(
+        "return [...document.querySelectorAll('figure[data-chart]')].filter(f => f.offsetParent && !f.querySelector('svg polyline, svg path, svg rect.bars'))"
+        ".map(f => f.dataset.chart)"
+    )
+    bad = session.run(
+        "return [...document.querySelectorAll('svg *')].filter(e => /NaN|Infinity/.test(e.outerHTML)).length"
+    )
+    return [f"figure {key} is empty" for key in empty] + (
+        [f"{bad} drawn elements without a place"] if bad else []
+    )
+
+
+def _rules(session: Browser, axe: str) -> list[str]:
+    session.run(axe)
+    found = session.run_async(
+        "const done = arguments[0]; axe.run().then(r => done(r.violations), e => done([{id: String(e), nodes: []}]))"
+    )
+    return [f"{one['id']}: {one.get('help', '')} ({len(one['nodes'])} times, {_first(one)})" for one in found]
+
+
+def _first(violation: dict[str, list[dict[str, object]]]) -> str:
+    nodes = violation["nodes"]
+    return f"{nodes[0]['target']} {str(nodes[0].get('failureSummary', ''))[:160]}" if nodes else ""
+
+
+def _keyboard(session: Browser) -> list[str]:
+    """Every control is reached with the tabulator, and a chart answers to keys."""
+    wanted = session.run(
+        "return [...document.querySelectorAll('a[href], button, summary, .plot, input:checked')].filter(e => e.offsetParent && !e.hidden).length"
+    )
+    if not wanted:
+        return []
+    session.run(
+        "document.activeElement.blur(); window.reached = new Set(); document.addEventListener('focusin', e => reached.add(e.target))"
+    )
+    session.press(*["\ue004"] * (wanted + 60))
+    reached = session.run("return reached.size")
+    wrong = [f"keyboard: {reached} of at least {wanted} controls reached"] if reached < wanted else []
+    if session.run("const p = document.querySelector('.plot'); if (p) p.focus(); return Boolean(p)"):
+        session.press("\ue014", "\ue014", "+")
+        said, zoomed = session.run(
+            "const f = document.activeElement.closest('figure'); return [f.querySelector('.readout').textContent, !f.querySelector('.reset').hidden]"
+        )
+        wrong += [] if said and zoomed else ["keyboard: a chart neither reads values nor zooms"]
+        session.press("0")
+    return wrong
+
+
+def _zoom(session: Browser) -> list[str]:
+    box = session.run(
+        "const p = document.querySelector('.plot'); if (!p) return null; p.scrollIntoView({block: 'center', behavior: 'instant'}); const b = p.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]"
+    )
+    if not box:
+        return []
+    x, y, width, height = box
+    session.drag((int(x + 0.4 * width), int(y + height / 3)), (int(x + 0.7 * width), int(y + height / 3)))
+    return (
+        []
+        if session.run(
+            "return !document.querySelector('.plot').closest('figure').querySelector('.reset').hidden"
+        )
+        else ["dragging over a chart does not zoom"]
+    )
+
+
+def _requests(session: Browser, page: Path) -> list[str]:
+    urls = set()
+    for entry in session.log("performance"):
+        message = json.loads(entry["message"])["message"]
+        if message["method"] == "Network.requestWillBeSent":
+            urls.add(message["params"]["request"]["url"].split("#")[0])
+    return [
+        f"request: {url[:120]}"
+        for url in sorted(urls)
+        if not url.startswith("data:") and url != page.resolve().as_uri()
+    ]
+
+
+def main() -> None:
+    """Check the reports that are named; end with status 1 when one is wrong."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("axe", type=Path)
+    arguments.add_argument("reports", type=Path, nargs="+")
+    arguments.add_argument("--pictures", type=Path)
+    given = arguments.parse_args()
+    axe = given.axe.read_text("utf-8")
+    if given.pictures:
+        given.pictures.mkdir(parents=True, exist_ok=True)
+    failed = False
+    with browser() as session:
+        for page in given.reports:
+            wrong = check(page, axe, session, given.pictures)
+            failed |= bool(wrong)
+            print(f"{page}: {'; '.join(['', *wrong]) if wrong else 'sound'}".replace("; ", "\n  "))
+    raise SystemExit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()

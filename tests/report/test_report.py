@@ -1,0 +1,217 @@
+"""The report page: complete in itself, says what the results say, and leaves out what is not there."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from discovery.errors import UserError
+from discovery.report import write_comparison, write_figures, write_report
+from discovery.report.chart import thinned
+from discovery.report.ranking import ratio
+from discovery.report.run import load_run
+from discovery.report.series import autocorrelation
+
+
+def _load(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+sample = _load("sample")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Path(sample.write_sample(tmp_path_factory.mktemp("runs") / "cutting fluid"))
+
+
+@pytest.fixture(scope="module")
+def page(folder: Path) -> str:
+    return write_report(folder).read_text("utf-8")
+
+
+class _Page(HTMLParser):
+    """Ids, links, labels and what would be loaded from elsewhere."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.charts: list[str] = []
+        self.open: list[str] = []
+        self.wrong: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        if tag not in ("meta", "link", "input", "br", "hr", "img", "rect", "line", "mspace"):
+            self.open.append(tag)
+        if given.get("id"):
+            self.ids.append(str(given["id"]))
+        if tag == "a":
+            self.links.append(str(given["href"]))
+        elif given.get("src") or given.get("href"):
+            self.loaded.append(str(given.get("src") or given.get("href")))
+        if tag == "figure":
+            self.charts.append(str(given["data-chart"]))
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in ("rect", "line", "mspace"):
+            return
+        if not self.open or self.open.pop() != tag:
+            self.wrong.append(tag)
+
+
+def _read(page: str) -> _Page:
+    reader = _Page()
+    reader.feed(page)
+    return reader
+
+
+def _data(page: str) -> dict[str, Any]:
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)
+    assert found
+    data: dict[str, Any] = json.loads(found[1])
+    return data
+
+
+def test_it_is_whole_and_loads_nothing(page: str) -> None:
+    reader = _read(page)
+    assert reader.wrong == []
+    assert reader.open == []
+    assert [one for one in reader.loaded if one != "data:,"] == []
+    assert "@import" not in page
+    assert "url(http" not in page
+    assert len(reader.ids) == len(set(reader.ids))
+    assert {link.removeprefix("#") for link in reader.links} <= set(reader.ids)
+    assert len(page.encode()) < 3_000_000
+
+
+def test_every_error_of_every_recording_is_drawn(page: str) -> None:
+    keys = {chart["key"] for chart in _data(page)["charts"]}
+    wanted = {f"{recording}-{output}" for recording in ("fit", "validation") for output in sample.OUTPUTS}
+    assert wanted <= keys
+    assert set(_read(page).charts) == keys
+
+
+def test_the_answer_agrees_with_an_independent_count(folder: Path, page: str) -> None:
+    results = json.loads((folder / "results.json").read_text())
+    scores = {name: entry["recordings"]["validation"] for name, entry in results["models"].items()}
+    logs = [np.log(scores["discovered"][o]["rms"] / scores["reduced"][o]["rms"]) for o in sample.OUTPUTS]
+    less = 100 * (1 - np.exp(np.mean(logs)))
+    assert "The discovered model “discovered” predicts best on the unseen recording “validation”" in page
+    assert f"{less:.0f} % less than “reduced” (hand-built)" in page
+    removed = np.mean([scores["discovered"][o]["improvement"]["rms"] for o in sample.OUTPUTS])
+    assert f"It removes {float(f'{removed:.2g}'):.0f} % of the thermal error" in page
+
+
+def test_a_recording_that_was_fitted_decides_nothing(folder: Path) -> None:
+    run = load_run(folder)
+    before = ratio(run, "discovered", "reduced")
+    for entry in run.results["models"].values():
+        for score in entry["recordings"]["fit"].values():
+            score["rms"] = 1e-6
+    assert ratio(run, "discovered", "reduced") == before
+
+
+def test_the_missing_physics_is_told_with_size_and_certainty(page: str) -> None:
+    assert "flooded gap at c_body_1 and b_corpus (98 % sure)" in page
+    assert "G_gap = 38.3 W/K (95 %: 35.1 to 41.6)" in page
+    assert "less than 1 in 1000" in page
+    assert "pump &gt; 0.5 and speed &gt; 750" in page
+    shades = [chart["shades"] for chart in _data(page)["charts"] if chart["key"] == "fit-E_Y0C"]
+    assert shades == [[[4, 10, "mismatch at b_corpus, 81 W"]]]
+
+
+def test_names_of_a_user_stay_text(page: str) -> None:
+    assert "cutting <fluid>" not in page
+    assert "cutting &lt;fluid&gt;" in page
+
+
+def test_without_diagnosis_and_discovered_model_those_parts_do_not_show(tmp_path: Path) -> None:
+    folder = sample.write_sample(tmp_path / "run", diagnosis=False)
+    results = json.loads((folder / "results.json").read_text())
+    del results["models"]["discovered"]
+    (folder / "results.json").write_text(json.dumps(results))
+    (folder / "models" / "discovered.toml").unlink()
+    page = write_report(folder).read_text("utf-8")
+    ids = _read(page).ids
+    assert "mismatch" not in ids
+    assert "discovery" not in ids
+    assert {"answer", "predictions", "comparison", "network", "reproduce"} <= set(ids)
+    assert "The hand-built model “thermobalance” predicts best" in page
+
+
+def test_a_diagnosis_alone_makes_a_report(tmp_path: Path) -> None:
+    (tmp_path / "diagnosis.json").write_text(json.dumps(sample.diagnosed(24.0)))
+    page = write_report(tmp_path).read_text("utf-8")
+    assert (
+        "<h1>Physics is missing in “thermobalance”: flooded gap at c_body_1 and b_corpus (98 % sure).</h1>"
+        in page
+    )
+
+
+def test_a_folder_without_results_is_told(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"neither results\.json nor diagnosis\.json is there"):
+        write_report(tmp_path)
+
+
+def test_broken_files_are_told_with_their_line(tmp_path: Path) -> None:
+    folder = sample.write_sample(tmp_path / "run")
+    file = folder / "predictions" / "fit.csv"
+    file.write_text(file.read_text().replace("\n600,", "\n600,x", 1))
+    with pytest.raises(UserError, match=r"fit\.csv, line 3: 'x.*' is not a number"):
+        write_report(folder)
+    (folder / "results.json").write_text('{\n"models": ]')
+    with pytest.raises(UserError, match=r"results\.json, line 2: not valid JSON"):
+        write_report(folder)
+
+
+def test_figures_name_their_units(folder: Path) -> None:
+    written = write_figures(folder)
+    assert {path.suffix for path in written} == {".svg", ".pdf"}
+    text = (folder / "figures" / "validation-E_Y0C.svg").read_text("utf-8")
+    assert "E_Y0C [µm]" in text
+    assert "time [h]" in text
+    assert (folder / "figures" / "validation-E_Y0C.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_comparison_counts_as_unseen_only_what_no_run_has_fitted(folder: Path, tmp_path: Path) -> None:
+    other = sample.write_sample(tmp_path / "second")
+    results = json.loads((other / "results.json").read_text()) | {"experiment": "second"}
+    (other / "results.json").write_text(json.dumps(results))
+    page = write_comparison([folder, other], tmp_path).read_text("utf-8")
+    assert "discovered, second" in page
+    assert "judged on validation" in page
+    with pytest.raises(UserError, match="two runs or more"):
+        write_comparison([folder], tmp_path)
+
+
+def test_thinning_keeps_peaks() -> None:
+    x = np.arange(5000.0)
+    y = np.sin(x / 300)
+    y[1234], y[3456] = 7.0, -7.0
+    a, b = thinned(x, y, 200)
+    assert len(a) <= 200
+    assert (b.max(), b.min()) == (7.0, -7.0)
+    assert (np.diff(a) > 0).all()
+
+
+def test_autocorrelation_is_that_of_statsmodels() -> None:
+    from statsmodels.tsa.stattools import acf
+
+    values = np.cumsum(np.random.default_rng(1).standard_normal(300))
+    np.testing.assert_allclose(autocorrelation(values, 12), acf(values, nlags=12, fft=False)[1:], rtol=1e-10)
