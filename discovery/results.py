@@ -89,8 +89,8 @@ def write_run(
         from discovery.export import export_model
 
         wanted = experiment.form.export
-        for form in wanted.to:
-            export_model(folder, wanted.model, form)
+        place = folder / "export" / wanted.model
+        export_model(fitted[wanted.model].model, experiment.campaign, experiment.fit, wanted.to, place)
     from discovery.report import write_report
 
     write_report(folder)
@@ -102,6 +102,7 @@ def results_document(experiment: Experiment, fitted: Mapping[str, Fitted], secon
     return {
         "experiment": experiment.name,
         "campaign": experiment.campaign.name,
+        "campaign_file": str(experiment.campaign.path),
         "fit": list(experiment.fit),
         "held_out": list(experiment.held_out),
         "outputs": list(experiment.outputs),

@@ -39,20 +39,24 @@ def agreement(model: Model, campaign: Campaign, recording: str, step_s: float) -
         marks.append(k * step_s)
     if not found:
         return {"integrator_um": 0.0, "held_inputs_um": 0.0}
-    ticks = np.arange(len(u)) * step_s
+    ticks: Array = np.arange(len(u)) * step_s
     data = campaign.recordings[recording]
     held, straight = {}, {}
     for i, name in enumerate(compiled.inputs):
         known = np.isfinite(data.values[name])
         held[name] = Samples(ticks, u[:, i], False)
-        straight[name] = Samples(data.time[known], data.values[name][known], campaign.channels[name].between == "linear")
+        straight[name] = Samples(
+            data.time[known], data.values[name][known], campaign.channels[name].between == "linear"
+        )
     return {
         "integrator_um": _deviation(model, recording, held, np.array(marks), np.array(found)),
         "held_inputs_um": _deviation(model, recording, straight, np.array(marks), np.array(found)),
     }
 
 
-def _deviation(model: Model, recording: str, samples: dict[str, Samples], marks: Array, found: Array) -> float:
+def _deviation(
+    model: Model, recording: str, samples: dict[str, Samples], marks: Array, found: Array
+) -> float:
     time = np.unique(np.concatenate([[0.0], marks, *(s.time[s.time <= marks[-1]] for s in samples.values())]))
     unread = np.full((len(marks), len(model.outputs)), np.nan)
     grid = Grid(recording, time, samples, tuple(model.outputs), np.searchsorted(time, marks), unread)

@@ -78,7 +78,10 @@ def _expression(instruction: Instruction, words: Sequence[str]) -> str:
 def c_files(exported: Exported) -> dict[str, str]:
     """Header and source by file name."""
     prefix = c_prefix(exported)
-    return {f"{prefix}.h": _header(exported, prefix), f"{prefix}.c": _source(exported.compiled, prefix, _title(exported))}
+    return {
+        f"{prefix}.h": _header(exported, prefix),
+        f"{prefix}.c": _source(exported.compiled, prefix, _title(exported)),
+    }
 
 
 def _title(exported: Exported) -> str:
@@ -178,7 +181,7 @@ _MATHS = """typedef {prefix}_real real;
 """
 
 
-def _function(prefix: str, kind: str, program: Program, results: Sequence[str], outputs: str) -> str:
+def _function(kind: str, program: Program, results: Sequence[str], outputs: str) -> str:
     return f"""static void {kind}(const real x[], const real u[], const real d[], const real p[], real t, {outputs})
 {{
 {body(program, results)}
@@ -192,10 +195,14 @@ def _source(c: Compiled, prefix: str, title: str) -> str:
     plays = [f"moved[{k}]" for k in range(c.plays)]
     rates = [f"f[{i}]" for i in range(n)] + [f"a[{k}]" for k in range(len(c.nonzeros))] + plays
     rows = [
-        " + ".join(f"a[{k}] * v[{j}]" for k, (i, j) in enumerate(c.nonzeros) if i == row) or "R(0.0)" for row in range(n)
+        " + ".join(f"a[{k}] * v[{j}]" for k, (i, j) in enumerate(c.nonzeros) if i == row) or "R(0.0)"
+        for row in range(n)
     ]
-    norms = [" + ".join(f"R_ABS(a[{k}])" for k, (i, _) in enumerate(c.nonzeros) if i == row) or "R(0.0)" for row in range(n)]
-    start = [f"x[{i}]" for i in range(n)] + [f"moved[{k}]" for k in range(c.plays)]
+    norms = [
+        " + ".join(f"R_ABS(a[{k}])" for k, (i, _) in enumerate(c.nonzeros) if i == row) or "R(0.0)"
+        for row in range(n)
+    ]
+    start = [f"first[{i}]" for i in range(n)] + [f"moved[{k}]" for k in range(c.plays)]
     product = "\n".join(f"    w[{i}] = {row};" for i, row in enumerate(rows))
     sums = "\n".join(f"    sum = {row};\n    if (sum > norm) {{ norm = sum; }}" for row in norms)
     offsets = [sum(d.whole + 2 for d in c.delays[:k]) for k in range(len(c.delays))]
@@ -229,9 +236,9 @@ def _source(c: Compiled, prefix: str, title: str) -> str:
 #define A {len(c.nonzeros)}
 #define H {real(c.step_s)}
 
-{_function(prefix, "start_values", c.start, start, "real x_[], real moved[]").replace("    x[", "    x_[")}
-{_function(prefix, "rates", c.rates, rates, "real f[], real a[], real moved[]")}
-{_function(prefix, "outputs", c.results, [f"y[{k}]" for k in range(len(c.outputs))] + plays, "real y[], real moved[]")}
+{_function("start_values", c.start, start, "real first[], real moved[]")}
+{_function("rates", c.rates, rates, "real f[], real a[], real moved[]")}
+{_function("outputs", c.results, [f"y[{k}]" for k in range(len(c.outputs))] + plays, "real y[], real moved[]")}
 /* w = A v */
 static void product(const real a[], const real v[], real w[])
 {{

@@ -111,7 +111,9 @@ def compile_model(model: Model, step_s: float) -> Compiled:
     zero = Node(build.constant(0.0))
     known = {**dict.fromkeys(states, zero), **common, **fed, "time": zero}
     first = {
-        name: Node(compile_expression(build, state.start, known, rest).value) if state.start is not None else zero
+        name: Node(compile_expression(build, state.start, known, rest).value)
+        if state.start is not None
+        else zero
         for name, state in model.states.items()
     }
     known |= first
@@ -139,7 +141,9 @@ def compile_model(model: Model, step_s: float) -> Compiled:
             )
             if build.constant_of(gain) != 0.0:
                 jacobian[i, j] = gain
-    read = [compile_expression(build, expression, env, running).value for expression in model.outputs.values()]
+    read = [
+        compile_expression(build, expression, env, running).value for expression in model.outputs.values()
+    ]
     for apply in plays:
         compile_expression(build, apply, env, running)
     moved = [running.moved[k] for k in range(len(plays))]
@@ -185,12 +189,19 @@ def _with_memory(
 
 
 def _delay(
-    model: Model, build: Builder, apply: Apply, known: Mapping[str, Node], inputs: tuple[str, ...], step_s: float
+    model: Model,
+    build: Builder,
+    apply: Apply,
+    known: Mapping[str, Node],
+    inputs: tuple[str, ...],
+    step_s: float,
 ) -> Delay:
     channel, duration = apply.arguments
     assert isinstance(channel, Name)
     if channel.id not in inputs:
-        raise UserError(f"model '{model.name}': delay({channel.id}, ...) is not of an input; only a channel can be delayed")
+        raise UserError(
+            f"model '{model.name}': delay({channel.id}, ...) is not of an input; only a channel can be delayed"
+        )
     seconds = None
     if names(duration) <= set(model.parameters):
         seconds = build.constant_of(compile_expression(build, duration, known, _AtStart({})).value)

@@ -71,7 +71,9 @@ def exportable(model: Model, campaign: Campaign) -> Model:
         UserError: a model without outputs.
     """
     model = expanded(model)
-    own = {name: Name(name) for name in model.states if name in campaign.channels and name not in model.outputs}
+    own = {
+        name: Name(name) for name in model.states if name in campaign.channels and name not in model.outputs
+    }
     model = replace(model, outputs={**model.outputs, **own})
     if not model.outputs:
         raise UserError(f"model '{model.name}' has no outputs; give it some under [outputs]")
@@ -98,12 +100,16 @@ def make_document(
         UserError: a model that cannot be exported (with the reason), or inputs that the recordings do not hold.
     """
     if not 0.001 <= step_s <= 3600.0:
-        raise UserError(f"a step of {step_s:g} s is not possible; give one between 0.001 and 3600, usually 1 to 10")
+        raise UserError(
+            f"a step of {step_s:g} s is not possible; give one between 0.001 and 3600, usually 1 to 10"
+        )
     model = exportable(model, campaign)
     known = set(campaign.channels) | set(model.states) | set(model.parameters) | {"time"}
     for expression in model.expressions():
         for name in sorted(names(expression) - known):
-            raise UserError(f"model '{model.name}': '{name}' is no channel of campaign {campaign.path}; it cannot be exported")
+            raise UserError(
+                f"model '{model.name}': '{name}' is no channel of campaign {campaign.path}; it cannot be exported"
+            )
     compiled = compile_model(model, step_s)
     limits = output_ranges(compiled, campaign, recordings)
     inputs = []
@@ -145,7 +151,13 @@ def make_document(
             for name, s in model.states.items()
         ],
         "terms": [
-            {"name": t.name, "into": t.into, "from": t.source, "expression": text(t.expression), "effect": t.effect}
+            {
+                "name": t.name,
+                "into": t.into,
+                "from": t.source,
+                "expression": text(t.expression),
+                "effect": t.effect,
+            }
             for t in model.terms
         ],
         "outputs": outputs,
@@ -167,10 +179,14 @@ def _parameter(name: str, p: Parameter) -> dict[str, Any]:
     return entry | {"min": finite(p.min), "max": finite(p.max), "low": finite(p.low), "high": finite(p.high)}
 
 
+def render(document: Mapping[str, Any], key: Ed25519PrivateKey | None = None) -> bytes:
+    """The bytes of a sealed document; signed when a key is given."""
+    return seal_bytes(json.dumps(document, indent=1, ensure_ascii=True, allow_nan=False).encode(), key)
+
+
 def write_document(path: Path, document: Mapping[str, Any], key: Ed25519PrivateKey | None = None) -> None:
     """Write a sealed document; signed when a key is given."""
-    body = json.dumps(document, indent=1, ensure_ascii=True, allow_nan=False).encode()
-    write_atomic(path, seal_bytes(body, key))
+    write_atomic(path, render(document, key))
 
 
 def read_document(path: Path) -> Exported:
@@ -190,9 +206,13 @@ def read_document(path: Path) -> Exported:
 def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) -> Exported:
     """The model of a document (see `read_document`)."""
     if document.get("format") != FORMAT:
-        raise UserError(f"{place}: format {document.get('format')!r} is not '{FORMAT}'; this is no exported model")
+        raise UserError(
+            f"{place}: format {document.get('format')!r} is not '{FORMAT}'; this is no exported model"
+        )
     if document.get("version") != VERSION:
-        raise UserError(f"{place}: version {document.get('version')!r} is not {VERSION}, the one this program reads; update it")
+        raise UserError(
+            f"{place}: version {document.get('version')!r} is not {VERSION}, the one this program reads; update it"
+        )
     _check_schema(document, place)
     parameters = {
         p["name"]: Parameter(
@@ -218,14 +238,22 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
         for s in document["states"]
     }
     terms = tuple(
-        Term(t["name"], t["into"], parse(t["expression"], f"{place}, term '{t['name']}'"), t["from"], t["effect"])
+        Term(
+            t["name"],
+            t["into"],
+            parse(t["expression"], f"{place}, term '{t['name']}'"),
+            t["from"],
+            t["effect"],
+        )
         for t in document["terms"]
     )
     outputs = {o["name"]: parse(o["expression"], f"{place}, output {o['name']}") for o in document["outputs"]}
     model = Model(document["name"], parameters, states, terms, outputs)
     for term in terms:
         if term.into not in states or (term.source is not None and term.source not in states):
-            raise UserError(f"{place}: term '{term.name}' enters or leaves a state that is not listed; export the model again")
+            raise UserError(
+                f"{place}: term '{term.name}' enters or leaves a state that is not listed; export the model again"
+            )
     if model_inputs(model) != tuple(i["name"] for i in document["inputs"]):
         raise UserError(f"{place}: the inputs listed are not those of its formulas; export the model again")
     ranges = InputRange.__dataclass_fields__
@@ -236,7 +264,10 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
             Input(i["name"], i["role"], i["unit"], i["between"], InputRange(**{k: i[k] for k in ranges}))
             for i in document["inputs"]
         ),
-        tuple(Output(o["name"], o["role"], o["unit"], OutputRange(o["limit"], o["rate"])) for o in document["outputs"]),
+        tuple(
+            Output(o["name"], o["role"], o["unit"], OutputRange(o["limit"], o["rate"]))
+            for o in document["outputs"]
+        ),
         document["revision"],
         document["provenance"],
         tuple(document["changelog"]),
@@ -255,7 +286,9 @@ def _check_schema(document: Mapping[str, Any], place: str | Path) -> None:
         from jsonschema import Draft202012Validator
         from jsonschema.exceptions import best_match
     except ImportError:
-        raise UserError("exported models need the extra 'export'; install discovery-workbench[export]") from None
+        raise UserError(
+            "exported models need the extra 'export'; install discovery-workbench[export]"
+        ) from None
     mistake = best_match(Draft202012Validator(_schema()).iter_errors(document))
     if mistake is not None:
         key = ".".join(str(part) for part in mistake.absolute_path)

@@ -156,7 +156,9 @@ def advance(rates, outputs, row, column, delays, part, h, u, x, c, d, p, ring, p
             offset, length = delays[j, 1], delays[j, 2]
             here = (position[j] + 1) % length
             ring[offset + here] = u[k, delays[j, 0]]
-            d[j] = (1.0 - part[j]) * ring[offset + (here + 2) % length] + part[j] * ring[offset + (here + 1) % length]
+            d[j] = (1.0 - part[j]) * ring[offset + (here + 2) % length] + part[j] * ring[
+                offset + (here + 1) % length
+            ]
         run(rates[0], rates[1], r, u[k], x, d, p, (count + k) * h)
         for i in range(n):
             f[i] = r[rates[2][i]]

@@ -58,9 +58,15 @@ def sampled_inputs(campaign: Campaign, recording: str, inputs: Sequence[str], st
     columns = []
     for name in inputs:
         channel = campaign.channels.get(name)
-        values = sample_input(data, channel, at) if channel is not None and name in data.values else np.array([np.nan])
+        values = (
+            sample_input(data, channel, at)
+            if channel is not None and name in data.values
+            else np.array([np.nan])
+        )
         if channel is None or not np.isfinite(values).all():
-            raise UserError(f"{campaign.path}: recording '{recording}' has no value of '{name}', which the model needs as an input")
+            raise UserError(
+                f"{campaign.path}: recording '{recording}' has no value of '{name}', which the model needs as an input"
+            )
         columns.append(values)
     return np.column_stack(columns) if columns else np.zeros((len(at), 0))
 
@@ -79,7 +85,9 @@ def input_range(campaign: Campaign, recordings: Sequence[str], name: str) -> Inp
             gaps.append(float(np.median(np.diff(time))))
             window = max(1, int(900.0 / max(gaps[-1], 1e-9)))  # over 15 min noise no longer counts as a rate
             if len(value) > window:
-                rates.append(float(np.max(np.abs(value[window:] - value[:-window]) / (time[window:] - time[:-window]))))
+                rates.append(
+                    float(np.max(np.abs(value[window:] - value[:-window]) / (time[window:] - time[:-window])))
+                )
     together = np.concatenate(series)
     low, high = float(together.min()), float(together.max())
     usual = next((r.usual for unit, r in ROLES[channel.role].ranges.items() if unit == channel.unit), None)
@@ -97,7 +105,9 @@ def input_range(campaign: Campaign, recordings: Sequence[str], name: str) -> Inp
     )
 
 
-def output_ranges(compiled: Compiled, campaign: Campaign, recordings: Sequence[str]) -> dict[str, OutputRange]:
+def output_ranges(
+    compiled: Compiled, campaign: Campaign, recordings: Sequence[str]
+) -> dict[str, OutputRange]:
     """Limits of the outputs from free runs of the model over the recordings of the fit."""
     size = np.zeros(len(compiled.outputs))
     rate = np.zeros(len(compiled.outputs))

@@ -63,7 +63,9 @@ def make_reference(compiled: Compiled, inputs: Array) -> Reference:
     stepper.start(inputs[0])
     y = stepper.run(inputs)
     if len(y) < len(inputs):
-        raise UserError(f"model '{compiled.name}' is not finite after {len(y)} steps of its reference inputs; check it or shorten the step")
+        raise UserError(
+            f"model '{compiled.name}' is not finite after {len(y)} steps of its reference inputs; check it or shorten the step"
+        )
     return Reference(inputs, y)
 
 
@@ -90,12 +92,20 @@ def prove_c(exported: Exported, reference: Reference) -> list[Proof]:
     proofs = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_files(folder, {**c_files(exported), **replay_source(exported), **reference_files(exported.compiled, reference)})
+        write_files(
+            folder,
+            {**c_files(exported), **replay_source(exported), **reference_files(exported.compiled, reference)},
+        )
         for kind, flags in (("double", []), ("float", ["-DDISCOVERY_FLOAT"])):
             source = ["replay.c", f"{c_prefix(exported)}.c"]
             command = ["gcc", *CFLAGS, *flags, *source, "-lm", "-o", "replay"]
             _call(command, folder, "the C code does not compile without warnings")
-            done = _call(["./replay", "reference_inputs.csv", "reference_outputs.csv"], folder, f"the C code in {kind} cannot be replayed", (0, 1))
+            done = _call(
+                ["./replay", "reference_inputs.csv", "reference_outputs.csv"],
+                folder,
+                f"the C code in {kind} cannot be replayed",
+                (0, 1),
+            )
             proofs.append(within(Proof(f"C {kind}", float(done.split()[-1]), LIMITS[kind])))
     return proofs
 
@@ -103,7 +113,9 @@ def prove_c(exported: Exported, reference: Reference) -> list[Proof]:
 def replay_source(exported: Exported) -> dict[str, str]:
     """The C program that replays the reference."""
     text = (TEMPLATES / "replay.c").read_text()
-    return {"replay.c": text.replace("@PREFIX@", c_prefix(exported)).replace("@UP@", c_prefix(exported).upper())}
+    return {
+        "replay.c": text.replace("@PREFIX@", c_prefix(exported)).replace("@UP@", c_prefix(exported).upper())
+    }
 
 
 def within(proof: Proof) -> Proof:

@@ -48,7 +48,9 @@ def open_seal(data: bytes, place: str | Path) -> tuple[dict[str, Any], Seal]:
     """
     head, mark, tail = data.rpartition(MARK)
     if not mark:
-        raise UserError(f"{place}: this is no sealed model; make one with `discovery export RUN --model NAME --to json`")
+        raise UserError(
+            f"{place}: this is no sealed model; make one with `discovery export RUN --model NAME --to json`"
+        )
     try:
         entry = _json(tail.rstrip().removesuffix(b"}"))
         seal = Seal(entry["sha256"], entry["public_key"], entry["signature"])
@@ -56,9 +58,13 @@ def open_seal(data: bytes, place: str | Path) -> tuple[dict[str, Any], Seal]:
     except (ValueError, KeyError, TypeError):
         raise UserError(f"{place}: the seal cannot be read; export the model again") from None
     if not genuine:
-        raise UserError(f"{place}: the file was changed after it was sealed (its SHA-256 differs); export the model again")
+        raise UserError(
+            f"{place}: the file was changed after it was sealed (its SHA-256 differs); export the model again"
+        )
     if seal.signature is not None and not _signed(head, seal):
-        raise UserError(f"{place}: the signature is not that of its public key; do not use this file, export the model again")
+        raise UserError(
+            f"{place}: the signature is not that of its public key; do not use this file, export the model again"
+        )
     try:
         document = _json(head + b"\n}")
     except (ValueError, RecursionError) as error:
@@ -99,9 +105,13 @@ def require_trusted(seal: Seal, trusted: Ed25519PublicKey, place: str | Path) ->
         UserError: unsigned, or signed by someone else.
     """
     if seal.signature is None:
-        raise UserError(f"{place}: the model is not signed, so it is not run; sign it with `discovery export ... --sign KEY`")
+        raise UserError(
+            f"{place}: the model is not signed, so it is not run; sign it with `discovery export ... --sign KEY`"
+        )
     if seal.public_key != trusted.public_bytes_raw().hex():
-        raise UserError(f"{place}: the model is signed by key {str(seal.public_key)[:16]}..., which is not the trusted one")
+        raise UserError(
+            f"{place}: the model is signed by key {str(seal.public_key)[:16]}..., which is not the trusted one"
+        )
 
 
 def private_key(path: Path) -> Ed25519PrivateKey:
@@ -114,9 +124,10 @@ def private_key(path: Path) -> Ed25519PrivateKey:
     from cryptography.hazmat.primitives import serialization as form
 
     if not path.exists():
-        key = ed25519.Ed25519PrivateKey.generate()
-        write_atomic(path, key.private_bytes(form.Encoding.PEM, form.PrivateFormat.PKCS8, form.NoEncryption()))
-        os.chmod(path, 0o600)  # noqa: PTH101
+        key: Ed25519PrivateKey = ed25519.Ed25519PrivateKey.generate()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+            file.write(key.private_bytes(form.Encoding.PEM, form.PrivateFormat.PKCS8, form.NoEncryption()))
         public = key.public_key().public_bytes(form.Encoding.PEM, form.PublicFormat.SubjectPublicKeyInfo)
         write_atomic(path.with_name(path.name + ".pub"), public)
         return key
@@ -125,8 +136,11 @@ def private_key(path: Path) -> Ed25519PrivateKey:
     except (ValueError, TypeError):
         found = None
     if not isinstance(found, ed25519.Ed25519PrivateKey):
-        raise UserError(f"{path}: no Ed25519 private key without password in PEM form; name a new file to have one made")
-    return found
+        raise UserError(
+            f"{path}: no Ed25519 private key without password in PEM form; name a new file to have one made"
+        )
+    known: Ed25519PrivateKey = found
+    return known
 
 
 def public_key(path: Path) -> Ed25519PublicKey:
@@ -139,14 +153,17 @@ def public_key(path: Path) -> Ed25519PublicKey:
     from cryptography.hazmat.primitives import serialization as form
 
     if not path.exists():
-        raise UserError(f"{path}: there is no such key; it stands as KEY.pub beside the key given to `discovery export --sign KEY`")
+        raise UserError(
+            f"{path}: there is no such key; it stands as KEY.pub beside the key given to `discovery export --sign KEY`"
+        )
     try:
         found = form.load_pem_public_key(path.read_bytes())
     except ValueError:
         found = None
     if not isinstance(found, ed25519.Ed25519PublicKey):
         raise UserError(f"{path}: no Ed25519 public key in PEM form; name the .pub file of the signing key")
-    return found
+    known: Ed25519PublicKey = found
+    return known
 
 
 def _crypto() -> Any:

@@ -78,7 +78,9 @@ class Stepper:
         u, empty = np.asarray(u, dtype=float), np.zeros(0)
         values = _run(self._tables.start, u, empty, empty, empty)
         if not np.isfinite(values).all():
-            raise UserError(f"model '{self.compiled.name}' has no finite start for these inputs; check that all are measured")
+            raise UserError(
+                f"model '{self.compiled.name}' has no finite start for these inputs; check that all are measured"
+            )
         n = len(self.compiled.states)
         self.x[:], self.carry[:], self.plays[:] = values[:n], 0.0, values[n:]
         for k, delay in enumerate(self.compiled.delays):
@@ -91,7 +93,9 @@ class Stepper:
     def outputs(self, u: Array) -> Array:
         """Outputs (Y,) of the present state under inputs u (U,), without a step."""
         time = self.count * self.compiled.step_s
-        values = _run(self._tables.outputs, np.asarray(u, dtype=float), self.x, self.delayed, self.plays, time)
+        values = _run(
+            self._tables.outputs, np.asarray(u, dtype=float), self.x, self.delayed, self.plays, time
+        )
         return values[: len(self.compiled.outputs)]
 
     def step(self, u: Array) -> Array | None:
@@ -113,8 +117,15 @@ class Stepper:
 
     def snapshot(self) -> Snapshot:
         """A copy of the running state."""
-        arrays = (self.x, self.carry, self.delayed, self.plays, self.ring, self.position)
-        return Snapshot(*(array.copy() for array in arrays), count=self.count)
+        return Snapshot(
+            self.x.copy(),
+            self.carry.copy(),
+            self.delayed.copy(),
+            self.plays.copy(),
+            self.ring.copy(),
+            self.position.copy(),
+            self.count,
+        )
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot.
@@ -127,7 +138,9 @@ class Stepper:
             (self.plays, snapshot.plays), (self.ring, snapshot.ring), (self.position, snapshot.position),
         ]  # fmt: skip
         if any(mine.shape != theirs.shape for mine, theirs in pairs):
-            raise UserError(f"the saved state does not fit model '{self.compiled.name}'; it is of another model")
+            raise UserError(
+                f"the saved state does not fit model '{self.compiled.name}'; it is of another model"
+            )
         for mine, theirs in pairs:
             mine[...] = theirs
         self.count = snapshot.count
@@ -150,9 +163,7 @@ class _Tables:
 
 
 def _table(program: Program) -> Table:
-    rows = [
-        (kernel.CODE[i.operation], *(i.arguments + (0, 0, 0))[:3], i.index) for i in program.instructions
-    ]
+    rows = [(kernel.CODE[i.operation], *(*i.arguments, 0, 0, 0)[:3], i.index) for i in program.instructions]
     table = np.array(rows, dtype=np.int64).reshape(-1, 5)
     return table, np.array([i.value for i in program.instructions]), np.array(program.results, dtype=np.int64)
 

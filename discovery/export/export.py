@@ -1,0 +1,211 @@
+"""Export: a fitted model as a document and as code, each proved equal to the Python model before it is written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from discovery.errors import UserError
+from discovery.export.agreement import agreement
+from discovery.export.c import c_files
+from discovery.export.document import Exported, from_document, make_document, render
+from discovery.export.fmu import fmu_bytes, prove_fmu
+from discovery.export.identifiers import identifier
+from discovery.export.ranges import sampled_inputs
+from discovery.export.replay import (
+    Proof,
+    Reference,
+    make_reference,
+    prove_c,
+    reference_files,
+    replay_source,
+    write_files,
+)
+from discovery.export.seal import open_seal
+from discovery.export.st import KINDS, st_name, st_text
+from discovery.export.stproof import prove_st
+from discovery.models import Model
+from discovery.recordings import Campaign
+from discovery.schema import suggest
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+TARGETS = ("json", "c", "fmu", "fmu3", "st")
+
+
+@dataclass(frozen=True)
+class Export:
+    """What an export wrote, and the proofs that it is the model."""
+
+    files: tuple[Path, ...]
+    proofs: tuple[Proof, ...]
+    agreement: Mapping[str, float]  # of the fixed step with discovery.dynamics, um
+
+    def lines(self) -> list[str]:
+        """What a user wants to know of it."""
+        step = (
+            f"the fixed step is {self.agreement['integrator_um']:.2g} um from the fitted model under the same inputs, "
+            f"{self.agreement['held_inputs_um']:.2g} um where inputs are held over a step"
+        )
+        return [*(str(path) for path in self.files), *(str(proof) for proof in self.proofs), step]
+
+
+def export_model(
+    model: Model,
+    campaign: Campaign,
+    recordings: Sequence[str],
+    to: str | Sequence[str],
+    out_dir: Path,
+    *,
+    step_s: float = 10.0,
+    states: int | None = None,
+    key: Ed25519PrivateKey | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Export:
+    """Export a fitted model for the compensation runtime; the JSON document, master of all, is always written.
+
+    Args:
+        recordings: those of the fit; trained ranges, limits and the reference of the replay come from them alone.
+        to: targets, some of `TARGETS`.
+        out_dir: folder that the files go to.
+        step_s: fixed internal step [s].
+        states: reduce the model to so many states first (see `discovery.export.reduce`).
+        key: signs the document.
+        provenance: what else should be known about where the model comes from.
+
+    Raises:
+        UserError: an unknown target, a model that cannot be exported, or a target that is not equal; then nothing is written.
+    """
+    targets = (to,) if isinstance(to, str) else tuple(to)
+    for target in targets:
+        if target not in TARGETS:
+            raise UserError(f"unknown export target '{target}'; {suggest(target, list(TARGETS))}")
+    if not recordings:
+        raise UserError(
+            f"model '{model.name}': name at least one recording of the fit; ranges and reference come from it"
+        )
+    notes = dict(provenance or {})
+    if states is not None:
+        from discovery.export.reduce import reduce_model
+
+        reduction = reduce_model(model, campaign, recordings, states, step_s)
+        model = reduction.model
+        notes["reduction"] = reduction.note()
+    found = agreement(model, campaign, recordings[0], step_s)
+    document = make_document(model, campaign, recordings, step_s, {**notes, "agreement_with_dynamics": found})
+    data = render(document, key)
+    body, seal = open_seal(data, model.name)
+    exported = from_document(body, seal, model.name)
+    inputs = sampled_inputs(campaign, recordings[0], exported.compiled.inputs, step_s)
+    reference = make_reference(exported.compiled, inputs)
+    stem = identifier(model.name)
+    files: dict[str, str | bytes] = {f"{stem}.json": data}
+    proofs: list[Proof] = []
+    for target in dict.fromkeys(targets):
+        made, proved = _TARGETS[target](exported, reference, stem)
+        files |= made
+        proofs += proved
+    write_files(out_dir, files)
+    return Export(tuple(out_dir / name for name in files), tuple(proofs), found)
+
+
+Made = tuple[dict[str, str | bytes], list[Proof]]
+
+
+def _json(exported: Exported, reference: Reference, stem: str) -> Made:  # noqa: ARG001
+    return dict(reference_files(exported.compiled, reference)), []
+
+
+def _c(exported: Exported, reference: Reference, stem: str) -> Made:  # noqa: ARG001
+    texts = {**c_files(exported), **replay_source(exported), **reference_files(exported.compiled, reference)}
+    return {f"c/{name}": text for name, text in texts.items()}, prove_c(exported, reference)
+
+
+def _fmu(version: int, suffix: str, exported: Exported, reference: Reference, stem: str) -> Made:
+    data = fmu_bytes(exported, version)
+    files: dict[str, str | bytes] = {f"{stem}{suffix}.fmu": data}
+    files |= reference_files(exported.compiled, reference)
+    return files, [prove_fmu(exported, reference, version, data)]
+
+
+def _st(exported: Exported, reference: Reference, stem: str) -> Made:  # noqa: ARG001
+    proofs = prove_st(exported, reference)
+    texts = {
+        f"{st_name(exported)}_{kind}.st": st_text(exported, precision) for precision, kind in KINDS.items()
+    }
+    return {
+        f"st/{name}": text
+        for name, text in {**texts, **reference_files(exported.compiled, reference)}.items()
+    }, proofs
+
+
+_TARGETS = {
+    "json": _json,
+    "c": _c,
+    "fmu": lambda *a: _fmu(2, "", *a),
+    "fmu3": lambda *a: _fmu(3, "_fmi3", *a),
+    "st": _st,
+}
+
+
+def export_run(
+    run: Path,
+    name: str,
+    to: str | Sequence[str],
+    out_dir: Path | None = None,
+    *,
+    campaign: Path | None = None,
+    step_s: float = 10.0,
+    states: int | None = None,
+    key: Ed25519PrivateKey | None = None,
+) -> Export:
+    """Export a model of a finished run (`discovery export`).
+
+    Args:
+        run: folder that `discovery run` wrote.
+        name: of a model in its `models` folder.
+        campaign: campaign file; default the one that the run names.
+
+    Raises:
+        UserError: no such run, model or campaign.
+    """
+    from discovery.models.modelfile import read_model
+    from discovery.recordings import load_campaign
+
+    results_file = run / "results.json"
+    if not results_file.is_file():
+        raise UserError(
+            f"{run}: this is no folder of a finished run (results.json is missing); make one with `discovery run`"
+        )
+    try:
+        results = json.loads(results_file.read_text(encoding="utf-8"))
+        fit, experiment = [str(r) for r in results["fit"]], str(results.get("experiment", run.name))
+    except (ValueError, KeyError, TypeError):
+        raise UserError(f"{results_file}: cannot be read; run the experiment again") from None
+    model_file = run / "models" / f"{name}.toml"
+    if not model_file.is_file():
+        known = sorted(path.stem for path in (run / "models").glob("*.toml"))
+        raise UserError(f"{run}: no model '{name}'; {suggest(name, known)}")
+    place = campaign or _campaign_of(run, results)
+    loaded = load_campaign(place, only=fit)
+    model = read_model(model_file)
+    out_dir = out_dir or run / "export" / name
+    provenance = {"experiment": experiment, "model_file": model_file.name}
+    return export_model(
+        model, loaded, fit, to, out_dir, step_s=step_s, states=states, key=key, provenance=provenance
+    )
+
+
+def _campaign_of(run: Path, results: Mapping[str, Any]) -> Path:
+    named = results.get("campaign_file")
+    if named is None:
+        raise UserError(f"{run / 'results.json'}: names no campaign file; give it with --campaign FILE")
+    if Path(str(named)).exists():
+        return Path(str(named))
+    raise UserError(
+        f"{run / 'results.json'}: the campaign {named} is not there any more; give it with --campaign FILE"
+    )
