@@ -160,9 +160,9 @@ def _number(text: str, name: str, line: int, troubles: _Troubles) -> float:
         if _DECIMAL_COMMA.fullmatch(text):
             do = "write numbers with a decimal point"
             troubles.cell(f"comma {name}", line, f"'{name}' is '{text}' with a decimal comma", do)
-        else:
-            do = "write a number, or leave the cell empty where nothing was measured"
-            troubles.cell(f"text {name}", line, f"'{name}' is '{_short(text)}', not a number", do)
+            return float(text.replace(",", "."))  # meant so: the checks that follow can go on
+        do = "write a number, or leave the cell empty where nothing was measured"
+        troubles.cell(f"text {name}", line, f"'{name}' is '{_short(text)}', not a number", do)
         return math.nan
 
 

@@ -1,0 +1,249 @@
+"""`discovery check`: each trouble is found once, at its line, with what to do; whatever the file holds."""
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from discovery.cli import app
+from discovery.errors import UserError
+from discovery.recordings import load_campaign
+from discovery.recordings.check import check_campaign, summary
+from tests.recordings.conftest import CAMPAIGN, Write, rows
+
+ROOT = Path(__file__).parents[2]
+
+
+def found(path: Path) -> list[str]:
+    """Findings without the folder, as they are printed."""
+    return [str(finding).replace(f"{path.parent}/", "") for finding in check_campaign(path)]
+
+
+def with_line(number: int, text: str) -> list[str]:
+    lines = rows()
+    lines[number - 1] = text
+    return lines
+
+
+def with_column(place: int, cells: list[str]) -> list[str]:
+    """The good recording with the cells of one column replaced, from the second line on."""
+    lines = [line.split(",") for line in rows(len(cells))]
+    for line, cell in zip(lines[1:], cells, strict=True):
+        line[place] = cell
+    return [",".join(line) for line in lines]
+
+
+def test_nothing_is_wrong(write: Write) -> None:
+    assert check_campaign(write()) == []
+    assert summary([]) == "nothing is wrong with these recordings"
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (with_line(1, "time,T_env,speed,speed"), "error: fit.csv, line 1: 2 columns are named 'speed'"),
+        (
+            with_line(1, "time,T_env,sped,E_Y0C"),
+            "error: fit.csv, line 1: no column 'speed'; add it, or say set",
+        ),
+        (with_line(1, "time,T_env,sped,E_Y0C"), "warning: fit.csv, line 1: the column 'sped' is not among"),
+        (with_line(9, "100,20,0,"), "error: fit.csv, line 9: time runs backwards by 260 s; sort"),
+        (
+            with_line(9, "360,20,0,"),
+            "error: fit.csv, line 9: the stamp of the line before comes again; delete",
+        ),
+        ([*rows(), "90000,20,0,1"], "warning: fit.csv, line 62: time jumps by 86460 s where steps are 60 s"),
+        (with_line(9, "420,2O,0,"), "error: fit.csv, line 9: 'T_env' is '2O', not a number; write a number"),
+        (with_line(9, '420,"20,5",0,'), "error: fit.csv, line 9: 'T_env' is '20,5' with a decimal comma"),
+        (with_line(9, "420,20,5,0,"), "error: fit.csv, line 9: 5 cells under 4 columns; look for a decimal"),
+        (with_line(9, "420,200,0,"), "warning: fit.csv, line 9: 'T_env' is 200 degC, unusual for"),
+        (with_line(9, "420,-300,0,"), "error: fit.csv, line 9: 'T_env' is -300 degC, no ambient temperature"),
+        (with_line(9, "420,20,9e9,"), "error: fit.csv, line 9: 'speed' is 9e+09 rpm, no rotation speed can"),
+        (rows(2), "error: fit.csv: only 2 rows; too short for any model"),
+        (rows(10), "warning: fit.csv: 'E_Y0C' has 5 readings; record longer"),
+        (with_column(3, [""] * 60), "warning: fit.csv: 'E_Y0C' has no readings; record longer"),
+        (
+            with_column(2, [""] * 60),
+            "error: fit.csv: the input 'speed' has no value at all; measure it, or say",
+        ),
+        (
+            with_column(2, ["1"] * 10 + [""] * 40 + ["1"] * 10),
+            "warning: fit.csv, line 12: the input 'speed' is empty for 2340 s, up to line 51; the value",
+        ),
+        (
+            with_column(2, ["1"] * 10 + [""] * 40 + ["1"] * 10),
+            "warning: fit.csv, line 12: 20 of 30 readings of 'E_Y0C' stand where 'speed' is not known",
+        ),
+        (
+            with_column(1, [""] * 30 + [f"{20 + i % 3}" for i in range(30)]),
+            "warning: fit.csv, line 2: the input 'T_env' is empty for 1740 s, up to line 31; the first known",
+        ),
+        (with_column(1, ["21.5"] * 60), "warning: fit.csv, line 2: 'T_env' is 21.5 in all 60 readings"),
+        (
+            with_column(
+                1, [f"{20 + i % 7}" for i in range(40)] + ["20"] * 160 + [f"{20 + i % 7}" for i in range(40)]
+            ),
+            "warning: fit.csv, line 42: 'T_env' stands still at 20 for 161 readings, up to line 202",
+        ),
+        (
+            "\n".join(rows()).replace(",", ";"),
+            "error: fit.csv, line 1: the columns are separated by a semicolon",
+        ),
+        ("\n".join(rows()).replace(",", "\t"), "error: fit.csv, line 1: the columns are separated by a tab"),
+        (
+            "\n".join(rows()).replace(",", ";").replace(".", ","),
+            "error: fit.csv, line 2: 'T_env' is '20,0' with a decimal comma (and",
+        ),
+        ("\n".join(rows()).encode("utf-16"), "error: fit.csv: the text is UTF-16; save the file as UTF-8"),
+        (
+            "\n".join(with_line(5, "180,20 °C,0,")).encode("latin-1"),
+            "error: fit.csv, line 5: not UTF-8 text (perhaps Latin-1, where the byte is '°'); save",
+        ),
+        (b"PK\x03\x04\0\0 no text", "error: fit.csv, line 1: a zero byte: not a text"),
+        (gzip.compress(b"time,T_env\n" * 99)[:-20], "error: fit.csv: cannot be read ("),
+        ("", "error: fit.csv: the file is empty"),
+        ("time,T_env,speed,E_Y0C\n", "error: fit.csv: no row with a stamp"),
+        (
+            with_line(9, "2026-03-01,20,0,"),
+            "error: fit.csv, line 9: the stamp '2026-03-01' is no number of seconds; write all stamps",
+        ),
+    ],
+)
+def test_each_trouble_is_found_where_it_is(write: Write, data: str | bytes | list[str], said: str) -> None:
+    told = found(write(data))
+    assert any(line.startswith(said) for line in told), told
+
+
+@pytest.mark.parametrize(
+    ("mixed", "trouble"), [("08:00:00", "some stamps name a time zone"), ("25:00", "is no ISO")]
+)
+def test_instants_that_do_not_fit_together(write: Write, mixed: str, trouble: str) -> None:
+    lines = [
+        rows()[0],
+        "2026-03-01T07:59:00Z,20,0,1",
+        f"2026-03-01T{mixed},20,0,",
+        "2026-03-01T08:01:00Z,20,0,2",
+    ]
+    assert any(trouble in line for line in found(write(lines)))
+
+
+def test_a_clock_that_is_put_back(write: Write) -> None:
+    lines = [
+        rows()[0],
+        "2026-10-25T02:59:00,20,0,1",
+        "2026-10-25T02:00:00,20,0,",
+        "2026-10-25T02:01:00,20,0,2",
+    ]
+    [told] = [line for line in found(write(lines)) if line.startswith("error")]
+    assert "line 3: time runs backwards by 3540 s" in told
+    assert "UTC" in told
+
+
+def test_a_trouble_of_many_cells_is_told_once(write: Write) -> None:
+    told = found(write(with_column(1, ["bad"] * 60)))
+    assert [line for line in told if "not a number" in line] == [
+        "error: fit.csv, line 2: 'T_env' is 'bad', not a number (and 59 more like it);"
+        " write a number, or leave the cell empty where nothing was measured"
+    ]
+
+
+def test_all_mistakes_of_the_campaign_file_are_told_and_the_rest_is_checked(write: Write) -> None:
+    text = CAMPAIGN.replace('"rpm"', '"rmp"').replace('"ambient temperature"', '"ambient"')
+    text += 'lost = { file = "lost.csv", set = { pump = 1 } }\nbad = { fiel = "fit.csv" }\n'
+    told = found(write(with_line(9, "420,20,0,x"), text))
+    beginnings = [
+        "error: campaign.toml, line 11: recordings.bad.fiel: unknown key; did you mean 'file'?",
+        "error: campaign.toml, line 4: channels.T_env.role: 'ambient' is not known",
+        "error: campaign.toml, line 5: channels.speed.unit: the unit 'rmp' is not known",
+        "error: campaign.toml, line 10: recordings.lost.set.pump: no such channel",
+        "error: fit.csv, line 9: 'E_Y0C' is 'x', not a number",
+        "error: lost.csv: there is no such file",
+    ]
+    for beginning in beginnings:
+        assert any(line.startswith(beginning) for line in told), (beginning, told)
+
+
+def test_parquet_troubles(write: Write) -> None:
+    assert "not a readable Parquet file" in found(write(b"PAR1 nothing", name="fit.parquet"))[0]
+
+
+def test_exit_status_and_closing_line(write: Write) -> None:
+    runner = CliRunner()
+    good = runner.invoke(app, ["check", str(write())])
+    assert (good.exit_code, good.stdout) == (0, "nothing is wrong with these recordings\n")
+    warned = runner.invoke(app, ["check", str(write(with_line(9, "420,200,0,")))])
+    assert (warned.exit_code, warned.stdout.splitlines()[-1]) == (0, "0 errors, 1 warning")
+    wrong = runner.invoke(app, ["check", str(write(with_line(9, "420,x,0,")))])
+    assert (wrong.exit_code, wrong.stdout.splitlines()[-1]) == (1, "1 error, 0 warnings")
+
+
+@pytest.mark.parametrize("folder", ["tclab"])
+def test_the_recordings_that_come_along_are_good(folder: str) -> None:
+    assert check_campaign(ROOT / "datasets" / folder) == []
+
+
+def test_slow_quantised_and_switched_signals_are_no_frozen_sensors(write: Write) -> None:
+    random = np.random.default_rng(1)
+    slow = 22 + np.cumsum(random.normal(0, 0.02, 600))
+    cells = [f"{value:.1f}" for value in slow]  # a sensor of 0.1 degC that changes every few readings
+    assert found(write(with_column(1, cells))) == []
+
+
+mutations = st.lists(
+    st.tuples(
+        st.integers(0, 900),
+        st.sampled_from(['"', ",", ";", "\n", "\0", "-", "é", "1e999", "", "T", "\r", "nan"]),
+    ),
+    max_size=6,
+)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(changes=mutations, encoding=st.sampled_from(["utf-8", "latin-1", "utf-16", "utf-8-sig"]))
+def test_a_damaged_file_is_told_or_read_never_a_crash(
+    write: Write, changes: list[tuple[int, str]], encoding: str
+) -> None:
+    text = "\n".join(rows(30))
+    for place, piece in changes:
+        text = text[:place] + piece + text[place + 1 :]
+    agree(write(text.encode(encoding)))
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.binary(max_size=300), name=st.sampled_from(["fit.csv", "fit.csv.gz", "fit.parquet"]))
+def test_any_bytes_are_told_never_a_crash(write: Write, data: bytes, name: str) -> None:
+    agree(write(data, name=name))
+    agree(write(b"time,T_env,speed,E_Y0C\n" + data, name=name))
+    agree(write(gzip.compress(data), name=name))
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(place=st.integers(0, len(CAMPAIGN)), piece=st.text(max_size=4), cut=st.integers(0, 12))
+def test_a_damaged_campaign_file_is_told_never_a_crash(
+    write: Write, place: int, piece: str, cut: int
+) -> None:
+    path = write()
+    path.write_text(CAMPAIGN[:place] + piece + CAMPAIGN[place + cut :], encoding="utf-8", errors="replace")
+    agree(path)
+
+
+def agree(path: Path) -> None:
+    """What `check` finds no error in can be loaded, and what cannot be loaded has an error in `check`."""
+    try:
+        errors = [finding for finding in check_campaign(path) if finding.severity == "error"]
+    except UserError:
+        errors = None
+    try:
+        load_campaign(path)
+    except UserError:
+        assert errors is None or errors
+    else:
+        # loading is lenient where values are only implausible
+        assert errors is not None
+        assert all(
+            "can be" in error.what or "no value" in error.what or "set." in error.what for error in errors
+        ), errors
