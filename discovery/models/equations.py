@@ -42,15 +42,14 @@ def _write(expression: Expression) -> str:
 
 
 def _sum(parts: Sequence[tuple[float, Expression]], values: dict[str, Expression]) -> str:
-    if not parts:
-        return "0"
+    """A sum with plain signs: what starts with a minus or leaves the state is subtracted."""
     line = ""
     for sign, expression in parts:
-        shown = _write(
-            substitute(expression, values) if sign > 0 else Apply("neg", (substitute(expression, values),))
-        )
-        if not line:
-            line = shown
-        else:
-            line += f" - {shown[1:]}" if shown.startswith("-") else f" + {shown}"
-    return line
+        tree = substitute(expression, values)
+        shown = _write(tree)
+        if sign < 0 and isinstance(tree, Apply) and tree.function in ("+", "-"):
+            shown = f"({shown})"
+        negative = shown.startswith("-") != (sign < 0)
+        shown = shown.removeprefix("-")
+        line += (f"-{shown}" if negative else shown) if not line else f" {'-' if negative else '+'} {shown}"
+    return line or "0"

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from discovery.errors import UserError
-from discovery.files import locate, read_toml, write_toml
+from discovery.files import dotted, locate, read_toml, write_toml
 from discovery.models.model import TIME_UNITS, Model, Parameter, State
 from discovery.terms import Expression, Term, names, parse, text
 from discovery.terms.expression import FUNCTIONS
@@ -83,7 +83,7 @@ def read_model(path: Path) -> Model:
 
     def at(*key: str | int) -> str:
         line = locate(source, key)
-        return f"{path}{f', line {line}' if line else ''}, key {'.'.join(str(part) for part in key)}"
+        return f"{path}{f', line {line}' if line else ''}, key {dotted(key)}"
 
     for kind in ("parameters", "states"):
         for name in getattr(form, kind):

@@ -1,0 +1,92 @@
+"""Units that fit pass, units that do not are named."""
+
+import dataclasses
+
+import pytest
+
+from discovery.models import Model, Parameter, State
+from discovery.models.dimensions import check_dimensions
+from discovery.models.reduced import reduced
+from discovery.models.superposition import superposition
+from discovery.models.thermobalance import thermobalance
+from discovery.recordings import Channel
+from discovery.terms import Number, Term, parse
+
+UNITS = {
+    "T_env": "degC",
+    "T_fluid": "degC",
+    "T_cool": "degC",
+    "pump": "1",
+    "speed": "rpm",
+    "P_drive": "W",
+    "h_nozzle": "mm",
+    "E_Y0C": "um",
+    "E_Z0T": "um",
+    "E_R0T": "um",
+    "E_A0C": "um/m",
+}
+CHANNELS = {name: Channel(name, "error" if unit[:2] == "um" else "other input", unit, None, "held") for name, unit in UNITS.items()}
+INPUTS, ERRORS = ["T_env", "P_drive", "T_fluid", "pump"], ["E_Y0C", "E_A0C"]
+
+
+@pytest.mark.parametrize(
+    "model", [thermobalance(), thermobalance(variant="printed"), reduced(INPUTS, ERRORS, CHANNELS), superposition(INPUTS, ERRORS, CHANNELS)]
+)
+def test_hand_built_models_fit(model: Model) -> None:
+    assert check_dimensions(model, CHANNELS) == []
+
+
+def one(expression: str, capacity: float | None = 1000.0, **units: str) -> list[str]:
+    state = State("x", "degC", capacity, Number(20.0), 0.5, 1.0)
+    parameters = {name: Parameter(1.0, unit) for name, unit in units.items()}
+    return check_dimensions(Model("m", parameters, {"x": state}, (Term("t", "x", parse(expression)),), {}), CHANNELS)
+
+
+@pytest.mark.parametrize(
+    ("expression", "units"),
+    [
+        ("G*(T_env - x)", {"G": "W/K"}),
+        ("hA*A*(T_env - x)", {"hA": "W/m**2/K", "A": "m**2"}),
+        ("0.3*P_drive", {}),
+        ("G*(speed/600)**m*(T_fluid - x)", {"G": "W/K", "m": "1"}),
+        ("G*(speed/n0)**m*(T_fluid - x)", {"G": "W/K", "n0": "rpm", "m": "1"}),
+        ("where(speed > 100, a*P_drive, 0)", {"a": "1"}),
+        ("a*P_drive*exp(-k*(x - 22))", {"a": "1", "k": "1/K"}),
+        ("G*(lag(T_fluid, tau) - x)", {"G": "W/K", "tau": "min"}),
+        ("kW*pump", {"kW": "kW"}),
+        ("s*A*((x + 273.15)**4 - (T_env + 273.15)**4)", {"s": "W/m**2/K**4", "A": "m**2"}),
+    ],
+)
+def test_what_fits(expression: str, units: dict[str, str]) -> None:
+    assert one(expression, **units) == []
+
+
+@pytest.mark.parametrize(
+    ("expression", "units", "word"),
+    [
+        ("G*(T_env - x)", {"G": "W/K/m"}, "is expected"),
+        ("P_drive + x", {}, "meet"),
+        ("G*(T_env - speed)", {"G": "W/K"}, "meet"),
+        ("a*P_drive*exp(k*x)", {"a": "1", "k": "1"}, "pure number"),
+        ("P_drive**x", {}, "exponent"),
+        ("P_drive*pump*G", {"G": "W"}, "is expected"),
+        ("G*(lag(T_env, x) - x)", {"G": "W/K"}, "time in s"),
+        ("max(P_drive, x)", {}, "meet"),
+        ("G*(T_env - x)", {"G": "furlongs_of_heat"}, "not known"),
+    ],
+)
+def test_what_does_not(expression: str, units: dict[str, str], word: str) -> None:
+    sentences = one(expression, **units)
+    assert len(sentences) == 1
+    assert word in sentences[0]
+
+
+def test_a_rate_is_compared_with_the_state_and_the_time_unit() -> None:
+    assert one("(T_env - x)/tau", capacity=None, tau="s") == []
+    assert "degC/s is expected" in one("k*P_drive", capacity=None, k="K")[0]
+
+
+def test_an_output_is_compared_with_its_channel() -> None:
+    model = thermobalance()
+    wrong = dataclasses.replace(model, outputs={"E_R0T": parse("T_ref*G_c1_c2")})
+    assert "output 'E_R0T'" in check_dimensions(wrong, CHANNELS)[0]

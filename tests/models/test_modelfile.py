@@ -1,0 +1,120 @@
+"""Model files: read, written, read back; mistakes are one sentence with the place."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from discovery.errors import UserError
+from discovery.models import Model, check_names, expanded, read_model, write_model
+from discovery.models.thermobalance import thermobalance
+from discovery.terms import text
+
+GOOD = """
+name = "two bodies"
+time_unit = "min"
+
+[parameters]
+G    = { start = 24.0, unit = "W/K", min = 0.0 }
+loss = { start = 0.3, per = "recording" }
+tau  = { start = 900.0, unit = "s", fixed = true }
+
+[states]
+a = { capacity = 44.7e3, start = "T_env" }
+b = { capacity = 62.4e3, start = 21 }
+y = { unit = "um", start = 0.0, start_sd = 0 }
+
+[[terms]]
+name = "link"
+into = "a"
+from = "b"
+expression = "G*(b - a)"
+
+[[terms]]
+into = "b"
+expression = "loss*lag(P, tau)"
+
+[[terms]]
+into = "y"
+expression = "a - 22"
+
+[outputs]
+E = "1.92*(a - 22) + y"
+"""
+
+
+def written(tmp_path: Path, content: str) -> Path:
+    path = tmp_path / "model.toml"
+    path.write_text(content)
+    return path
+
+
+def test_a_file_becomes_what_it_says(tmp_path: Path) -> None:
+    model = read_model(written(tmp_path, GOOD))
+    assert model.inputs == ("P",)
+    assert model.free == ("G", "loss")
+    assert model.states["a"].scale == 1 / 44.7e3
+    assert model.states["y"].scale == 1 / 60
+    assert (model.states["a"].start_sd, model.states["y"].start_sd) == (0.5, 0.0)
+    assert model.parameters["loss"].per_recording
+    assert [term.name for term in model.terms] == ["link", "term 2", "term 3"]
+
+
+def test_a_model_survives_its_file(tmp_path: Path) -> None:
+    for model in (read_model(written(tmp_path, GOOD)), thermobalance()):
+        fitted = dataclasses.replace(
+            model,
+            parameters={
+                name: dataclasses.replace(p, value=p.value * 1.1, low=0.0, high=p.value * 2, max=p.value * 9) for name, p in model.parameters.items()
+            },
+        )
+        write_model(tmp_path / "again.toml", fitted)
+        again = read_model(tmp_path / "again.toml")
+        assert again.states == fitted.states
+        assert again.outputs == fitted.outputs
+        assert [dataclasses.replace(t) for t in again.terms] == list(fitted.terms)
+        for name, p in fitted.parameters.items():
+            assert again.parameters[name].value == pytest.approx(p.value, rel=1e-9)
+            assert again.parameters[name].low == 0.0
+            assert again.parameters[name].unit == p.unit
+
+
+def test_a_lag_becomes_a_hidden_state(tmp_path: Path) -> None:
+    model = expanded(read_model(written(tmp_path, GOOD)))
+    assert text(model.terms[-1].expression) == "(P - lag_1)/tau"
+    assert list(model.states) == ["a", "b", "y", "lag_1"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('into = "y"', 'into = "z"', ["line 26", "'z' is not a state", "a, b, y"]),
+        ("G*(b - a)", "G*(b - a", ["line 19", "not a formula"]),
+        ("G*(b - a)", "__import__('os')", ["line 19", "unknown function"]),
+        ("capacity = 44.7e3", "capacity = -1", ["line 11", "greater than 0"]),
+        ("min = 0.0", "min = 30.0", ["line 6", "start 24"]),
+        ("[states]", "[state]", ["unknown key", "did you mean 'states'"]),
+        ("fixed = true", "fixd = true", ["line 8", "did you mean 'fixed'"]),
+        ('time_unit = "min"', 'time_unit = "minutes"', ["line 3", "min"]),
+        ("G    =", "exp =", ["line 6", "cannot name"]),
+        ("G    =", "a =", ["line 6", "also a state"]),
+        ('per = "recording"', 'per = "day"', ["line 7", "recording"]),
+    ],
+)
+def test_mistakes(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
+    assert old in GOOD
+    with pytest.raises(UserError) as caught:
+        read_model(written(tmp_path, GOOD.replace(old, new)))
+    sentence = str(caught.value)
+    assert "\n" not in sentence
+    for word in ("model.toml", *words):
+        assert word in sentence
+
+
+def test_a_name_that_nobody_knows(tmp_path: Path) -> None:
+    model: Model = read_model(written(tmp_path, GOOD))
+    check_names(model, {"P", "T_env"}, "model.toml")
+    with pytest.raises(UserError, match=r"start of 'a': 'T_env' is neither"):
+        check_names(model, {"P"}, "model.toml")
