@@ -42,6 +42,11 @@ class Context:
     flows: Mapping[str, float]  # largest heat flow (or rate) by state, rms
     belief: float | None
 
+    @property
+    def fit_states(self) -> tuple[str, ...]:
+        """States at which heat can be missing."""
+        return tuple(self.heat_limit)
+
     def spread(self, h: Hypothesis) -> tuple[float, ...]:
         """Prior standard deviation of each amplitude: what is plausible, but no more than the model's own flows."""
         size = h.effect.amplitude.plausible

@@ -49,7 +49,7 @@ def _index(lens: Lens, run: str) -> int:
     return next(i for i, t in enumerate(lens.fit.trajectories) if t.system.grid.recording == run)
 
 
-def _whiten_one(lens: Lens, view: View, run: str, columns: Array) -> Array:
+def whiten_one(lens: Lens, view: View, run: str, columns: Array) -> Array:
     """Projected whitened columns of one recording (N, M)."""
     parts = []
     for t, part in zip(lens.fit.trajectories, lens.filters, strict=True):
@@ -61,7 +61,7 @@ def _whiten_one(lens: Lens, view: View, run: str, columns: Array) -> Array:
     return view.project(np.concatenate(parts))
 
 
-def _heat_steps(trajectory: Trajectory, body: str, instants: Array) -> Array:
+def heat_steps(trajectory: Trajectory, body: str, instants: Array) -> Array:
     """Response (R, Y, M) to a unit heat at a body from each instant on."""
     system = trajectory.system
     time, step = system.grid.time, system.grid.step
@@ -78,17 +78,17 @@ def _windows(lens: Lens, view: View, run: str, group: list[Hypothesis], spread: 
     found = []
     for h in group:
         body, sd = h.states[0], spread[h.amplitudes[0]]
-        i, j, _ = _best_window(lens, view, run, _heat_steps(trajectory, body, coarse), sd)
+        i, j, _ = _best_window(lens, view, run, heat_steps(trajectory, body, coarse), sd)
         width = coarse[1] - coarse[0]
         fine = np.unique(np.concatenate([np.clip(c + np.linspace(-width, width, 2 * FINE + 1), time[0], time[-1]) for c in (coarse[i], coarse[j])]))
-        i, j, _ = _best_window(lens, view, run, _heat_steps(trajectory, body, fine), sd)
+        i, j, _ = _best_window(lens, view, run, heat_steps(trajectory, body, fine), sd)
         edges = dict(zip(h.shapes, (float(fine[i]), float(fine[j])), strict=True))
-        found.append(replace(h.at(edges), cost=float(np.log(COARSE))))
+        found.append(replace(h.at(edges), cost=float(2 * np.log(COARSE))))  # two edges were searched
     return found
 
 
 def _best_window(lens: Lens, view: View, run: str, steps: Array, sd: float) -> tuple[int, int, float]:
-    z = _whiten_one(lens, view, run, steps)
+    z = whiten_one(lens, view, run, steps)
     dot = z.T @ view.residual
     gram = z.T @ z
     size = np.maximum(np.diag(gram)[:, None] + np.diag(gram)[None, :] - 2 * gram, 0.0) + sd**-2
@@ -109,7 +109,7 @@ def _jumps(lens: Lens, view: View, run: str, group: list[Hypothesis], spread: di
         out = np.zeros((len(read_time), outs, outs * len(instants)))
         for y in range(outs):
             out[:, y, y * len(instants) : (y + 1) * len(instants)] = steps
-        return _whiten_one(lens, view, run, out)
+        return whiten_one(lens, view, run, out)
 
     found = []
     coarse = read_time[every::every]

@@ -1,0 +1,213 @@
+"""The diagnosis from start to end: fit, noise, detect, locate, name, model, prove, check, ask."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from discovery.errors import UserError
+from discovery.mismatch.ask import next_experiment
+from discovery.mismatch.catalogue import Effect, catalogue
+from discovery.mismatch.context import Context, make_context
+from discovery.mismatch.describe import Curve, Description, curves, describe
+from discovery.mismatch.evidence import Score
+from discovery.mismatch.forcing import Forcing, free_forcing
+from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.locate import Location, locate
+from discovery.mismatch.prove import Improvement, compare, explained, improvements
+from discovery.mismatch.search import Assessment, Search, search
+from discovery.mismatch.selfcheck import false_alarm, named_again
+from discovery.mismatch.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
+from discovery.models import Model
+from discovery.recordings import Campaign
+from discovery.terms import Apply, Expression, Name, Term, text
+from discovery.terms.expression import rewrite
+
+INVISIBLE = 0.05  # share of a signature that a refit leaves, below which a claim cannot be decided from these recordings
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything a diagnosis found. `document()` is the content of diagnosis.json."""
+
+    context: Context
+    search: Search
+    verdict: Verdict
+    location: Location
+    forcings: tuple[Forcing, ...]  # on what the baseline leaves
+    fit: Improvement
+    held_out: dict[str, Improvement]
+    p_value: float
+    repaired: Model | None  # the baseline with what was found, fitted; None where nothing is named
+    description: Description | None
+    curves: tuple[Curve, ...]
+    checked: tuple[float | None, ...]  # share of blind repetitions that name each effect again
+    question: str
+    seconds: float
+
+    @property
+    def explained(self) -> float | None:
+        """Share of the closable mismatch of the held-out recordings that the repair removes."""
+        if self.repaired is None or all(n.hypothesis.recording for n in self.verdict.named):
+            return None
+        return explained(self.held_out)
+
+    def document(self) -> dict[str, Any]:
+        """The content of diagnosis.json, contract section 6."""
+        from discovery.mismatch.document import document
+
+        return document(self)
+
+
+def diagnose(
+    model: Model,
+    campaign: Campaign,
+    fit: Sequence[str],
+    held_out: Sequence[str] = (),
+    outputs: Sequence[str] | None = None,
+    effects: Sequence[Effect] = (),
+    tell: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """Find what a model leaves out.
+
+    Args:
+        model: the baseline, start values as its author believes them.
+        fit: recordings that fits and searches see.
+        held_out: recordings for the proof at the end, touched by nothing before.
+        outputs: measured channels; default all that model and campaign share.
+        effects: entries beside the catalogue's, or replacing those of the same word.
+        tell: told what begins.
+
+    Raises:
+        UserError: a model that does not run, or recordings without readings.
+    """
+    began = clock.perf_counter()
+    outputs = tuple(outputs or [n for n in (*model.outputs, *model.states) if n in campaign.channels])
+    outputs = tuple(n for n in outputs if n in model.outputs or n in model.states)
+    if not outputs:
+        raise UserError(f"model '{model.name}' predicts no measured channel; name one under [outputs]")
+    entries = {**catalogue(), **{e.word: e for e in effects}}
+    seen = replace(campaign, recordings={r: campaign.recordings[r] for r in fit})  # nothing else can leak in
+    tell("fitting the baseline and its noise")
+    context = make_context(seen, model, fit, outputs, list(entries.values()))
+    tell("scoring the catalogue")
+    found = search(context, tell=lambda what: tell(f"found so far: {what}"))
+    tell("locating")
+    before = free_forcing(context, found.baseline)
+    after = free_forcing(context, found.best) if found.best is not found.baseline else before
+    verdict = decide(context, found, before, after)
+    shown = verdict.named or verdict.candidates
+    location = locate(context, found.baseline, found.best, verdict.named, before)
+    repaired = _repaired(found.best) if verdict.named else None
+    tell("proving on held-out recordings")
+    noise = found.best.best_view.noise
+    old, new = found.baseline.fit.model, (found.best if verdict.named else found.baseline).fit.model
+    proof = improvements(campaign, held_out, outputs, old, new, noise)
+    on_fit = _on_fit(found.baseline, found.best if verdict.named else found.baseline)
+    unexplained = verdict.word == UNEXPLAINED and bool(before)
+    tell("asking for the next experiment")
+    white = np.array(noise.white)
+    rivals = [r for n in shown for r in n.rivals if r.below <= 3.0]
+    rival_model = _rival_model(found, rivals[0].hypothesis) if rivals else None
+    if verdict.word == NO_MISMATCH:
+        question = _smallest(found)
+    elif verdict.word == FAULT:
+        question = "repeat the recording after checking the device; a fault of the measuring chain needs no new physics"
+    else:
+        question = next_experiment(context, found.best.fit.model, rival_model, white)
+    levels = [v.level for v in found.baseline.views]
+    top = found.looks[0].claims[0].gain if found.looks[0].claims else 0.0
+    return Diagnosis(
+        context,
+        found,
+        verdict,
+        location,
+        tuple(before),
+        on_fit,
+        proof,
+        false_alarm(found.looks[0].board, int(np.argmax(levels)), top),
+        repaired,
+        describe(context, found.baseline, before[0]) if unexplained else None,
+        tuple(curves(found.baseline, before[0])) if before and verdict.word != NO_MISMATCH else (),
+        tuple(named_again(context, found, n.hypothesis) for n in verdict.named),
+        question,
+        clock.perf_counter() - began,
+    )
+
+
+def _on_fit(before: Assessment, after: Assessment) -> Improvement:
+    parts = [
+        compare(old, new, after.best_view.noise)
+        for old, new in zip(before.fit.trajectories, after.fit.trajectories, strict=True)
+    ]
+    square = lambda pick: float(np.sqrt(np.mean([pick(p) ** 2 for p in parts])))  # noqa: E731
+    return Improvement(
+        square(lambda p: p.before),
+        square(lambda p: p.after),
+        square(lambda p: p.floor),
+        min(p.low for p in parts),
+        max(p.high for p in parts),
+    )
+
+
+def _rival_model(found: Search, rival: Hypothesis) -> Model | None:
+    for attempt in found.tried:
+        if any(h.key == rival.key for h in attempt.hypotheses) and len(attempt.hypotheses) == len(found.best.hypotheses):
+            return attempt.fit.model
+    return None
+
+
+def _smallest(found: Search) -> str:
+    """What would have been seen: the size at which the most visible and the usual effects reach the threshold."""
+    seen: list[tuple[float, Score]] = []
+    for claim in found.looks[0].claims:
+        h = claim.hypothesis
+        if h.effect.amplitude.fixed is None and h.recording is None and claim.t and claim.share > INVISIBLE:
+            error = abs(claim.size[0] / claim.t)
+            seen.append((4.5 * error, claim))
+    texts = []
+    for word in ("fluid_convection", "friction_speed", "evaporation_drying", "flooded_gap", "second_thermal_mass"):
+        sizes = [(size, c) for size, c in seen if c.hypothesis.effect.word == word]
+        if sizes:
+            size, c = max(sizes, key=lambda item: item[0])
+            texts.append(f"{word} of {size:.2g} {c.hypothesis.effect.amplitude.unit} at any body")
+    return "these recordings would have shown " + ", ".join(texts) if texts else "nothing is missing that these recordings could show"
+
+
+def _repaired(best: Assessment) -> Model:
+    """The fitted model with what was found written as an engineer would write it (no switch that is always on)."""
+    model = best.fit.model
+    switches = {h.amplitudes[0]: h for h in best.hypotheses if h.effect.amplitude.fixed is not None and not h.recording}
+
+    def simplify(apply: Apply) -> Expression | None:
+        match apply:
+            case Apply(function="*", arguments=(Name(id=name), Apply(function="-", arguments=(changed, _)))) if name in switches:
+                return changed
+        return None
+
+    terms = []
+    for term in model.terms:
+        plain = rewrite(term.expression, simplify)
+        if plain != term.expression:
+            # the replacement carries the whole term: the original goes
+            terms = [t for t in terms if not (t.into == term.into and t.source == term.source and _is_original(term, t))]
+        terms.append(replace(term, expression=plain))
+    parameters = {n: p for n, p in model.parameters.items() if n not in switches or _used(n, terms, model)}
+    return replace(model, name=f"{model.name}, repaired", terms=tuple(terms), parameters=parameters)
+
+
+def _is_original(replaced: Term, term: Term) -> bool:
+    match replaced.expression:
+        case Apply(function="*", arguments=(_, Apply(function="-", arguments=(_, original)))):
+            return bool(term.expression == original)
+    return False
+
+
+def _used(name: str, terms: Sequence[Term], model: Model) -> bool:
+    return any(name in text(t.expression) for t in terms) or any(name in text(e) for e in model.outputs.values())
+
+

@@ -1,0 +1,165 @@
+"""The content of diagnosis.json (contract section 6, and more that a reader of the report wants)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from discovery.mismatch.describe import heat_over_time
+from discovery.mismatch.forcing import alike
+from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.verdict import UNEXPLAINED, Named
+from discovery.terms import text
+
+if TYPE_CHECKING:
+    from discovery.mismatch.diagnosis import Diagnosis
+
+
+def _number(value: float | None, digits: int = 5) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(f"{value:.{digits}g}")
+
+
+def document(d: Diagnosis) -> dict[str, Any]:
+    """diagnosis.json of a diagnosis."""
+    baseline, best, context = d.search.baseline, d.search.best, d.context
+    outputs = context.outputs
+    white = dict(zip(baseline.views[0].noise.outputs, baseline.views[0].noise.white, strict=True))
+    rms = {
+        name: _number(float(np.sqrt(np.nanmean(np.concatenate([r[:, y] for r in baseline.lens.residuals]) ** 2))))
+        for y, name in enumerate(outputs)
+    }
+    noise = best.best_view.noise
+    top = d.search.looks[0].claims[:12]
+    states = context.fit_states
+    rate = not any(s.capacity for s in context.model.states.values())
+    return {
+        "model": context.model.name,
+        "verdict": d.verdict.word,
+        "reasons": list(d.verdict.reasons),
+        "about": "the states of this model are the errors themselves: effects act on their rates" if rate else "heat flows in W",
+        "detection": {
+            "p_value": _number(d.p_value, 3),
+            "log_evidence": _number(d.search.gain),
+            "free_forcing_log_evidence": _number(d.forcings[0].gain) if d.forcings else None,
+            "noise": {name: _number(v) for name, v in white.items()},
+            "slow_noise": {n: _number(v) for n, v in zip(noise.outputs, noise.slow, strict=True)},
+            "everyday_heat_W": {n: _number(v) for n, v in (noise.heat or {}).items()},
+            "residual_rms": rms,
+        },
+        "location": {
+            "outputs": dict(d.location.outputs),
+            "states": dict(d.location.states),
+            "alike": [list(group) for group in alike(list(d.forcings)) if len(group) > 1],
+            "windows": [
+                {"recording": w.recording, "start_s": _number(w.start_s, 7), "end_s": _number(w.end_s, 7), "state": w.state, "heat_W": _number(w.heat, 4)}
+                for w in d.location.windows
+            ],
+            "regime": d.location.regime,
+            "unmodelled_heat_W": {f.state: _number(float(np.sqrt(np.mean(np.concatenate(list(f.heat.values())) ** 2))), 3) for f in d.forcings if f.state in states},
+        },
+        "physics": [_physics(d, n, c) for n, c in zip(d.verdict.named, d.checked, strict=True)],
+        "alternatives": _alternatives(d.verdict.named),
+        "considered": [
+            {
+                "effect": c.hypothesis.effect.word,
+                "states": list(c.hypothesis.places),
+                "log_evidence": _number(c.gain, 4),
+                "score": _number(c.t, 4),
+                "share_that_a_refit_leaves": _number(c.share, 3),
+                "decidable": c.share > 0.05,
+            }
+            for c in top
+        ],
+        "closest": [_claim(n.hypothesis) for n in d.verdict.candidates],
+        "improvement": {
+            "fit": {"rms_before": _number(d.fit.before), "rms_after": _number(d.fit.after), "noise_floor": _number(d.fit.floor)},
+            "held_out": {
+                run: {
+                    "rms_before": _number(i.before),
+                    "rms_after": _number(i.after),
+                    "noise_floor": _number(i.floor),
+                    "gain_low": _number(i.low),
+                    "gain_high": _number(i.high),
+                }
+                for run, i in d.held_out.items()
+            },
+            "explained": _number(d.explained, 4),
+        },
+        "missing_heat": _missing_heat(d),
+        "description": (
+            {"state": d.description.state, "formula": d.description.formula, "log_evidence": _number(d.description.gain, 4), "note": "describes the missing heat; it is not its cause"}
+            if d.description
+            else None
+        ),
+        "next_experiment": d.question,
+        "seconds": round(d.seconds, 2),
+    }
+
+
+def _claim(h: Hypothesis) -> dict[str, Any]:
+    return {"effect": h.effect.word, "states": list(h.places), **({"recording": h.recording} if h.recording else {})}
+
+
+def _alternatives(named: tuple[Named, ...]) -> list[dict[str, Any]]:
+    rows = [
+        {**_claim(r.hypothesis), "log_evidence_below_best": round(r.below, 2), "instead_of": n.hypothesis.effect.word}
+        for n in named
+        for r in n.rivals
+    ]
+    return sorted(rows, key=lambda row: row["log_evidence_below_best"])[:12]
+
+
+def _physics(d: Diagnosis, n: Named, checked: float | None) -> dict[str, Any]:
+    h, model = n.hypothesis, d.search.best.fit.model
+    parameters = {}
+    for name in (*h.amplitudes, *h.shapes):
+        p = model.parameters[name]
+        value = p.values.get(h.recording, p.value) if h.recording else p.value
+        low, high = (p.low, p.high) if not h.recording else _interval(d, name)
+        fixed = p.fixed
+        parameters[name] = {
+            "value": _number(value),
+            "low": _number(value if fixed else low),
+            "high": _number(value if fixed else high),
+            "unit": p.unit,
+        }
+    expressions = [text(t.expression) for t in h.terms] or [text(e) for e in h.shown.values()]
+    return {
+        "effect": h.effect.word,
+        "title": h.effect.title,
+        "states": list(h.places),
+        **({"recording": h.recording} if h.recording else {}),
+        "probability": round(n.probability, 4),
+        "named_again": _number(checked, 3),
+        "expression": expressions[0],
+        **({"expressions": expressions} if len(expressions) > 1 else {}),
+        "parameters": parameters,
+        "source": h.effect.source,
+        "confused_with": list(h.effect.confused_with),
+    }
+
+
+def _interval(d: Diagnosis, name: str) -> tuple[float | None, float | None]:
+    fit = d.search.best.fit
+    for i, u in enumerate(fit.problem.unknowns):
+        if u.name == name and not u.is_start:
+            half = 1.96 * float(fit.standard_errors[i])
+            return float(fit.theta[i]) - half, float(fit.theta[i]) + half
+    return None, None
+
+
+def _missing_heat(d: Diagnosis) -> dict[str, Any] | None:
+    if not d.curves or not d.forcings:
+        return None
+    f = d.forcings[0]
+    offsets = {r: d.context.campaign.recordings[r].start for r in d.context.recordings}
+    return {
+        "state": f.state,
+        "over_time": heat_over_time(f, offsets, d.context.recordings),
+        "against": {
+            c.variable: {"value": [_number(v, 5) for v in c.centre], "heat": [_number(v, 4) for v in c.heat], "error": [_number(v, 3) for v in c.error]}
+            for c in d.curves
+        },
+        "named": d.verdict.word != UNEXPLAINED,
+    }
