@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
+from discovery.errors import UserError
 from discovery.fitting.noise import Noise, whiten, white_noise
 from discovery.fitting.problem import Problem, make_problem
 from discovery.models import Model
@@ -151,11 +152,18 @@ def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds:
         parts = [whiten(t, noise, -problem.jacobian(t)) for t in run(x)[1]]
         return np.concatenate([*parts, problem.prior_rows(x)[1]])
 
+    def residual(x: Array) -> Array:
+        try:
+            return run(x)[0]
+        except UserError:  # a trial step at which the model runs away: the solver takes a shorter one
+            return np.full(rows, np.inf)
+
     # scipy refuses a start on the bound's wrong side by rounding, and moves one that lies on it inside
     x0 = np.clip(theta, low, high)
+    rows = len(run(x0)[0])
     if len(x0):
         result = least_squares(
-            lambda x: run(x)[0],
+            residual,
             x0,
             jac=jacobian,
             bounds=(low, high),
@@ -167,8 +175,8 @@ def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds:
             gtol=1e-9,
         )
         x0 = result.x
-    residual, trajectories = run(x0)
-    return _Solution(x0, trajectories, jacobian(x0), 0.5 * float(residual @ residual))
+    left, trajectories = run(x0)
+    return _Solution(x0, trajectories, jacobian(x0), 0.5 * float(left @ left))
 
 
 def _covariance(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array, list[str]]:

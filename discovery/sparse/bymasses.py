@@ -93,7 +93,7 @@ def discover_error(
         )
         for k in range(rows)
     )
-    model = mass_model(data.library, output, campaign.channels[output].unit, chosen, theta, start_sd)
+    model = mass_model(data.library, output, campaign.channels[output].unit, chosen, theta * noise, start_sd)
     if options.refine:
         grids = {
             r: replace(data.grids[r], outputs=(output,), readings=data.grids[r].readings[:, [column]])

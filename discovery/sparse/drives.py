@@ -64,7 +64,7 @@ def make_inputs(campaign: Campaign, recordings: Sequence[str], asked: Sequence[s
         role = campaign.channels[name].role
         if name in moving or (asked is not None and role != FLOW):
             by_role[role] = (*by_role.get(role, ()), name)
-    air = [values[name] for name in by_role.get(AMBIENT, ())]
+    air = [series for name, series in values.items() if campaign.channels[name].role == AMBIENT]
     flow = by_role.get(FLOW, ())
     most = float(np.max(values[flow[0]])) if flow else 1.0
     gate = (flow[0] if most <= 1.0 else f"{flow[0]}/{most:g}") if flow else None

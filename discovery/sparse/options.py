@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-FAMILIES = ("linear", "pump", "speed", "coupling", "radiation", "natural", "second mass")
+FAMILIES = ("linear", "pump", "speed", "coupling", "radiation", "natural", "heater", "second mass")
 
 
 class SparseOptions(BaseModel):

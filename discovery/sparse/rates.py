@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid
 from discovery.errors import UserError
-from discovery.fitting import Fit, fit_model
+from discovery.fitting import Fit, Noise, fit_model
 from discovery.models import Model, Parameter
 from discovery.recordings import Campaign
 from discovery.sparse.folds import Blocks
@@ -177,14 +177,15 @@ def refit(
     outputs: Sequence[str],
     values: Mapping[str, float],
     grids: Mapping[str, Grid],
+    noise: Noise | None = None,
     max_rounds: int = 25,
 ) -> Fit:
-    """Fit from values that are already near."""
+    """Fit from values that are already near; a given noise is kept, else it is estimated along the way."""
     inside = {
         name: float(np.clip(value, model.parameters[name].min, model.parameters[name].max))
         for name, value in values.items()
         if name in model.parameters and not model.parameters[name].fixed
     }
     return fit_model(
-        model.with_values(inside), campaign, recordings, outputs, grids=grids, max_rounds=max_rounds
+        model.with_values(inside), campaign, recordings, outputs, noise=noise, grids=grids, max_rounds=max_rounds
     )

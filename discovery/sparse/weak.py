@@ -20,7 +20,7 @@ from discovery.terms import Expression, evaluate
 
 Array = NDArray[np.float64]
 
-HALF_WIDTH = 2 * 3600.0  # s
+_SHARE, _READINGS = 1 / 36, 8  # half width: share of the recording, and at least so many readings
 _POWER = 2
 _OVERLAP = 8  # windows per half width
 _MOST_POINTS = 40_000  # of the raster of one recording
@@ -31,7 +31,7 @@ def weak_rows(
     output: str,
     library: Sequence[Expression],
     constants: Mapping[str, float] | None = None,
-    half_width: float = HALF_WIDTH,
+    half_width: float | None = None,
     aliases: Mapping[str, str] | None = None,
 ) -> tuple[Array, Array, Array]:
     """Rows of the weak regression of d(output)/dt on a library, rates per second.
@@ -39,14 +39,15 @@ def weak_rows(
     Args:
         library: expressions of channels and outputs, without memory.
         constants: values of further names.
-        half_width: H [s]; at most a quarter of the recording is used.
+        half_width: H [s]; default a 36th of the recording and at least 8 readings. At most a quarter is used.
         aliases: further names of outputs, as {"y": "E_Y0C"}.
 
     Returns:
         columns (W, M), target (W,), time of each window's middle (W,) [s].
     """
     span = float(grid.time[-1] - grid.time[0])
-    half = min(half_width, span / 4)
+    usual = max(_SHARE * span, _READINGS * float(np.median(np.diff(grid.time[grid.read]))))
+    half = min(half_width or usual, span / 4)
     finest = float(np.min(grid.step))
     step = half / max(8, round(half / max(finest, span / _MOST_POINTS)))
     time = np.arange(grid.time[0], grid.time[-1] + 1e-6 * step, step)
