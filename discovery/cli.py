@@ -39,7 +39,7 @@ class _Sentences(TyperGroup):
 app = typer.Typer(
     cls=_Sentences,
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
@@ -80,6 +80,52 @@ def check(
     typer.echo(summary(findings))
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(1)
+
+
+@app.command()
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that the files are written into.")],
+    sources: Annotated[
+        list[Path], typer.Option("--from", metavar="CSV", help="Your recording; repeat it for several of one machine.")
+    ],
+) -> None:
+    """Make campaign, model and experiment from your own CSV, and say what was guessed."""
+    from discovery.firsthour.new import new as make
+
+    for line in make(folder, sources):
+        typer.echo(line)
+
+
+@app.command("list")
+def list_words(
+    what: Annotated[str, typer.Argument(metavar="effects|models|roles", help="What to list.")],
+) -> None:
+    """List the effects, the kinds of models, or the roles of channels, each in a line."""
+    from discovery.firsthour.explain import list_words as lines_of
+
+    for line in lines_of(what):
+        typer.echo(line)
+
+
+@app.command()
+def explain(
+    effect: Annotated[str, typer.Argument(metavar="EFFECT", help="A word of `discovery list effects`.")],
+) -> None:
+    """Explain the physics of EFFECT: formula, size, signature, what it is confused with."""
+    from discovery.firsthour.explain import explain as lines_of
+
+    for line in lines_of(effect):
+        typer.echo(line)
+
+
+@app.command()
+def schema(
+    file: Annotated[str, typer.Argument(metavar="campaign|model|experiment", help="Which file.")],
+) -> None:
+    """Print the JSON schema of a file, for completion in an editor."""
+    from discovery.firsthour.schemas import schema as schema_of
+
+    typer.echo(schema_of(file))
 
 
 @app.command()
@@ -127,6 +173,27 @@ def record(
     )
     for line in record_orders(out, title, orders, reveal=reveal, envelope=campaign is None):
         typer.echo(line)
+
+
+@app.command()
+def diagnose(
+    experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, experiments/*.toml.")],
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; default runs/<experiment name>.")] = None,
+) -> None:
+    """Find what the model of [mismatch] leaves out: where, which physics, how sure, and how much better the repair fits.
+
+    Writes diagnosis.json, the repaired model and report.html. "no mismatch" and "unexplained" are answers too: nothing
+    is named that the recordings cannot tell apart.
+    """
+    from discovery.experiment import diagnose as find
+    from discovery.mismatch.summary import summary
+    from discovery.progress import shown
+
+    with shown() as progress:
+        folder = find(experiment, out, progress)
+    for line in summary(folder / "diagnosis.json"):
+        typer.echo(line)
+    typer.echo(f"report: {folder / 'report.html'}")
 
 
 @app.command()

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from discovery.report.ranking import cells, is_discovered, mean_improvement, ranked, ratio
+import numpy as np
+
+from discovery.report.ranking import cells, is_discovered, is_error, mean_improvement, ranked, ratio
 from discovery.report.run import Run, pretty_unit
 from discovery.report.text import listed, number, percent, words
 
@@ -45,22 +47,11 @@ def _models(run: Run) -> tuple[str, list[str], list[tuple[str, str]]]:
         return "", [], []
     best = order[0]
     unseen = run.held_out
-    where = (
-        f"on the unseen recording{'s' * (len(unseen) > 1)} {listed([f'“{name}”' for name in unseen])}"
-        if unseen
-        else "on the recordings it was fitted to"
-    )
+    where = f"on {_called(unseen)}" if unseen else "on the recordings it was fitted to"
     made = "the discovered model" if is_discovered(run, best) else "the hand-built model"
     rivals = [model for model in order[1:] if math.isfinite(ratio(run, best, model))]
     headline = f"{made.capitalize()} “{best}” predicts best {where}."
-    points = []
-    improved = mean_improvement(run, best)
-    figures = []
-    if math.isfinite(improved):
-        points.append(
-            f"It removes {number(improved, 2)} % of the thermal error (rms, mean over {_count(run, best)})."
-        )
-        figures.append((f"{number(improved, 2)} %", f"of the error removed by {best}, unseen recordings"))
+    points, figures = _removed(run, best) if is_error(run) else _left(run, best)
     compared = [f"{_less(ratio(run, best, model))} {_name(run, model)}" for model in rivals]
     if compared:
         points.append(f"It leaves {listed(compared)}.")
@@ -68,14 +59,42 @@ def _models(run: Run) -> tuple[str, list[str], list[tuple[str, str]]]:
         (_less(ratio(run, best, model), short=True), f"rms left by {best} against {model}")
         for model in [m for m in rivals if not is_discovered(run, m)][:2]
     ]
-    worst = _worst(run, best)
-    if worst:
+    if is_error(run) and (worst := _worst(run, best)):
         points.append(worst)
     if not unseen:
         points.append(
             "No recording was held out: these figures say how well the models fit, not how well they predict."
         )
     return headline, points, figures
+
+
+def _removed(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
+    """How much of the thermal error is gone; the error without compensation is what was read."""
+    improved = mean_improvement(run, best)
+    if not math.isfinite(improved):
+        return [], []
+    point = f"It removes {number(improved, 2)} % of the thermal error (rms, mean over {_count(run, best)})."
+    return [point], [(f"{number(improved, 2)} %", f"of the error removed by {best}, {_seen(run)}")]
+
+
+def _left(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
+    """How far off a prediction of temperatures is: without a model there is nothing to compare with."""
+    scored = [score["rms"] for score in cells(run, best).values() if score.get("rms") is not None]
+    if not scored:
+        return [], []
+    middle, unit = float(np.median(scored)), run.unit(run.outputs[0]).replace("°C", "K")
+    point = f"It is off by {number(middle, 2)} {unit} (median rms over {_count(run, best)}, at worst {number(max(scored), 2)} {unit})."
+    return [point], [(f"{number(middle, 2)} {unit}", f"left by {best}, {_seen(run)}")]
+
+
+def _seen(run: Run) -> str:
+    return "unseen recordings" if run.held_out else "fitted recordings"
+
+
+def _called(unseen: Sequence[str]) -> str:
+    if len(unseen) > 4:
+        return f"{len(unseen)} unseen recordings"
+    return f"the unseen recording{'s' * (len(unseen) > 1)} {listed([f'“{name}”' for name in unseen])}"
 
 
 def _name(run: Run, model: str) -> str:
@@ -167,7 +186,7 @@ def _proof(diagnosis: Mapping[str, Any]) -> list[str]:
     if held:
         each = [f"{number(s['rms_before'])} → {number(s['rms_after'])} on {name}" for name, s in held.items()]
         points.append(
-            f"Repaired, it leaves on unseen recordings (rms, in units of the reading noise or as stated): {listed(each)}."
+            f"Repaired and run freely on unseen recordings it leaves (rms, errors weighed by their noise): {listed(each)}."
         )
     if improvement.get("explained") is not None:
         points.append(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from discovery.models import Model
 from discovery.report.chart import Chart, Panel, Series
 from discovery.report.network import drawing
 from discovery.report.printed import Line, Printed
@@ -14,56 +15,105 @@ from discovery.report.run import Run, pretty_unit
 from discovery.report.series import time_axis
 from discovery.report.text import listed, number, percent, with_unit, words
 
+_HEAT_NOTE = "What would close the gap, cause unknown, over time and against each input and state (band: 95 %). What it follows is missing."
+
 
 def section(run: Run) -> dict[str, Any] | None:
     """Texts, tables and charts of the diagnosis; None where there is none."""
     d = run.diagnosis
     if not d:
         return None
-    found = [_physics(d), _outputs(run, d), _windows(d), _rivals(d)]
-    charts = heat_charts(run)
+    tables = [_physics(d), _proof(d), _outputs(run, d), _windows(run, d), _rivals(d), _considered(d)]
     return {
         "about": _about(d),
-        "tables": [table for table in found if table.rows],
-        "charts": charts,
-        "heat_note": "Heat of unknown cause that would close the gap (band: 95 %), over time and against each input: what it follows is what is missing.",
+        "reasons": list(d.get("reasons") or []),
+        "tables": [table for table in tables if table.rows],
+        "charts": heat_charts(run),
+        "heat_note": _HEAT_NOTE,
+        "formula": _formula(d),
         "next": d.get("next_experiment"),
     }
 
 
+def diagnosed(run: Run) -> Model | None:
+    """The fitted model that the diagnosis is about, by the name of its file or its own."""
+    named = (run.diagnosis or {}).get("model")
+    return next((model for key, model in run.models.items() if named in (key, model.name)), None)
+
+
+def _heat_unit(run: Run) -> str:
+    """W where states have capacities; else heat is a rate of the states."""
+    model = diagnosed(run)
+    if model is None or any(state.capacity for state in model.states.values()):
+        return "W"
+    units = {pretty_unit(state.unit) for state in model.states.values() if state.unit}
+    return f"{units.pop()}/{model.time_unit}" if len(units) == 1 else f"unit of the state/{model.time_unit}"
+
+
 def _about(d: Mapping[str, Any]) -> str:
-    verdict, model = d.get("verdict", "unknown"), d.get("model", "the model")
-    text = f"Verdict on “{model}”: {verdict}."
-    regime = (d.get("location") or {}).get("regime")
-    if regime:
-        text += f" It shows where {regime}."
-    smallest = (d.get("detection") or {}).get("smallest_visible") or d.get("smallest_detectable")
-    if isinstance(smallest, str):
-        text += f" {smallest}"
+    text = f"Verdict on “{d.get('model', 'the model')}”: {d.get('verdict', 'unknown')}."
+    location = d.get("location") or {}
+    if location.get("regime"):
+        text += f" It shows where {location['regime']}."
+    if location.get("alike"):
+        groups = listed([listed(group) for group in location["alike"]], "; and")
+        text += f" Heat at {groups} would look alike in these readings."
     return text
+
+
+def _sizes(one: Mapping[str, Any]) -> str:
+    return "; ".join(
+        f"{name} = {number(p.get('value'))} {pretty_unit(str(p.get('unit', '')))} "
+        f"({number(p.get('low'))} to {number(p.get('high'))})"
+        for name, p in (one.get("parameters") or {}).items()
+    )
 
 
 def _physics(d: Mapping[str, Any]) -> Printed:
     rows = []
     for one in d.get("physics") or []:
-        sizes = [
-            f"{name} = {number(p.get('value'))} {pretty_unit(str(p.get('unit', '')))} ({number(p.get('low'))} to {number(p.get('high'))})"
-            for name, p in (one.get("parameters") or {}).items()
-        ]
+        place = listed(one.get("states", [])) + (f" in {one['recording']}" if one.get("recording") else "")
         cells = (
             words(one["effect"]),
-            listed(one.get("states", [])),
+            place,
             percent(one.get("probability")),
             one.get("expression") or "",
-            "; ".join(sizes),
+            _sizes(one),
         )
-        rows.append(Line(cells))
+        again = percent(one["named_again"]) if one.get("named_again") is not None else "–"
+        rows.append(Line((*cells, again)))
+    header = ("Effect", "Where", "Probability", "Term", "Size (95 %)", "Named again in blind repetitions")
+    return Printed("What the repaired model adds", header, tuple(rows), frozenset({1, 3, 4}))
+
+
+def _proof(d: Mapping[str, Any]) -> Printed:
+    improvement = d.get("improvement") or {}
+    parts = {"fitted": improvement.get("fit") or {}} | {
+        f"{name} (unseen)": one for name, one in (improvement.get("held_out") or {}).items()
+    }
+    rows = [
+        Line(
+            (
+                name,
+                number(one["rms_before"]),
+                number(one.get("rms_after")),
+                number(one.get("noise_floor")),
+                _gain(one),
+            )
+        )
+        for name, one in parts.items()
+        if one.get("rms_before") is not None and one.get("rms_before") != one.get("rms_after")
+    ]
+    header = ("Recording", "rms before", "rms repaired", "Noise floor", "Improvement (95 %)")
     return Printed(
-        "What the repaired model adds",
-        ("Effect", "Where", "Probability", "Term", "Size (95 %)"),
+        "The proof: free runs before and after the repair, all errors weighed by their noise",
+        header,
         tuple(rows),
-        frozenset({1, 3, 4}),
     )
+
+
+def _gain(one: Mapping[str, Any]) -> str:
+    return "" if one.get("gain_low") is None else f"{number(one['gain_low'])} to {number(one['gain_high'])}"
 
 
 def _outputs(run: Run, d: Mapping[str, Any]) -> Printed:
@@ -85,22 +135,25 @@ def _outputs(run: Run, d: Mapping[str, Any]) -> Printed:
     )
 
 
-def _windows(d: Mapping[str, Any]) -> Printed:
+def _windows(run: Run, d: Mapping[str, Any]) -> Printed:
     rows = [
         Line(
             (
                 str(w.get("recording")),
-                f"{number(w['start_s'] / 3600)} h",
-                f"{number(w['end_s'] / 3600)} h",
+                _hours(w.get("start_s")),
+                _hours(w.get("end_s")),
                 str(w.get("state") or ""),
                 number(w.get("heat_W")),
             )
         )
         for w in (d.get("location") or {}).get("windows") or []
     ]
-    return Printed(
-        "When it shows", ("Recording", "From", "To", "Body", "Missing heat [W]"), tuple(rows), frozenset({3})
-    )
+    header = ("Recording", "From [h]", "To [h]", "Body", with_unit("Missing heat", _heat_unit(run)))
+    return Printed("When it shows", header, tuple(rows), frozenset({3}))
+
+
+def _hours(seconds: float | None) -> str:
+    return number(None if seconds is None else seconds / 3600)
 
 
 def _rivals(d: Mapping[str, Any]) -> Printed:
@@ -125,28 +178,52 @@ def _rivals(d: Mapping[str, Any]) -> Printed:
     )
 
 
+def _considered(d: Mapping[str, Any]) -> Printed:
+    """What scored highest in the search; only where nothing was named, since else the rivals say more."""
+    if d.get("physics") or d.get("verdict") == "no mismatch":
+        return Printed("", (), ())
+    rows = [
+        Line(
+            (
+                words(c["effect"]),
+                listed(c.get("states", [])),
+                number(c.get("log_evidence")),
+                "yes" if c.get("decidable") else "no",
+            )
+        )
+        for c in d.get("considered") or []
+    ]
+    header = ("Effect", "Where", "Log evidence", "Can these recordings decide it?")
+    return Printed("What came closest", header, tuple(rows), frozenset({1, 3}))
+
+
+def _formula(d: Mapping[str, Any]) -> str:
+    found = d.get("description") or {}
+    return (
+        f"{found['formula']} at {found.get('state')} describes the missing heat; it is not its cause."
+        if found.get("formula")
+        else ""
+    )
+
+
 def network(run: Run) -> dict[str, str] | None:
     """The heat map on the thermal network of the diagnosed (else the first thermal) model."""
-    named = str((run.diagnosis or {}).get("model", ""))
-    candidates = [named, *run.models]
-    model = next(
-        (
-            run.models[n]
-            for n in candidates
-            if n in run.models and any(s.capacity for s in run.models[n].states.values())
-        ),
-        None,
-    )
-    if model is None:
+    thermal = [m for m in (diagnosed(run), *run.models.values()) if m is not None and _is_thermal(m)]
+    if not thermal:
         return None
+    model = thermal[0]
     location = (run.diagnosis or {}).get("location") or {}
-    watts = location.get("unmodelled_heat_W") or location.get("heat_W") or {}
-    if watts:
-        note = "The darker a body, the more heat (rms) the recordings ask for that no term of the model provides."
-        svg = drawing(model, {k: float(v) for k, v in watts.items() if k in model.states})
-    elif location.get("states"):
-        note = "The darker a body, the larger its share of the mismatch."
-        svg = drawing(model, {k: float(v) for k, v in location["states"].items() if k in model.states}, "")
+    watts = {
+        k: float(v)
+        for k, v in (location.get("unmodelled_heat_W") or {}).items()
+        if k in model.states and v is not None
+    }
+    shares = {k: float(v) for k, v in (location.get("states") or {}).items() if k in model.states}
+    if watts and any(watts.values()):
+        note = "The darker a body, the more heat (rms) the recordings ask for there that no term of the model provides."
+        svg = drawing(model, watts, _heat_unit(run))
+    elif shares:
+        note, svg = "The darker a body, the larger its share of the mismatch.", drawing(model, shares, "")
     else:
         note, svg = "", drawing(model, {})
     return {
@@ -157,37 +234,52 @@ def network(run: Run) -> dict[str, str] | None:
     }
 
 
+def _is_thermal(model: Model) -> bool:
+    return any(state.capacity or state.unit == "degC" for state in model.states.values())
+
+
 def heat_charts(run: Run) -> list[Chart]:
-    """Missing heat over time and against each input, where the diagnosis has reconstructed it."""
+    """Missing heat over time and against each input and state, where the diagnosis has reconstructed it."""
+    missing = (run.diagnosis or {}).get("missing_heat") or {}
+    unit, place = _heat_unit(run), missing.get("state", "")
+    label = with_unit("missing heat" if unit == "W" else "missing rate", unit)
     charts = []
-    for index, one in enumerate((run.diagnosis or {}).get("missing_heat") or []):
-        time, heat = np.array(one["time_s"], dtype=float), np.array(one["heat_W"], dtype=float)
-        unit = pretty_unit(str(one.get("unit", "W")))
-        label = with_unit("missing heat" if unit == "W" else "missing rate", unit)
+    for recording, one in (missing.get("over_time") or {}).items():
+        time, heat, sd = (np.array(one[key], dtype=float) for key in ("time_s", "heat", "sd"))
         x, x_label, _ = time_axis(time)
-        series = [Series("missing heat", x, heat, "line", "0")]
-        if one.get("low") and one.get("high"):
-            low, high = np.array(one["low"], dtype=float), np.array(one["high"], dtype=float)
-            series.insert(0, Series("95 %", x, heat, "band", "0", low, high))
-        place = f"{one.get('state', '')}, {one.get('recording', '')}".strip(", ")
+        binned = (
+            Series("95 %", x, heat, "band", "0", heat - 1.96 * sd, heat + 1.96 * sd),
+            Series("mean", x, heat, "line", "0"),
+        )
         charts.append(
             Chart(
-                f"heat-{index}",
-                f"Missing heat at {place}",
-                x_label,
-                (Panel(label, tuple(series), zero=True),),
+                f"heat-{recording}", f"At {place}, {recording}", x_label, (Panel(label, curves, zero=True),)
             )
         )
-        for name, values in (one.get("inputs") or {}).items():
-            given = np.array(values["values"] if isinstance(values, Mapping) else values, dtype=float)
-            axis = (
-                with_unit(name, pretty_unit(str(values.get("unit", ""))))
-                if isinstance(values, Mapping)
-                else name
+    for name, one in (missing.get("against") or {}).items():
+        order = np.argsort(np.array(one["value"], dtype=float))
+        x, heat, error = (np.array(one[key], dtype=float)[order] for key in ("value", "heat", "error"))
+        if len(x) < 2:
+            continue
+        binned = (
+            Series("95 %", x, heat, "band", "0", heat - 1.96 * error, heat + 1.96 * error),
+            Series("mean of a bin", x, heat, "line", "0"),
+            Series("bins", x, heat, "points", "0"),
+        )
+        charts.append(
+            Chart(
+                f"heat-against-{name}",
+                f"Against {name}",
+                _axis(run, name),
+                (Panel(label, curves, zero=True),),
             )
-            order = np.argsort(given, kind="stable")
-            points = Series("missing heat", given[order], heat[order], "points", "0")
-            charts.append(
-                Chart(f"heat-{index}-{name}", f"Against {name}", axis, (Panel(label, (points,), zero=True),))
-            )
+        )
     return charts
+
+
+def _axis(run: Run, name: str) -> str:
+    model = diagnosed(run)
+    if model and name in model.states:
+        return with_unit(name, pretty_unit(model.states[name].unit))
+    unit = (run.results.get("input_units") or {}).get(name)
+    return with_unit(name, pretty_unit(str(unit))) if unit else name

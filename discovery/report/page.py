@@ -17,8 +17,8 @@ from discovery.files import write_atomic
 from discovery.report import equations, mismatch, series
 from discovery.report.answer import answer
 from discovery.report.chart import Chart, Panel, Series, payload
-from discovery.report.printed import Line, Printed, paper_tables, summary
-from discovery.report.ranking import is_discovered, ranked
+from discovery.report.printed import Line, Printed, paper_tables, rms_tables, summary
+from discovery.report.ranking import is_discovered, is_error, ranked
 from discovery.report.run import Run, load_run
 from discovery.report.text import counted, listed, number, percent
 
@@ -52,7 +52,7 @@ def render(run: Run) -> str:
     charts = [*curves]
     for part in (missing, found, residual):
         charts += part["charts"] if part else []
-    tables = paper_tables(run)
+    tables = paper_tables(run) if is_error(run) else rms_tables(run)
     shown = 2 if tables and "Table 1" in tables[0].title else 1  # the other recordings fold away
     view: dict[str, Any] = {
         "title": f"{run.name}: report",
@@ -155,21 +155,23 @@ def _group(run: Run, recording: str, charts: list[Chart]) -> dict[str, Any]:
 def _eyebrow(run: Run) -> str:
     parts = [run.name]
     if run.results.get("fit"):
-        parts.append(f"fitted to {listed(run.results['fit'])}")
+        parts.append(f"fitted to {_brief(run.results['fit'])}")
     if run.held_out:
-        parts.append(f"judged on {listed(run.held_out)}, which no fit, choice or threshold has seen")
+        parts.append(f"judged on {_brief(run.held_out)}, which no fit, choice or threshold has seen")
     return " · ".join(parts)
+
+
+def _brief(names: Sequence[str]) -> str:
+    return listed(names) if len(names) < 5 else f"{len(names)} recordings"
 
 
 def _detailed(run: Run) -> list[str]:
     """The models whose equations are worth a section: best, best discovered, diagnosed and repaired ones."""
     order = [name for name in ranked(run) if name in run.models] or list(run.models)
     wanted = [*order[:1], *[name for name in order if is_discovered(run, name)][:1]]
-    diagnosed = (run.diagnosis or {}).get("model")
+    subject = mismatch.diagnosed(run)
     wanted += [
-        name
-        for name in run.models
-        if name in (diagnosed, "repaired") or any(term.effect for term in run.models[name].terms)
+        name for name, model in run.models.items() if model is subject or any(t.effect for t in model.terms)
     ]
     return list(dict.fromkeys(wanted))
 
@@ -208,16 +210,10 @@ def _discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
     tables: list[Printed] = []
     for name in names:
         entry = run.results["models"][name]["search"]
-        charts += _pareto(name, entry.get("pareto") or [])
+        charts += _pareto(name, entry.get("path") or [])
         if entry.get("stability"):
-            shares = (
-                entry["stability"].items()
-                if isinstance(entry["stability"], Mapping)
-                else [(s["term"], s["share"]) for s in entry["stability"]]
-            )
-            rows = tuple(
-                Line((str(term), percent(share))) for term, share in sorted(shares, key=lambda pair: -pair[1])
-            )
+            shares = sorted(entry["stability"].items(), key=lambda pair: -pair[1])
+            rows = tuple(Line((str(term), percent(share))) for term, share in shares)
             tables.append(
                 Printed(
                     f"{name}: how often each term is chosen when the search is repeated on parts of the data",
@@ -229,32 +225,30 @@ def _discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
     return {"about": about, "charts": charts, "tables": tables}
 
 
-def _pareto(name: str, points: Sequence[Mapping[str, Any]]) -> list[Chart]:
-    if len(points) < 2:
-        return []
-    key = next((k for k in ("error", "rms", "score", "cv") if k in points[0]), None)
-    if key is None:
-        return []
-    points = sorted(points, key=lambda p: p["terms"])
-    x, y = np.array([float(p["terms"]) for p in points]), np.array([float(p[key]) for p in points])
-    chosen = next((float(p["terms"]) for p in points if p.get("chosen")), None)
-    lines: tuple[Series, ...] = (
-        Series("cross-validated error", x, y, "line", "0"),
-        Series("each size", x, y, "points", "0"),
-    )
-    if all(p.get("spread") is not None for p in points):
-        spread = np.array([float(p["spread"]) for p in points])
-        lines = (Series("± standard error", x, y, "band", "0", y - spread, y + spread), *lines)
-    marks = {"chosen": chosen} if chosen is not None else {}
-    return [
-        Chart(
-            f"pareto-{name}",
-            f"{name}: error against size",
-            "terms [-]",
-            (Panel("error, cross-validated [noise]", lines),),
-            marks=marks,
-        )
-    ]
+def _pareto(name: str, path: Sequence[Mapping[str, Any]]) -> list[Chart]:
+    """Error against size, one chart for each group of outputs that was searched together."""
+    charts = []
+    for outputs in dict.fromkeys(tuple(point["outputs"]) for point in path):
+        points = sorted((p for p in path if tuple(p["outputs"]) == outputs), key=lambda p: p["terms"])
+        if len(points) < 2:
+            continue
+        terms = np.array([float(p["terms"]) for p in points])
+        curves = []
+        for key, label, color in (
+            ("left_out_rms", "on data left out", "0"),
+            ("fit_rms", "on data fitted", "1"),
+        ):
+            error = np.array([math.nan if p.get(key) is None else float(p[key]) for p in points])
+            curves += [
+                Series(label, terms, error, "line", color),
+                Series(label, terms, error, "points", color),
+            ]
+        chosen = [float(p["terms"]) for p in points if p.get("chosen")]
+        marks = {"chosen": chosen[0]} if chosen else {}
+        title = f"{name}: {', '.join(outputs)}, error against size"
+        panel = Panel("rms [reading noise]", tuple(curves))
+        charts.append(Chart(f"size-{name}-{outputs[0]}", title, "terms [-]", (panel,), marks=marks))
+    return charts
 
 
 def _residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:

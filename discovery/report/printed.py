@@ -7,9 +7,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from discovery.evaluation import tables
-from discovery.report.ranking import cells, is_discovered, kind, mean_improvement, ranked, ratio
+from discovery.report.ranking import (
+    cells,
+    is_discovered,
+    is_error,
+    kind,
+    mean_improvement,
+    mean_rms,
+    ranked,
+    ratio,
+)
 from discovery.report.run import Run
 from discovery.report.text import number
+
+_MOST_RECORDINGS = 4  # columns of the summary; the tables below have all
 
 
 @dataclass(frozen=True)
@@ -48,12 +59,15 @@ def summary(run: Run) -> Printed | None:
     if not order:
         return None
     recordings = list(dict.fromkeys(r for model in order for r, _ in cells(run, model)))
+    shown = recordings[:_MOST_RECORDINGS]
+    removed = is_error(run)
+    what = "rms removed [%]" if removed else f"rms left [{run.unit(run.outputs[0]).replace('°C', 'K')}]"
     header = (
         "Model",
         "Kind",
         "Terms",
         "Parameters",
-        *(f"{r}: rms removed [%]" for r in recordings),
+        *(f"{r}: {what}" for r in shown),
         "left against best",
         "Fit [s]",
     )
@@ -61,17 +75,15 @@ def summary(run: Run) -> Printed | None:
     for model in order:
         entry = run.results["models"][model]
         share = ratio(run, model, order[0])
-        improved = [number(mean_improvement(run, model, r), 2) for r in recordings]
+        scores = [mean_improvement(run, model, r) if removed else mean_rms(run, model, r) for r in shown]
         made = f"{kind(run, model)}{' (discovered)' if is_discovered(run, model) else ''}"
         size = [number(entry.get("terms")), number(entry.get("parameters"))]
         times = "–" if not math.isfinite(share) else f"× {number(share, 3)}"
-        rows.append(
-            Line(
-                (model, made, *size, *improved, times, number(entry.get("seconds"), 2)),
-                "best" if model == order[0] else "",
-            )
-        )
-    return Printed("Mean improvement over all errors", header, tuple(rows), frozenset({1}))
+        figures = [number(score, 2 if removed else 3) for score in scores]
+        look = "best" if model == order[0] else ""
+        rows.append(Line((model, made, *size, *figures, times, number(entry.get("seconds"), 2)), look))
+    title = "Mean over all errors" if removed else "Over all outputs"
+    return Printed(title, header, tuple(rows), frozenset({1}))
 
 
 def paper_tables(run: Run) -> list[Printed]:
@@ -101,3 +113,23 @@ def _parts(run: Run) -> dict[str, str]:
         for part, name in {"test cycle": fit, "2. test cycle": second, "left side": left}.items()
         if name
     }
+
+
+def rms_tables(run: Run) -> list[Printed]:
+    """What each model leaves of temperatures: a row for each recording and output, unseen recordings first."""
+    order, found = ranked(run), run.results.get("models", {})
+    rows = []
+    for recording in dict.fromkeys([*run.held_out, *run.results.get("fit", [])]):
+        for index, output in enumerate(run.outputs):
+            scores = [
+                found[model].get("recordings", {}).get(recording, {}).get(output, {}).get("rms")
+                for model in order
+            ]
+            seen = "unseen" if recording in run.held_out else "fitted"
+            first = Line((recording, seen, output, *map(number, scores)), "first")
+            rows.append(
+                first if index == 0 else Line(("", "", output, *map(number, scores)), repeated=recording)
+            )
+    unit = run.unit(run.outputs[0]).replace("°C", "K") if run.outputs else ""
+    header = ("Recording", "", "Output", *(f"{model} [{unit}]" for model in order))
+    return [Printed("rms left over", header, tuple(rows), frozenset({1, 2}))] if rows else []

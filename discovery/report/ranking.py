@@ -76,3 +76,20 @@ def mean_improvement(run: Run, model: str, recording: str | None = None) -> floa
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and math.isfinite(value)
+
+
+def is_error(run: Run) -> bool:
+    """Whether the outputs are errors, which are zero where nothing is wrong; temperatures are not."""
+    return not any(run.unit(output) in ("°C", "K", "°F") for output in run.outputs)
+
+
+def mean_rms(run: Run, model: str, recording: str) -> float:
+    """Quadratic mean over errors of what a model leaves on a recording; NaN where units differ or nothing was scored."""
+    if len({run.unit(output) for output in run.outputs}) > 1:
+        return math.nan
+    found = [
+        score["rms"]
+        for (name, _), score in cells(run, model).items()
+        if name == recording and _is_number(score["rms"])
+    ]
+    return math.sqrt(sum(rms**2 for rms in found) / len(found)) if found else math.nan

@@ -94,7 +94,7 @@ def load(hours: Array, seed: int) -> Array:
     """A slow, bounded pattern of load between 0 and 1."""
     phase = np.random.default_rng(seed).uniform(0, 6, 4)
     periods = np.array([37.0, 23.0, 11.0, 7.0])
-    waves = np.sin(2 * np.pi * hours[:, None] / periods + phase).sum(axis=1)
+    waves: Array = np.sin(2 * np.pi * hours[:, None] / periods + phase).sum(axis=1)
     return np.asarray(0.5 + 0.5 * np.tanh(waves)) * (1 - np.exp(-hours / 5))
 
 
@@ -149,7 +149,16 @@ def results(scores: dict[str, dict[str, Any]]) -> dict[str, Any]:
     models["thermobalance"]["shares"] = {"drive loss": 0.55, "cutting fluid": 0.3, "air": 0.1}
     models["thermobalance"]["notes"] = ["m is not determined: its 95 % interval is wider than its value"]
     models["discovered"]["search"] = {
-        "pareto": [{"terms": n, "error": 6 / n + 0.9, "spread": 0.2, "chosen": n == 6} for n in range(1, 12)],
+        "path": [
+            {
+                "outputs": list(OUTPUTS),
+                "terms": n,
+                "left_out_rms": 6 / n + 0.9,
+                "fit_rms": 5 / n,
+                "chosen": n == 6,
+            }
+            for n in range(1, 12)
+        ],
         "stability": {"drive into E_Y0C": 1.0, "fluid into E_Y0C": 0.93, "T_env into E_A0C": 0.41},
     }
     return {
@@ -175,11 +184,24 @@ def diagnosed(hours: float) -> dict[str, Any]:
     return {
         "model": "thermobalance",
         "verdict": "missing physics",
-        "detection": {"p_value": 0.0004, "noise": {"E_Y0C": 0.5, "E_R0T": 0.5}, "residual_rms": {"E_Y0C": 1.9, "E_R0T": 0.6}},
+        "detection": {
+            "p_value": 0.0004,
+            "noise": {"E_Y0C": 0.5, "E_R0T": 0.5},
+            "residual_rms": {"E_Y0C": 1.9, "E_R0T": 0.6},
+        },
         "location": {
             "outputs": {"E_Y0C": 0.81, "E_R0T": 0.19},
             "states": {"b_corpus": 0.97, "c_body_1": 0.03},
-            "windows": [{"recording": "fit", "start_s": 7200 * 2, "end_s": 7200 * 5, "state": "b_corpus", "heat_W": 81.0}],
+            "unmodelled_heat_W": {"b_corpus": 38.0, "c_body_1": 4.1, "table": 0.9},
+            "windows": [
+                {
+                    "recording": "fit",
+                    "start_s": 7200 * 2,
+                    "end_s": 7200 * 5,
+                    "state": "b_corpus",
+                    "heat_W": 81.0,
+                }
+            ],
             "regime": "pump > 0.5 and speed > 750",
         },
         "physics": [
@@ -191,15 +213,22 @@ def diagnosed(hours: float) -> dict[str, Any]:
                 "parameters": {"G_gap": {"value": 38.3, "low": 35.1, "high": 41.6, "unit": "W/K"}},
             }
         ],
-        "alternatives": [{"effect": "conduction_path", "states": ["table", "b_corpus"], "log_evidence_below_best": 2.1}],
+        "alternatives": [
+            {"effect": "conduction_path", "states": ["table", "b_corpus"], "log_evidence_below_best": 2.1}
+        ],
         "improvement": {
             "fit": {"rms_before": 0.61, "rms_after": 0.5},
             "held_out": {"validation": {"rms_before": 0.6, "rms_after": 0.5}},
             "explained": 0.99,
         },
         "next_experiment": "Run the pump for six hours at 900 rpm, then stop it: flooded gap and conduction path part there.",
-        "missing_heat": [
-            {"state": "b_corpus", "recording": "fit", "time_s": time.tolist(), "heat_W": heat.tolist(), "low": (heat - 9).tolist(), "high": (heat + 9).tolist(),
-             "inputs": {"speed": {"unit": "rpm", "values": (900 * load(time / 3600, 3)).tolist()}}}
-        ],
-    }  # fmt: skip
+        "missing_heat": {
+            "state": "b_corpus",
+            "over_time": {
+                "fit": {"time_s": time.tolist(), "heat": heat.tolist(), "sd": (0 * heat + 5).tolist()}
+            },
+            "against": {"speed": {"value": [0, 300, 900], "heat": [0.5, 21, 59], "error": [2, 2, 3]}},
+            "named": True,
+        },
+        "reasons": ["flooded gap adds 300 of log evidence"],
+    }

@@ -1,0 +1,96 @@
+"""Words explained: effects, models, roles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from discovery.errors import UserError
+from discovery.schema import suggest
+
+MODELS = {
+    "file": 'a model of your own: { file = "model.toml" }, a sparse sum of terms with named parameters',
+    "reduced": "equation (9): each error first order, driven by all inputs together, fitted from one cycle",
+    "superposition": "equation (8): each error a sum of parts, each first order and driven by one input",
+    "sindy": "discovered: the fewest terms of a large library that predict parts of the data left out",
+}
+
+
+def list_words(what: str) -> Iterator[str]:
+    """Lines on all effects, models or roles.
+
+    Raises:
+        UserError: another word.
+    """
+    if what == "effects":
+        yield from _effects()
+    elif what == "models":
+        yield from _pairs(MODELS.items())
+    elif what == "roles":
+        yield from _roles()
+    else:
+        raise UserError(f"'{what}' cannot be listed; {suggest(what, ['effects', 'models', 'roles'])}")
+
+
+def _effects() -> Iterator[str]:
+    from discovery.mismatch.catalogue import catalogue
+
+    groups = dict.fromkeys(effect.group for effect in catalogue().values())
+    for group in groups:
+        yield f"{group}:"
+        yield from (
+            f"  {line}"
+            for line in _pairs((e.word, e.title) for e in catalogue().values() if e.group == group)
+        )
+
+
+def _roles() -> Iterator[str]:
+    from discovery.recordings.roles import ROLES
+
+    for role, facts in ROLES.items():
+        unit = " or ".join(facts.units) if facts.units else "any unit"
+        kind = "read now and then" if facts.measured else f"input, {facts.between} between its stamps"
+        yield f"{role:20} {unit:12} {kind}"
+
+
+def _pairs(pairs: Iterable[tuple[str, str]]) -> Iterator[str]:
+    known = list(pairs)
+    width = max(len(word) for word, _ in known)
+    for word, text in known:
+        yield f"{word:{width}}  {text}"
+
+
+def explain(word: str) -> Iterator[str]:
+    """What the catalogue knows of an effect: formula, size, signature, what it is confused with, source.
+
+    Raises:
+        UserError: no such effect.
+    """
+    from discovery.mismatch.catalogue import catalogue
+
+    known = catalogue()
+    if word not in known:
+        raise UserError(f"there is no effect '{word}'; {suggest(word, sorted(known))}")
+    effect = known[word]
+    size = effect.amplitude
+    sign = {1: ", positive", -1: ", negative"}.get(size.sign, ", either sign")
+    yield f"{effect.title} ({effect.word}; {effect.group})"
+    yield ""
+    yield f"  formula        {effect.formula}"
+    yield f"  acts on        {effect.place}"
+    if size.fixed is None:
+        yield f"  size           {size.name}, about {size.plausible:g} {size.unit} on machines of this class{sign}"
+    for shape in effect.shapes:
+        tried = _listed([f"{value:g}" for value in shape.grid])
+        limits = "" if shape.fixed else f", refined between {shape.low:g} and {shape.high:g}"
+        yield f"  shape          {shape.name} [{shape.unit}]: tried at {tried}{limits}"
+    yield f"  signature      {effect.signature}"
+    if effect.confused_with:
+        yield f"  confused with  {_listed(effect.confused_with)}"
+    for example in effect.examples:
+        values = ", ".join(f"{name} = {value:g}" for name, value in example.values.items())
+        yield f"  example        {values}: {example.expected:g}"
+    yield f"  source         {effect.source}"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return ", ".join(words)

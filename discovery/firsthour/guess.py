@@ -1,0 +1,136 @@
+"""What a column probably is: role and unit from its name and its values, with the reason."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.firsthour.table import Column
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Role and unit of a column, and why; `sure` is False where a person should look."""
+
+    role: str
+    unit: str
+    why: str
+    sure: bool = True
+
+
+# words of a name -> role; the first match counts
+_WORDS: tuple[tuple[str, str], ...] = (
+    (r"correction|comp(ensation)?|offset", "applied correction"),
+    (
+        r"e [xyzabcr]\d?[0a-z]*|e[xyzabc]\d[abct]|error|dev(iation)?|displacement|probe|r test|growth|shift|drift",
+        "error",
+    ),
+    (r"nozzle.*(height|h)|h nozzle", "nozzle height"),
+    (r"nozzle.*side|side.*nozzle", "nozzle side"),
+    (r"(p|power|q|heat).*cool(ing|er)?|cool(ing|er)? *(power|p)|chiller *(power|p)", "cooling power"),
+    (r"(t|temp(erature)?)? *(coolant|chiller|cool(er|ing)?)", "coolant temperature"),
+    (
+        r"(t|temp(erature)?)? *(fluid|emulsion|kss|sump|tank|cutting fluid)( *t(emp(erature)?)?)?$",
+        "fluid temperature",
+    ),
+    (
+        r"(t|temp(erature)?)? *(amb(ient)?|env(ironment)?|room|air|hall|outside|umgebung|raum)",
+        "ambient temperature",
+    ),
+    (r"pump|flow|volume stream", "fluid flow"),
+    (r"speed|rpm|spindle|n|rev(olution)?s?|drehzahl", "rotation speed"),
+    (r"heater\w*|p|power|load|drive|torque|loss(es)?|q|heat|current|motor|leistung", "heat load"),
+    (r"t|temp(erature)?s?|thermo(couple)?|pt\d*|tc\d*", "temperature"),
+    (r"sensor|housing|bearing|plate|body|bed|table", "temperature"),
+)
+_ROLE_OF_UNIT = {"degC": "temperature", "degF": "temperature", "K": "temperature", "rpm": "rotation speed", "W": "heat load",
+                 "kW": "heat load", "um": "error", "um/m": "error", "l/min": "fluid flow"}  # fmt: skip
+_UNITS = {
+    "°c": "degC", "c": "degC", "degc": "degC", "celsius": "degC", "deg c": "degC", "°f": "degF", "f": "degF", "degf": "degF",
+    "fahrenheit": "degF", "deg f": "degF", "k": "K", "kelvin": "K", "%": "percent", "pct": "percent", "percent": "percent",
+    "rpm": "rpm", "1/min": "rpm", "u/min": "rpm", "min-1": "rpm", "w": "W", "watt": "W", "kw": "kW", "um": "um", "µm": "um", "μm": "um",
+    "micron": "um", "mm": "mm", "um/m": "um/m", "µm/m": "um/m", "l/min": "l/min", "lpm": "l/min", "a": "A", "v": "V", "-": "1", "1": "1",
+}  # fmt: skip
+_TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
+_USUAL = {
+    "rotation speed": "rpm",
+    "error": "um",
+    "applied correction": "um",
+    "nozzle height": "mm",
+    "nozzle side": "1",
+}
+_ROOM_F = (55.0, 100.0)  # a machine starts near room temperature: 13 to 38 degC
+
+
+def guess(column: Column) -> Guess:
+    """Role and unit of a column."""
+    named = _UNITS.get(column.unit.lower().strip())
+    role, why = _role(column, named)
+    if named:
+        if role in _TEMPERATURES and named not in ("degC", "degF", "K"):
+            role, why = "other input", f"the unit {column.unit} is none of a temperature"
+        return Guess(role, named, f"{why}; the header says {column.unit}", role != "other input")
+    if column.unit:
+        return Guess(
+            role, column.unit, f"{why}; the header says {column.unit}, which was left as it is", sure=False
+        )
+    return _by_values(role, why, column.values)
+
+
+def _role(column: Column, unit: str | None) -> tuple[str, str]:
+    words = re.sub(r"[\W_]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", column.name)).lower().strip()
+    spaced = re.sub(r"(?<=[a-z])(?=\d)", " ", words)
+    for pattern, role in _WORDS:
+        found = re.search(rf"(?<![a-z0-9])(?:{pattern})(?![a-z])", words) or re.search(
+            rf"(?<![a-z0-9])(?:{pattern})(?![a-z])", spaced
+        )
+        if found and (unit is None or _fits(unit, role)):
+            return role, f"'{found[0].strip()}' in its name"
+    if unit in _ROLE_OF_UNIT:
+        return _ROLE_OF_UNIT[unit], "by its unit"
+    return "other input", "nothing in its name says what it is"
+
+
+def _fits(unit: str, role: str) -> bool:
+    if role in _TEMPERATURES:
+        return unit in ("degC", "degF", "K")
+    if role in ("error", "applied correction"):
+        return unit in ("um", "mm", "um/m")
+    if role in ("heat load", "cooling power"):
+        return unit in ("W", "kW", "percent", "1")
+    if role == "rotation speed":
+        return unit == "rpm"
+    return unit not in ("degC", "degF", "K")
+
+
+def _by_values(role: str, why: str, values: Array) -> Guess:
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return Guess(role, _USUAL.get(role, "1"), f"{why}; it holds no value", sure=False)
+    low, high, first = float(known.min()), float(known.max()), float(known[0])
+    span = f"from {low:.4g} to {high:.4g}"
+    if role in _TEMPERATURES:
+        if low > 200:
+            return Guess(role, "K", f"{why}; values {span} can only be kelvin")
+        if low > _ROOM_F[0] - 5 and _ROOM_F[0] <= first <= _ROOM_F[1]:
+            return Guess(
+                role,
+                "degF",
+                f"{why}; values {span}, starting at {first:.3g}: a room in Fahrenheit",
+                sure=False,
+            )
+        return Guess(role, "degC", f"{why}; values {span} look like degrees Celsius", sure=False)
+    if role in ("heat load", "cooling power"):
+        if low >= -1e-9 and 10 < high <= 100:
+            return Guess(role, "percent", f"{why}; values {span} look like percent", sure=False)
+        return Guess(role, "W", f"{why}; values {span} taken as watts", sure=False)
+    if role == "fluid flow":
+        return Guess(role, "1" if high <= 1 else "l/min", f"{why}; values {span}", sure=high <= 1)
+    if role in _USUAL:
+        return Guess(role, _USUAL[role], f"{why}; {_USUAL[role]} is usual", sure=False)
+    return Guess(role, "1", why, sure=False)
