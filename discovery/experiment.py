@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from discovery.evaluation.crossvalidation import cross_validate
 from discovery.experimentfile import (
     Experiment,
     FileEntry,
+    MismatchForm,
     ModelEntry,
     ReducedEntry,
     SuperpositionEntry,
@@ -26,6 +27,7 @@ from discovery.experimentfile import (
     separate,
 )
 from discovery.fitting import Fit, fit_model, predict_recording
+from discovery.fitting.fit import Loss
 from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.starts import warm_start
 from discovery.models import Model
@@ -36,6 +38,9 @@ from discovery.models.superposition import superposition
 from discovery.progress import Progress, silent
 from discovery.results import default_folder, staged, write_run
 from discovery.sparse.options import SparseOptions
+
+if TYPE_CHECKING:
+    from discovery.mismatch import Diagnosis
 
 Array = NDArray[np.float64]
 
@@ -98,10 +103,38 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
         fitted = {}
         for name, entry in experiment.form.models.items():
             fitted[name] = fit_entry(experiment, name, entry, progress)
-        document = diagnosis(experiment, progress)
+        found = diagnosis(experiment, progress)
+        if found is not None and found.repaired is not None:
+            fitted["repaired"] = fit_model_of(experiment, "repaired", "repaired", found.repaired)
         seconds = clock.perf_counter() - began
         progress("writing the report")
-        write_run(temporary, experiment, fitted, document, seconds)
+        write_run(temporary, experiment, fitted, found.document() if found else None, seconds)
+    return folder
+
+
+def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
+    """What the model of [mismatch] leaves out, alone: that model, the diagnosis, the repaired model and a report.
+
+    Without [mismatch] the experiment's only (or first) model is taken. Files and failures as in `run`.
+    """
+    began = clock.perf_counter()
+    progress("reading the recordings")
+    experiment = load_experiment(path)
+    if experiment.form.mismatch is None:
+        asked = MismatchForm(model=next(iter(experiment.form.models)))
+        experiment = replace(experiment, form=experiment.form.model_copy(update={"mismatch": asked}))
+    experiment = replace(experiment, form=experiment.form.model_copy(update={"cross_validate": False, "export": None}))
+    folder = out or default_folder(experiment.name)
+    with staged(folder) as temporary:
+        found = diagnosis(experiment, progress)
+        assert found is not None and experiment.form.mismatch is not None
+        name = experiment.form.mismatch.model
+        kind = experiment.form.models[name].kind
+        fitted = {name: fit_model_of(experiment, name, kind, replace(found.context.model, name=name))}
+        if found.repaired is not None:
+            fitted["repaired"] = fit_model_of(experiment, "repaired", "repaired", found.repaired)
+        progress("writing the report")
+        write_run(temporary, experiment, fitted, found.document(), clock.perf_counter() - began)
     return folder
 
 
@@ -110,13 +143,30 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
     began = clock.perf_counter()
     progress(f"fitting {name}")
     model, report = starting_model(experiment, name, entry)
-    outputs = [y for y in experiment.outputs_of(entry) if y in model.outputs or y in model.states]
+    loss = getattr(entry, "loss", "linear")
+    fitted = fit_model_of(experiment, name, entry.kind, model, report, experiment.outputs_of(entry), loss, progress)
+    return replace(fitted, seconds=clock.perf_counter() - began)
+
+
+def fit_model_of(
+    experiment: Experiment,
+    name: str,
+    kind: str,
+    model: Model,
+    report: Mapping[str, Any] | None = None,
+    outputs: Sequence[str] | None = None,
+    loss: Loss = "linear",
+    progress: Progress = silent,
+) -> Fitted:
+    """A model with start values, wherever it comes from: fit, cross-validation, free runs."""
+    began = clock.perf_counter()
+    outputs = [y for y in outputs or experiment.outputs if y in model.outputs or y in model.states]
     if not outputs:
         raise UserError(
             f"{experiment.path}: model '{name}' gives none of the outputs {', '.join(experiment.outputs)}; "
             "write them under [outputs] of the model"
         )
-    fit = fit_model(model, experiment.fitting, experiment.fit, outputs, loss=getattr(entry, "loss", "linear"))
+    fit = fit_model(model, experiment.fitting, experiment.fit, outputs, loss=loss)
     validation: Mapping[str, Mapping[str, float]] = {}
     if experiment.form.cross_validate:
         progress(f"cross-validating {name}")
@@ -125,7 +175,7 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
     predictions = {r: predict(fit, experiment, r) for r in (*experiment.fit, *experiment.held_out)}
     notes = [*fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
-    return Fitted(name, entry.kind, fit, predictions, validation, report, tuple(notes), seconds)
+    return Fitted(name, kind, fit, predictions, validation, report or {}, tuple(notes), seconds)
 
 
 def starting_model(experiment: Experiment, name: str, entry: ModelEntry) -> tuple[Model, dict[str, Any]]:
@@ -172,12 +222,19 @@ def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
     return Prediction(outputs, grid.time[grid.read], grid.readings, predicted, reference)
 
 
-def diagnosis(experiment: Experiment, progress: Progress = silent) -> dict[str, Any] | None:
-    """The content of diagnosis.json, where the experiment asks what a model leaves out."""
-    if experiment.form.mismatch is None:
+def diagnosis(experiment: Experiment, progress: Progress = silent) -> Diagnosis | None:
+    """What the model of [mismatch] leaves out, where the experiment asks."""
+    wanted = experiment.form.mismatch
+    if wanted is None:
         return None
-    from discovery.mismatch import diagnose
+    from discovery.mismatch import diagnose as find_missing
 
-    progress(f"looking for what {experiment.form.mismatch.model} leaves out")
-    document: dict[str, Any] = diagnose(experiment, progress).document()
-    return document
+    entry = experiment.form.models[wanted.model]
+    model, _ = starting_model(experiment, wanted.model, entry)
+    effects = [form.effect() for form in wanted.effects]
+    progress(f"looking for what {wanted.model} leaves out")
+    outputs = experiment.outputs_of(entry)
+    found = find_missing(
+        model, experiment.campaign, experiment.fit, experiment.held_out, outputs, effects, physical=entry.kind == "file", tell=progress
+    )
+    return found

@@ -15,6 +15,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag
 from discovery.errors import UserError
 from discovery.files import dotted, locate, read_text, read_toml
 from discovery.fitting.fit import Loss
+from discovery.mismatch.catalogue.form import EffectForm
 from discovery.models import Model, check_names, read_model
 from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, campaign_path
@@ -78,6 +79,7 @@ class MismatchForm(Strict):
     """[mismatch]: the model whose missing physics is looked for."""
 
     model: str
+    effects: list[EffectForm] = Field([], description="effects of your own, beside the catalogue's")
 
 
 class ExportForm(Strict):

@@ -187,7 +187,10 @@ def _covariance(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array,
     sentences = []
     seen = length > 0
     scaled = jacobian[:, seen] / length[seen]
-    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-12, hermitian=True)
+    size, direction = np.linalg.eigh(scaled.T @ scaled)
+    told = size > 1e-12 * size.max(initial=0.0)
+    inverse = (direction[:, told] / size[told]) @ direction[:, told].T
+    blind = np.sum(direction[:, ~told] ** 2, axis=1) > 1e-6  # takes part in a combination that nothing tells
     covariance = np.zeros((total, total))
     index = np.flatnonzero(seen)
     covariance[np.ix_(index, index)] = inverse / np.outer(length[seen], length[seen])
@@ -201,9 +204,11 @@ def _covariance(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array,
             )
             covariance[i, i] = np.inf
             continue
-        share = 1.0 / np.sqrt(max(inverse[np.searchsorted(index, i), np.searchsorted(index, i)], 1.0))
+        k = int(np.searchsorted(index, i))
+        share = 0.0 if blind[k] else 1.0 / np.sqrt(max(inverse[k, k], 1.0))
         error = np.sqrt(covariance[i, i])
         if share < _UNSEEN:
+            covariance[i, i] = np.inf if blind[k] else covariance[i, i]
             sentences.append(
                 f"{u.name}{where} cannot be told apart from other parameters with these recordings"
             )

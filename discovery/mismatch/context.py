@@ -70,7 +70,7 @@ class Context:
 
 
 def make_context(
-    campaign: Campaign, model: Model, recordings: Sequence[str], outputs: Sequence[str], effects: Sequence[Effect]
+    campaign: Campaign, model: Model, recordings: Sequence[str], outputs: Sequence[str], effects: Sequence[Effect], physical: bool = True
 ) -> Context:
     """Fit the baseline jointly and find the noise levels that tests must reckon with.
 
@@ -84,8 +84,7 @@ def make_context(
         and all(np.isfinite(campaign.recordings[r].values.get(name, np.array([np.nan]))).any() for r in recordings)
     ]
     grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
-    physical = any(state.capacity for state in model.states.values())
-    belief = BELIEF if physical else None
+    belief = BELIEF if physical and any(state.capacity for state in model.states.values()) else None
     fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
     flows = _flows(fit)
     largest = max(flows.values(), default=1.0)

@@ -70,6 +70,8 @@ def diagnose(
     held_out: Sequence[str] = (),
     outputs: Sequence[str] | None = None,
     effects: Sequence[Effect] = (),
+    *,
+    physical: bool = True,
     tell: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """Find what a model leaves out.
@@ -80,6 +82,7 @@ def diagnose(
         held_out: recordings for the proof at the end, touched by nothing before.
         outputs: measured channels; default all that model and campaign share.
         effects: entries beside the catalogue's, or replacing those of the same word.
+        physical: the start values of the model are an engineer's beliefs (not those of a builder).
         tell: told what begins.
 
     Raises:
@@ -93,7 +96,7 @@ def diagnose(
     entries = {**catalogue(), **{e.word: e for e in effects}}
     seen = replace(campaign, recordings={r: campaign.recordings[r] for r in fit})  # nothing else can leak in
     tell("fitting the baseline and its noise")
-    context = make_context(seen, model, fit, outputs, list(entries.values()))
+    context = make_context(seen, model, fit, outputs, list(entries.values()), physical)
     tell("scoring the catalogue")
     found = search(context, tell=lambda what: tell(f"found so far: {what}"))
     tell("locating")

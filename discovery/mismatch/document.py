@@ -67,7 +67,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
                 "log_evidence": _number(c.gain, 4),
                 "score": _number(c.t, 4),
                 "share_that_a_refit_leaves": _number(c.share, 3),
-                "decidable": c.share > 0.05,
+                "decidable": c.decidable,
             }
             for c in top
         ],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ class Score:
 
     `gain` is the log Bayes factor against the fit without it (integrated over noise settings), `t` the signed score in
     standard deviations at the best setting, `size` its amplitudes there, `share` what a refit leaves of the signature.
+    `decidable`: an effect of plausible size would stand out by three standard deviations.
     """
 
     hypothesis: Hypothesis
@@ -28,6 +29,7 @@ class Score:
     t: float
     size: tuple[float, ...]
     share: float
+    decidable: bool
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,8 @@ def scores(board: Board) -> list[Score]:
             size = tuple(float(s) for s in solved)
         length = board.lengths[v][mine].max()
         share = float(np.sqrt(gram_diagonal[mine].max()) / length) if length > 0 else 0.0
-        out.append(Score(h, gain if share > 0 else 0.0, t, size, share))
+        reach = float(np.sqrt(gram_diagonal[mine].max()) * board.spreads[mine].max())
+        out.append(Score(h, gain if share > 0 else 0.0, t, size, share, reach > 3.0))
     return out
 
 
@@ -133,7 +136,7 @@ def by_claim(found: Sequence[Score]) -> list[Score]:
         best = max(group, key=lambda s: s.gain)
         gains = np.array([s.gain for s in group])
         mean = float(log_mean_exp(gains)) + float(np.log(best.hypothesis.effect.prior)) - best.hypothesis.cost
-        out.append(Score(best.hypothesis, mean, best.t, best.size, best.share))
+        out.append(replace(best, gain=mean))
     return sorted(out, key=lambda s: -s.gain)
 
 

@@ -1,0 +1,64 @@
+"""An effect of the user's own, as lines of an experiment file ([[mismatch.effects]])."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from discovery.errors import UserError
+from discovery.mismatch.catalogue.effect import ROLE_OF, Amplitude, Effect, Place, Shape
+from discovery.schema import Strict
+from discovery.terms import names, parse
+
+
+class ShapeForm(Strict):
+    """A parameter inside the formula."""
+
+    unit: str = "1"
+    grid: list[float] = Field(min_length=1, description="values that the search tries")
+    low: float = Field(description="smallest value that the refit may give")
+    high: float = Field(description="largest value that the refit may give")
+
+
+class EffectForm(Strict):
+    """One effect.
+
+    `formula` is a heat flow into `body` (out of `other`, for two bodies) with `amplitude` as a factor; the variables are
+    body, other, y (for outputs) and ambient, fluid, flow, speed, load, cooling, coolant, height, other_input.
+    """
+
+    word: str = Field(pattern="^[a-z][a-z0-9_]*$", description="its name in results")
+    title: str = ""
+    place: Place = Field("body", description="where it can act")
+    formula: str
+    amplitude: str = Field(description="the name in the formula that switches it on")
+    unit: str = Field("W", description="unit of the amplitude")
+    plausible: float = Field(gt=0, description="usual size of the amplitude")
+    sign: Literal[-1, 0, 1] = Field(1, description="sign of the amplitude, 0 where physics leaves it open")
+    shapes: dict[str, ShapeForm] = {}
+    source: str = "given in the experiment file"
+
+    def effect(self) -> Effect:
+        """The effect as the catalogue holds it.
+
+        Raises:
+            UserError: a formula that does not parse, or a name in it that means nothing here.
+        """
+        where = f"effect '{self.word}'"
+        known = {self.amplitude, *self.shapes, *ROLE_OF, "body", "other", "y", "time"}
+        for name in sorted(names(parse(self.formula, where)) - known):
+            raise UserError(f"{where}: '{name}' means nothing in its formula; known: {', '.join(sorted(known))}")
+        if self.amplitude not in names(parse(self.formula, where)):
+            raise UserError(f"{where}: the amplitude '{self.amplitude}' does not stand in the formula")
+        return Effect(
+            word=self.word,
+            title=self.title or self.word.replace("_", " "),
+            group="user",
+            place=self.place,
+            formula=self.formula,
+            amplitude=Amplitude(self.amplitude, self.unit, self.plausible, self.sign),
+            shapes=tuple(Shape(name, s.unit, tuple(s.grid), s.low, s.high) for name, s in self.shapes.items()),
+            source=self.source,
+            signature="given by the user",
+        )
