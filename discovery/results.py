@@ -107,6 +107,7 @@ def results_document(experiment: Experiment, fitted: Mapping[str, Fitted], secon
         "held_out": list(experiment.held_out),
         "outputs": list(experiment.outputs),
         "units": {name: channels[name].unit for name in experiment.outputs},
+        "input_units": {name: c.unit for name, c in channels.items() if name not in experiment.outputs},
         "noise": {name: channels[name].noise for name in experiment.outputs},
         "parts": parts_of_the_paper(experiment.campaign, experiment.fit, experiment.held_out),
         "models": {name: model_entry(one) for name, one in fitted.items()},

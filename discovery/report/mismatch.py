@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from discovery.models import Model
-from discovery.report.chart import Chart, Panel, Series
+from discovery.report.chart import Array, Chart, Panel, Series
 from discovery.report.network import drawing
 from discovery.report.printed import Line, Printed
 from discovery.report.run import Run, pretty_unit
@@ -247,34 +247,24 @@ def heat_charts(run: Run) -> list[Chart]:
     for recording, one in (missing.get("over_time") or {}).items():
         time, heat, sd = (np.array(one[key], dtype=float) for key in ("time_s", "heat", "sd"))
         x, x_label, _ = time_axis(time)
-        binned = (
-            Series("95 %", x, heat, "band", "0", heat - 1.96 * sd, heat + 1.96 * sd),
-            Series("mean", x, heat, "line", "0"),
-        )
-        charts.append(
-            Chart(
-                f"heat-{recording}", f"At {place}, {recording}", x_label, (Panel(label, curves, zero=True),)
-            )
-        )
+        panel = Panel(label, _curves(x, heat, 1.96 * sd), zero=True)
+        charts.append(Chart(f"heat-{recording}", f"At {place}, {recording}", x_label, (panel,)))
     for name, one in (missing.get("against") or {}).items():
         order = np.argsort(np.array(one["value"], dtype=float))
         x, heat, error = (np.array(one[key], dtype=float)[order] for key in ("value", "heat", "error"))
         if len(x) < 2:
             continue
-        binned = (
-            Series("95 %", x, heat, "band", "0", heat - 1.96 * error, heat + 1.96 * error),
-            Series("mean of a bin", x, heat, "line", "0"),
-            Series("bins", x, heat, "points", "0"),
-        )
-        charts.append(
-            Chart(
-                f"heat-against-{name}",
-                f"Against {name}",
-                _axis(run, name),
-                (Panel(label, curves, zero=True),),
-            )
-        )
+        bins = Series("bins", x, heat, "points", "0")
+        panel = Panel(label, (*_curves(x, heat, 1.96 * error), bins), zero=True)
+        charts.append(Chart(f"heat-against-{name}", f"Against {name}", _axis(run, name), (panel,)))
     return charts
+
+
+def _curves(x: Array, mean: Array, half: Array) -> tuple[Series, ...]:
+    return (
+        Series("95 %", x, mean, "band", "0", mean - half, mean + half),
+        Series("mean", x, mean, "line", "0"),
+    )
 
 
 def _axis(run: Run, name: str) -> str:

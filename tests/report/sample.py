@@ -95,7 +95,8 @@ def load(hours: Array, seed: int) -> Array:
     phase = np.random.default_rng(seed).uniform(0, 6, 4)
     periods = np.array([37.0, 23.0, 11.0, 7.0])
     waves: Array = np.sin(2 * np.pi * hours[:, None] / periods + phase).sum(axis=1)
-    return np.asarray(0.5 + 0.5 * np.tanh(waves)) * (1 - np.exp(-hours / 5))
+    pattern: Array = (0.5 + 0.5 * np.tanh(waves)) * (1 - np.exp(-hours / 5))
+    return pattern
 
 
 def write_sample(folder: Path, hours: float = 24.0, diagnosis: bool = True) -> Path:
@@ -169,6 +170,7 @@ def results(scores: dict[str, dict[str, Any]]) -> dict[str, Any]:
         "outputs": list(OUTPUTS),
         "units": {name: unit for name, (unit, _, _) in OUTPUTS.items()},
         "noise": {name: noise for name, (_, _, noise) in OUTPUTS.items()},
+        "input_units": {"speed": "rpm"},
         "parts": {"test cycle": "fit", "2. test cycle": "validation"},
         "models": models,
         "seconds": 21.5,
