@@ -167,7 +167,7 @@ def check_names(model: Model, known: set[str], path: Path | str) -> None:
 def model_document(model: Model) -> dict[str, Any]:
     """The model as the nested mapping that its file holds."""
 
-    def number(value: float) -> float:
+    def number(value: float) -> float:  # value and bounds alike, so that a value on its bound stays there
         return float(f"{value:.10g}")
 
     def finite(entries: dict[str, Any]) -> dict[str, Any]:
@@ -179,7 +179,7 @@ def model_document(model: Model) -> dict[str, Any]:
 
     parameters = {}
     for name, p in model.parameters.items():
-        entry = finite({"start": number(p.value), "unit": p.unit, "min": p.min, "max": p.max})
+        entry = finite({"start": number(p.value), "unit": p.unit, "min": number(p.min), "max": number(p.max)})
         entry |= {"fixed": True} if p.fixed else {}
         entry |= {"per": "recording"} if p.per_recording else {}
         entry |= finite({"low": p.low and number(p.low), "high": p.high and number(p.high)})

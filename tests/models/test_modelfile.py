@@ -81,6 +81,13 @@ def test_a_model_survives_its_file(tmp_path: Path) -> None:
             assert again.parameters[name].unit == p.unit
 
 
+def test_a_value_on_its_bound_is_read_back(tmp_path: Path) -> None:
+    model = thermobalance()
+    third = dataclasses.replace(model.parameters["G_b1_b2"], value=1 / 48, min=1 / 48, max=1 / 3)
+    write_model(tmp_path / "m.toml", dataclasses.replace(model, parameters={**model.parameters, "G_b1_b2": third}))
+    assert read_model(tmp_path / "m.toml").parameters["G_b1_b2"].value == pytest.approx(1 / 48)
+
+
 def test_a_lag_becomes_a_hidden_state(tmp_path: Path) -> None:
     model = expanded(read_model(written(tmp_path, GOOD)))
     assert text(model.terms[-1].expression) == "(P - lag_1)/tau"

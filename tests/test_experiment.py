@@ -1,0 +1,293 @@
+"""The main job end to end on small data: what it writes, what it refuses, and that nothing held out leaks into a fit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from discovery.cli import app
+from discovery.errors import UserError
+from discovery.experiment import run
+from discovery.experimentfile import load_experiment
+from discovery.models import read_model
+from discovery.summary import comparison
+
+CAMPAIGN = """
+name = "small"
+
+[channels]
+T_env = { role = "ambient temperature", unit = "degC" }
+P     = { role = "heat load", unit = "W" }
+E_Y0C = { role = "error", unit = "um", noise = 0.3 }
+E_R0T = { role = "error", unit = "um", noise = 0.3 }
+
+[recordings]
+a = { file = "a.csv" }
+b = { file = "b.csv" }
+c = { file = "c.csv" }
+"""
+
+MODEL = """
+name = "one body"
+
+[parameters]
+G    = { start = 10.0, unit = "W/K", min = 0.0 }
+loss = { start = 0.5, unit = "1", min = 0.0 }
+
+[states]
+body = { capacity = 60e3, start = "T_env" }
+
+[[terms]]
+into = "body"
+expression = "G*(T_env - body)"
+
+[[terms]]
+into = "body"
+expression = "loss*P"
+
+[outputs]
+E_Y0C = "-5*(body - 22)"
+E_R0T = "2*(body - 22)"
+"""
+
+EXPERIMENT = """
+name = "small"
+campaign = "campaign.toml"
+fit = ["a", "b"]
+held_out = ["c"]
+
+[models]
+reduced       = { kind = "reduced" }
+superposition = { kind = "superposition", inputs = ["T_env", "P"] }
+one_body      = { file = "model.toml" }
+"""
+
+
+def write_recording(path: Path, seed: int) -> None:
+    """24 h of the body of MODEL with G = 12 W/K and loss = 0.4; a reading every 15 minutes, 0.3 um of noise."""
+    rng = np.random.default_rng(seed)
+    lines, x, room, power = ["time,T_env,P,E_Y0C,E_R0T"], 22.0, 22.0, 0.0
+    for k in range(24 * 12 + 1):
+        if k % 12 == 0:
+            power = float(rng.choice([0.0, 100.0, 250.0]))
+        room = 22.0 + 0.8 * np.sin(k / 40.0 + seed)
+        errors = ["", ""]
+        if k % 3 == 0:
+            errors = [f"{factor * (x - 22) + 0.3 * rng.standard_normal():.3f}" for factor in (-5.0, 2.0)]
+        lines.append(f"{300 * k},{room:.3f},{power:.0f},{','.join(errors)}")
+        steady = room + 0.4 * power / 12.0
+        x = steady + (x - steady) * float(np.exp(-300 * 12.0 / 60e3))
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for seed, name in enumerate("abc"):
+        write_recording(tmp_path / f"{name}.csv", seed)
+    (tmp_path / "campaign.toml").write_text(CAMPAIGN)
+    (tmp_path / "model.toml").write_text(MODEL)
+    (tmp_path / "experiment.toml").write_text(EXPERIMENT)
+    return tmp_path
+
+
+def results_of(out: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((out / "results.json").read_text())
+    return content
+
+
+def test_a_run_writes_what_the_contract_says(folder: Path) -> None:
+    out = run(folder / "experiment.toml", folder / "out")
+    names = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
+    models = ("reduced", "superposition", "one_body")
+    assert names >= {"results.json", "report.html", *(f"models/{m}.toml" for m in models), *(f"predictions/{r}.csv" for r in "abc")}
+    results = results_of(out)
+    assert (results["experiment"], results["fit"], results["held_out"]) == ("small", ["a", "b"], ["c"])
+    assert list(results["models"]) == list(models)
+    entry = results["models"]["reduced"]
+    assert (entry["terms"], entry["parameters"]) == (8, 8)
+    assert entry["equations"][0].startswith("d/dt E_Y0C = ")
+    assert set(entry["recordings"]) == {"a", "b", "c"}
+    score = entry["recordings"]["c"]["E_Y0C"]
+    assert set(score) == {"rms", "peak", "mean", "variance", "r2", "uncompensated", "improvement"}
+    assert set(score["uncompensated"]) == set(score["improvement"]) == {"rms", "peak", "mean", "variance"}
+    assert len(results["inputs"]["c.csv"]) == 64
+    assert results["versions"]["numpy"] == np.__version__
+
+
+def test_the_right_model_is_right_on_the_held_out_recording(folder: Path) -> None:
+    results = results_of(run(folder / "experiment.toml", folder / "out"))
+    entry = results["models"]["one_body"]
+    for error in ("E_Y0C", "E_R0T"):
+        assert entry["recordings"]["c"][error]["rms"] == pytest.approx(0.3, rel=0.15)
+        assert entry["cross_validation"]["recordings"][error] == pytest.approx(0.3, rel=0.15)
+    values = entry["values"]
+    assert values["G"]["low"] < 12.0 < values["G"]["high"]
+    assert values["loss"]["value"] == pytest.approx(0.4, rel=0.02)
+
+
+def test_predictions_are_readings_and_models_side_by_side(folder: Path) -> None:
+    out = run(folder / "experiment.toml", folder / "out")
+    table = np.genfromtxt(out / "predictions" / "c.csv", delimiter=",", names=True, deletechars="")
+    assert table.dtype.names is not None
+    assert set(table.dtype.names) == {
+        "time", "E_Y0C", "E_R0T",
+        *(f"{e}|{m}" for e in ("E_Y0C", "E_R0T") for m in ("reduced", "superposition", "one_body")),
+    }  # fmt: skip
+    rms = np.sqrt(np.mean((table["E_Y0C"] - table["E_Y0C|one_body"]) ** 2))
+    assert rms == pytest.approx(results_of(out)["models"]["one_body"]["recordings"]["c"]["E_Y0C"]["rms"], rel=1e-3)
+
+
+def test_a_fitted_model_can_be_fitted_again(folder: Path) -> None:
+    """What a run writes is a model file like any other: run again from it, the numbers stay."""
+    out = run(folder / "experiment.toml", folder / "out")
+    again = EXPERIMENT.replace('one_body      = { file = "model.toml" }', 'one_body = { file = "out/models/one_body.toml" }')
+    (folder / "again.toml").write_text(again.replace("{ kind = \"reduced\" }", '{ file = "out/models/reduced.toml" }'))
+    second = run(folder / "again.toml", folder / "out2")
+    for name in ("one_body", "reduced", "superposition"):
+        before, after = (read_model(o / "models" / f"{name}.toml") for o in (out, second))
+        for parameter in before.free:
+            assert after.parameters[parameter].value == pytest.approx(before.parameters[parameter].value, rel=2e-3)
+
+
+def test_nothing_held_out_touches_a_fit(folder: Path) -> None:
+    """Another held-out recording: every number found stays the same to the last digit, the scores on it change."""
+    (folder / "experiment.toml").write_text(EXPERIMENT + 'discovered = { kind = "sindy", bootstraps = 4 }\n')
+    before = run(folder / "experiment.toml", folder / "out1")
+    write_recording(folder / "c.csv", seed=99)
+    after = run(folder / "experiment.toml", folder / "out2")
+    for name in ("reduced", "superposition", "one_body", "discovered"):
+        file = f"models/{name}.toml"
+        assert (before / file).read_bytes() == (after / file).read_bytes()
+        one, two = (results_of(out)["models"][name] for out in (before, after))
+        for key in ("equations", "values", "cross_validation", "noise", "notes", "terms"):
+            assert one[key] == two[key], key
+        assert one["recordings"]["a"] == two["recordings"]["a"]
+        assert one["recordings"]["c"] != two["recordings"]["c"]
+
+
+def test_fits_are_not_even_handed_what_is_held_out(folder: Path) -> None:
+    experiment = load_experiment(folder / "experiment.toml")
+    assert set(experiment.fitting.recordings) == {"a", "b"}
+    assert set(experiment.campaign.recordings) == {"a", "b", "c"}
+
+
+def test_one_influence_after_the_other(folder: Path) -> None:
+    entry = 'superposition = { kind = "superposition", separate = { T_env = ["a"], P = ["b"] } }'
+    text = EXPERIMENT.replace('superposition = { kind = "superposition", inputs = ["T_env", "P"] }', entry)
+    (folder / "experiment.toml").write_text(text)
+    found = results_of(run(folder / "experiment.toml", folder / "out"))["models"]["superposition"]
+    assert found["parameters"] == 0
+    assert found["values"]["p4_E_Y0C"]["low"] < found["values"]["p4_E_Y0C"]["value"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('fit = ["a", "b"]', 'fit = ["a", "bb"]', ["line 4", "fit", "no recording 'bb'", "did you mean 'b'"]),
+        ('held_out = ["c"]', 'held_out = ["b"]', ["line 5", "'b' stands in fit too"]),
+        ('held_out = ["c"]', 'held_out = ["d"]', ["line 5", "no recording 'd'"]),
+        ('fit = ["a", "b"]', "fit = []", ["line 4", "at least 1"]),
+        ('fit = ["a", "b"]\n', "", ["the key 'fit' is missing"]),
+        ('fit = ["a", "b"]', 'fits = ["a", "b"]', ["line 4", "unknown key", "did you mean 'fit'"]),
+        ('kind = "reduced"', 'kind = "redced"', ["line 8", "'redced' is not known", "did you mean 'reduced'"]),
+        ('kind = "reduced"', 'kind = "reduced", file = "x"', ["line 8", "unknown key"]),
+        ('kind = "reduced"', 'kind = "reduced", input = ["P"]', ["line 8", "did you mean 'inputs'"]),
+        ('inputs = ["T_env", "P"]', 'inputs = ["T_env", "Q"]', ["line 9", "no channel 'Q'"]),
+        ('inputs = ["T_env", "P"]', 'separate = { P = ["c"] }', ["line 9", "'c' is held out"]),
+        ('inputs = ["T_env", "P"]', 'separate = { P = ["z"] }', ["line 9", "no recording 'z'"]),
+        ('file = "model.toml"', 'file = "modell.toml"', ["modell.toml", "no such file"]),
+        ('campaign = "campaign.toml"', 'campaign = "c.toml"', ["c.toml", "no such file"]),
+        ('name = "small"', 'name = "../small"', ["line 2", "name of a file"]),
+        ('name = "small"', 'name = "small"\noutputs = ["P"]', ["line 3", "'P' is no measured channel"]),
+        ("one_body      =", '"one/body"    =', ["line 10", "name of a file"]),
+        ("[models]", "[mismatch]\nmodel = \"x\"\n[models]", ["no model 'x'"]),
+        ("[models]", "[export]\nmodel = \"one_body\"\nto = [\"exe\"]\n[models]", ["'exe' is not known"]),
+        ("[models]", "[models", ["line 7", "not valid TOML"]),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_sentence_with_its_place(folder: Path, old: str, new: str, words: list[str]) -> None:
+    assert old in EXPERIMENT
+    (folder / "experiment.toml").write_text(EXPERIMENT.replace(old, new))
+    with pytest.raises(UserError) as caught:
+        run(folder / "experiment.toml", folder / "out")
+    sentence = str(caught.value)
+    assert "\n" not in sentence
+    for word in words:
+        assert word in sentence
+    assert not (folder / "out").exists()
+
+
+def test_a_model_without_the_outputs_is_refused(folder: Path) -> None:
+    (folder / "model.toml").write_text(MODEL.split("[outputs]")[0])
+    with pytest.raises(UserError, match=r"'one_body' gives none of the outputs E_Y0C, E_R0T"):
+        run(folder / "experiment.toml", folder / "out")
+
+
+def test_an_interrupted_run_leaves_what_was_there(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = run(folder / "experiment.toml", folder / "out")
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("discovery.experiment.write_run", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run(folder / "experiment.toml", out)
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+    assert not [path for path in folder.iterdir() if path.name.startswith(".")]
+
+
+def test_a_folder_that_holds_something_else_is_left_alone(folder: Path) -> None:
+    (folder / "mine").mkdir()
+    (folder / "mine" / "thesis.tex").write_text("...")
+    with pytest.raises(UserError, match="something else than results"):
+        run(folder / "experiment.toml", folder / "mine")
+    assert (folder / "mine" / "thesis.tex").exists()
+
+
+def test_a_run_replaces_an_older_one_as_a_whole(folder: Path) -> None:
+    out = run(folder / "experiment.toml", folder / "out")
+    shorter = EXPERIMENT.replace('superposition = { kind = "superposition", inputs = ["T_env", "P"] }\n', "")
+    (folder / "experiment.toml").write_text(shorter)
+    run(folder / "experiment.toml", out)
+    assert not (out / "models" / "superposition.toml").exists()
+
+
+def test_runs_side_by_side(folder: Path) -> None:
+    first = run(folder / "experiment.toml", folder / "one")
+    (folder / "experiment.toml").write_text(EXPERIMENT.replace('fit = ["a", "b"]', 'fit = ["a"]'))
+    second = run(folder / "experiment.toml", folder / "two")
+    text = "\n".join(comparison([first, second]))
+    assert "Recording 'c' (held out)" in text
+    for out in (first, second):
+        assert f"{out}: one_body" in text
+    with pytest.raises(UserError, match="two or more runs"):
+        list(comparison([first]))
+    with pytest.raises(UserError, match=r"no results\.json"):
+        list(comparison([first, folder]))
+
+
+def test_the_command_line(folder: Path) -> None:
+    runner = CliRunner()
+    done = runner.invoke(app, ["run", str(folder / "experiment.toml"), "--out", str(folder / "out")])
+    assert done.exit_code == 0, done.output
+    assert "report.html" in done.output
+    assert runner.invoke(app, ["compare", str(folder / "out"), str(folder / "out")]).exit_code == 0
+    failed = runner.invoke(app, ["run", str(folder / "nothing.toml")])
+    assert failed.exit_code == 1
+    assert "no such file" in failed.output
+    assert runner.invoke(app, ["run"]).exit_code == 2
+
+
+@pytest.mark.parametrize("name", ["nmv5000", "tclab"])
+def test_the_experiments_of_the_repository_load(name: str) -> None:
+    experiment = load_experiment(Path(__file__).parents[1] / "experiments" / f"{name}.toml")
+    assert not set(experiment.fit) & set(experiment.held_out)
+    for model, entry in experiment.form.models.items():
+        if entry.kind == "file":
+            assert experiment.model_file(model).outputs or experiment.model_file(model).states
