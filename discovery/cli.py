@@ -277,5 +277,50 @@ def export(
         typer.echo(line)
 
 
+@app.command()
+def compensate(
+    model: Annotated[Path, typer.Argument(help="An exported model (.json).")],
+    inputs: Annotated[str | None, typer.Option(help="CSV file with time and the inputs, or - for stdin.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="CSV file of the offsets [stdout].")] = None,
+    state: Annotated[
+        Path | None, typer.Option(help="Folder that keeps state and models; another MODEL there runs in the shadow first.")
+    ] = None,
+    trust: Annotated[Path | None, typer.Option(help="Public key (.pub) that must have signed the model.")] = None,
+    allow_unsigned: Annotated[bool, typer.Option("--allow-unsigned", help="Try a model without a key.")] = False,
+    shadow_hours: Annotated[float, typer.Option(help="Length of a shadow run.")] = 24.0,
+    back: Annotated[bool, typer.Option("--back", help="One step back to the model before, in --state.")] = False,
+    opcua: Annotated[Path | None, typer.Option(help="TOML file of an OPC UA connection.")] = None,
+    opcua_demo: Annotated[
+        bool, typer.Option("--opcua-demo", help="Start a simulated machine server and compensate it.")
+    ] = False,
+    seconds: Annotated[float | None, typer.Option(help="Stop OPC UA after so long.")] = None,
+) -> None:
+    """Run an exported model: readings in, offsets [um, um/m] with status word and heartbeat out.
+
+    \b
+    discovery compensate model.json --trust machine.pem.pub --inputs today.csv --out offsets.csv --state memory
+    discovery compensate model.json --allow-unsigned --opcua-demo --seconds 60
+    """
+    from discovery.runtime.command import compensate_rows, go_back, trusted_model
+
+    def say(text: str) -> None:
+        typer.echo(text, err=True)
+
+    if back:
+        if state is None:
+            raise UserError("--back needs --state, the folder that keeps the models")
+        go_back(state, say)
+        return
+    exported = trusted_model(model, trust, allow_unsigned=allow_unsigned)
+    if opcua is not None or opcua_demo:
+        from discovery.runtime.opcua import compensate_opcua
+
+        compensate_opcua(exported, opcua, model=model, folder=state, seconds=seconds, say=say)
+    elif inputs is not None:
+        compensate_rows(exported, inputs, out, model=model, folder=state, shadow_hours=shadow_hours, say=say)
+    else:
+        raise UserError("say where the readings come from: --inputs FILE, --inputs -, --opcua FILE or --opcua-demo")
+
+
 if __name__ == "__main__":
     sys.exit(app())

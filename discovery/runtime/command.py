@@ -1,0 +1,102 @@
+"""`discovery compensate`: from files and streams to offsets."""
+
+from __future__ import annotations
+
+import gzip
+import sys
+from collections.abc import Iterable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TextIO
+
+from discovery.errors import UserError
+from discovery.export.document import Exported, read_document
+from discovery.export.seal import public_key, require_trusted
+from discovery.runtime.compensator import Compensator, Settings, Tick
+from discovery.runtime.rows import csv_rows, ticks
+from discovery.runtime.session import Say, Session
+from discovery.runtime.shadow import Rule
+from discovery.runtime.store import step_back
+
+
+def trusted_model(model: Path, trust: Path | None, *, allow_unsigned: bool) -> Exported:
+    """The model, if it is signed by the owner of the key `trust`.
+
+    Raises:
+        UserError: unsigned or signed by someone else, and `allow_unsigned` is not said.
+    """
+    exported = read_document(model)
+    if trust is not None:
+        require_trusted(exported.seal, public_key(trust), model)
+    elif not allow_unsigned:
+        raise UserError(
+            f"{model}: no key is trusted, so the model is not run; say --trust KEY.pub of the key that signed it, "
+            "or --allow-unsigned to try it where no machine hangs on it"
+        )
+    return exported
+
+
+def compensate_rows(
+    exported: Exported,
+    source: str,
+    out: Path | None,
+    *,
+    model: Path,
+    folder: Path | None = None,
+    shadow_hours: float = 24.0,
+    say: Say = lambda _: None,
+) -> None:
+    """Ticks over the rows of a CSV file, or of standard input (`-`), to `out` or standard output.
+
+    With `folder` the state is kept there: a restart goes on after the last state saved, and ticks done again stand twice in
+    `out`; the later ones count.
+    """
+    step = exported.compiled.step_s
+    session = Session(exported, model=model, folder=folder, settings=Settings(tick_s=step), rule=Rule(hours=shadow_hours), say=say)
+    with ExitStack() as stack:
+        lines: Iterable[str] = sys.stdin if source == "-" else stack.enter_context(_open(Path(source)))
+        goes_on = out is not None and out.exists() and session.resumed is not None
+        stream: TextIO = sys.stdout
+        if out is not None:
+            out.parent.mkdir(parents=True, exist_ok=True)
+            stream = stack.enter_context(out.open("a" if goes_on else "w", encoding="utf-8"))
+        if not goes_on:
+            stream.write(header(session.compensator))
+        last = None
+        for now, newest, fresh in ticks(csv_rows(lines), step, session.resumed):
+            found = session.tick(newest, fresh, now)
+            stream.write(line(session.compensator, found))
+            if source == "-":
+                stream.flush()
+            last = now
+        if last is None:
+            say("no row came after the saved state; nothing was done")
+        else:
+            session.save(last)
+
+
+def header(compensator: Compensator) -> str:
+    """First line of the output: time [s] at which the offsets are valid, state, status word, heartbeat, offsets, model."""
+    return ",".join(["time", "state", "status", "heartbeat", *compensator.names, "model"]) + "\n"
+
+
+def line(compensator: Compensator, tick: Tick) -> str:
+    """A tick as a line of CSV."""
+    numbers = [f"{tick.offsets[name]:.4f}" for name in compensator.names]
+    cells = [f"{tick.valid_at:.10g}", tick.state.name, str(tick.status), str(tick.heartbeat), *numbers]
+    return ",".join([*cells, compensator.exported.seal.sha256[:12]]) + "\n"
+
+
+def go_back(folder: Path, say: Say) -> None:
+    """One step back to the model before."""
+    back = step_back(folder)
+    say(f"revision {back.revision} of '{back.model.name}' is at work again; its offsets begin where the last ones were")
+
+
+def _open(path: Path) -> TextIO:
+    if not path.is_file():
+        raise UserError(f"{path}: there is no such file; name a CSV file with the columns time and the inputs of the model, or -")
+    if path.suffix == ".gz":
+        return gzip.open(path, "rt", encoding="utf-8", errors="replace", newline="")
+    return path.open(encoding="utf-8", errors="replace", newline="")
+

@@ -1,0 +1,88 @@
+"""Readings from CSV text, and the ticks between them."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from datetime import datetime
+
+from discovery.errors import UserError
+from discovery.runtime.guards import Reading
+
+LONGEST_SILENCE_S = 3600.0  # a longer gap in the rows: the machine, and its runtime, were off
+LONGEST_JUMP_S = 400 * 24 * 3600.0  # a row that claims to be later than this is damaged
+
+
+def csv_rows(lines: Iterable[str]) -> Iterator[tuple[float, dict[str, Reading]]]:
+    """Instant [s] and readings by name of each row; an empty cell is no reading, a damaged one is a bad reading.
+
+    A row whose time cannot be read or runs backwards is left out.
+
+    Raises:
+        UserError: no column `time`.
+    """
+    reader = csv.reader(lines)
+    header = [cell.strip() for cell in next(reader, [])]
+    if "time" not in header:
+        raise UserError(f"the inputs have no column 'time'; their first line is {','.join(header)[:80]!r}")
+    place, last = header.index("time"), -math.inf
+    while True:
+        try:
+            row = next(reader)
+        except StopIteration:
+            return
+        except csv.Error:
+            continue
+        stamp = _time(row[place]) if place < len(row) else math.nan
+        if not stamp >= last or (last > -math.inf and stamp - last > LONGEST_JUMP_S):
+            continue
+        last = stamp
+        cells = {name: cell for name, cell in zip(header, row, strict=False) if name != "time" and cell.strip()}
+        yield stamp, {name: Reading(_number(cell), stamp) for name, cell in cells.items()}
+
+
+def ticks(
+    rows: Iterable[tuple[float, Mapping[str, Reading]]], tick_s: float, after: float | None = None
+) -> Iterator[tuple[float, dict[str, Reading], dict[str, Reading]]]:
+    """Instants of the ticks: with the newest readings of each input, and the readings that are new since the last tick.
+
+    Args:
+        tick_s: time between ticks [s].
+        after: the first tick comes after this instant (a restart); rows before it fill in what is known.
+    """
+    newest: dict[str, Reading] = {}
+    fresh: dict[str, Reading] = {}
+    following: float | None = None if after is None else after + tick_s
+    for time, readings in rows:
+        if following is None:
+            following = time
+        if time - following > LONGEST_SILENCE_S:
+            following = time
+        while following < time:
+            yield following, newest, fresh
+            fresh = {}
+            following += tick_s
+        newest.update(readings)
+        if after is None or time > after:
+            fresh.update(readings)
+    if following is not None and newest:
+        yield following, newest, fresh
+
+
+def _time(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        pass
+    try:
+        return datetime.fromisoformat(cell.strip()).timestamp()
+    except (ValueError, OverflowError):
+        return math.nan
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan

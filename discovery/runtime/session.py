@@ -1,0 +1,77 @@
+"""A session: a model at work on a source of readings, its memory on disk, a candidate in its shadow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from discovery.export.document import Exported
+from discovery.runtime.compensator import Compensator, Settings, Tick
+from discovery.runtime.guards import Reading
+from discovery.runtime.persistence import restore, save, succeed
+from discovery.runtime.shadow import Rule, Shadow, begin_shadow, take_over
+from discovery.runtime.store import open_store, refuse_candidate, replace_active
+
+Say = Callable[[str], None]
+
+
+class Session:
+    """Runs a compensator and everything around it."""
+
+    def __init__(
+        self,
+        exported: Exported,
+        *,
+        model: Path | None = None,
+        folder: Path | None = None,
+        settings: Settings | None = None,
+        rule: Rule | None = None,
+        save_every_s: float = 600.0,
+        say: Say = lambda _: None,
+    ) -> None:
+        self.folder, self.say, self.save_every_s = folder, say, save_every_s
+        self.settings = settings or Settings()
+        self.shadow: Shadow | None = None
+        self.resumed: float | None = None
+        self.saved: float | None = None
+        if folder is not None and model is not None:
+            models = open_store(folder, model, exported)
+            exported = models.active
+            if models.candidate is not None:
+                self.shadow = begin_shadow(models.candidate, self.settings, rule)
+                say(f"revision {models.candidate.revision} runs in the shadow of revision {exported.revision}")
+        self.compensator = Compensator(exported, self.settings)
+        if folder is not None:
+            self.resumed = restore(self.compensator, folder)
+            if self.resumed is None:
+                succeed(self.compensator, folder)
+
+    def tick(self, readings: Mapping[str, Reading], measured: Mapping[str, Reading], now: float, *, enabled: bool = True) -> Tick:
+        """One tick; `measured`: readings that came since the last one, among them measured errors."""
+        found = self.compensator.tick(readings, now, enabled=enabled)
+        if self.shadow is not None:
+            self.shadow.tick(self.compensator, readings, measured, now)
+            verdict = self.shadow.verdict(now)
+            if verdict is not None:
+                self._decide(*verdict)
+        if self.folder is not None and (self.saved is None or now - self.saved >= self.save_every_s):
+            self.save(now)
+        return found
+
+    def _decide(self, passed: bool, why: str) -> None:
+        assert self.shadow is not None
+        assert self.folder is not None
+        if passed:
+            self.compensator = take_over(self.compensator, self.shadow.compensator)
+            replace_active(self.folder)
+            self.saved = None
+        else:
+            refuse_candidate(self.folder)
+        self.say(f"the new model {'takes over' if passed else 'is refused'}: {why}")
+        self.shadow = None
+
+    def save(self, now: float) -> None:
+        """Write the state to disk."""
+        if self.folder is not None and self.compensator.origin is not None:
+            save(self.compensator, self.folder)
+            self.saved = now

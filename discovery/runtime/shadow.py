@@ -1,0 +1,96 @@
+"""A new model runs in the shadow of the old one before it may take its place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from discovery.export.document import Exported
+from discovery.runtime.compensator import Compensator, Settings, State
+from discovery.runtime.guards import Reading, number
+
+
+@dataclass(frozen=True)
+class Rule:
+    """When a shadow run is passed. `least_readings` measured errors decide by their residual; fewer, and the two models may
+    not differ by more than `most_um`."""
+
+    hours: float = 24.0
+    least_readings: int = 5
+    worse: float = 1.05
+    most_um: float = 20.0
+
+
+@dataclass
+class Shadow:
+    """A candidate beside the model at work: the same readings, offsets that nobody sees."""
+
+    compensator: Compensator
+    rule: Rule
+    began: float | None = None
+    difference: float = 0.0
+    trouble: bool = False
+    residuals: dict[str, list[tuple[float, float]]] = field(default_factory=dict)  # old, new
+
+    def tick(self, active: Compensator, readings: Mapping[str, Reading], measured: Mapping[str, Reading], now: float) -> None:
+        """Follow a tick of the model at work."""
+        if self.began is None and active.predicted is not None:
+            self.began = now
+            self.compensator.succeed(active.states(), dict(zip(active.names, active.offsets, strict=True)))
+        if self.began is None:
+            return
+        found = self.compensator.tick(readings, now)
+        self.trouble |= found.state in (State.FROZEN, State.FAULT)
+        old, new = predictions(active), predictions(self.compensator)
+        for name in old.keys() & new.keys():
+            self.difference = max(self.difference, abs(old[name] - new[name]))
+            reading = number(measured[name].value) if name in measured else math.nan
+            if math.isfinite(reading):
+                self.residuals.setdefault(name, []).append((reading - old[name], reading - new[name]))
+
+    def verdict(self, now: float) -> tuple[bool, str] | None:
+        """Whether the candidate may take over, and why; None: not yet known."""
+        if self.trouble:
+            return False, "the new model failed in its shadow run"
+        if self.began is None or now - self.began < self.rule.hours * 3600.0:
+            return None
+        count = sum(len(pairs) for pairs in self.residuals.values())
+        if count >= self.rule.least_readings:
+            old, new = self._rms(0), self._rms(1)
+            text = f"rms of {count} measured errors {new:.2f} with the new model, {old:.2f} with the old one"
+            return new <= self.rule.worse * old, text
+        text = f"the two models differ by at most {self.difference:.2f} um"
+        return self.difference <= self.rule.most_um, text
+
+    def _rms(self, which: int) -> float:
+        """Of the residuals about their mean: where a measurement is zeroed is not the model's affair."""
+        total, count = 0.0, 0
+        for pairs in self.residuals.values():
+            values = [pair[which] for pair in pairs]
+            mean = sum(values) / len(values)
+            total += sum((value - mean) ** 2 for value in values)
+            count += len(values)
+        return math.sqrt(total / max(count, 1))
+
+
+def predictions(compensator: Compensator) -> dict[str, float]:
+    """Predicted errors by name; none before the first step."""
+    if compensator.predicted is None:
+        return {}
+    return {n: float(compensator.predicted[k]) for n, k in zip(compensator.names, compensator.places, strict=True)}
+
+
+def begin_shadow(candidate: Exported, settings: Settings, rule: Rule | None = None) -> Shadow:
+    """A shadow run of a candidate."""
+    return Shadow(Compensator(candidate, settings), rule or Rule())
+
+
+def take_over(old: Compensator, new: Compensator) -> Compensator:
+    """The new model at work: its offsets begin where the old ones are, the difference fades."""
+    before = dict(zip(old.names, old.offsets, strict=True))
+    new.offsets = [before.get(name, 0.0) for name in new.names]
+    if new.predicted is not None:
+        new.bump = [o + float(new.predicted[k]) for o, k in zip(new.offsets, new.places, strict=True)]
+    new.heartbeat, new.state, new.since = old.heartbeat, old.state, old.since
+    return new

@@ -1,0 +1,60 @@
+"""The models of a machine: the one at work, the one before it, and one that waits in the shadow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from discovery.errors import UserError
+from discovery.export.document import Exported, read_document
+from discovery.files import write_atomic
+
+ACTIVE, PREVIOUS, CANDIDATE, REFUSED = "active.json", "previous.json", "candidate.json", "refused.json"
+
+
+@dataclass(frozen=True)
+class Models:
+    """What works, and what is tried beside it."""
+
+    active: Exported
+    candidate: Exported | None
+
+
+def open_store(folder: Path, model: Path, exported: Exported) -> Models:
+    """The model at work in `folder`, and `model` as candidate where it is another one.
+
+    The first model of a folder is at work at once: there is nothing yet that a shadow run could be compared with.
+    """
+    data = model.read_bytes()
+    if not (folder / ACTIVE).exists():
+        write_atomic(folder / ACTIVE, data)
+    active = read_document(folder / ACTIVE)
+    if active.seal.sha256 == exported.seal.sha256:
+        return Models(active, None)
+    write_atomic(folder / CANDIDATE, data)
+    return Models(active, exported)
+
+
+def replace_active(folder: Path) -> None:
+    """The candidate becomes the model at work; that one is kept for one step back."""
+    write_atomic(folder / PREVIOUS, (folder / ACTIVE).read_bytes())
+    (folder / CANDIDATE).replace(folder / ACTIVE)
+
+
+def refuse_candidate(folder: Path) -> None:
+    """The candidate is put aside."""
+    (folder / CANDIDATE).replace(folder / REFUSED)
+
+
+def step_back(folder: Path) -> Exported:
+    """The model before the one at work takes over again; the other one is kept in its place.
+
+    Raises:
+        UserError: there is none before.
+    """
+    if not (folder / PREVIOUS).exists():
+        raise UserError(f"{folder}: there is no model before the one at work, so no step back")
+    now, before = (folder / ACTIVE).read_bytes(), (folder / PREVIOUS).read_bytes()
+    write_atomic(folder / ACTIVE, before)
+    write_atomic(folder / PREVIOUS, now)
+    return read_document(folder / ACTIVE)
