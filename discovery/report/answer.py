@@ -113,7 +113,8 @@ def _less(share: float, short: bool = False) -> str:
 def _count(run: Run, model: str) -> str:
     pairs = cells(run, model)
     recordings, outputs = {r for r, _ in pairs}, {o for _, o in pairs}
-    return f"{len(outputs)} error{'s' * (len(outputs) != 1)} and {len(recordings)} recording{'s' * (len(recordings) != 1)}"
+    what = "error" if is_error(run) else "output"
+    return f"{len(outputs)} {what}{'s' * (len(outputs) != 1)} and {len(recordings)} recording{'s' * (len(recordings) != 1)}"
 
 
 def _worst(run: Run, model: str) -> str:

@@ -82,8 +82,13 @@ def _physics(d: Mapping[str, Any]) -> Printed:
         )
         again = percent(one["named_again"]) if one.get("named_again") is not None else "–"
         rows.append(Line((*cells, again)))
-    header = ("Effect", "Where", "Probability", "Term", "Size (95 %)", "Named again in blind repetitions")
-    return Printed("What the repaired model adds", header, tuple(rows), frozenset({1, 3, 4}))
+    header = ("Effect", "Where", "Probability", "Term", "Size (95 %)", "Named again")
+    return Printed(
+        "What the repaired model adds; the last column: how often a blind search finds it again",
+        header,
+        tuple(rows),
+        frozenset({1, 3, 4}),
+    )
 
 
 def _proof(d: Mapping[str, Any]) -> Printed:

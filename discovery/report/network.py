@@ -43,8 +43,11 @@ def edges(model: Model) -> list[Edge]:
 
 def drawing(model: Model, heat: Mapping[str, float], unit: str = "W") -> str:
     """SVG of the network; `heat` by state colours its bodies (a share of 1 or watts, as `unit` says)."""
-    links = edges(model)
-    bodies = list(model.states)
+    bodies = [name for name, state in model.states.items() if state.capacity or state.unit == "degC"]
+    helpers = set(model.states) - set(
+        bodies
+    )  # lags and other memory: no bodies, their inputs are drawn at the body
+    links = [link for link in edges(model) if not helpers & {link.one, link.other}]
     inputs = sorted({end for link in links for end in (link.one, link.other)} - set(bodies))
     place = _layout(bodies, inputs, links)
     largest = max((abs(value) for value in heat.values()), default=0.0) or 1.0
@@ -70,7 +73,7 @@ def _layout(bodies: list[str], inputs: list[str], links: list[Edge]) -> dict[str
         angle = 2 * math.pi * index / max(len(order), 1) - math.pi / 2
         angles[name] = angle
         spread = 0.0 if len(order) == 1 else 1.0
-        place[name] = (centre[0] + spread * 165 * math.cos(angle), centre[1] + spread * 105 * math.sin(angle))
+        place[name] = (centre[0] + spread * 190 * math.cos(angle), centre[1] + spread * 115 * math.sin(angle))
     wished = {
         name: _mean_angle(
             [
@@ -85,7 +88,7 @@ def _layout(bodies: list[str], inputs: list[str], links: list[Edge]) -> dict[str
     }
     for index, name in enumerate(sorted(inputs, key=lambda name: wished[name])):
         angle = 2 * math.pi * (index + 0.5) / len(inputs) - math.pi
-        place[name] = (centre[0] + 300 * math.cos(angle), centre[1] + 190 * math.sin(angle))
+        place[name] = (centre[0] + 315 * math.cos(angle), centre[1] + 192 * math.sin(angle))
     return place
 
 

@@ -62,6 +62,8 @@ def render(run: Run) -> str:
         "shaded": any(chart.shades for chart in curves),
         "curves": _legend(run, order, curves),
         "summary": summary(run),
+        "errors": is_error(run),
+        "unseen": bool(run.held_out),
         "tables": tables[:shown],
         "more_tables": tables[shown:],
         "paper": paper.SOURCE if set(run.outputs) & set(paper.TABLE_3) else "",
