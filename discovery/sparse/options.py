@@ -19,7 +19,11 @@ class SparseOptions(BaseModel):
         None, description="channels that terms may use; default every input that moves in the recordings to fit"
     )
     baseline: str = Field("eq9", description='"eq9", or a gray-box model file whose terms are built upon')
-    keep_baseline: bool = Field(False, description="true: the baseline's terms are always in; false: free to leave")
+    keep_baseline: bool | None = Field(
+        None,
+        description="true: the baseline's terms are always in; false: free to leave; default true for a file, "
+        "false for eq9",
+    )
     form: Literal["auto", "masses", "rates"] = Field(
         "auto",
         description='"masses": hidden thermal masses driven by the inputs; "rates": terms in the rates of the '

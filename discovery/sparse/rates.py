@@ -28,13 +28,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A term that may be added: `coefficient * expression` into a state."""
+    """A term that may be added: `coefficient * expression` into a state (and out of `source`, where heat is exchanged)."""
 
     into: str
     expression: Expression
     low: float = -np.inf
     high: float = np.inf
     start: float = 0.0
+    source: str | None = None
 
     @property
     def label(self) -> str:
@@ -58,7 +59,7 @@ def with_candidates(model: Model, candidates: Sequence[Candidate]) -> tuple[Mode
         parameters[name] = Parameter(candidate.start, unit, candidate.low, candidate.high)
         product = text(candidate.expression)
         expression = parse_product(name, product)
-        terms.append(Term(f"{product} in {candidate.into}", candidate.into, expression))
+        terms.append(Term(f"{product} in {candidate.into}", candidate.into, expression, candidate.source))
         labels[name] = f"{candidate.into}: {product}"
     return model.with_terms(*terms, parameters=parameters), labels
 
