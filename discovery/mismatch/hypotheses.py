@@ -187,7 +187,7 @@ def _claim(
             if effect.place == "inputs of a recording":
                 swaps = {
                     c: substitute(formula, {**base, "input": Name(c)})
-                    for c in names(term.expression) & set(channels)
+                    for c in names(term.expression) & set(channels) - set(model.states)
                 }
             else:
                 swaps = {c: fresh for c in names(term.expression) & names(fresh) & set(channels)}
@@ -274,7 +274,7 @@ def _places(
             if terms:
                 yield tuple(dict.fromkeys(t.into for t in terms)), terms, ()
         case "inputs of a recording":
-            terms = tuple(t for t in model.terms if not t.effect and names(t.expression) & set(channels))
+            terms = tuple(t for t in model.terms if not t.effect and names(t.expression) & set(channels) - set(model.states))
             if terms:
                 yield (), terms, ()
         case "output" | "output of a recording":
