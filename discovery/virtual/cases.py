@@ -89,15 +89,15 @@ def _sized(world: World, base: Array, effect: Concealed, wanted: float) -> tuple
 
 
 def _one(rng: np.random.Generator, world: World, base: Array) -> Found:
-    """An effect of the catalogue, drawn until one reaches at least size 0.5 without being unphysical."""
+    """An effect of the catalogue, drawn until one can reach the size wanted without being unphysical."""
     wanted = float(np.exp(rng.uniform(np.log(0.5), np.log(4.0))))
-    for _ in range(ATTEMPTS):
+    for attempt in range(ATTEMPTS):
         k = int(rng.integers(len(laws.ONE) + 1))
         if k == len(laws.ONE):
             break
         effect = laws.ONE[k](rng, world.plant.machine)
         size, readings = _sized(world, base, effect, wanted)
-        if world.size_of(readings - base) > 0.47:
+        if world.size_of(readings - base) > (0.9 * wanted if attempt < ATTEMPTS // 2 else 0.47):
             return readings, _key_of(world, effect, size, readings - base)
     return _window(rng, world, base, wanted)
 

@@ -103,6 +103,18 @@ def fluid_convection_speed(rng: Draw, _: FineMachine) -> Concealed:
     )
 
 
+def rim_detachment(rng: Draw, m: FineMachine) -> Concealed:
+    """C-Body 1 is wetted less the faster the table throws the film off, with an edge of its own steepness."""
+    edge, p = rng.uniform(120, 300), rng.uniform(1.5, 3.0)
+
+    def thrown(u: Inputs) -> Array:
+        return np.asarray(-m.wet[1] * u.pump * (1.0 - 1.0 / (1.0 + (u.speed / edge) ** p)))
+
+    law, also = body_law(fine.TO_REF, 1, thrown, fluid), ("fluid_convection_speed",)
+    shape = {"n_c": edge, "m": p}
+    return Concealed("rim_detachment", (BODIES[1],), law, "1", 0.5, 1.0, "pump > 0.5", shape, (), also)
+
+
 def evaporation_drying(rng: Draw, _: FineMachine) -> Concealed:
     """After the pump the film m dries by m' = -m^p/tau, p 0 to 0.7: neither straight nor exponential."""
     b, tau, p = one_of(rng, WET), rng.uniform(1500, 4000), rng.uniform(0.0, 0.7)
@@ -211,6 +223,7 @@ def contact_conductance(rng: Draw, m: FineMachine) -> Concealed:
 ONE: tuple[Maker, ...] = (
     fluid_convection,
     fluid_convection_speed,
+    rim_detachment,
     evaporation_drying,
     film_drag,
     flooded_gap,

@@ -83,7 +83,7 @@ def draw_world(rng: np.random.Generator, *, coloured: bool) -> World:
 
     coloured: small unmodelled heat (2 W, 3 h) at every body.
     """
-    sigma = round(float(rng.uniform(0.3, 0.8)), 2)
+    sigma = round(float(rng.uniform(0.3, 0.7)), 2)
     machine = replace(draw_machine(rng), stiffness=float(rng.uniform(0.4, 2.5)))
     inputs = tuple(draw_inputs(rng, machine) for _ in RECORDINGS)
     starts = tuple(np.asarray(u.air[0] + rng.normal(0.0, 0.25, 5)) for u in inputs)
