@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from discovery.report.mismatch import sizes
 from discovery.report.ranking import cells, is_discovered, is_error, mean_improvement, ranked, ratio
-from discovery.report.run import Run, pretty_unit
+from discovery.report.run import Run
 from discovery.report.text import listed, number, percent, words
 
 _VERDICTS = {
@@ -140,7 +141,7 @@ def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
     sentence = f"{lead} in “{model}”"
     if found:
         sentence += f": {listed([_effect(one) for one in found])}"
-    points = [_size(one) for one in found if one.get("parameters")]
+    points = [f"Size of {words(one['effect'])}: {listed(sizes(one))}." for one in found if sizes(one)]
     p_value = diagnosis.get("detection", {}).get("p_value")
     if p_value is not None:
         chance = "less than 1 in 1000" if p_value < 1e-3 else f"p = {number(p_value, 2)}"
@@ -161,19 +162,6 @@ def _effect(one: Mapping[str, Any]) -> str:
     sure = one.get("probability")
     text = f"{words(str(one.get('effect', 'unknown')))}{f' at {states}' if states else ''}"
     return text + (f" ({percent(sure)} sure)" if sure is not None else "")
-
-
-def _size(one: Mapping[str, Any]) -> str:
-    sizes = [
-        f"{name} = {number(p.get('value'))} {pretty_unit(str(p.get('unit', '')))}".rstrip()
-        + (
-            f" (95 %: {number(p['low'])} to {number(p['high'])})"
-            if p.get("low") is not None and p.get("high") is not None
-            else ""
-        )
-        for name, p in one["parameters"].items()
-    ]
-    return f"Size of {words(str(one.get('effect')))}: {listed(sizes)}."
 
 
 def _proof(diagnosis: Mapping[str, Any]) -> list[str]:

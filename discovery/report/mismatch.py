@@ -61,12 +61,14 @@ def _about(d: Mapping[str, Any]) -> str:
     return text
 
 
-def _sizes(one: Mapping[str, Any]) -> str:
-    return "; ".join(
+def sizes(one: Mapping[str, Any]) -> list[str]:
+    """The parameters of an effect that was found, each with its interval; a switch that is on is no size."""
+    return [
         f"{name} = {number(p.get('value'))} {pretty_unit(str(p.get('unit', '')))} "
-        f"({number(p.get('low'))} to {number(p.get('high'))})"
+        f"(95 %: {number(p.get('low'))} to {number(p.get('high'))})"
         for name, p in (one.get("parameters") or {}).items()
-    )
+        if p.get("low") != p.get("high")
+    ]
 
 
 def _physics(d: Mapping[str, Any]) -> Printed:
@@ -78,11 +80,11 @@ def _physics(d: Mapping[str, Any]) -> Printed:
             place,
             percent(one.get("probability")),
             one.get("expression") or "",
-            _sizes(one),
+            "; ".join(sizes(one)),
         )
         again = percent(one["named_again"]) if one.get("named_again") is not None else "–"
         rows.append(Line((*cells, again)))
-    header = ("Effect", "Where", "Probability", "Term", "Size (95 %)", "Named again")
+    header = ("Effect", "Where", "Probability", "Term", "Size", "Named again")
     return Printed(
         "What the repaired model adds; the last column: how often a blind search finds it again",
         header,

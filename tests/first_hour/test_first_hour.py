@@ -1,0 +1,121 @@
+"""As a new user would: a CSV of one's own, columns renamed, in Fahrenheit, from nothing to a diagnosis."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from discovery.cli import app
+
+TCLAB = Path(__file__).parents[2] / "datasets" / "tclab"
+HEADER = "Elapsed (min);Heater A 1;Heater A 2;Plate 1 temp;Plate 2 temp"
+
+
+def own_csv(source: str, target: Path, every: int = 1) -> None:
+    """A run of the two heaters as an engineer may have it: semicolons, decimal commas, minutes, Fahrenheit."""
+    with io.TextIOWrapper(gzip.open(TCLAB / f"{source}.csv.gz")) as file:
+        rows = list(csv.DictReader(file))[::every]
+    lines = [HEADER]
+    for row in rows:
+        numbers = [float(row["time"]) / 60, float(row["heater1"]), float(row["heater2"])]
+        numbers += [float(row[name]) * 1.8 + 32 for name in ("T1", "T2")]
+        lines.append(";".join(f"{number:.4f}".replace(".", ",") for number in numbers))
+    target.write_text("\n".join(lines) + "\n", "utf-8")
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("desk")
+    own_csv("random_both_01", folder / "monday.csv", every=2)
+    own_csv("step_h1_up_090", folder / "tuesday.csv")
+    return folder
+
+
+def test_from_nothing_to_a_diagnosis_in_four_commands(desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(desk)
+    commands = [
+        "new rig --from monday.csv --from tuesday.csv",
+        "check rig",
+        "diagnose rig/experiment.toml --out answer",
+        "explain conduction_path",
+    ]
+    said = []
+    for command in commands:
+        result = CliRunner().invoke(app, command.split())
+        assert result.exit_code == 0, result.output
+        said.append(result.output)
+    assert "Plate_1_temp: temperature, degF" in said[0]
+    assert "a room in Fahrenheit" in said[0]
+    assert "nothing is wrong" in said[1]
+    assert "formula" in said[3]
+    diagnosis = json.loads((desk / "answer" / "diagnosis.json").read_text())
+    assert diagnosis["verdict"] == "missing physics"
+    found = {(one["effect"], *one["states"]): one for one in diagnosis["physics"]}
+    # The source documents heat transfer between the heaters, and conduction to the sensor that lags by about 20 s.
+    assert {("conduction_path", "Plate_1_temp", "Plate_2_temp"), ("sensor_lag", "Plate_1_temp")} <= set(found)
+    lags = [
+        p["value"] for p in found["sensor_lag", "Plate_1_temp"]["parameters"].values() if p["unit"] == "s"
+    ]
+    assert 10 < lags[0] < 30
+    proof = diagnosis["improvement"]["held_out"]["tuesday"]
+    assert proof["rms_after"] < 0.3 * proof["rms_before"]
+    page = (desk / "answer" / "report.html").read_text("utf-8")
+    assert "Physics is missing in “first order”" in page
+
+
+def test_values_in_fahrenheit_arrive_in_celsius(desk: Path) -> None:
+    from discovery.recordings import load_campaign
+
+    result = CliRunner().invoke(app, ["new", str(desk / "one"), "--from", str(desk / "monday.csv")])
+    assert result.exit_code == 0, result.output
+    campaign = load_campaign(desk / "one")
+    with gzip.open(TCLAB / "random_both_01.csv.gz", "rt") as file:
+        first = next(csv.DictReader(file))
+    recording = campaign.recordings["first_part"]
+    assert recording.values["Plate_1_temp"][0] == pytest.approx(float(first["T1"]), abs=1e-3)
+    assert recording.time[1] - recording.time[0] == pytest.approx(10.0, abs=0.02)
+    experiment = tomllib.loads((desk / "one" / "experiment.toml").read_text())
+    assert (experiment["fit"], experiment["held_out"]) == (["first_part"], ["last_part"])
+
+
+def test_nothing_is_overwritten(desk: Path) -> None:
+    arguments = ["new", str(desk / "two"), "--from", str(desk / "monday.csv")]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    again = CliRunner().invoke(app, arguments)
+    assert again.exit_code == 1
+    assert "campaign.toml is there already" in again.stderr
+
+
+def test_a_table_of_errors_makes_files_that_load(tmp_path: Path) -> None:
+    from discovery.experimentfile import load_experiment
+
+    rows = ["time,T_hall [°F],Spindle rpm,P_drive (kW),Coolant temp (°C),E_Y0C [µm],E_A0C [µm/m]"]
+    rows += [
+        f"2026-03-01T08:{k:02d}:00,{70 + k / 30:.2f},{600 * (k % 2)},{0.3 + k / 100:.2f},20.5,{k / 9:.2f},{k / 7:.2f}"
+        for k in range(60)
+    ]
+    (tmp_path / "shift.csv").write_text("\n".join(rows), "utf-8")
+    result = CliRunner().invoke(
+        app, ["new", str(tmp_path / "machine"), "--from", str(tmp_path / "shift.csv")]
+    )
+    assert result.exit_code == 0, result.output
+    experiment = load_experiment(tmp_path / "machine" / "experiment.toml")
+    channels = experiment.campaign.channels
+    assert {name: (c.role, c.unit) for name, c in channels.items()} == {
+        "T_hall": ("ambient temperature", "degC"),
+        "Spindle": ("rotation speed", "rpm"),
+        "P_drive": ("heat load", "W"),
+        "Coolant_temp": ("coolant temperature", "degC"),
+        "E_Y0C": ("error", "um"),
+        "E_A0C": ("error", "um/m"),
+    }
+    assert experiment.outputs == ("E_Y0C", "E_A0C")
+    assert experiment.campaign.recordings["first_part"].values["P_drive"][0] == pytest.approx(300.0)
+    assert experiment.model_file("first_order").outputs == {}

@@ -1,0 +1,79 @@
+"""What columns of an own CSV are taken for, and what is said when a file cannot be read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from discovery.errors import UserError
+from discovery.firsthour.guess import guess
+from discovery.firsthour.table import Column, read_own
+
+CASES = [
+    ("T_room", "", np.linspace(20, 23, 50), "ambient temperature", "degC"),
+    ("Ambient", "", np.linspace(70, 74, 50), "ambient temperature", "degF"),
+    ("bed temperature", "°F", np.linspace(70, 74, 50), "temperature", "degF"),
+    ("T3", "", np.linspace(294, 305, 50), "temperature", "K"),
+    ("coolant", "", np.linspace(18, 22, 50), "coolant temperature", "degC"),
+    ("cooling power", "W", np.linspace(0, 900, 50), "cooling power", "W"),
+    ("emulsion temp", "C", np.linspace(18, 22, 50), "fluid temperature", "degC"),
+    ("pump", "", np.arange(50) % 2, "fluid flow", "1"),
+    ("pump flow", "", np.arange(50) % 3 * 6.0, "fluid flow", "l/min"),
+    ("spindle speed", "", np.arange(50) * 100.0, "rotation speed", "rpm"),
+    ("heater 1", "", np.arange(50) * 2.0, "heat load", "percent"),
+    ("P_drive", "kW", np.linspace(0, 2, 50), "heat load", "kW"),
+    ("E_Z0T", "", np.linspace(0, 20, 50), "error", "um"),
+    ("nozzle height", "mm", np.full(50, 50.0), "nozzle height", "mm"),
+    ("gizmo", "", np.linspace(0, 1, 50), "other input", "1"),
+]
+
+
+@pytest.mark.parametrize(("name", "unit", "values", "role", "expected"), CASES)
+def test_roles_and_units(name: str, unit: str, values: np.ndarray, role: str, expected: str) -> None:  # type: ignore[type-arg]
+    found = guess(Column(name, name.replace(" ", "_"), unit, np.asarray(values, dtype=float)))
+    assert (found.role, found.unit) == (role, expected)
+    assert found.why
+
+
+def _file(folder: Path, *lines: str) -> Path:
+    path = folder / "own.csv"
+    path.write_text("\n".join(lines), "utf-8")
+    return path
+
+
+def test_a_row_of_units_is_read(tmp_path: Path) -> None:
+    table = read_own(
+        _file(tmp_path, "t\tT1\tP", "h\t°F\tkW", *(f"{k / 10}\t{70 + k}\t{k}" for k in range(20)))
+    )
+    assert table.time[1] == pytest.approx(360.0)
+    assert [(c.name, c.unit) for c in table.columns] == [("T1", "°F"), ("P", "kW")]
+
+
+def test_instants_of_a_logger(tmp_path: Path) -> None:
+    rows = [f"01.03.2026 08:{k:02d}:30;{k},5" for k in range(15)]
+    table = read_own(_file(tmp_path, "Zeit;T bed", *rows))
+    assert table.time[-1] == pytest.approx(14 * 60.0)
+    assert table.columns[0].name == "T_bed"
+    assert table.columns[0].values[3] == 3.5
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (["time,T1", *(f"{k},{k}" for k in range(12)), "12,x"], r"line 14, column 'T1': 'x' is not a number"),
+        (["time,T1", *(f"{k},{k}" for k in range(12)), "5,5"], r"line 14: the time does not run forward"),
+        (["time,T1", *(f"{k},{k}" for k in range(12)), "12,5,6"], r"line 14: 3 cells where the header has 2"),
+        (["T1,T2", *("1,2" for _ in range(12))], "no column of time was found"),
+        (["time,T1", "0,1", "1,2"], "only 2 rows"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, lines: list[str], said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        read_own(_file(tmp_path, *lines))
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="cannot be read"):
+        read_own(tmp_path / "none.csv")

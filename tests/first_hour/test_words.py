@@ -1,0 +1,55 @@
+"""Words explained, and schemas that accept the files that come with the workbench."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+from typer.testing import CliRunner
+
+from discovery.cli import app
+from discovery.firsthour.schemas import schema
+from discovery.mismatch.catalogue import catalogue
+
+ROOT = Path(__file__).parents[2]
+FILES = [("campaign", ROOT / "datasets/tclab/campaign.toml"), ("campaign", ROOT / "datasets/nmv5000/campaign.toml"),
+         ("model", ROOT / "datasets/nmv5000/thermobalance.toml"), ("experiment", ROOT / "experiments/nmv5000.toml"),
+         ("experiment", ROOT / "experiments/tclab.toml")]  # fmt: skip
+
+
+@pytest.mark.parametrize("word", sorted(catalogue()))
+def test_every_effect_is_explained(word: str) -> None:
+    result = CliRunner().invoke(app, ["explain", word])
+    effect = catalogue()[word]
+    assert result.exit_code == 0
+    for part in (effect.title, effect.formula, effect.signature, effect.source, *effect.confused_with):
+        assert part in result.output
+
+
+def test_a_mistaken_word_is_told_the_nearest() -> None:
+    result = CliRunner().invoke(app, ["explain", "floded_gap"])
+    assert result.exit_code == 1
+    assert "did you mean 'flooded_gap'?" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("what", "word"),
+    [("effects", "flooded_gap"), ("models", "superposition"), ("roles", "coolant temperature")],
+)
+def test_lists(what: str, word: str) -> None:
+    result = CliRunner().invoke(app, ["list", what])
+    assert result.exit_code == 0
+    assert word in result.output
+
+
+@pytest.mark.parametrize(("kind", "path"), FILES, ids=lambda value: getattr(value, "stem", value))
+def test_schemas_accept_our_files(kind: str, path: Path) -> None:
+    document = json.loads(schema(kind))
+    jsonschema.Draft202012Validator.check_schema(document)
+    data = tomllib.loads(path.read_text("utf-8"))
+    jsonschema.validate(data, document)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(data | {"misspelt": 1}, document)
