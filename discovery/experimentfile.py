@@ -22,7 +22,11 @@ from discovery.recordings.campaignfile import CampaignForm, campaign_path
 from discovery.schema import Strict, suggest
 from discovery.sparse.options import SparseOptions
 
-_INPUT_ROLES = ("ambient temperature", "heat load", "fluid temperature")  # of eqs. (8) and (9), in the paper's order
+_INPUT_ROLES = (
+    "ambient temperature",
+    "heat load",
+    "fluid temperature",
+)  # of eqs. (8) and (9), in the paper's order
 
 
 def _file_name(name: str) -> str:
@@ -56,7 +60,9 @@ class SuperpositionEntry(Strict):
     inputs: list[str] | None = Field(None, min_length=1, description="default by role, as in the paper")
     outputs: list[str] | None = Field(None, min_length=1, description="default: those of the experiment")
     separate: dict[str, Annotated[list[str], Field(min_length=1)]] | None = Field(
-        None, min_length=1, description="input -> its recordings; fitted in this order, one input after the other"
+        None,
+        min_length=1,
+        description="input -> its recordings; fitted in this order, one input after the other",
     )
     loss: Loss = Field("linear", description="how outliers pull")
 
@@ -97,7 +103,9 @@ class ExperimentForm(Strict):
     outputs: list[str] | None = Field(None, min_length=1, description="default: every channel of role error")
     fit: list[str] = Field(min_length=1, description="recordings that fits may see")
     held_out: list[str] = Field([], description="recordings that nothing sees before the end")
-    cross_validate: bool = Field(True, description="leave recordings and blocks out of the fit, one after the other")
+    cross_validate: bool = Field(
+        True, description="leave recordings and blocks out of the fit, one after the other"
+    )
     models: dict[Annotated[str, AfterValidator(_file_name)], TaggedEntry] = Field(min_length=1)
     mismatch: MismatchForm | None = None
     export: ExportForm | None = None
@@ -159,13 +167,16 @@ class Experiment:
 
 def only(campaign: Campaign, names: Collection[str]) -> Campaign:
     """The campaign with the recordings of these names alone."""
-    return replace(campaign, recordings={name: campaign.recordings[name] for name in campaign.recordings if name in names})
+    return replace(
+        campaign,
+        recordings={name: campaign.recordings[name] for name in campaign.recordings if name in names},
+    )
 
 
 def load_experiment(path: str | os.PathLike[str]) -> Experiment:
     """The experiment at `path` with its campaign.
 
-    Raises UserError: a mistake in the experiment, the campaign or a recording, with file, line and what to do.
+    Raises UserError: a mistake in the experiment, the campaign or a recording, with file, line, what to do.
     """
     path = Path(path)
     form = read_toml(path, ExperimentForm)
@@ -174,7 +185,7 @@ def load_experiment(path: str | os.PathLike[str]) -> Experiment:
     if not outputs:
         raise UserError(
             f'{path}: no channel of {campaign.path} has the role "error"; say outputs = [...] '
-            f"with some of {', '.join(c.name for c in campaign.channels.values() if c.measured) or 'its channels'}"
+            f"with some of {', '.join(c.name for c in campaign.channels.values() if c.measured)}"
         )
     _check(path, form, campaign, outputs)
     return Experiment(form, path, campaign, tuple(outputs))
@@ -183,8 +194,8 @@ def load_experiment(path: str | os.PathLike[str]) -> Experiment:
 def _recordings(path: Path, form: ExperimentForm) -> list[str]:
     """The recordings to load. Raises UserError where the campaign does not have one of them."""
     known = list(read_toml(campaign_path(path.parent / form.campaign), CampaignForm).recordings)
-    named: dict[str, tuple[str, ...]] = {name: ("fit",) for name in form.fit}
-    named |= {name: ("held_out",) for name in form.held_out}
+    named: dict[str, tuple[str, ...]] = dict.fromkeys(form.fit, ("fit",))
+    named |= dict.fromkeys(form.held_out, ("held_out",))
     for model, entry in form.models.items():
         for names in separate(entry).values():
             named |= {name: ("models", model) for name in names if name not in named}
@@ -205,7 +216,9 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
     measured = [name for name in channels if campaign.channels[name].measured]
     both = [name for name in form.fit if name in form.held_out]
     if both:
-        raise _mistake(path, ("held_out",), f"'{both[0]}' stands in fit too; what is fitted cannot be held out")
+        raise _mistake(
+            path, ("held_out",), f"'{both[0]}' stands in fit too; what is fitted cannot be held out"
+        )
     for name in outputs:
         if name not in measured:
             raise _mistake(path, ("outputs",), f"'{name}' is no measured channel; {suggest(name, measured)}")
@@ -216,13 +229,19 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
                 raise _mistake(path, key, f"no channel '{name}'; {suggest(name, channels)}")
         for name in getattr(entry, "outputs", None) or []:
             if name not in outputs:
-                raise _mistake(path, key, f"'{name}' is no output of the experiment; {suggest(name, list(outputs))}")
+                raise _mistake(
+                    path, key, f"'{name}' is no output of the experiment; {suggest(name, list(outputs))}"
+                )
         for name in {name for names in separate(entry).values() for name in names} & set(form.held_out):
             raise _mistake(path, key, f"separate: '{name}' is held out; a fit must not see it")
     for section in ("mismatch", "export"):
         chosen = getattr(form, section)
         if chosen and chosen.model not in form.models:
-            raise _mistake(path, (section, "model"), f"no model '{chosen.model}'; {suggest(chosen.model, list(form.models))}")
+            raise _mistake(
+                path,
+                (section, "model"),
+                f"no model '{chosen.model}'; {suggest(chosen.model, list(form.models))}",
+            )
 
 
 def _mistake(path: Path, key: tuple[str | int, ...], what: str) -> UserError:
@@ -234,7 +253,10 @@ def input_files(experiment: Experiment) -> Mapping[str, Path]:
     campaign = experiment.campaign.path
     files = {experiment.path.name: experiment.path, campaign.name: campaign}
     form = read_toml(campaign, CampaignForm)
-    files |= {form.recordings[name].file: campaign.parent / form.recordings[name].file for name in experiment.campaign.recordings}
+    files |= {
+        form.recordings[name].file: campaign.parent / form.recordings[name].file
+        for name in experiment.campaign.recordings
+    }
     for entry in experiment.form.models.values():
         if isinstance(entry, FileEntry):
             files[entry.file] = experiment.path.parent / entry.file

@@ -8,13 +8,15 @@ from contextlib import contextmanager
 Progress = Callable[[str], None]  # told what begins
 
 
-def silent(what: str) -> None:  # noqa: ARG001
+def silent(what: str) -> None:
     """A progress that nobody watches."""
 
 
 @contextmanager
 def shown() -> Iterator[Progress]:
-    """A line on stderr that says what is being done and for how long; plain lines where stderr is no terminal."""
+    """A line on stderr that says what is being done and for how long; plain lines where stderr is no
+    terminal.
+    """
     from rich.console import Console
     from rich.progress import Progress as Bar
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -23,6 +25,12 @@ def shown() -> Iterator[Progress]:
     if not console.is_terminal:
         yield lambda what: console.print(what, highlight=False, markup=False)
         return
-    with Bar(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console, transient=True) as bar:
+    with Bar(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+    ) as bar:
         task = bar.add_task("starting", total=None)
         yield lambda what: bar.update(task, description=what)

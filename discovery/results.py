@@ -1,4 +1,6 @@
-"""The results folder: results.json, models, predictions, report; written beside its place and moved there at the end."""
+"""The results folder: results.json, models, predictions, report; written beside its place and moved there at
+the end.
+"""
 
 from __future__ import annotations
 
@@ -40,16 +42,19 @@ def default_folder(experiment: str) -> Path:
 
 @contextmanager
 def staged(folder: Path) -> Iterator[Path]:
-    """A temporary folder beside `folder` that takes its place when the block ends well, and vanishes when not.
+    """A temporary folder beside `folder` that takes its place when the block ends well, and vanishes when
+    not.
 
-    Raises UserError: `folder` exists and holds something else than the results of a run, or cannot be written.
+    Raises UserError: `folder` holds something else than the results of a run, or cannot be written.
     """
     _refuse_foreign(folder)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
     except OSError as error:
-        raise UserError(f"{folder}: cannot be written ({error.strerror}); choose another place with --out") from None
+        raise UserError(
+            f"{folder}: cannot be written ({error.strerror}); choose another place with --out"
+        ) from None
     try:
         temporary.chmod(0o755)
         yield temporary
@@ -71,11 +76,17 @@ def _refuse_foreign(folder: Path) -> None:
         raise UserError(f"{folder}: this is a file; name a folder with --out")
     content = {entry.name for entry in folder.iterdir()}
     if content and not content & {"results.json", "diagnosis.json"}:
-        raise UserError(f"{folder}: this folder holds something else than results; name another one with --out")
+        raise UserError(
+            f"{folder}: this folder holds something else than results; name another one with --out"
+        )
 
 
 def write_run(
-    folder: Path, experiment: Experiment, fitted: Mapping[str, Fitted], diagnosis: Mapping[str, Any] | None, seconds: float
+    folder: Path,
+    experiment: Experiment,
+    fitted: Mapping[str, Fitted],
+    diagnosis: Mapping[str, Any] | None,
+    seconds: float,
 ) -> None:
     """Everything that a run leaves behind."""
     write_json(folder / "results.json", results_document(experiment, fitted, seconds))
@@ -118,7 +129,7 @@ def results_document(experiment: Experiment, fitted: Mapping[str, Fitted], secon
 
 
 def model_entry(one: Fitted) -> dict[str, Any]:
-    """One model in results.json; with terms and parameters of the model as it stands, equation by equation."""
+    """One model in results.json; terms and parameters are counted over all its equations."""
     model = one.model
     return {
         "kind": one.kind,
@@ -141,7 +152,11 @@ def parameter_values(model: Model) -> dict[str, dict[str, Any]]:
     found = {}
     for name, p in model.parameters.items():
         entry: dict[str, Any] = {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
-        found[name] = entry | ({"fixed": True} if p.fixed else {}) | ({"recordings": dict(p.values)} if p.values else {})
+        found[name] = (
+            entry
+            | ({"fixed": True} if p.fixed else {})
+            | ({"recordings": dict(p.values)} if p.values else {})
+        )
     return found
 
 
@@ -153,7 +168,9 @@ def predictions_table(recording: str, fitted: Mapping[str, Fitted]) -> str:
         p = one.predictions[recording]
         stamps = [float(t) for t in p.time]
         for y, output in enumerate(p.outputs):
-            measured[output] = measured.get(output, {}) | dict(zip(stamps, p.readings[:, y].tolist(), strict=True))
+            measured[output] = measured.get(output, {}) | dict(
+                zip(stamps, p.readings[:, y].tolist(), strict=True)
+            )
             predicted[f"{output}|{name}"] = dict(zip(stamps, p.predicted[:, y].tolist(), strict=True))
     columns = measured | predicted
     text = io.StringIO()

@@ -11,6 +11,8 @@ from discovery.errors import UserError
 from discovery.evaluation.tables import Table, as_text
 from discovery.files import read_text
 
+MOST_NOTES = 5  # of a model, in the terminal
+
 
 def summary(folder: Path) -> Iterator[str]:
     """rms of each model on each recording, the notes, and where the report is."""
@@ -19,8 +21,10 @@ def summary(folder: Path) -> Iterator[str]:
         yield as_text(rms_table({"": results}, recording))
         yield ""
     for name, model in results["models"].items():
-        for note in model["notes"]:
-            yield f"note, {name}: {note}"
+        notes = model["notes"]
+        yield from (f"note, {name}: {note}" for note in notes[:MOST_NOTES])
+        if len(notes) > MOST_NOTES:
+            yield f"note, {name}: {len(notes) - MOST_NOTES} more in results.json"
     yield f"{results['seconds']:.0f} s; the report: {folder / 'report.html'}"
 
 
@@ -39,7 +43,7 @@ def comparison(folders: Sequence[Path]) -> Iterator[str]:
 
 
 def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
-    """rms of each output, a row for each model that predicted the recording; the uncompensated errors first."""
+    """rms of each output, a row for each model that predicted the recording; uncompensated errors first."""
     rows: list[tuple[str | float | None, ...]] = []
     outputs = list(dict.fromkeys(name for one in runs.values() for name in one["outputs"]))
     parts = set()
@@ -67,5 +71,7 @@ def read_results(folder: Path) -> dict[str, Any]:
     try:
         results: dict[str, Any] = json.loads(read_text(path))
     except json.JSONDecodeError as error:
-        raise UserError(f"{path}, line {error.lineno}: not valid JSON ({error.msg}); make the run again") from None
+        raise UserError(
+            f"{path}, line {error.lineno}: not valid JSON ({error.msg}); make the run again"
+        ) from None
     return results

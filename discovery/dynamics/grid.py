@@ -19,7 +19,7 @@ Ints = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Samples:
-    """A channel as it was recorded: stamps (N,) in s, values (N,), and whether it runs straight between them."""
+    """A channel as it was recorded: stamps (N,) in s, values (N,), whether it runs straight between them."""
 
     time: Array
     value: Array
@@ -43,8 +43,8 @@ class Samples:
 class Grid:
     """Nodes of a recording, inputs on them, and the readings.
 
-    `ends` holds each channel at both ends of every interval, interleaved in time: entries 2k and 2k+1 belong to
-    interval k, so a held input keeps its value to the end of the interval and no step is smeared.
+    `ends` holds each channel at both ends of every interval, interleaved in time: entries 2k and 2k+1 belong
+    to interval k, so a held input keeps its value to the end of the interval and no step is smeared.
     """
 
     recording: str
@@ -87,8 +87,8 @@ class Memory:
     def delayed(self, channel: str, seconds: float) -> tuple[Array, Array]:
         """Channel `seconds` ago and its derivative by `seconds`.
 
-        A held channel is averaged over each interval, which keeps switches inside an interval exact in the mean and
-        the delay differentiable.
+        A held channel is averaged over each interval, which keeps switches inside an interval exact in the
+        mean and the delay differentiable.
         """
         samples, time = self.grid.samples[channel], self.grid.time - seconds
         if samples.linear:
@@ -154,7 +154,8 @@ def make_grid(
         known = np.isfinite(values) if values is not None else np.zeros(len(data.time), dtype=bool)
         if values is None or not known.any():
             raise UserError(
-                f"{campaign.path}: recording '{recording}' has no value of '{name}', which the model needs as an input"
+                f"{campaign.path}: recording '{recording}' has no value of '{name}', "
+                "which the model needs as an input"
             )
         samples[name] = Samples(data.time[known], values[known], campaign.channels[name].between == "linear")
         if np.ptp(values[known]) > 0:

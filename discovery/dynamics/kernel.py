@@ -1,12 +1,13 @@
 """The compiled kernel: exponential steps of a linear time-varying system and of its sensitivities.
 
-On each interval the system is x' = A x + g(t) with constant A and g running straight from g0 to g1, solved exactly:
+On each interval the system is x' = A x + g(t) with constant A and g running straight from g0 to g1,
+solved exactly:
 
     x1 = E x0 + W0 g0 + W1 g1,   E = exp(hA),  W1 = h phi2(hA),  W0 = h phi1(hA) - W1,
     phi1(z) = (e^z - 1)/z,  phi2(z) = (phi1(z) - 1)/z        (Hochbruck & Ostermann, Acta Numerica 19, 2010)
 
-so it is exact for linear terms under held or straight inputs however stiff the bodies are, and of second order
-otherwise. No code is compiled per model.
+so it is exact for linear terms under held or straight inputs however stiff the bodies are, and of second
+order otherwise. No code is compiled per model.
 """
 
 from __future__ import annotations
@@ -125,7 +126,7 @@ def transitions(a, h):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def trajectory(which, e, w0, w1, g0, g1, start):  # type: ignore[no-untyped-def]
-    """States (K + 1, n) from the start value and the forcing at both ends of each interval, g0 and g1 (K, n)."""
+    """States (K + 1, n) from the start and the forcing at both ends of each interval, g0 and g1 (K, n)."""
     count, n = g0.shape
     x = np.empty((count + 1, n))
     x[0] = start
@@ -223,7 +224,8 @@ def play(series, width):  # type: ignore[no-untyped-def]
     """Play operator y = max(x - w, min(x + w, y_before)), starting at rest in the middle.
 
     Returns:
-        y (N,), index of the instant whose x it follows (N,), side of the contact (N,): 1, -1, or 0 before any.
+        y (N,), index of the instant whose x it follows (N,), side of the contact (N,): 1, -1, or 0 before
+        any.
     """
     n = series.shape[0]
     y = np.empty(n)
@@ -247,7 +249,9 @@ def play(series, width):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def lag_ends(series, step, tau):  # type: ignore[no-untyped-def]
-    """First-order lag of a series on interval ends (2K,) that runs straight within each interval; starts settled."""
+    """First-order lag of a series on interval ends (2K,) that runs straight within each interval; starts
+    settled.
+    """
     out = np.empty_like(series)
     y = series[0]
     for k in range(step.shape[0]):

@@ -1,4 +1,6 @@
-"""A model on a recording: its trajectory, its outputs, and the sensitivities of parameters and candidate terms."""
+"""A model on a recording: its trajectory, its outputs, and the sensitivities of parameters and candidate
+terms.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +61,8 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Column:
-    """A piece of forcing: a heat flow (or rate) that enters `into` and leaves `source`, at the interval ends (2K,).
+    """A piece of forcing: a heat flow (or rate) that enters `into` and leaves `source`, at the interval ends
+    (2K,).
 
     Pieces with the same `owner` add up to one sensitivity column.
     """
@@ -90,7 +93,9 @@ def make_system(model: Model, grid: Grid) -> System:
 
 
 def start_values(system: System, values: Mapping[str, float]) -> Array:
-    """Declared start values (n,): an expression at the first instant, or the first reading of the state's channel."""
+    """Declared start values (n,): an expression at the first instant, or the first reading of the state's
+    channel.
+    """
     first = {name: float(series[0]) for name, series in system.grid.nodes.items()}
     for i, name in enumerate(system.grid.outputs):
         read = system.grid.readings[:, i]
@@ -124,7 +129,7 @@ def _state_ends(system: System, x: Array) -> dict[str, Array]:
 
 
 def _linearise(system: System, values: Mapping[str, float], x: Array) -> tuple[Array, Array, Array]:
-    """State matrices (K, n, n) and forcing left over at both interval ends, (K, n) each, around a trajectory."""
+    """State matrices (K, n, n) around a trajectory, forcing left over at both interval ends (K, n) each."""
     count, n = len(system.grid.step), len(system.states)
     env = {**system.grid.ends, **values, **_state_ends(system, x)}
     rates = np.zeros((2 * count, n))

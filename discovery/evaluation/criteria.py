@@ -2,8 +2,9 @@
 
     P_V = max |e_k|        M_V = 1/N sum e_k        Q_M = 1/N sum (e_k - M_V)^2
 
-(Tables 1 and 3 of "Compensation of cutting fluid influences on five axis machine tools"), with the root mean square and
-R2 beside them. The mean alone is a weak criterion: a model may be right on average and wrong all day.
+(Tables 1 and 3 of "Compensation of cutting fluid influences on five axis machine tools"), with the root mean
+square and R2 beside them. The mean alone is a weak criterion: a model may be right on average and wrong all
+day.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ def criteria(error: Array) -> Criteria:
     Args:
         error: (N,) error, or what a compensation leaves of it; NaN where nothing was read.
 
-    >>> criteria(np.array([-4.0, 0.0, np.nan, 1.0]))
-    Criteria(rms=2.380476142847617, peak=4.0, mean=-1.0, variance=4.666666666666667)
+    >>> criteria(np.array([-4.0, 4.0, np.nan, -3.0, 3.0]))
+    Criteria(rms=3.5355339059327378, peak=4.0, mean=0.0, variance=12.5)
     """
     e = error[np.isfinite(error)]
     if not len(e):
@@ -46,7 +47,8 @@ def criteria(error: Array) -> Criteria:
 
 
 def improvement(before: Criteria, after: Criteria) -> dict[str, float]:
-    """Improvement of each criterion's magnitude in percent: 100 (1 - |after|/|before|); NaN where nothing was wrong.
+    """Improvement of each criterion's magnitude in percent: 100 (1 - |after|/|before|); NaN where nothing was
+    wrong.
 
     >>> round(improvement(Criteria(9, 49, -35, 73), Criteria(3, 16, 6, 6))["mean"])
     83

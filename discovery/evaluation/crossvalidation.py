@@ -1,7 +1,7 @@
 """Cross-validation over the recordings to fit: whole recordings left out, and blocks of hours left out.
 
-Held-out recordings take no part. What is left out here is refitted without, then predicted; it says how far the figures of
-the fit can be trusted before anything unseen is looked at.
+Held-out recordings take no part. What is left out here is refitted without, then predicted; it says how far
+the figures of the fit can be trusted before anything unseen is looked at.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Fold:
 
 
 def folds(campaign: Campaign, recordings: Sequence[str], blocks: int = 3) -> list[Fold]:
-    """Leave one recording (or group of recordings) out, where there are two or more; then by blocks of time."""
+    """Leave one recording (or group of them) out, where there are two or more; then blocks of time."""
     out = []
     if len(recordings) > 1:
         groups = [tuple(recordings[i::MOST_FOLDS]) for i in range(min(MOST_FOLDS, len(recordings)))]
@@ -47,7 +47,9 @@ def folds(campaign: Campaign, recordings: Sequence[str], blocks: int = 3) -> lis
     return out
 
 
-def cross_validate(model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> dict[str, dict[str, float]]:
+def cross_validate(
+    model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]
+) -> dict[str, dict[str, float]]:
     """rms of each output on what was left out, pooled over the folds: {"recordings": {...}, "blocks": {...}}.
 
     The structure of the model stays; its parameters are fitted anew from where they are.
@@ -62,7 +64,9 @@ def cross_validate(model: Model, campaign: Campaign, recordings: Sequence[str], 
     }
 
 
-def _left_over(model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], fold: Fold) -> Iterator[Array]:
+def _left_over(
+    model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], fold: Fold
+) -> Iterator[Array]:
     """Readings minus model (R, Y) where the fit did not see them, NaN elsewhere."""
     if fold.windows is None:
         kept = [name for name in recordings if name not in fold.recordings]
@@ -100,10 +104,15 @@ def _mask(recording: Recording, outputs: Sequence[str], window: Window) -> Recor
 def parts_of_the_paper(campaign: Campaign, fit: Sequence[str], held_out: Sequence[str]) -> dict[str, str]:
     """Which recording plays which part of the paper: "test cycle", "2. test cycle", "left side", "100 mm".
 
-    The left nozzle is told by a channel of role nozzle side or by its name, the 100 mm by a nozzle height of 100.
+    The left nozzle is told by a channel of role nozzle side or by its name, the 100 mm by a nozzle height of
+    100.
     """
     left = [name for name in held_out if "left" in name.lower() or _constant(campaign, name, "nozzle side")]
-    high = [name for name in held_out if name not in left and (_constant(campaign, name, "nozzle height") or 0.0) > 75.0]
+    high = [
+        name
+        for name in held_out
+        if name not in left and (_constant(campaign, name, "nozzle height") or 0.0) > 75.0
+    ]
     plain = [name for name in held_out if name not in left and name not in high]
     parts = {"test cycle": fit, "2. test cycle": plain, "left side": left, "100 mm": high}
     return {part: names[0] for part, names in parts.items() if names}

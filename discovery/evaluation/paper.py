@@ -1,4 +1,6 @@
-"""What the paper measured (Tables 1 and 3 of "Compensation of cutting fluid influences on five axis machine tools")."""
+"""What the paper measured (Tables 1 and 3 of "Compensation of cutting fluid influences on five axis machine
+tools").
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,8 @@ SOURCE = (
     "Compensation of cutting fluid influences on five axis machine tools, Mori Seiki NMV 5000 DCG, IWF Zurich"
 )
 
-# Table 1: reduction of the arithmetic mean [%] by the thermobalance: test cycle, second test cycle, nozzle on the left.
+# Table 1: reduction of the arithmetic mean [%] by the thermobalance: test cycle, second test cycle, nozzle on
+# the left.
 TABLE_1_COLUMNS = ("test cycle", "2. test cycle", "left side")
 TABLE_1: dict[str, tuple[float, float, float]] = {
     "E_Y0C": (85.5, 86.7, 92.7),

@@ -23,7 +23,9 @@ def term_shares(fit: Fit) -> dict[str, float]:
         env, steps = trajectory.at_ends(), len(system.grid.step)
         columns = []
         for owner, term in enumerate(system.model.terms):
-            series = np.broadcast_to(evaluate(term.expression, env, frozenset(), system.ends).value, (2 * steps,))
+            series = np.broadcast_to(
+                evaluate(term.expression, env, frozenset(), system.ends).value, (2 * steps,)
+            )
             columns.append(Column(owner, term.into, np.ascontiguousarray(series), term.source))
         effect = sensitivities(trajectory, (), (), columns, len(terms)) / white[:, None]  # (R, Y, terms)
         known = system.grid.measured

@@ -42,7 +42,8 @@ def table_1(results: Mapping[str, Any], model: str, recordings: Mapping[str, str
 
 
 def table_3(results: Mapping[str, Any], recording: str, models: Sequence[str] | None = None) -> Table:
-    """Table 3: P_V, M_V, Q_M and rms of each error on one recording, uncompensated and left over by each model.
+    """Table 3: P_V, M_V, Q_M and rms of each error on one recording, uncompensated and left over by each
+    model.
 
     Beside the uncompensated rows and those of equations (8) and (9) stand the figures that the paper prints.
     """
@@ -56,8 +57,7 @@ def table_3(results: Mapping[str, Any], recording: str, models: Sequence[str] | 
         having = [name for name in chosen if error in found[name]]
         rows.append(_row(error, "uncompensated", found[having[0]][error]["uncompensated"], "uncompensated"))
         equations = {name: EQUATION.get(str(results["models"][name].get("kind"))) for name in having}
-        for name in having:
-            rows.append(_row(error, name, found[name][error], equations[name]))
+        rows += [_row(error, name, found[name][error], equations[name]) for name in having]
         for name in having:
             equation = equations[name] and f"{equations[name]} %"
             rows.append(_row(error, f"improvement {name} [%]", found[name][error]["improvement"], equation))

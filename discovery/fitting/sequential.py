@@ -1,8 +1,8 @@
 """Equation (8) the paper's way: one influence at a time, from separate recordings.
 
-"First, the model for environmental influences is developed ... With these derived parameters the machine tool is compensated
-against environmental influences and the next input is investigated" (Mayr et al., section 4). So each step fits eq. (7) to
-what the influences known before leave of the readings.
+"First, the model for environmental influences is developed ... With these derived parameters the machine tool
+is compensated against environmental influences and the next input is investigated" (Mayr et al., section 4).
+So each step fits eq. (7) to what the influences known before leave of the readings.
 """
 
 from __future__ import annotations
@@ -21,13 +21,15 @@ from discovery.models.superposition import superposition
 from discovery.recordings import Campaign, Recording
 
 
-def fit_one_at_a_time(campaign: Campaign, separate: Mapping[str, Sequence[str]], outputs: Sequence[str]) -> Model:
+def fit_one_at_a_time(
+    campaign: Campaign, separate: Mapping[str, Sequence[str]], outputs: Sequence[str]
+) -> Model:
     """Eq. (8) found influence by influence; its parameters are `fixed` and keep the intervals of their step.
 
     Args:
         campaign: holds the separate recordings.
-        separate: input -> recordings in which it acts, in the order of identification. An input that was identified
-            before may act in them too.
+        separate: input -> recordings in which it acts, in the order of identification. An input that was
+            identified before may act in them too.
         outputs: errors.
     """
     known: list[Model] = []
@@ -45,8 +47,10 @@ def fit_one_at_a_time(campaign: Campaign, separate: Mapping[str, Sequence[str]],
     return replace(whole, parameters={name: parameters[name] for name in whole.parameters})
 
 
-def compensated(campaign: Campaign, recording: str, known: Sequence[Model], outputs: Sequence[str]) -> Recording:
-    """The recording as a machine would have shown it that compensates the known influences from its start on."""
+def compensated(
+    campaign: Campaign, recording: str, known: Sequence[Model], outputs: Sequence[str]
+) -> Recording:
+    """The recording as a machine would show it that compensates the known influences from the start."""
     data = campaign.recordings[recording]
     values = {name: np.array(series) for name, series in data.values.items()}
     for model in known:

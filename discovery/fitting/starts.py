@@ -1,7 +1,8 @@
 """Start values of first-order models from the readings alone, so that a fit converges from nowhere.
 
-With the time constants given, equations (7) to (9) are linear in everything else. So every input is filtered through a grid
-of time constants once; the best combination is a small linear regression for each, and the exact fit starts there.
+With the time constants given, equations (7) to (9) are linear in everything else. So every input is filtered
+through a grid of time constants once; the best combination is a small linear regression for each, and the
+exact fit starts there.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ class _Part:
 
 
 def warm_start(model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> Model:
-    """The model with start values from a regression on filtered inputs; unchanged where it is not of first-order parts.
+    """The model with start values from a regression on filtered inputs; unchanged where it is not of
+    first-order parts.
 
     Args:
         recordings: recordings to fit; nothing else is looked at.
@@ -85,7 +87,7 @@ def _parts(model: Model) -> dict[str, _Part] | None:
 
 
 def _grid_of_times(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> Array:
-    """Time constants in s between a quarter of the distance of readings and a third of the longest recording."""
+    """Time constants in s from a quarter of the distance of readings to a third of the longest recording."""
     spans, steps = [], []
     for recording in recordings:
         data = campaign.recordings[recording]
@@ -143,9 +145,9 @@ def _best(
                 )
         first = chosen[0]
         out.append(np.concatenate([1 - bank.decay[first] for bank in banks]))
-        for b in range(len(banks)):  # each recording starts somewhere
-            out.append(np.concatenate([bank.decay[first] * (i == b) for i, bank in enumerate(banks)]))
-        return np.column_stack(out)[seen]
+        for start in range(len(banks)):  # each recording starts somewhere
+            out += [np.concatenate([bank.decay[first] * (i == start) for i, bank in enumerate(banks)])]
+        return np.asarray(np.column_stack(out)[seen])
 
     def misfit(chosen: Sequence[int]) -> tuple[float, Array]:
         x = columns(chosen)

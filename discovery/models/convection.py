@@ -1,17 +1,20 @@
-"""Heat transfer of a jet of cutting fluid on a rotating table: equations (1) to (6) of the paper, as plain functions.
+"""Heat transfer of a jet of cutting fluid on a rotating table: equations (1) to (6) of the paper, as plain
+functions.
 
-    Nu = 1.97619 beta^0.0909 Re^0.75 Ek^-0.1111 eps^-0.9                                              (1)
-    Ek = nu_f / (4 Omega r_d^2)    eps = lambda_s/lambda_f    beta = h_n/d_n    h = Nu lambda_f/d_n   (2) to (5)
+    Nu = 1.97619 beta^0.0909 Re^0.75 Ek^-0.1111 eps^-0.9                                           (1)
+    Ek = nu_f / (4 Omega r_d^2)   eps = lambda_s/lambda_f   beta = h_n/d_n   h = Nu lambda_f/d_n   (2) to (5)
 
-Source: Mayr et al., "Compensation of cutting fluid influences on five axis machine tools", section 3, after a correlation of
-numerical results for small rotating disks; only the paper is witness for its coefficient and exponents. Read here as it must
-be meant: nu_f is the kinematic viscosity in m2/s (the paper's "dynamic viscosity" has the wrong dimension), Omega is in rad/s,
-and h_n is the vertical distance of the nozzle (the paper says "horizontal").
+Source: Mayr et al., "Compensation of cutting fluid influences on five axis machine tools", section 3, after a
+correlation of numerical results for small rotating disks; only the paper is witness for its coefficient and
+exponents. Read here as it must be meant: nu_f is the kinematic viscosity in m2/s (the paper's "dynamic
+viscosity" has the wrong dimension), Omega is in rad/s, and h_n is the vertical distance of the nozzle (the
+paper says "horizontal").
 
-Limits, said plainly. The ranges of the paper belong to a disk of a few millimetres: on a table of 0.25 m the Ekman number is
-1000 times below its limit at any speed, and a flood of 10 l/min has a Reynolds number above its limit. At standstill eq. (1)
-gives no heat transfer at all, so a floor is needed. Where the table is well wetted it follows the fluid whatever h is: a
-factor in front of h has to be fitted, and differences between the variants hardly show.
+Limits, said plainly. The ranges of the paper belong to a disk of a few millimetres: on a table of 0.25 m the
+Ekman number is 1000 times below its limit at any speed, and a flood of 10 l/min has a Reynolds number above
+its limit. At standstill eq. (1) gives no heat transfer at all, so a floor is needed. Where the table is well
+wetted it follows the fluid whatever h is: a factor in front of h has to be fitted, and differences between
+the variants hardly show.
 """
 
 from __future__ import annotations
@@ -71,7 +74,7 @@ def nusselt(beta: float, reynolds: float, ekman_number: float, epsilon: float) -
     """
     if math.isinf(ekman_number):
         return 0.0
-    return 1.97619 * beta**0.0909 * reynolds**0.75 * ekman_number**-0.1111 * epsilon**-0.9
+    return float(1.97619 * beta**0.0909 * reynolds**0.75 * ekman_number**-0.1111 * epsilon**-0.9)
 
 
 def speed_new(rpm: float, variant: Speeding = "none") -> float:
@@ -79,16 +82,16 @@ def speed_new(rpm: float, variant: Speeding = "none") -> float:
 
         Omega_new = 4 (Omega - 750)^5 + 750                                                            (6)
 
-    As "printed" the heat transfer doubles between 750 and 760 rpm and is 16.6 times larger at 1200 rpm, more than the fluid
-    can carry: doubtful, though the law behind it, h ~ (Omega - 750)^0.556, is tame. "1.5" replaces the exponent 5 by 1.5
-    (1.55 times at 1200 rpm). "none", the default, leaves the speed as it is.
+    As "printed" the heat transfer doubles between 750 and 760 rpm and is 16.6 times larger at 1200 rpm, more
+    than the fluid can carry: doubtful, though the law behind it, h ~ (Omega - 750)^0.556, is tame. "1.5"
+    replaces the exponent 5 by 1.5 (1.55 times at 1200 rpm). "none", the default, leaves the speed as it is.
 
     >>> [f"{speed_new(1000, variant):.4g}" for variant in ("printed", "1.5", "none")]
     ['3.906e+12', '1.656e+04', '1000']
     """
     if variant == "none" or rpm <= SPEED[1]:
         return rpm
-    return 4.0 * (rpm - 750.0) ** (5.0 if variant == "printed" else 1.5) + 750.0
+    return float(4.0 * (rpm - 750.0) ** (5.0 if variant == "printed" else 1.5) + 750.0)
 
 
 def film_coefficient(
@@ -136,7 +139,9 @@ def film_coefficient(
     for sentence in validity(ekman(nu_f, rad_per_s(rpm), r_d), reynolds, rpm, prandtl, biot, variant):
         warnings.warn(sentence, OutsideValidity, stacklevel=2)
     if at_rest:
-        warnings.warn("eq. (1) gives no heat transfer at standstill; set a floor", OutsideValidity, stacklevel=2)
+        warnings.warn(
+            "eq. (1) gives no heat transfer at standstill; set a floor", OutsideValidity, stacklevel=2
+        )
     return h
 
 
@@ -169,7 +174,9 @@ SYMBOLS = ("Re", "nu", "r_d")
 
 
 def validity_of_model(model: Model, campaign: Campaign, recordings: Sequence[str]) -> list[str]:
-    """A sentence for each range that a model with eqs. (1) to (5) leaves on some recordings; none for other models."""
+    """A sentence for each range that a model with eqs. (1) to (5) leaves on some recordings; none for other
+    models.
+    """
     speeds = [name for name in model.inputs if campaign.channels[name].role == "rotation speed"]
     if not set(SYMBOLS) <= set(model.parameters) or not speeds:
         return []

@@ -1,9 +1,12 @@
-"""Do the units of a model's expressions fit together? Warnings, since literals may carry a unit that nobody wrote."""
+"""Do the units of a model's expressions fit together? Warnings, since literals may carry a unit that nobody
+wrote.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from discovery.models.model import Model
@@ -27,18 +30,22 @@ class _Mismatch(Exception):  # noqa: N818  (control flow, caught here)
 def check_dimensions(model: Model, channels: Mapping[str, Channel]) -> list[str]:
     """A sentence for each term and output whose units do not fit; empty when all do.
 
-    A literal is a wildcard, and so is whatever it is multiplied with: its unit is not written down. An angle counts as a
-    dimension (rpm is not 1/s), a temperature as an absolute one (a difference of degC is a K).
+    A literal is a wildcard, and so is whatever it is multiplied with: its unit is not written down. An angle
+    counts as a dimension (rpm is not 1/s), a temperature as an absolute one (a difference of degC is a K).
     """
     units = {name: p.unit for name, p in model.parameters.items()}
     units |= {name: s.unit for name, s in model.states.items()}
     units |= {name: c.unit for name, c in channels.items() if name not in units} | {"time": "s"}
-    sentences = [f"model '{model.name}': the unit '{u}' of {n} is not known" for n, u in units.items() if not _known(u)]
+    sentences = [
+        f"model '{model.name}': the unit '{u}' of {n} is not known" for n, u in units.items() if not _known(u)
+    ]
     dimensions = {name: _dimension(unit) for name, unit in units.items()}
     for term in model.terms:
         state = model.states[term.into]
         wanted, name = (
-            ("W", "W, a heat flow") if state.capacity else (f"({_differences(state.unit)})/({model.time_unit})", f"{state.unit}/{model.time_unit}")
+            ("W", "W, a heat flow")
+            if state.capacity
+            else (f"({_differences(state.unit)})/({model.time_unit})", f"{state.unit}/{model.time_unit}")
         )
         found = _compare(term.expression, dimensions, _dimension(wanted), name)
         if found:
@@ -51,13 +58,15 @@ def check_dimensions(model: Model, channels: Mapping[str, Channel]) -> list[str]
     return sentences
 
 
-def _compare(expression: Expression, dimensions: Mapping[str, Dimension], wanted: Dimension, name: str) -> str | None:
+def _compare(
+    expression: Expression, dimensions: Mapping[str, Dimension], wanted: Dimension, name: str
+) -> str | None:
     try:
         found = _of(expression, dimensions)
     except _Mismatch as mismatch:
         return str(mismatch)
     if found is not None and wanted is not None and found != wanted:
-        return f"'{text(expression)[:60]}' has the dimension {_spell(found)} where {name} is expected; mend the unit of a parameter"
+        return f"'{text(expression)[:60]}' has the dimension {_spell(found)} where {name} is expected"
     return None
 
 
@@ -75,7 +84,9 @@ def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimensio
         case Apply(function="**", arguments=(a, b)):
             base, power = _of(a, dimensions), _of(b, dimensions)
             if power:
-                raise _Mismatch(f"the exponent '{text(b)}' has the dimension {_spell(power)}; it must be a pure number")
+                raise _Mismatch(
+                    f"the exponent '{text(b)}' has the dimension {_spell(power)}; it must be a pure number"
+                )
             if base == {}:
                 return {}
             return _times(base, b.value) if base is not None and isinstance(b, Number) else None
@@ -87,13 +98,19 @@ def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimensio
             return _equal(a, b, dimensions)
         case Apply(function=function, arguments=arguments) if function in _SAME:
             shared = _of(arguments[0], dimensions)
-            for a, b in zip(arguments[:-1], arguments[1:], strict=True):
-                shared = _equal(a, b, dimensions) if shared is None or len(arguments) == 2 else _equal(arguments[0], b, dimensions)
+            for a, b in pairwise(arguments):
+                shared = (
+                    _equal(a, b, dimensions)
+                    if shared is None or len(arguments) == 2
+                    else _equal(arguments[0], b, dimensions)
+                )
             return {} if function in COMPARISONS else shared
         case Apply(function=function, arguments=(a,)) if function in _PURE:
             inner = _of(a, dimensions)
             if inner:
-                raise _Mismatch(f"{function}() of '{text(a)}', which has the dimension {_spell(inner)}; it must be a pure number")
+                raise _Mismatch(
+                    f"{function}() of '{text(a)}', which is {_spell(inner)}; it must be a pure number"
+                )
             return {}
         case Apply(function="sign"):
             return {}
@@ -109,7 +126,9 @@ def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimensio
 def _equal(a: Expression, b: Expression, dimensions: Mapping[str, Dimension]) -> Dimension:
     left, right = _of(a, dimensions), _of(b, dimensions)
     if left is not None and right is not None and left != right:
-        raise _Mismatch(f"'{text(a)[:40]}' ({_spell(left)}) and '{text(b)[:40]}' ({_spell(right)}) meet, but have different dimensions")
+        raise _Mismatch(
+            f"'{text(a)[:40]}' ({_spell(left)}) meets '{text(b)[:40]}' ({_spell(right)}), another dimension"
+        )
     return right if left is None else left
 
 
@@ -160,7 +179,7 @@ def _known(unit: str) -> bool:
 def _units() -> Callable[[str], Any]:
     import pint
 
-    registry = pint.UnitRegistry()
+    registry: Any = pint.UnitRegistry()
 
     def parse(unit: str) -> Any:
         return registry.Unit(_differences(unit))

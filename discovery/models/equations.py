@@ -11,12 +11,14 @@ from discovery.terms import Apply, Expression, Name, substitute, text
 def equations(model: Model) -> list[str]:
     """One line for each state and each output, with the values of the parameters.
 
-    A body with a capacity is an energy balance in W. Numbers are rounded to four digits; the model file has them all.
+    A body with a capacity is an energy balance in W. Numbers are rounded to four digits; the model file has
+    them all.
 
     >>> from discovery.models.reduced import reduced
     >>> from discovery.recordings import Channel
-    >>> channels = {"y": Channel("y", "error", "um", None, "held"), "u": Channel("u", "heat load", "W", None, "held")}
-    >>> equations(reduced(["u"], ["y"], channels).with_values({"p1_y": -0.5, "p2_y": 0.25, "p3_y": -3}))
+    >>> y, u = Channel("y", "error", "um", None, "held"), Channel("u", "heat load", "W", None, "held")
+    >>> model = reduced(["u"], ["y"], {"y": y, "u": u})
+    >>> equations(model.with_values({"p1_y": -0.5, "p2_y": 0.25, "p3_y": -3}))
     ['d/dt y = -0.5 [1/h]*y + 0.25 [um/W/h]*u - 3 [um/h]']
     """
     values = {name: _printed(parameter) for name, parameter in model.parameters.items()}

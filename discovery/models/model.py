@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from discovery.terms import Apply, Expression, Name, Number, Term, names, substitute
 from discovery.terms.expression import rewrite
 
+_ZERO = Number(0.0)
 TIME_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
@@ -16,8 +17,8 @@ TIME_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 class Parameter:
     """A number of the model: given, bounded or found.
 
-    `value` is the start value before a fit and the estimate after it, `low` and `high` its 95 % interval. With
-    `per_recording` every recording has its own, kept in `values`.
+    `value` is the start value before a fit and the estimate after it, `low` and `high` its 95 % interval.
+    With `per_recording` every recording has its own, kept in `values`.
     """
 
     value: float
@@ -39,15 +40,15 @@ class Parameter:
 class State:
     """A state. With a capacity [J/K] its terms are heat flows in W, without it rates in `unit` per time unit.
 
-    `start` is an expression of channels and parameters at the first instant, or None: the first reading of the
-    channel of that name. `start_sd` is the spread that a fit allows around it (0: exact).
-    `scale` turns the sum of its terms into unit per second.
+    `start` is an expression of channels and parameters at the first instant, or None: the first reading of
+    the channel of that name. `start_sd` is the spread that a fit allows around it (0: exact). `scale` turns
+    the sum of its terms into unit per second.
     """
 
     name: str
     unit: str = "degC"
     capacity: float | None = None
-    start: Expression | None = Number(0.0)
+    start: Expression | None = _ZERO
     start_sd: float = 0.5
     scale: float = 1.0
 

@@ -89,7 +89,8 @@ def read_model(path: Path) -> Model:
         for name in getattr(form, kind):
             if not name.isidentifier() or keyword.iskeyword(name) or name in FUNCTIONS or name == "time":
                 raise UserError(
-                    f"{at(kind, name)}: '{name}' cannot name a {kind[:-1]}; use letters, digits and _ and no reserved word"
+                    f"{at(kind, name)}: '{name}' cannot name a {kind[:-1]}; "
+                    "use letters, digits and _ and no reserved word"
                 )
     for name in form.parameters.keys() & form.states.keys():
         raise UserError(f"{at('parameters', name)}: '{name}' is also a state; rename one of them")
@@ -100,7 +101,8 @@ def read_model(path: Path) -> Model:
             raise UserError(f"{at('parameters', name)}: min {entry.min:g} is above max {entry.max:g}")
         if not entry.min <= entry.start <= entry.max and not entry.fixed:
             raise UserError(
-                f"{at('parameters', name)}: start {entry.start:g} lies outside min {entry.min:g} and max {entry.max:g}"
+                f"{at('parameters', name)}: start {entry.start:g} lies outside "
+                f"min {entry.min:g} and max {entry.max:g}"
             )
         parameters[name] = Parameter(
             entry.start,
@@ -159,7 +161,8 @@ def check_names(model: Model, known: set[str], path: Path | str) -> None:
     for place, expression in places:
         for name in sorted(names(expression) - own):
             raise UserError(
-                f"{path}, {place}: '{name}' is neither a state or parameter of the model nor a channel of the campaign "
+                f"{path}, {place}: '{name}' is neither a state or parameter of the model "
+                "nor a channel of the campaign "
                 f"({', '.join(sorted(known))}); mend the name or add the channel"
             )
 

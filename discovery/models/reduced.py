@@ -2,8 +2,9 @@
 
     dy/dt = p1 y + p2 u1 + p3 u2 + p4 u3 + p5
 
-(Mayr et al., "Compensation of cutting fluid influences on five axis machine tools", eq. (9)): p1 weighs the error itself,
-p2 ... weigh the inputs, the last one balances the zero. Equation (7) is the case of one input: p2 (u + p3) = p2 u + p2 p3.
+(Mayr et al., "Compensation of cutting fluid influences on five axis machine tools", eq. (9)): p1 weighs the
+error itself, p2 ... weigh the inputs, the last one balances the zero. Equation (7) is the case of one input:
+p2 (u + p3) = p2 u + p2 p3.
 """
 
 from __future__ import annotations
@@ -19,9 +20,11 @@ POLE_MAX = -0.01  # 1/h: slower than 100 h is a drift that no recording tells fr
 
 
 def reduced(inputs: Sequence[str], outputs: Sequence[str], channels: Mapping[str, Channel]) -> Model:
-    """Equation (9) for every output; parameters p1_E, p2_E, ... in the order of the inputs, then the zero balance.
+    """Equation (9) for every output; parameters p1_E, p2_E, ... in the order of the inputs, then the zero
+    balance.
 
-    Start values are generic (two hours, no influence); `fitting.warm_start` finds good ones from fit recordings.
+    Start values are generic (two hours, no influence); `fitting.warm_start` finds good ones from fit
+    recordings.
 
     Args:
         inputs: channels u1, u2, ...

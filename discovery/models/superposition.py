@@ -2,12 +2,14 @@
 
     d/dt y_tot = sum_i dy_i/dt,   dy_i/dt = p_(3i-2) y_i + p_(3i-1) (u_i + p_(3i))
 
-(Mayr et al., "Compensation of cutting fluid influences on five axis machine tools", eqs. (7) and (8)). The text there names
-y_2 the fluid and y_3 the losses, but u_2 the cooling power and u_3 the fluid temperature; here input i is influence i.
+(Mayr et al., "Compensation of cutting fluid influences on five axis machine tools", eqs. (7) and (8)). The
+text there names y_2 the fluid and y_3 the losses, but u_2 the cooling power and u_3 the fluid temperature;
+here input i is influence i.
 
-In a joint fit only the steady sum of the zero balances p3, p6, p9 is determined. So only the first is free there; the others
-stay where their influence vanishes: at the reference temperature of 20 degC (ISO 1), at zero for everything else. Fitted one
-influence at a time, from recordings of their own (`fitting.sequential`), each has its own.
+In a joint fit only the steady sum of the zero balances p3, p6, p9 is determined. So only the first is free
+there; the others stay where their influence vanishes: at the reference temperature of 20 degC (ISO 1), at
+zero for everything else. Fitted one influence at a time, from recordings of their own (`fitting.sequential`),
+each has its own.
 """
 
 from __future__ import annotations
@@ -43,8 +45,8 @@ def superposition(inputs: Sequence[str], outputs: Sequence[str], channels: Mappi
             parameters[pole] = Parameter(-0.5, f"1/{TIME_UNIT}", max=POLE_MAX)
             parameters[gain] = Parameter(0.0, rate_unit(unit, of))
             parameters[zero] = Parameter(-REFERENCE if of == "degC" else 0.0, of, fixed=k > 0)
-            # The first influence takes up the first reading as it is. Free starts would be free offsets of whichever
-            # influence turns out slow, found in the fit and missing in every prediction.
+            # The first influence takes up the first reading as it is. Free starts would be free offsets of
+            # whichever influence turns out slow, found in the fit and missing in every prediction.
             start = Name(output) if k == 0 else Number(0.0)
             states[state] = State(state, unit, None, start, 0.0, 1.0 / TIME_UNITS[TIME_UNIT])
             terms.append(Term(f"{state} itself", state, Apply("*", (Name(pole), Name(state)))))

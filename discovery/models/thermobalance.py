@@ -3,10 +3,11 @@
     C_i T_i' = sum_j G_ij (T_j - T_i) + hA_i (T_env - T_i) + loss_i P_drive + cool_i (T_cool - T_i)
                + pump hF_i h(n, h_nozzle) (T_fluid - T_i)
 
-Table, C-Body 1 and 2, B-Body 1 and 2 as in figure 4 of Mayr et al., "Compensation of cutting fluid influences on five axis
-machine tools"; the fluid floods Table and C-Body 1 with the film coefficient h of eqs. (1) to (5), spelt out in the
-expression (see `convection` for what they mean and where they hold). Drive losses and internal cooling enter the C axis.
-Capacities and levers come from drawings; the rest is a rough start that a fit replaces. Of eq. (1) only the product of area
+Table, C-Body 1 and 2, B-Body 1 and 2 as in figure 4 of Mayr et al., "Compensation of cutting fluid influences
+on five axis machine tools"; the fluid floods Table and C-Body 1 with the film coefficient h of eqs. (1) to
+(5), spelt out in the expression (see `convection` for what they mean and where they hold). Drive losses and
+internal cooling enter the C axis. Capacities and levers come from drawings; the rest is a rough start that a
+fit replaces. Of eq. (1) only the product of area
 and coefficient can be calibrated: hF is an effective area.
 """
 
@@ -16,7 +17,8 @@ from discovery.models.convection import Speeding
 from discovery.models.model import Model, Parameter, State
 from discovery.terms import Term, parse
 
-# body: capacity [J/K] and start values of air [W/K], share of drive power [1], internal cooling [W/K], wet area [m2]
+# body: capacity [J/K] and start values of air [W/K], share of drive power [1], internal cooling [W/K], wet
+# area [m2]
 BODIES: dict[str, tuple[float, float, float | None, float | None, float | None]] = {
     "table": (45e3, 3.0, 0.1, None, 0.05),
     "c_body_1": (62e3, 2.0, 0.4, 20.0, 0.03),
@@ -34,10 +36,13 @@ LINKS = {
 }
 # error: expansion (10.8 cast iron, 11.5 steel, um/m/K) x lever [m] of each body
 LEVERS = {
-    "E_Y0C": "-1.6740*(c_body_1 - T_ref) -0.8640*(c_body_2 - T_ref) -5.1840*(b_body_1 - T_ref) -2.7216*(b_body_2 - T_ref)",
-    "E_Z0T": "0.7360*(table - T_ref) +1.7365*(c_body_1 - T_ref) +2.0700*(c_body_2 - T_ref) +1.7135*(b_body_1 - T_ref)",
+    "E_Y0C": "-1.6740*(c_body_1 - T_ref) -0.8640*(c_body_2 - T_ref)"
+    " -5.1840*(b_body_1 - T_ref) -2.7216*(b_body_2 - T_ref)",
+    "E_Z0T": "0.7360*(table - T_ref) +1.7365*(c_body_1 - T_ref)"
+    " +2.0700*(c_body_2 - T_ref) +1.7135*(b_body_1 - T_ref)",
     "E_R0T": "1.9205*(table - T_ref)",
-    "E_A0C": "5.8300*(c_body_1 - T_ref) +2.8700*(c_body_2 - T_ref) -6.2900*(b_body_1 - T_ref) -2.4100*(b_body_2 - T_ref)",
+    "E_A0C": "5.8300*(c_body_1 - T_ref) +2.8700*(c_body_2 - T_ref)"
+    " -6.2900*(b_body_1 - T_ref) -2.4100*(b_body_2 - T_ref)",
 }
 SPEED_NEW = {  # eq. (6), in rpm
     "none": "max(speed, n_min)",
@@ -47,9 +52,12 @@ SPEED_NEW = {  # eq. (6), in rpm
 
 
 def film(variant: Speeding = "none") -> str:
-    """Expression of eqs. (1) to (6) in W/m2K: h_nozzle and d_n in mm, speed in rpm (0.10472 rad/s each), h_still at rest."""
+    """Expression of eqs. (1) to (6) in W/m2K: h_nozzle and d_n in mm, speed in rpm (0.10472 rad/s each),
+    h_still at rest.
+    """
     ekman = f"(nu/(4*0.10472*{SPEED_NEW[variant]}*r_d**2))"
-    moving = f"1.97619*1000*lambda_f/d_n*(h_nozzle/d_n)**0.0909*Re**0.75*{ekman}**(-0.1111)*(lambda_s/lambda_f)**(-0.9)"
+    nusselt = f"(h_nozzle/d_n)**0.0909*Re**0.75*{ekman}**(-0.1111)*(lambda_s/lambda_f)**(-0.9)"
+    moving = f"1.97619*1000*lambda_f/d_n*{nusselt}"
     return f"where(speed > n_min, {moving}, h_still)"
 
 
@@ -65,7 +73,8 @@ def thermobalance(*, fluid: bool = True, variant: Speeding = "none") -> Model:
     parameters = {f"G_{_short(a)}_{_short(b)}": _positive(G, "W/K") for (a, b), G in LINKS.items()}
     parameters["G_b2_bed"] = _positive(8.0, "W/K")
     terms = [
-        Term(f"conduction {b} to {a}", a, parse(f"G_{_short(a)}_{_short(b)}*({b} - {a})"), b) for a, b in LINKS
+        Term(f"conduction {b} to {a}", a, parse(f"G_{_short(a)}_{_short(b)}*({b} - {a})"), b)
+        for a, b in LINKS
     ]
     terms.append(Term("conduction bed to b_body_2", "b_body_2", parse("G_b2_bed*(bed - b_body_2)")))
     terms.append(Term("bed follows the room", "bed", parse("(T_env - bed)/tau_bed")))
@@ -79,7 +88,9 @@ def thermobalance(*, fluid: bool = True, variant: Speeding = "none") -> Model:
     for body, (_, _, _, cooling, _) in BODIES.items():
         if cooling is not None:
             parameters[f"cool_{_short(body)}"] = _positive(cooling, "W/K")
-            terms.append(Term(f"internal cooling of {body}", body, parse(f"cool_{_short(body)}*(T_cool - {body})")))
+            terms.append(
+                Term(f"internal cooling of {body}", body, parse(f"cool_{_short(body)}*(T_cool - {body})"))
+            )
     parameters["tau_bed"] = Parameter(90e3, "s", 20e3, 400e3)
     for body, (*_, wet) in BODIES.items():
         if fluid and wet is not None:

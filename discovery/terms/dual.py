@@ -1,7 +1,7 @@
 """Values and exact first derivatives of expressions, vectorised over time (forward-mode differentiation).
 
-A `Dual` carries the value of an expression on all instants at once and, for each name asked for, the derivative
-array. Sparse by construction: a name that does not occur costs nothing.
+A `Dual` carries the value of an expression on all instants at once and, for each name asked for, the
+derivative array. Sparse by construction: a name that does not occur costs nothing.
 """
 
 from __future__ import annotations
@@ -62,24 +62,31 @@ def evaluate(
     >>> d.value.tolist(), d.partials["x"].tolist(), d.partials["a"].tolist()
     ([3.0, 12.0], [6.0, 12.0], [1.0, 4.0])
     """
-    with np.errstate(all="ignore"):  # what is undefined is NaN or infinite; the caller sees a trajectory run away
+    with np.errstate(
+        all="ignore"
+    ):  # what is undefined is NaN or infinite; the caller sees a trajectory run away
         return _evaluate(expression, values, wrt, memory)
 
 
-def _evaluate(expression: Expression, values: Mapping[str, Value], wrt: frozenset[str], memory: Memory | None) -> Dual:
+def _evaluate(
+    expression: Expression, values: Mapping[str, Value], wrt: frozenset[str], memory: Memory | None
+) -> Dual:
     match expression:
         case Number(value=number):
             return Dual(np.float64(number))  # numpy's numbers divide by zero without a crash
         case Name(id=name):
             value = values[name]
-            return Dual(np.float64(value) if np.ndim(value) == 0 else value, {name: 1.0} if name in wrt else {})
+            return Dual(
+                np.float64(value) if np.ndim(value) == 0 else value, {name: 1.0} if name in wrt else {}
+            )
         case Apply(function="delay", arguments=(Name(id=channel), seconds)):
             duration = _evaluate(seconds, values, wrt, memory)
             assert memory is not None
             late, slope = memory.delayed(channel, float(np.mean(duration.value)))
             return Dual(late, {name: slope * partial for name, partial in duration.partials.items()})
         case Apply(function="lag", arguments=(inner, tau)) if memory is not None:
-            # A model's own lags are states (models.expanded); this one serves candidates, seen along a given trajectory.
+            # A model's own lags are states (models.expanded); this one serves candidates, seen along a given
+            # trajectory.
             series = np.asarray(evaluate(inner, values, memory=memory).value, dtype=float)
             return Dual(memory.lagged(series, float(np.mean(evaluate(tau, values, memory=memory).value))))
         case Apply(function="play", arguments=(inner, width)):

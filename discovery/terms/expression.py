@@ -139,7 +139,7 @@ def _convert(node: ast.AST, source: str, where: str, counter: list[int], depth: 
             return Name(name)
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             inner = down(operand)
-            return Number(-inner.value) if isinstance(inner, Number) else Apply("neg", (inner,))
+            return Number(0.0 - inner.value) if isinstance(inner, Number) else Apply("neg", (inner,))
         case ast.UnaryOp(op=ast.UAdd(), operand=operand):
             return down(operand)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
@@ -167,7 +167,8 @@ def _convert(node: ast.AST, source: str, where: str, counter: list[int], depth: 
             return Apply(name, tuple(down(arg) for arg in args))
         case ast.Call(func=ast.Name(id=name)):
             raise UserError(
-                f"{where}: unknown function {name}() in '{source[:60]}'; known: {', '.join(sorted(FUNCTIONS))}"
+                f"{where}: unknown function {name}() in '{source[:60]}'; "
+                f"known: {', '.join(sorted(FUNCTIONS))}"
             )
         case _:
             pass
@@ -264,11 +265,8 @@ def _text(expression: Expression, number: Callable[[float], str]) -> tuple[str, 
             left_open = (
                 left_level < level or (function == "**" and left_level <= level) or level == 1 == left_level
             )
-            right_open = (
-                right_level < level
-                or (function in ("-", "/") and right_level <= level)
-                or level == 1 == right_level
-            )
+            # brackets also where mathematics needs none: what is read back rounds as it did before
+            right_open = right_level < level or (function != "**" and right_level <= level)
             right_open = right_open or right_level == 4
             left_text = f"({left_text})" if left_open else left_text
             right_text = f"({right_text})" if right_open else right_text

@@ -11,8 +11,8 @@ from discovery.terms.expression import Expression
 class Term:
     """One summand of the right-hand side.
 
-    `expression` is a heat flow in W where the state it enters has a capacity, else a rate in the state's unit per
-    time unit. With `source` what enters one state leaves the other, so that conduction conserves energy.
+    `expression` is a heat flow in W where the state it enters has a capacity, else a rate in the state's unit
+    per time unit. With `source` what enters one state leaves the other, so that conduction conserves energy.
     """
 
     name: str

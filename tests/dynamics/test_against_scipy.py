@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -21,7 +22,9 @@ HOUR = 3600.0
 
 
 def wet_day(step: float, hours: float = 24.0) -> Campaign:
-    """Inputs every `step` s: straight temperatures with an hourly knot, speed and pump switched on whole minutes."""
+    """Inputs every `step` s: straight temperatures with an hourly knot, speed and pump switched on whole
+    minutes.
+    """
     time = np.arange(0.0, hours * HOUR + 1.0, step)
     rng = np.random.default_rng(4)
     knots = np.arange(0.0, hours + 1.0)
@@ -43,15 +46,29 @@ def wet_day(step: float, hours: float = 24.0) -> Campaign:
         "P_drive": 0.95 * speed,
         "h_nozzle": np.full(len(time), 50.0),
     }
-    errors = dict.fromkeys(("E_Y0C", "E_Z0T", "E_R0T", "E_A0C"), np.where(np.arange(len(time)) % 60 == 0, 0.0, np.nan))
-    roles = {"pump": "fluid flow", "speed": "rotation speed", "P_drive": "heat load", "h_nozzle": "nozzle height"}
-    channels = {name: Channel(name, roles.get(name, "ambient temperature"), "1", None, "held" if name in roles else "linear") for name in values}
+    errors = dict.fromkeys(
+        ("E_Y0C", "E_Z0T", "E_R0T", "E_A0C"), np.where(np.arange(len(time)) % 60 == 0, 0.0, np.nan)
+    )
+    roles = {
+        "pump": "fluid flow",
+        "speed": "rotation speed",
+        "P_drive": "heat load",
+        "h_nozzle": "nozzle height",
+    }
+    channels = {
+        name: Channel(
+            name, roles.get(name, "ambient temperature"), "1", None, "held" if name in roles else "linear"
+        )
+        for name in values
+    }
     channels |= {name: Channel(name, "error", "um", 0.5, "linear") for name in errors}
     return Campaign("day", channels, {"day": Recording("day", time, {**values, **errors})})
 
 
 def thermobalance_by_hand(campaign: Campaign) -> tuple[Array, Array]:
-    """The five bodies and the bed written out once more in numpy and solved by LSODA; readings' instants and errors."""
+    """The five bodies and the bed written out once more in numpy and solved by LSODA; readings' instants and
+    errors.
+    """
     data = campaign.recordings["day"]
     u, time = data.values, data.time
     C = np.array([45e3, 62e3, 82e3, 165e3, 240e3])
@@ -65,7 +82,9 @@ def thermobalance_by_hand(campaign: Campaign) -> tuple[Array, Array]:
         if speed <= 1.0:
             return 400.0
         ekman = 1.2e-6 / (4 * 0.10472 * speed * 0.25**2)
-        return float(1.97619 * 5.0**0.0909 * 1000.0**0.75 * ekman**-0.1111 * (45 / 0.58) ** -0.9 * 0.58 / 0.010)
+        return float(
+            1.97619 * 5.0**0.0909 * 1000.0**0.75 * ekman**-0.1111 * (45 / 0.58) ** -0.9 * 0.58 / 0.010
+        )
 
     def rates(t: float, x: Array, k: int) -> Array:
         straight = {name: np.interp(t, time, u[name]) for name in ("T_env", "T_cool", "T_fluid")}
@@ -81,7 +100,7 @@ def thermobalance_by_hand(campaign: Campaign) -> tuple[Array, Array]:
     x = np.full(6, u["T_env"][0])
     read = np.flatnonzero(np.isfinite(u["E_Y0C"]))
     found, switches = {0: x}, np.arange(0, len(time), round(600.0 / (time[1] - time[0])))
-    for a, b in zip(switches[:-1], switches[1:], strict=True):
+    for a, b in pairwise(switches):
         wanted = read[(read > a) & (read <= b)]
         stamps = np.union1d(time[wanted], [time[b]])
         part = solve_ivp(rates, (time[a], time[b]), x, "LSODA", stamps, args=(a,), rtol=1e-9, atol=1e-10)
@@ -127,7 +146,13 @@ def test_first_order_is_exact_whatever_the_step(between: str) -> None:
     time[0] = 0.0
     u, tau = rng.standard_normal(60), 40.0
     campaign = one_channel(time, u, between, np.zeros(60))
-    model = Model("lag", {"tau": Parameter(tau)}, {"y": State("y", "um", None, Number(0.3), 0.0)}, (Term("t", "y", parse("(u - y)/tau")),), {})
+    model = Model(
+        "lag",
+        {"tau": Parameter(tau)},
+        {"y": State("y", "um", None, Number(0.3), 0.0)},
+        (Term("t", "y", parse("(u - y)/tau")),),
+        {},
+    )
     x = simulate(make_system(model, make_grid(campaign, "r", ["u"], ["y"])), {"tau": tau})
     expected = [0.3]
     for k, h in enumerate(np.diff(time)):
@@ -141,16 +166,23 @@ def test_radiation_converges_with_the_square_of_the_step() -> None:
     """A quartic term against LSODA: the error falls fourfold when the step halves."""
     source = "P/C - 5.67e-8*A/C*((x + 273.15)**4 - 295.15**4)"
     parameters = {"P": Parameter(60.0), "A": Parameter(0.5), "C": Parameter(2000.0)}
-    model = Model("hot", parameters, {"x": State("x", "degC", None, Number(22.0), 0.0)}, (Term("t", "x", parse(source)),), {"y": parse("x")})
+    model = Model(
+        "hot",
+        parameters,
+        {"x": State("x", "degC", None, Number(22.0), 0.0)},
+        (Term("t", "x", parse(source)),),
+        {"y": parse("x")},
+    )
 
-    def exact(t: float, x: Array) -> Array:
+    def exact(_: float, x: Array) -> Array:
         return np.asarray(60 / 2000 - 5.67e-8 * 0.5 / 2000 * ((x + 273.15) ** 4 - 295.15**4))
 
     solved = solve_ivp(exact, (0, 3600.0), [22.0], "LSODA", [3600.0], rtol=1e-11, atol=1e-11).y[0, -1]
     errors = []
     for step in (240.0, 120.0):
         time = np.arange(0.0, 3601.0, step)
-        campaign = one_channel(time, np.arange(len(time)) * 1.0, "held", np.where(time == 3600.0, 0.0, np.nan))
+        readings = np.where(time == 3600.0, 0.0, np.nan)
+        campaign = one_channel(np.asarray(time), np.arange(len(time), dtype=np.float64), "held", readings)
         trajectory = simulate(make_system(model, make_grid(campaign, "r", ["u"], ["y"])), model.values())
         errors.append(abs(predict(trajectory)[-1, 0] - solved))
     assert errors[0] < 0.02

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from discovery.dynamics import make_grid, make_system, simulate
 from discovery.dynamics.kernel import play
@@ -24,12 +25,14 @@ def campaign(between: str) -> Campaign:
     return Campaign("c", channels, {"r": Recording("r", time, {"u": u, "y": np.zeros(len(time))})})
 
 
-def output(between: str, expression: str, **values: float) -> np.ndarray:  # type: ignore[type-arg]
+def output(between: str, expression: str, **values: float) -> NDArray[np.float64]:
     from discovery.models import State
     from discovery.terms import Number
 
     given = {name: Parameter(value) for name, value in values.items()}
-    model = Model("m", given, {"still": State("still", "", None, Number(0.0), 0.0)}, (), {"y": parse(expression)})
+    model = Model(
+        "m", given, {"still": State("still", "", None, Number(0.0), 0.0)}, (), {"y": parse(expression)}
+    )
     c = campaign(between)
     return predict(simulate(make_system(model, make_grid(c, "r", model.inputs, ["y"])), model.values()))[:, 0]
 
@@ -78,7 +81,9 @@ def test_readings_stay_where_they_were_taken() -> None:
     u = np.where(np.isin(time, inputs), time / 1000, np.nan)
     y = np.where(np.isin(time, reads), time, np.nan)
     channels = campaign("linear").channels
-    grid = make_grid(Campaign("c", channels, {"r": Recording("r", time, {"u": u, "y": y})}), "r", ["u"], ["y"])
+    grid = make_grid(
+        Campaign("c", channels, {"r": Recording("r", time, {"u": u, "y": y})}), "r", ["u"], ["y"]
+    )
     assert np.array_equal(grid.time[grid.read], reads)
     assert np.array_equal(grid.readings[:, 0], reads)
     assert np.allclose(grid.nodes["u"], grid.time / 1000)

@@ -1,4 +1,6 @@
-"""Sensitivities against differences: linear and nonlinear terms, lag, delay, play, start values, candidate terms."""
+"""Sensitivities against differences: linear and nonlinear terms, lag, delay, play, start values, candidate
+terms.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,11 @@ def campaign() -> Campaign:
     time = np.arange(0.0, 6 * 3600.0 + 1, 20.0)
     rng = np.random.default_rng(2)
     heat = rng.choice([0.0, 100.0, 300.0], 13)[(time / 1800).astype(int)]
-    values = {"T": 22 + 3 * np.sin(time / 4000), "P": heat, "y": np.where(np.arange(len(time)) % 30 == 0, 0.0, np.nan)}
+    values = {
+        "T": 22 + 3 * np.sin(time / 4000),
+        "P": heat,
+        "y": np.where(np.arange(len(time)) % 30 == 0, 0.0, np.nan),
+    }
     channels = {
         "T": Channel("T", "ambient temperature", "degC", None, "linear"),
         "P": Channel("P", "heat load", "W", None, "held"),
@@ -82,7 +88,10 @@ def test_parameters_and_starts(name: str, campaign: Campaign) -> None:
     for k, state in enumerate(("a", "b")):
         shift = np.zeros(len(start))
         shift[system.states.index(state)] = 1e-3
-        _alike(found[:, len(free) + k], (run(system, values, start + shift) - run(system, values, start - shift)) / 2e-3)
+        _alike(
+            found[:, len(free) + k],
+            (run(system, values, start + shift) - run(system, values, start - shift)) / 2e-3,
+        )
 
 
 def _alike(found: Array, expected: Array) -> None:
@@ -91,9 +100,13 @@ def _alike(found: Array, expected: Array) -> None:
 
 
 @pytest.mark.parametrize("candidate", ["T - a", "P*(T - a)", "abs(b - a)*(b - a)", "(a + 273.15)**4/1e8"])
-def test_a_candidate_column_is_the_slope_at_zero_of_a_model_with_that_term(candidate: str, campaign: Campaign) -> None:
+def test_a_candidate_column_is_the_slope_at_zero_of_a_model_with_that_term(
+    candidate: str, campaign: Campaign
+) -> None:
     base = CASES["natural convection"]
-    grown = base.with_terms(Term("new", "b", parse(f"theta*({candidate})"), "a"), parameters={"theta": Parameter(0.0)})
+    grown = base.with_terms(
+        Term("new", "b", parse(f"theta*({candidate})"), "a"), parameters={"theta": Parameter(0.0)}
+    )
     system = make_system(base, make_grid(campaign, "r", base.inputs, ["y"]))
     trajectory = simulate(system, base.values())
     series = evaluate(parse(candidate), trajectory.at_ends(), memory=system.ends).value
@@ -110,7 +123,9 @@ def test_the_width_of_a_play_behind_a_body(campaign: Campaign) -> None:
     system = make_system(model, make_grid(campaign, "r", model.inputs, ["y"]))
     values, start = model.values(), start_values(system, model.values())
     found = sensitivities(simulate(system, values, start), ["w"])[:, 0, 0]
-    _alike(found, (run(system, values | {"w": 0.41}, start) - run(system, values | {"w": 0.39}, start)) / 0.02)
+    _alike(
+        found, (run(system, values | {"w": 0.41}, start) - run(system, values | {"w": 0.39}, start)) / 0.02
+    )
 
 
 def test_what_leaves_one_body_enters_the_other(campaign: Campaign) -> None:

@@ -35,7 +35,9 @@ def test_r2_against_sklearn() -> None:
 @pytest.mark.parametrize("error", TABLE_3)
 @pytest.mark.parametrize("equation", ["8", "9"])
 def test_improvements_are_those_that_the_paper_prints(error: str, equation: str) -> None:
-    """The paper computed its percentages from unrounded figures: they agree to the rounding of what it prints."""
+    """The paper computed its percentages from unrounded figures: they agree to the rounding of what it
+    prints.
+    """
     before, after, printed = (TABLE_3[error][key] for key in ("uncompensated", equation, f"{equation} %"))
     found = improvement(Criteria(1.0, *before), Criteria(1.0, *after))
     for key, value in zip(("peak", "mean", "variance"), printed, strict=True):
@@ -80,15 +82,26 @@ def test_table_3_has_the_papers_figures_beside_ours() -> None:
     rows = {row[:2]: row[2:] for row in table.rows}
     assert rows["E_Y0C", "uncompensated"][:4] == (49.0, 49, -35.0, -35)
     assert rows["E_Y0C", "reduced"][1::2][:3] == (16, 6, 6)
-    assert rows["E_Y0C", "improvement reduced [%]"][:2] == (pytest.approx(90.0), 69)
+    assert list(rows["E_Y0C", "improvement reduced [%]"][:2]) == pytest.approx([90.0, 69])
     assert rows["E_Y0C", "mine"][1] is None
     assert rows["T1", "uncompensated"][1] is None
 
 
 def test_table_1_has_a_column_for_each_part() -> None:
     table = table_1(results(), "reduced", {"test cycle": "fit", "left side": "left"})
-    assert table.header == ("Error", "test cycle (fit)", "paper", "2. test cycle", "paper", "left side (left)", "paper")
-    assert table.rows == (("E_Y0C", pytest.approx(90.0), 85.5, None, 86.7, pytest.approx(90.0), 92.7),)
+    assert table.header == (
+        "Error",
+        "test cycle (fit)",
+        "paper",
+        "2. test cycle",
+        "paper",
+        "left side (left)",
+        "paper",
+    )
+    [row] = table.rows
+    assert row[0] == "E_Y0C"
+    assert [row[1], row[5]] == pytest.approx([90.0, 90.0])
+    assert (row[2], row[3], row[4], row[6]) == (85.5, None, 86.7, 92.7)
 
 
 def test_a_table_as_text_lines_up() -> None:

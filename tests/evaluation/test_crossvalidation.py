@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -62,8 +63,12 @@ def test_one_recording_is_left_out_in_blocks_alone(model: Model) -> None:
 def test_recordings_that_are_not_to_fit_are_not_looked_at(model: Model) -> None:
     c = campaign(a=2.0, b=2.0, other=2.0)
     before = cross_validate(model, c, ["a", "b"], ["E"])
-    spoiled = replace(c.recordings["other"], values={name: v * np.nan for name, v in c.recordings["other"].values.items()})
-    after = cross_validate(model, replace(c, recordings={**c.recordings, "other": spoiled}), ["a", "b"], ["E"])
+    spoiled = replace(
+        c.recordings["other"], values={name: v * np.nan for name, v in c.recordings["other"].values.items()}
+    )
+    after = cross_validate(
+        model, replace(c, recordings={**c.recordings, "other": spoiled}), ["a", "b"], ["E"]
+    )
     assert before == after
 
 
@@ -75,10 +80,20 @@ def test_every_recording_and_every_hour_is_left_out_once() -> None:
     windows = [fold.windows["r0"] for fold in found if fold.windows]
     assert windows[0][0] == 0.0
     assert windows[-1][1] == np.inf
-    assert all(a[1] == b[0] for a, b in zip(windows[:-1], windows[1:], strict=True))
+    assert all(a[1] == b[0] for a, b in pairwise(windows))
 
 
 def test_the_parts_of_the_paper_are_recognised() -> None:
-    recordings = {name: recording(name, 1, height=100.0 if name == "high" else 50.0) for name in ("fit", "validation", "left_nozzle", "high")}
-    parts = parts_of_the_paper(Campaign("c", CHANNELS, recordings), ["fit"], ["validation", "left_nozzle", "high"])
-    assert parts == {"test cycle": "fit", "2. test cycle": "validation", "left side": "left_nozzle", "100 mm": "high"}
+    recordings = {
+        name: recording(name, 1, height=100.0 if name == "high" else 50.0)
+        for name in ("fit", "validation", "left_nozzle", "high")
+    }
+    parts = parts_of_the_paper(
+        Campaign("c", CHANNELS, recordings), ["fit"], ["validation", "left_nozzle", "high"]
+    )
+    assert parts == {
+        "test cycle": "fit",
+        "2. test cycle": "validation",
+        "left side": "left_nozzle",
+        "100 mm": "high",
+    }

@@ -32,7 +32,7 @@ def truth(u: Array, v: Array, hours: float, a: float = 0.5, g: float = 0.02, k: 
 
 def recording(seed: int, noise: float = 0.5, count: int = 200, **parameters: float) -> Recording:
     rng = np.random.default_rng(seed)
-    time = np.arange(count) * 900.0
+    time = np.arange(count, dtype=np.float64) * 900.0
     u, v = rng.choice([0.0, 300.0, 900.0], count), rng.normal(0, 2, count)
     y = truth(u, v, 0.25, **parameters) + noise * rng.standard_normal(count)
     return Recording(f"r{seed}", time, {"u": u, "v": v, "y": y})
@@ -71,7 +71,9 @@ def test_intervals_follow_the_residual_where_no_noise_is_stated() -> None:
     inside = 0
     for seed in range(100):
         r = recording(seed, noise=1.7)
-        p = fit_model(model(a=Parameter(0.6, "1/h", 0.0)), Campaign("c", unstated, {r.name: r}), [r.name]).model.parameters["g"]
+        p = fit_model(
+            model(a=Parameter(0.6, "1/h", 0.0)), Campaign("c", unstated, {r.name: r}), [r.name]
+        ).model.parameters["g"]
         assert p.low is not None
         assert p.high is not None
         inside += p.low <= TRUTH["g"] <= p.high
@@ -95,7 +97,10 @@ def test_outliers_pull_less_with_a_robust_loss() -> None:
     values["y"][[20, 77, 140]] += np.array([125.0, -90.0, 60.0])
     spoiled = campaign(replace(r, values=values))
     clean = fit_model(model(), campaign(r), ["r3"]).model.parameters["a"].value
-    found = [fit_model(model(), spoiled, ["r3"], loss=loss).model.parameters["a"].value for loss in ("linear", "cauchy")]
+    found = [
+        fit_model(model(), spoiled, ["r3"], loss=loss).model.parameters["a"].value
+        for loss in ("linear", "cauchy")
+    ]
     assert abs(found[1] - clean) < 0.01
     assert abs(found[1] - clean) < 0.3 * abs(found[0] - clean)
 
@@ -148,7 +153,9 @@ def test_start_values_are_found_within_their_spread() -> None:
 def test_a_prediction_uses_the_first_reading_and_no_later_one() -> None:
     r = recording(0)
     fitted = fit_model(model(), campaign(r), ["r0"]).model
-    spoiled = replace(r, values={**r.values, "y": np.concatenate([r.values["y"][:1], r.values["y"][1:] * 0 + 999.0])})
+    spoiled = replace(
+        r, values={**r.values, "y": np.concatenate([r.values["y"][:1], r.values["y"][1:] * 0 + 999.0])}
+    )
     a, b = (predict_recording(fitted, campaign(one), "r0", ["y"], [0.5]) for one in (r, spoiled))
     assert np.array_equal(a.x, b.x)
     moved = replace(r, values={**r.values, "y": np.concatenate([r.values["y"][:1] + 1.0, r.values["y"][1:]])})

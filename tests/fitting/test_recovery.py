@@ -25,8 +25,12 @@ CHANNELS = {
 }
 
 
-def inputs(seed: int, hours: float = 48.0, on: tuple[str, ...] = ("T_env", "P", "T_fluid")) -> tuple[Array, dict[str, Array]]:
-    """Stamps every 5 minutes; temperatures with hourly knots, power switched every half hour; what is not `on` rests."""
+def inputs(
+    seed: int, hours: float = 48.0, on: tuple[str, ...] = ("T_env", "P", "T_fluid")
+) -> tuple[Array, dict[str, Array]]:
+    """Stamps every 5 minutes; temperatures with hourly knots, power switched every half hour; what is not
+    `on` rests.
+    """
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, hours * HOUR + 1, 300.0)
     knots = np.arange(0.0, hours + 1)
@@ -40,7 +44,9 @@ def inputs(seed: int, hours: float = 48.0, on: tuple[str, ...] = ("T_env", "P", 
     }
 
 
-def solved(time: Array, u: dict[str, Array], pole: float, gains: dict[str, float], constant: float, start: float) -> Array:
+def solved(
+    time: Array, u: dict[str, Array], pole: float, gains: dict[str, float], constant: float, start: float
+) -> Array:
     """y' = pole y + sum gain u + constant, in hours, by LSODA from stamp to stamp of the power."""
 
     def rate(t: float, y: Array, power: float) -> Array:
@@ -50,7 +56,9 @@ def solved(time: Array, u: dict[str, Array], pole: float, gains: dict[str, float
     y, out = np.array([start]), [start]
     for k in range(0, len(time) - 1, 6):
         stamps = time[k : k + 7]
-        part = solve_ivp(rate, (stamps[0], stamps[-1]), y, "LSODA", stamps[1:], args=(u["P"][k],), rtol=1e-8, atol=1e-8)
+        part = solve_ivp(
+            rate, (stamps[0], stamps[-1]), y, "LSODA", stamps[1:], args=(u["P"][k],), rtol=1e-8, atol=1e-8
+        )
         y = part.y[:, -1]
         out += part.y[0].tolist()
     return np.array(out)
@@ -84,7 +92,9 @@ def test_equation_9_from_its_own_data_without_noise() -> None:
     fitted = fit_model(model, campaign, ["fit"]).model
     for name, value in TRUTH.items():
         assert fitted.parameters[name].value == pytest.approx(value, rel=1e-3), name
-    left = fit_model(model, campaign, ["fit"]).problem.residual(predict_recording(fitted, campaign, "other", ["E"]))
+    left = fit_model(model, campaign, ["fit"]).problem.residual(
+        predict_recording(fitted, campaign, "other", ["E"])
+    )
     assert np.nanmax(np.abs(left)) < 1e-3
 
 
@@ -105,7 +115,9 @@ def test_the_fit_does_not_need_a_good_start() -> None:
     """From two hours and no influence, and from the regression on filtered inputs, to the same minimum."""
     campaign = one_cycle(0.5)
     generic = reduced(INPUTS, ["E"], CHANNELS)
-    costs = [fit_model(m, campaign, ["fit"]).cost for m in (generic, warm_start(generic, campaign, ["fit"], ["E"]))]
+    costs = [
+        fit_model(m, campaign, ["fit"]).cost for m in (generic, warm_start(generic, campaign, ["fit"], ["E"]))
+    ]
     assert costs[0] == pytest.approx(costs[1], rel=1e-3)
 
 
@@ -125,7 +137,9 @@ def separate_runs() -> tuple[Campaign, dict[str, dict[str, float]]]:
         time, u = inputs(seed + 10, 72.0, on)
         for one in ("T_env", "T_fluid"):
             u[one] = u[one] - u[one][0] - truth[one]["zero"]
-        y = sum(solved(time, u, t["pole"], {c: t["gain"]}, t["gain"] * t["zero"], 0.0) for c, t in truth.items())
+        y = sum(
+            solved(time, u, t["pole"], {c: t["gain"]}, t["gain"] * t["zero"], 0.0) for c, t in truth.items()
+        )
         recordings[name] = Recording(name, time, {**u, "E": read(time, np.asarray(y), 0.1, seed)})
     return Campaign("c", CHANNELS, recordings), truth
 

@@ -40,7 +40,7 @@ def quiet(rpm: float, h_n: float, reynolds: float, **others: object) -> float:
 
 
 @pytest.mark.parametrize(("speed", "reynolds"), TABLE)
-def test_film_coefficients(speed: float, reynolds: float) -> None:
+def test_film_coefficients(speed: int, reynolds: int) -> None:
     for h_n, expected in zip((0.05, 0.10), TABLE[speed, reynolds], strict=True):
         assert quiet(speed, h_n, reynolds) == pytest.approx(expected, abs=1.0)
 
@@ -104,5 +104,7 @@ def test_the_law_in_the_model_is_the_law_of_the_functions() -> None:
     for variant in ("none", "printed", "1.5"):
         for speed in (0.0, 100.0, 600.0, 751.0, 1200.0):
             found = evaluate(parse(film(variant)), values | {"speed": speed}).value  # type: ignore[arg-type]
-            expected = quiet(speed, 0.10, 1000, variant=variant, floor=values["h_still"] if speed == 0 else 0.0)
+            expected = quiet(
+                speed, 0.10, 1000, variant=variant, floor=values["h_still"] if speed == 0 else 0.0
+            )
             assert float(np.asarray(found)) == pytest.approx(expected, rel=1e-5)

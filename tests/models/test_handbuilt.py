@@ -26,7 +26,9 @@ CHANNELS = {
 
 def rates(model: Model) -> dict[str, str]:
     """Right-hand side of each state as one text."""
-    return {name: " + ".join(text(t.expression) for t in model.terms if t.into == name) for name in model.states}
+    return {
+        name: " + ".join(text(t.expression) for t in model.terms if t.into == name) for name in model.states
+    }
 
 
 def test_equation_9_letter_by_letter() -> None:
@@ -55,7 +57,10 @@ def test_equation_8_letter_by_letter() -> None:
         "E_by_pump": "p7_E*E_by_pump + p8_E*(pump + p9_E)",
     }
     assert text(model.outputs["E"]) == "E_by_T_env + E_by_P + E_by_pump"
-    assert set(model.parameters) - set(model.free) == {"p6_E", "p9_E"}  # only their steady sum can be found jointly
+    assert set(model.parameters) - set(model.free) == {
+        "p6_E",
+        "p9_E",
+    }  # only their steady sum can be found jointly
 
 
 @pytest.mark.parametrize(("file", "fluid"), [("thermobalance.toml", True), ("dry_thermobalance.toml", False)])
@@ -72,7 +77,9 @@ def test_conduction_conserves_energy() -> None:
 def test_equations_are_readable() -> None:
     model = thermobalance(fluid=False)
     lines = equations(model)
-    assert lines[0].startswith("4.5e+04 [J/K] * d/dt table = 20 [W/K]*(c_body_1 - table) + 3 [W/K]*(T_env - table)")
+    assert lines[0].startswith(
+        "4.5e+04 [J/K] * d/dt table = 20 [W/K]*(c_body_1 - table) + 3 [W/K]*(T_env - table)"
+    )
     assert "d/dt bed = (T_env - bed)/9e+04 [s]" in lines
     assert "E_R0T = 1.9205*(table - 22 [degC])" in lines
     found = equations(reduced(["P"], ["E"], CHANNELS).with_values({"p1_E": -0.4, "p2_E": 0.012, "p3_E": -2}))

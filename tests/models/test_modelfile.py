@@ -67,7 +67,8 @@ def test_a_model_survives_its_file(tmp_path: Path) -> None:
         fitted = dataclasses.replace(
             model,
             parameters={
-                name: dataclasses.replace(p, value=p.value * 1.1, low=0.0, high=p.value * 2, max=p.value * 9) for name, p in model.parameters.items()
+                name: dataclasses.replace(p, value=p.value * 1.1, low=0.0, high=p.value * 2, max=p.value * 9)
+                for name, p in model.parameters.items()
             },
         )
         write_model(tmp_path / "again.toml", fitted)
@@ -84,7 +85,9 @@ def test_a_model_survives_its_file(tmp_path: Path) -> None:
 def test_a_value_on_its_bound_is_read_back(tmp_path: Path) -> None:
     model = thermobalance()
     third = dataclasses.replace(model.parameters["G_b1_b2"], value=1 / 48, min=1 / 48, max=1 / 3)
-    write_model(tmp_path / "m.toml", dataclasses.replace(model, parameters={**model.parameters, "G_b1_b2": third}))
+    write_model(
+        tmp_path / "m.toml", dataclasses.replace(model, parameters={**model.parameters, "G_b1_b2": third})
+    )
     assert read_model(tmp_path / "m.toml").parameters["G_b1_b2"].value == pytest.approx(1 / 48)
 
 

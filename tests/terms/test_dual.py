@@ -44,7 +44,9 @@ def test_a_quotient_by_zero_is_no_crash() -> None:
 
 
 def test_the_branch_not_taken_may_be_undefined() -> None:
-    dual = evaluate(parse("where(x > 0, log(max(x, 1e-300)), 0)"), {"x": np.array([0.0, 1.0])}, frozenset({"x"}))
+    dual = evaluate(
+        parse("where(x > 0, log(max(x, 1e-300)), 0)"), {"x": np.array([0.0, 1.0])}, frozenset({"x"})
+    )
     assert np.isfinite(dual.value).all()
 
 

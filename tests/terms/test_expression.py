@@ -10,11 +10,15 @@ from discovery.terms import Apply, Expression, Name, Number, degree, evaluate, n
 from discovery.terms.expression import FUNCTIONS, MAX_DEPTH, MAX_LENGTH
 
 VARIABLES = ("x", "y", "T_fluid")
-VALUES = {"x": np.array([0.3, 1.7, -2.0]), "y": np.array([1.0, 0.5, 4.0]), "T_fluid": np.array([20.0, 25.0, -1.0])}
+VALUES = {
+    "x": np.array([0.3, 1.7, -2.0]),
+    "y": np.array([1.0, 0.5, 4.0]),
+    "T_fluid": np.array([20.0, 25.0, -1.0]),
+}
 BINARY = ("+", "-", "*", "/", "**", "<", "<=", ">", ">=", "==", "!=")
 
 leaves = st.one_of(
-    st.floats(-1e6, 1e6, allow_nan=False).map(Number),
+    st.floats(-1e6, 1e6, allow_nan=False).map(lambda value: Number(value + 0.0)),  # 0 has no sign
     st.sampled_from(VARIABLES).map(Name),
 )
 
@@ -36,7 +40,9 @@ expressions = st.recursive(leaves, applied, max_leaves=12)
 def test_what_is_printed_reads_back_to_the_same_values(expression: Expression) -> None:
     again = parse(text(expression))
     with np.errstate(all="ignore"):
-        assert np.array_equal(evaluate(again, VALUES).value, evaluate(expression, VALUES).value, equal_nan=True)
+        assert np.array_equal(
+            evaluate(again, VALUES).value, evaluate(expression, VALUES).value, equal_nan=True
+        )
     assert names(again) == names(expression)
 
 
@@ -44,11 +50,10 @@ def test_what_is_printed_reads_back_to_the_same_values(expression: Expression) -
 @given(st.text(max_size=60))
 def test_any_text_is_read_or_refused_with_a_sentence(source: str) -> None:
     try:
-        expression = parse(source, "model.toml, line 3")
+        found: object = parse(source, "model.toml, line 3")
     except UserError as error:
-        assert str(error).startswith("model.toml, line 3: ")
-    else:
-        assert isinstance(expression, Number | Name | Apply)
+        found = str(error)
+    assert isinstance(found, Number | Name | Apply) or str(found).startswith("model.toml, line 3: ")
 
 
 @pytest.mark.parametrize(
@@ -120,7 +125,16 @@ def test_the_deepest_expression_that_is_read_can_be_printed_and_evaluated() -> N
 
 
 def test_signs_and_powers_bind_as_in_python() -> None:
-    for source in ("-x**2", "(-x)**2", "2**-x", "-x*-y", "x - (y - T_fluid)", "x/(y*T_fluid)", "x**y**2", "(x**y)**2"):
+    for source in (
+        "-x**2",
+        "(-x)**2",
+        "2**-x",
+        "-x*-y",
+        "x - (y - T_fluid)",
+        "x/(y*T_fluid)",
+        "x**y**2",
+        "(x**y)**2",
+    ):
         with np.errstate(all="ignore"):
             expected = eval(source, {}, dict(VALUES))  # the oracle; the product never evaluates text
             assert np.allclose(evaluate(parse(source), VALUES).value, expected, equal_nan=True), source
@@ -132,7 +146,10 @@ def test_comparisons_chain_and_count_as_numbers() -> None:
 
 def test_degree_tells_affine_terms_from_others() -> None:
     states = frozenset({"x", "y"})
-    assert [degree(parse(s), states) for s in ("T_fluid**2", "T_fluid*(x - y)", "x*y", "where(T_fluid > 1, x, y)", "abs(x)")] == [0, 1, 2, 1, 2]
+    assert [
+        degree(parse(s), states)
+        for s in ("T_fluid**2", "T_fluid*(x - y)", "x*y", "where(T_fluid > 1, x, y)", "abs(x)")
+    ] == [0, 1, 2, 1, 2]
 
 
 def test_substitution_leaves_the_rest() -> None:
