@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from discovery.virtual import fine, laws
+from discovery.virtual import chains, laws, outside
 from discovery.virtual.casefiles import case_files
 from discovery.virtual.cycles import HOUR, noise
 from discovery.virtual.faults import FAULTS
@@ -105,15 +105,15 @@ def _one(rng: np.random.Generator, world: World, base: Array) -> Found:
 def _window(rng: np.random.Generator, world: World, base: Array, wanted: float) -> Found:
     """Heat of unknown cause for some hours in one recording to fit."""
     where, body = int(rng.integers(len(FIT))), int(rng.integers(5))
-    shape, start, end = laws.window_of_heat(rng, len(world.inputs[0].air))
+    shape, start, end = outside.window_of_heat(rng, len(world.inputs[0].air))
 
     def readings(size: float) -> Array:
-        heated = fine.Law(fine.HEAT, body, -1, size * shape, shape)
+        heated = chains.Law(chains.HEAT, body, -1, size * shape, shape)
         return world.readings([[heated] if k == where else [] for k in range(len(RECORDINGS))])
 
     size = float(f"{100.0 * wanted / world.size_of(readings(100.0) - base):.5g}")
     effect = Concealed(
-        "unmeasured_heat", (BODIES[body],), laws.body_law(fine.HEAT, body, laws.always), "W", size, size
+        "unmeasured_heat", (BODIES[body],), laws.body_law(chains.HEAT, body, laws.always), "W", size, size
     )
     change = readings(size) - base
     return base + change, _key_of(world, effect, size, change) | {"window": [RECORDINGS[where], start, end]}
@@ -141,9 +141,9 @@ def _two(rng: np.random.Generator, world: World, base: Array) -> Found:
 def _outside(rng: np.random.Generator, world: World, base: Array) -> Found:
     """Something that no catalogue holds."""
     wanted = float(np.exp(rng.uniform(np.log(0.8), np.log(4.0))))
-    kind = int(rng.integers(len(laws.OUTSIDE) + 1))
-    for _ in range(ATTEMPTS if kind < len(laws.OUTSIDE) else 0):
-        effect = laws.OUTSIDE[kind](rng, world.plant.machine)
+    kind = int(rng.integers(len(outside.OUTSIDE) + 1))
+    for _ in range(ATTEMPTS if kind < len(outside.OUTSIDE) else 0):
+        effect = outside.OUTSIDE[kind](rng, world.plant.machine)
         size, readings = _sized(world, base, effect, wanted)
         if world.size_of(readings - base) > 0.6:
             return readings, _key_of(world, effect, size, readings - base)
@@ -158,14 +158,14 @@ def _odd_joint(rng: np.random.Generator, world: World, base: Array, wanted: floa
     def readings(width: float) -> Array:
         slipping = [b.copy() for b in bodies]
         for b in slipping:
-            b[:, body] = laws.odd_joint(b[:, body], width, creep)
+            b[:, body] = outside.odd_joint(b[:, body], width, creep)
         return world.shown(slipping)
 
     width = 0.3
     for _ in range(5):
         width = float(np.clip(width * wanted / max(world.size_of(readings(width) - base), 1e-9), 0.02, 3.0))
     width = float(f"{width:.5g}")
-    law = laws.body_law(fine.HEAT, body, laws.always)
+    law = laws.body_law(chains.HEAT, body, laws.always)
     effect = Concealed("out of catalogue", (BODIES[body],), law, "K", width, 3.0, accepts=("unexplained",),
                        also=("joint_hysteresis",))  # fmt: skip
     change = readings(width) - base

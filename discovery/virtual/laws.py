@@ -1,4 +1,4 @@
-"""Concealed physics for the finer plant: each effect draws its own place, exponents and thresholds.
+"""Concealed physics for the finer plant: each effect draws its own place, exponents, edges.
 
 Exponents are drawn about the textbook's and edges are smooth, so that no catalogue has exactly these forms.
 """
@@ -10,20 +10,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from discovery.virtual import fine
-from discovery.virtual.cycles import noise
-from discovery.virtual.fine import (
-    BODIES,
-    LINKS,
-    LOSSES,
-    STEP_S,
-    WET,
-    Array,
-    FineMachine,
-    Inputs,
-    Law,
-    first_order,
-)
+from discovery.virtual import chains
+from discovery.virtual.chains import Law
+from discovery.virtual.fine import BODIES, LINKS, LOSSES, STEP_S, WET, Array, FineMachine, Inputs, first_order
 
 Draw = np.random.Generator
 
@@ -90,13 +79,13 @@ def one_of(rng: Draw, places: tuple[int, ...]) -> int:
 
 def fluid_convection(rng: Draw, _: FineMachine) -> Concealed:
     b = one_of(rng, (2, 3, 4))
-    law = body_law(fine.TO_REF, b, while_pumping, fluid)
+    law = body_law(chains.TO_REF, b, while_pumping, fluid)
     return Concealed("fluid_convection", (BODIES[b],), law, "W/K", 20.0, 60.0, "pump > 0.5")
 
 
 def fluid_convection_speed(rng: Draw, _: FineMachine) -> Concealed:
     b, m = one_of(rng, WET), rng.uniform(0.5, 0.9)
-    law = body_law(fine.TO_REF, b, wet_speed_power(m), fluid)
+    law = body_law(chains.TO_REF, b, wet_speed_power(m), fluid)
     shape, also = {"m": m}, ("rim_detachment",) if b == 1 else ()
     return Concealed(
         "fluid_convection_speed", (BODIES[b],), law, "W/K", 20.0, 120.0, "pump > 0.5", shape, (), also
@@ -110,7 +99,7 @@ def rim_detachment(rng: Draw, m: FineMachine) -> Concealed:
     def thrown(u: Inputs) -> Array:
         return np.asarray(-m.wet[1] * u.pump * (1.0 - 1.0 / (1.0 + (u.speed / edge) ** p)))
 
-    law, also = body_law(fine.TO_REF, 1, thrown, fluid), ("fluid_convection_speed",)
+    law, also = body_law(chains.TO_REF, 1, thrown, fluid), ("fluid_convection_speed",)
     shape = {"n_c": edge, "m": p}
     return Concealed("rim_detachment", (BODIES[1],), law, "1", 0.5, 1.0, "pump > 0.5", shape, (), also)
 
@@ -126,7 +115,7 @@ def evaporation_drying(rng: Draw, _: FineMachine) -> Concealed:
             film[k] = m
         return film
 
-    law = body_law(fine.EVAPORATION, b, wetness)
+    law = body_law(chains.EVAPORATION, b, wetness)
     return Concealed(
         "evaporation_drying", (BODIES[b],), law, "W", 50.0, 250.0, "after the pump", {"drying_s": tau}
     )
@@ -134,13 +123,13 @@ def evaporation_drying(rng: Draw, _: FineMachine) -> Concealed:
 
 def film_drag(rng: Draw, _: FineMachine) -> Concealed:
     p = rng.uniform(1.8, 2.2)
-    law = body_law(fine.HEAT, 0, wet_speed_power(p))
+    law = body_law(chains.HEAT, 0, wet_speed_power(p))
     return Concealed("film_drag", (BODIES[0],), law, "W", 30.0, 150.0, "pump > 0.5 and speed > 600", {"m": p})
 
 
 def flooded_gap(rng: Draw, _: FineMachine) -> Concealed:
     del rng
-    law = body_law(fine.LINK, 1, while_pumping, out=3)
+    law = body_law(chains.LINK, 1, while_pumping, out=3)
     return Concealed("flooded_gap", (BODIES[1], BODIES[3]), law, "W/K", 30.0, 90.0, "pump > 0.5")
 
 
@@ -151,7 +140,7 @@ def fluid_delay(rng: Draw, m: FineMachine) -> Concealed:
     def laws(size: float, u: Inputs) -> list[Law]:
         t = np.arange(len(u.fluid)) * STEP_S
         behind = np.interp(t - size, t, u.fluid) - u.fluid
-        return [Law(fine.HEAT, b, -1, G * u.pump * behind, u.air) for b, G in zip(WET, m.wet, strict=True)]
+        return [Law(chains.HEAT, b, -1, G * u.pump * behind, u.air) for b, G in zip(WET, m.wet, strict=True)]
 
     states = tuple(BODIES[b] for b in WET)
     return Concealed("fluid_delay", states, laws, "s", 1200.0, 3600.0, "pump > 0.5")
@@ -159,13 +148,13 @@ def fluid_delay(rng: Draw, m: FineMachine) -> Concealed:
 
 def friction_speed(rng: Draw, _: FineMachine) -> Concealed:
     b, p = one_of(rng, LOSSES), rng.uniform(1.3, 1.9)
-    law = body_law(fine.HEAT, b, speed_power(p))
+    law = body_law(chains.HEAT, b, speed_power(p))
     return Concealed("friction_speed", (BODIES[b],), law, "W", 50.0, 250.0, "speed > 0", {"m": p})
 
 
 def viscosity_temperature(rng: Draw, _: FineMachine) -> Concealed:
     b, p, k = one_of(rng, (1, 2)), rng.uniform(1.3, 1.9), rng.uniform(0.025, 0.04)
-    law = body_law(fine.EXPONENT, b, speed_power(p), shape=(-k, 0.0, 1.0))
+    law = body_law(chains.EXPONENT, b, speed_power(p), shape=(-k, 0.0, 1.0))
     shape, also = {"k": k, "m": p}, ("friction_speed",)
     return Concealed(
         "viscosity_temperature", (BODIES[b],), law, "W", 80.0, 300.0, "speed > 0", shape, (), also
@@ -174,19 +163,19 @@ def viscosity_temperature(rng: Draw, _: FineMachine) -> Concealed:
 
 def thermal_preload(rng: Draw, _: FineMachine) -> Concealed:
     p = rng.uniform(0.9, 1.2)
-    law = body_law(fine.DRIVEN, 1, speed_power(p), out=3)
+    law = body_law(chains.DRIVEN, 1, speed_power(p), out=3)
     return Concealed("thermal_preload", (BODIES[1],), law, "W/K", 5.0, 15.0, "speed > 0", {"m": p})
 
 
 def rotating_air_convection(rng: Draw, _: FineMachine) -> Concealed:
     b, p = one_of(rng, (0, 1)), rng.uniform(0.6, 0.9)
-    law = body_law(fine.TO_REF, b, speed_power(p))
+    law = body_law(chains.TO_REF, b, speed_power(p))
     return Concealed("rotating_air_convection", (BODIES[b],), law, "W/K", 8.0, 30.0, "speed > 0", {"m": p})
 
 
 def natural_convection(rng: Draw, _: FineMachine) -> Concealed:
     b, p = one_of(rng, (0, 1, 2, 3, 4)), rng.uniform(0.2, 0.3)
-    law = body_law(fine.POWER, b, always, shape=(p, 0.0, 1.0))
+    law = body_law(chains.POWER, b, always, shape=(p, 0.0, 1.0))
     return Concealed(
         "natural_convection", (BODIES[b],), law, "W/K", 10.0, 40.0, "", {"m": p}, (), ("radiation",)
     )
@@ -195,13 +184,13 @@ def natural_convection(rng: Draw, _: FineMachine) -> Concealed:
 def conduction_path(rng: Draw, _: FineMachine) -> Concealed:
     missing = [(i, j) for i in range(5) for j in range(i + 1, 5) if (i, j) not in LINKS]
     i, j = missing[int(rng.integers(len(missing)))]
-    law = body_law(fine.LINK, i, always, out=j)
+    law = body_law(chains.LINK, i, always, out=j)
     return Concealed("conduction_path", (BODIES[i], BODIES[j]), law, "W/K", 10.0, 60.0)
 
 
 def second_thermal_mass(rng: Draw, _: FineMachine) -> Concealed:
     b, tau = one_of(rng, (0, 1, 2, 3)), rng.uniform(1800, 7200)
-    law = body_law(fine.HIDDEN_MASS, b, always, shape=(tau, 0.0, 1.0))
+    law = body_law(chains.HIDDEN_MASS, b, always, shape=(tau, 0.0, 1.0))
     return Concealed(
         "second_thermal_mass", (BODIES[b],), law, "W/K", 20.0, 90.0, "", {"time_constant_s": tau}
     )
@@ -209,14 +198,14 @@ def second_thermal_mass(rng: Draw, _: FineMachine) -> Concealed:
 
 def bed_memory(rng: Draw, _: FineMachine) -> Concealed:
     b, tau = one_of(rng, (3, 4)), rng.uniform(20, 50) * 3600
-    law = body_law(fine.TO_REF, b, always, lambda u: first_order(u.air, tau))
+    law = body_law(chains.TO_REF, b, always, lambda u: first_order(u.air, tau))
     return Concealed("bed_memory", (BODIES[b],), law, "W/K", 10.0, 40.0, "", {"time_constant_s": tau})
 
 
 def contact_conductance(rng: Draw, m: FineMachine) -> Concealed:
     k = int(rng.integers(len(LINKS)))
     i, j = LINKS[k]
-    law = body_law(fine.CONTACT, i, lambda u: np.full_like(u.air, m.links[k]), out=j)
+    law = body_law(chains.CONTACT, i, lambda u: np.full_like(u.air, m.links[k]), out=j)
     return Concealed("contact_conductance", (BODIES[i], BODIES[j]), law, "1/K", 0.05, 0.15)
 
 
@@ -238,64 +227,3 @@ ONE: tuple[Maker, ...] = (
     bed_memory,
     contact_conductance,
 )
-
-
-def window_of_heat(rng: Draw, n: int) -> tuple[Array, float, float]:
-    """A window (n,) with soft edges of a few minutes, 3 to 10 h long, and its start and end [s]."""
-    length = rng.uniform(3, 10) * 3600
-    start = rng.uniform(0.05, 0.95) * (n * STEP_S - length)
-    t, edge = (np.arange(n) + 0.5) * STEP_S, rng.uniform(60, 400)
-    shape = (np.tanh((t - start) / edge) - np.tanh((t - start - length) / edge)) / 2
-    return np.asarray(shape), round(float(start)), round(float(start + length))
-
-
-# Out of the catalogue: nobody has a formula for these, `unexplained` is the right word.
-
-
-def phase_change(rng: Draw, _: FineMachine) -> Concealed:
-    """Latent heat of something that melts in a body (wax, grease), smeared over temperature and time."""
-    b, melt = one_of(rng, (0, 1, 2, 3)), rng.uniform(23.5, 25.5)
-    shape = (melt, rng.uniform(300, 1200), rng.uniform(0.2, 0.6))
-    law = body_law(fine.MELTING, b, always, shape=shape)
-    return Concealed("out of catalogue", (BODIES[b],), law, "J", 50e3, 600e3, accepts=("unexplained",))
-
-
-def irregular_heat(rng: Draw, _: FineMachine) -> Concealed:
-    """Heat that comes and goes by its own clock, otherwise in every recording."""
-    b, tau, seed = one_of(rng, (0, 1, 2, 3, 4)), rng.uniform(2, 5) * 3600, int(rng.integers(2**31))
-
-    def gate(u: Inputs) -> Array:
-        own = np.random.default_rng([seed, int(u.air[0] * 1e6)])
-        return np.asarray(0.5 * (1 + np.tanh(3 * noise(own, len(u.air), STEP_S, tau, 1.0))))
-
-    law = body_law(fine.HEAT, b, gate)
-    return Concealed("unmeasured_heat", (BODIES[b],), law, "W", 60.0, 300.0, accepts=("unexplained",))
-
-
-def shifted_law(rng: Draw, _: FineMachine) -> Concealed:
-    """The right input in a wrong form: a resonance in speed, or a rhythm of its own while the pump runs."""
-    b = one_of(rng, (1, 2, 3))
-    centre, width = rng.uniform(350, 800), rng.uniform(60, 140)
-    phase, period = rng.uniform(0, 6.28), rng.uniform(5, 11) * 3600
-
-    def resonance(u: Inputs) -> Array:
-        return np.asarray(np.exp(-(((u.speed - centre) / width) ** 2)))
-
-    def rhythm(u: Inputs) -> Array:
-        return np.asarray(u.pump * np.sin(2 * np.pi * np.arange(len(u.pump)) * STEP_S / period + phase))
-
-    law = body_law(fine.HEAT, b, resonance if rng.uniform() < 0.5 else rhythm)
-    return Concealed("out of catalogue", (BODIES[b],), law, "W", 60.0, 300.0, accepts=("unexplained",))
-
-
-OUTSIDE: tuple[Maker, ...] = (phase_change, irregular_heat, shifted_law)
-
-
-def odd_joint(x: Array, width: float, creep: float) -> Array:
-    """A joint of unusual shape: play 0.4 as wide on the way up, and it creeps home by `creep` a minute."""
-    y, now, share = np.empty_like(x), float(x[0]), creep * STEP_S / 60.0
-    for k, value in enumerate(x.tolist()):
-        now = max(value - width, min(value + 0.4 * width, now))
-        now += share * (value - now)
-        y[k] = now
-    return y

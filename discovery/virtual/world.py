@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.virtual.chains import Law, Propagator, propagator, run
 from discovery.virtual.cycles import HOUR, noise
 from discovery.virtual.fine import (
     BODIES,
@@ -20,13 +21,9 @@ from discovery.virtual.fine import (
     Array,
     FineMachine,
     Inputs,
-    Law,
-    Propagator,
     draw_inputs,
     draw_machine,
     lumped,
-    propagator,
-    run,
 )
 
 RECORDINGS = ("a", "b", "c")

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from discovery.virtual import fine, laws
+from discovery.virtual import laws
 from discovery.virtual.cases import KINDS, Case, draw_kinds, make_case
+from discovery.virtual.chains import propagator, run
 from discovery.virtual.fine import (
     BODIES,
     COOLED,
@@ -25,6 +26,7 @@ from discovery.virtual.fine import (
     draw_machine,
     lumped,
 )
+from discovery.virtual.outside import OUTSIDE
 from discovery.virtual.world import draw_world, lumping
 
 Array = NDArray[np.float64]
@@ -45,7 +47,7 @@ def test_lumped_plant_against_lsoda() -> None:
     m = lumped(draw_machine(rng))
     u = draw_inputs(rng, m, hours=3.0)
     start = np.array([20.0, 21.0, 22.0, 23.0, 24.0])
-    got = fine.run(fine.propagator(m), u, start, np.zeros((len(u.air), 5)))
+    got = run(propagator(m), u, start, np.zeros((len(u.air), 5)))
 
     def rhs(_: float, T: Array, k: int) -> Array:
         q = m.air * (u.air[k] - T)
@@ -71,7 +73,7 @@ def test_fine_plant_keeps_its_energy() -> None:
     u = draw_inputs(rng, m, hours=2.0)
     heat = np.zeros((len(u.air), 5))
     heat[:, 3] = 100.0
-    bodies = fine.run(fine.propagator(closed), u, np.full(5, 22.0), heat)
+    bodies = run(propagator(closed), u, np.full(5, 22.0), heat)
     stored = float((bodies[-1] - bodies[0]) @ m.capacity)
     assert stored == pytest.approx(100.0 * 7200.0, rel=1e-9)
     assert 20 <= m.nodes.sum() <= 50
@@ -81,12 +83,12 @@ def test_a_law_of_link_keeps_energy_and_zero_size_is_nothing() -> None:
     rng = np.random.default_rng(5)
     m = draw_machine(rng)
     u = draw_inputs(rng, m, hours=2.0)
-    p, quiet, start = fine.propagator(m), np.zeros((len(u.air), 5)), np.array([30.0, 20.0, 22.0, 25.0, 18.0])
-    plain = fine.run(p, u, start, quiet)
-    for maker in (*laws.ONE, *laws.OUTSIDE):
+    p, quiet, start = propagator(m), np.zeros((len(u.air), 5)), np.array([30.0, 20.0, 22.0, 25.0, 18.0])
+    plain = run(p, u, start, quiet)
+    for maker in (*laws.ONE, *OUTSIDE):
         effect = maker(np.random.default_rng(1), m)
-        np.testing.assert_array_equal(fine.run(p, u, start, quiet, effect.laws(0.0, u)), plain)
-        acting = fine.run(p, u, start, quiet, effect.laws(effect.trial, u))
+        np.testing.assert_array_equal(run(p, u, start, quiet, effect.laws(0.0, u)), plain)
+        acting = run(p, u, start, quiet, effect.laws(effect.trial, u))
         assert np.isfinite(acting).all(), effect.effect
         assert np.abs(acting - plain).max() > 1e-4, effect.effect
 
@@ -108,9 +110,9 @@ def test_size_is_what_a_nonlinear_refit_leaves() -> None:
             wet=coarse.wet * np.exp(z[13:15]),
             cooling=coarse.cooling * float(np.exp(z[15])),
         )
-        p = fine.propagator(m)
+        p = propagator(m)
         bodies = [
-            fine.run(p, world.inputs[k], world.starts[k] + z[16 + 5 * k : 21 + 5 * k], quiet) for k in (0, 1)
+            run(p, world.inputs[k], world.starts[k] + z[16 + 5 * k : 21 + 5 * k], quiet) for k in (0, 1)
         ]
         shown = [((b[::30] - 22.0) @ m.outputs.T).ravel() for b in bodies]
         return np.asarray(np.concatenate(shown) - truth)
