@@ -1,6 +1,53 @@
 """Discovery workbench: models of thermal errors from recordings, and what physics they miss.
 
-Nothing heavy is imported here: ``import discovery`` takes a few milliseconds.
+Nothing heavy is imported here: ``import discovery`` takes a few milliseconds, each name below loads what it needs.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from discovery.errors import UserError
+    from discovery.experiment import run
+    from discovery.fitting import fit_model
+    from discovery.frames import campaign_from_frames, prediction_frame, recording_frame
+    from discovery.mismatch import diagnose
+    from discovery.models import read_model, write_model
+    from discovery.recordings import load_campaign
+    from discovery.report import write_report
+
+_HOME = {
+    "UserError": "errors",
+    "campaign_from_frames": "frames",
+    "diagnose": "mismatch",
+    "fit_model": "fitting",
+    "load_campaign": "recordings",
+    "prediction_frame": "frames",
+    "read_model": "models",
+    "recording_frame": "frames",
+    "run": "experiment",
+    "write_model": "models",
+    "write_report": "report",
+}
+
+__all__ = [
+    "UserError",
+    "campaign_from_frames",
+    "diagnose",
+    "fit_model",
+    "load_campaign",
+    "prediction_frame",
+    "read_model",
+    "recording_frame",
+    "run",
+    "write_model",
+    "write_report",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'discovery' has no attribute '{name}'")
+    return getattr(import_module(f"discovery.{_HOME[name]}"), name)

@@ -1,0 +1,93 @@
+"""Notebooks: pandas frames in and out, for the same steps that the commands take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from discovery.errors import UserError
+from discovery.recordings import Campaign, Recording
+from discovery.recordings.campaign import make_channel
+from discovery.recordings.campaignfile import ChannelForm
+from discovery.recordings.units import UnitError, conversion
+from discovery.schema import suggest
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from discovery.models import Model
+
+
+def campaign_from_frames(
+    frames: Mapping[str, pd.DataFrame], channels: Mapping[str, Mapping[str, Any]], name: str = "notebook"
+) -> Campaign:
+    """A campaign of pandas frames.
+
+    Args:
+        frames: recordings by name; the index is time (seconds, or a DatetimeIndex), NaN is "not measured".
+        channels: column -> {"role": ..., "unit": ...} as in a campaign file; further columns are left out.
+
+    Raises:
+        UserError: an unknown role or unit, a column that is missing, an index that does not run forward.
+    """
+    from pydantic import ValidationError
+
+    made, rules = {}, {}
+    for column, entry in channels.items():
+        try:
+            form = ChannelForm.model_validate(dict(entry))
+            rules[column] = conversion(form.unit, form.role)
+        except UnitError as error:
+            raise UserError(f"channel '{column}': {error}") from None
+        except ValidationError as error:
+            what = error.errors(include_url=False)[0]
+            raise UserError(f"channel '{column}', {'.'.join(map(str, what['loc']))}: {what['msg']}") from None
+        made[column] = make_channel(column, form, rules[column])
+    recordings = {}
+    for key, frame in frames.items():
+        missing = next((column for column in channels if column not in frame), None)
+        if missing is not None:
+            raise UserError(f"recording '{key}': no column '{missing}'; {suggest(missing, [str(c) for c in frame.columns])}")
+        values = {c: rule.factor * frame[c].to_numpy(float) + rule.offset for c, rule in rules.items()}
+        recordings[key] = Recording(key, _seconds(key, frame), values)
+    return Campaign(name, made, recordings, Path(name))
+
+
+def _seconds(key: str, frame: pd.DataFrame) -> np.ndarray[Any, np.dtype[np.float64]]:
+    import pandas as pd
+
+    index = frame.index
+    stamps = (index - index[0]).total_seconds() if isinstance(index, pd.DatetimeIndex) else index - index[0]
+    seconds = np.asarray(stamps, dtype=float)
+    if not (np.diff(seconds) > 0).all():
+        raise UserError(f"recording '{key}': its index does not run forward; use frame.sort_index()")
+    return seconds
+
+
+def recording_frame(campaign: Campaign, recording: str) -> pd.DataFrame:
+    """A recording as a frame: index time [s], a column for each channel in its canonical unit."""
+    import pandas as pd
+
+    data = campaign.recordings[recording]
+    return pd.DataFrame(dict(data.values), index=pd.Index(data.time, name="time"))
+
+
+def prediction_frame(model: Model, campaign: Campaign, recording: str, outputs: Sequence[str]) -> pd.DataFrame:
+    """Free run of a model on a recording: index time [s] of the readings, for each output NAME the reading,
+    what the model predicts (NAME|model) and what is left over (NAME|left)."""
+    import pandas as pd
+
+    from discovery.dynamics.system import predict
+    from discovery.fitting import predict_recording
+
+    trajectory = predict_recording(model, campaign, recording, list(outputs))
+    grid, predicted = trajectory.system.grid, predict(trajectory)
+    columns = {}
+    for y, output in enumerate(outputs):
+        columns[output] = grid.readings[:, y]
+        columns[f"{output}|model"] = predicted[:, y]
+        columns[f"{output}|left"] = grid.readings[:, y] - predicted[:, y]
+    return pd.DataFrame(columns, index=pd.Index(grid.time[grid.read], name="time"))
