@@ -1,0 +1,252 @@
+"""Discovery of terms in the rates of states: from eq. (9), from measured temperatures, or from a baseline file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import Grid, make_grid
+from discovery.dynamics.system import predict
+from discovery.errors import UserError
+from discovery.fitting import Fit, Noise, predict_recording
+from discovery.fitting.noise import white_noise
+from discovery.models import Model
+from discovery.recordings import Campaign
+from discovery.sparse.discovery import Discovery, PathPoint
+from discovery.sparse.folds import Blocks, choose, make_blocks, make_folds
+from discovery.sparse.gram import Gram, solve
+from discovery.sparse.optimisers import pysindy_path
+from discovery.sparse.options import SparseOptions
+from discovery.sparse.path import Support, backward, forward
+from discovery.sparse.rates import Evidence, evidence, extended_bic, masked, refit, without
+
+Array = NDArray[np.float64]
+
+_READINGS = 400  # of one output in one recording: more say nothing new about hours or minutes
+_ROUNDS = 4  # of a fit in a fold: it starts where the normal equations of the fold have their minimum
+_SIZES = 6  # that are refitted and run freely, down from the one that the criterion names
+
+
+@dataclass(frozen=True)
+class RateData:
+    """What the choice works on."""
+
+    campaign: Campaign
+    recordings: tuple[str, ...]
+    outputs: tuple[str, ...]
+    grids: Mapping[str, Grid]
+    blocks: Blocks
+
+
+def make_rate_data(
+    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str], blocks: int
+) -> RateData:
+    """Grids of the recordings with all inputs that any candidate may use, dense readings thinned."""
+    campaign = thinned(campaign, recordings, outputs, inputs)
+    grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
+    times = [grids[r].time[grids[r].read] for r in recordings]
+    return RateData(campaign, tuple(recordings), tuple(outputs), grids, make_blocks(times, blocks))
+
+
+def discover_rates(
+    data: RateData,
+    model: Model,
+    labels: Mapping[str, str],
+    always: Sequence[str],
+    options: SparseOptions,
+    first: Mapping[str, float] | None = None,
+) -> Discovery:
+    """Choose which coefficients of a model stay, and fit the rest.
+
+    Args:
+        model: baseline and all candidates, coefficients at good start values.
+        labels: coefficients that may leave, by name; what reports call their terms.
+        always: parameters that cannot leave (shapes, baseline terms that are kept).
+        first: values of the baseline before its fit. Given, the model is a fitted baseline with candidates at zero:
+            terms first enter one by one by their score, then those that entered may leave. Else all are fitted at
+            once and leave one by one.
+    """
+    if first is not None:
+        model, labels = _grown(data, model, labels, options, first)
+    full = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, _rough_noise(data))
+    noise = white_noise(data.outputs, _stated(data), list(full.residuals().values()))
+    full = replace(full, noise=noise)
+    seen = evidence(full, data.blocks)
+    kept = [i for i, name in enumerate(seen.names) if name in always or name not in labels]
+    g = seen.pooled()
+    most = len(kept) + options.max_terms * len(data.outputs)
+    path = [s for s in _path(g, seen, kept, options) if len(s) <= most]
+    costs = [g.cost(solve(g, s, seen.low, seen.high)) for s in path]
+    dispersion = max(min(costs) / max(g.count - len(path[-1]), 1), 1.0)
+    criterion = extended_bic(g, [len(s) for s in path], [c / dispersion for c in costs], max(len(labels), 1))
+    last = int(np.argmin(criterion))
+    window = range(max(0, last - _SIZES + 1), last + 1)
+
+    errors = np.array([_left_out(data, model, seen, path[k], noise) for k in window])
+    row = choose(errors, options.tolerance)
+    chosen = path[window[row]]
+    fit = _refit(data, model, seen, g, chosen, data.grids, None, 25)
+    points = tuple(
+        PathPoint(
+            data.outputs,
+            len(path[k]),
+            float(np.sqrt(errors[i].mean())),
+            float(np.sqrt(max(costs[k], 0.0) / g.count)),
+            i == row,
+            tuple(labels.get(seen.names[j], seen.names[j]) for j in path[k]),
+        )
+        for i, k in enumerate(window)
+    )
+    stability = _stability(seen, kept, chosen, options)
+    report = {
+        "outputs": list(data.outputs),
+        "form": "rates",
+        "terms": len(chosen),
+        "left_out_rms": round(points[row].left_out_rms, 4),
+        "library": len(labels),
+        "kept": [labels[seen.names[j]] for j in chosen if seen.names[j] in labels],
+    }
+    named = {labels[seen.names[j]]: share for j, share in stability.items() if seen.names[j] in labels}
+    return Discovery(fit.model, points, named, report)
+
+
+def thinned(
+    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str]
+) -> Campaign:
+    """The campaign with at most about `_READINGS` evenly chosen readings of each output in a recording.
+
+    Held inputs keep the stamps at which they change alone, which says the same; both spare nodes of the grid.
+    """
+    made = {}
+    for name in recordings:
+        recording = campaign.recordings[name]
+        values = dict(recording.values)
+        for output in outputs:
+            known = np.flatnonzero(np.isfinite(values[output]))
+            if len(known) >= 2 * _READINGS:
+                few = np.full(len(recording.time), np.nan)
+                few[known[:: len(known) // _READINGS]] = values[output][known[:: len(known) // _READINGS]]
+                values[output] = few
+        for channel in set(inputs) & set(values):
+            known = np.flatnonzero(np.isfinite(values[channel]))
+            if campaign.channels[channel].between == "held" and len(known) > 1:
+                same = known[1:][np.diff(values[channel][known]) == 0]
+                values[channel] = values[channel].copy()
+                values[channel][same] = np.nan
+        made[name] = replace(recording, values=values)
+    return replace(campaign, recordings=made)
+
+
+def _stated(data: RateData) -> dict[str, float | None]:
+    return {name: data.campaign.channels[name].noise for name in data.outputs}
+
+
+def _rough_noise(data: RateData) -> Noise:
+    """Noise that weighs the outputs before anything is fitted: the stated one, else 2 % of the readings' spread."""
+    spread = np.nanstd(np.concatenate([data.grids[r].readings for r in data.recordings]), axis=0)
+    stated = _stated(data).values()
+    return Noise(data.outputs, tuple(n or max(0.02 * float(s), 1e-9) for n, s in zip(stated, spread, strict=True)))
+
+
+def _grown(
+    data: RateData, model: Model, labels: Mapping[str, str], options: SparseOptions, first: Mapping[str, float]
+) -> tuple[Model, dict[str, str]]:
+    """The baseline with the candidates that its residual asks for, one at a time, each time fitted anew.
+
+    A baseline that lacks something large is bent by its fit; so each fit also starts from the values `first` that
+    the baseline had before, and the better one counts.
+
+    A candidate enters by its score: what its column, filtered through the present model, takes off the cost when all
+    fitted parameters may follow. Growth ends where the extended criterion does not pay for the next term.
+    """
+    entered: list[str] = []
+    noise = _rough_noise(data)
+    while len(entered) < options.max_terms:
+        here = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, noise, 1)
+        seen = evidence(here, data.blocks)
+        kept = [i for i, name in enumerate(seen.names) if name in entered or name not in labels]
+        g = seen.pooled()
+        better = forward(g, len(kept) + 1, kept, low=seen.low, high=seen.high)
+        if not better:
+            break
+        costs = [g.cost(solve(g, s)) for s in (kept, better[0])]
+        dispersion = max(costs[1] / g.count, 1.0)
+        before, after = extended_bic(g, [0, 1], [c / dispersion for c in costs], len(labels))
+        if after >= before:
+            break
+        entered.append(next(seen.names[i] for i in better[0] if i not in kept))
+        small = without(model, [name for name in labels if name not in entered])
+        fits = [
+            refit(small, data.campaign, data.recordings, data.outputs, start, data.grids, noise, 40)
+            for start in ({}, first)
+        ]
+        fit = min(fits, key=lambda one: one.cost)
+        model = model.with_values({name: fit.model.parameters[name].value for name in small.free})
+    grown = without(model, [name for name in labels if name not in entered])
+    return grown, {name: labels[name] for name in entered}
+
+
+def _path(g: Gram, seen: Evidence, kept: Sequence[int], options: SparseOptions) -> list[Support]:
+    if options.optimiser != "elimination":
+        return pysindy_path(g, options.optimiser, kept)
+    return backward(g, kept, seen.low, seen.high)
+
+
+def _refit(
+    data: RateData,
+    model: Model,
+    seen: Evidence,
+    g: Gram,
+    support: Support,
+    grids: Mapping[str, Grid],
+    noise: Noise | None,
+    rounds: int,
+) -> Fit:
+    theta = solve(g, support, seen.low, seen.high)
+    gone = [name for i, name in enumerate(seen.names) if i not in support]
+    start = {name: float(theta[i]) for i, name in enumerate(seen.names) if i in support}
+    recordings = [r for r in data.recordings if r in grids]
+    return refit(without(model, gone), data.campaign, recordings, data.outputs, start, grids, noise, rounds)
+
+
+def _left_out(data: RateData, model: Model, seen: Evidence, support: Support, noise: Noise) -> Array:
+    """Mean squared error (B,) of the free run on each block, by fits that have not seen its fold."""
+    blocks = data.blocks
+    errors = np.full(blocks.count, np.nan)
+    for fold in make_folds(blocks):
+        keep = {r: ~np.isin(block, fold) for r, block in zip(data.recordings, blocks.of, strict=True)}
+        train = {r: masked(data.grids[r], keep[r]) for r in data.recordings if keep[r].any()}
+        try:
+            weights = np.ones(blocks.count)
+            weights[fold] = 0.0
+            fit = _refit(data, model, seen, seen.pooled(weights), support, train, noise, _ROUNDS)
+            trajectories = {t.system.grid.recording: t for t in fit.trajectories}
+            for i, r in enumerate(data.recordings):
+                mine = [b for b in fold if blocks.recording[b] == i]
+                if not mine:
+                    continue
+                trajectory = trajectories.get(r) or predict_recording(
+                    fit.model, data.campaign, r, data.outputs, fit.noise.white, data.grids[r]
+                )
+                left = data.grids[r].readings - predict(trajectory)
+                for b in mine:
+                    errors[b] = np.nanmean(left[blocks.of[i] == b] ** 2)
+        except UserError:  # a sparse model that runs away is a bad model, not a mistake of the user
+            errors[fold] = np.inf
+    return np.where(np.isfinite(errors), errors, 1e12)
+
+
+def _stability(seen: Evidence, kept: Sequence[int], chosen: Support, options: SparseOptions) -> dict[int, float]:
+    """Share of block bootstraps that keep each chosen column."""
+    rng = np.random.default_rng(options.seed)
+    count = len(seen.blocks)
+    found: Counter[int] = Counter()
+    for _ in range(options.bootstraps):
+        weights = rng.multinomial(count, np.full(count, 1 / count)).astype(float)
+        path = _path(seen.pooled(weights), seen, kept, options)
+        found.update(min(path, key=lambda s: abs(len(s) - len(chosen))))
+    return {j: found[j] / max(options.bootstraps, 1) for j in chosen}
