@@ -311,13 +311,24 @@ def compensate(
             raise UserError("--back needs --state, the folder that keeps the models")
         go_back(state, say)
         return
-    exported = trusted_model(model, trust, allow_unsigned=allow_unsigned)
+    exported, key = trusted_model(model, trust, allow_unsigned=allow_unsigned)
     if opcua is not None or opcua_demo:
         from discovery.runtime.opcua import compensate_opcua
 
-        compensate_opcua(exported, opcua, model=model, folder=state, seconds=seconds, say=say)
+        compensate_opcua(
+            exported,
+            opcua,
+            model=model,
+            folder=state,
+            trusted=key,
+            seconds=seconds,
+            shadow_hours=shadow_hours,
+            say=say,
+        )
     elif inputs is not None:
-        compensate_rows(exported, inputs, out, model=model, folder=state, shadow_hours=shadow_hours, say=say)
+        compensate_rows(
+            exported, inputs, out, model=model, folder=state, trusted=key, shadow_hours=shadow_hours, say=say
+        )
     else:
         raise UserError("say where the readings come from: --inputs FILE, --inputs -, --opcua FILE or --opcua-demo")
 

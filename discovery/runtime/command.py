@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from discovery.errors import UserError
 from discovery.export.document import Exported, read_document
@@ -18,22 +18,29 @@ from discovery.runtime.session import Say, Session
 from discovery.runtime.shadow import Rule
 from discovery.runtime.store import step_back
 
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
-def trusted_model(model: Path, trust: Path | None, *, allow_unsigned: bool) -> Exported:
-    """The model, if it is signed by the owner of the key `trust`.
+
+def trusted_model(
+    model: Path, trust: Path | None, *, allow_unsigned: bool
+) -> tuple[Exported, Ed25519PublicKey | None]:
+    """The model, if it is signed by the owner of the key `trust`, and that key.
 
     Raises:
         UserError: unsigned or signed by someone else, and `allow_unsigned` is not said.
     """
     exported = read_document(model)
     if trust is not None:
-        require_trusted(exported.seal, public_key(trust), model)
-    elif not allow_unsigned:
+        key = public_key(trust)
+        require_trusted(exported.seal, key, model)
+        return exported, key
+    if not allow_unsigned:
         raise UserError(
             f"{model}: no key is trusted, so the model is not run; say --trust KEY.pub of the key that signed it, "
             "or --allow-unsigned to try it where no machine hangs on it"
         )
-    return exported
+    return exported, None
 
 
 def compensate_rows(
@@ -43,6 +50,7 @@ def compensate_rows(
     *,
     model: Path,
     folder: Path | None = None,
+    trusted: Ed25519PublicKey | None = None,
     shadow_hours: float = 24.0,
     say: Say = lambda _: None,
 ) -> None:
@@ -52,7 +60,8 @@ def compensate_rows(
     `out`; the later ones count.
     """
     step = exported.compiled.step_s
-    session = Session(exported, model=model, folder=folder, settings=Settings(tick_s=step), rule=Rule(hours=shadow_hours), say=say)
+    settings, rule = Settings(tick_s=step), Rule(hours=shadow_hours)
+    session = Session(exported, model=model, folder=folder, trusted=trusted, settings=settings, rule=rule, say=say)
     with ExitStack() as stack:
         lines: Iterable[str] = sys.stdin if source == "-" else stack.enter_context(_open(Path(source)))
         goes_on = out is not None and out.exists() and session.resumed is not None

@@ -136,7 +136,9 @@ class Compensator:
             due -= self.stepper.count - before
         if due <= 0:
             return False, False
-        y = self.stepper.run(np.broadcast_to(u, (due, len(u))))
+        held = np.tile(u if self.inputs is None else self.inputs, (due, 1))  # missed steps: as the inputs were
+        held[-1] = u
+        y = self.stepper.run(held)
         if len(y):
             if self.inherited is not None:
                 self._no_bump(y[-1])

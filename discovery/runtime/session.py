@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from discovery.export.document import Exported
 from discovery.runtime.compensator import Compensator, Settings, Tick
@@ -11,6 +12,9 @@ from discovery.runtime.guards import Reading
 from discovery.runtime.persistence import restore, save, succeed
 from discovery.runtime.shadow import Rule, Shadow, begin_shadow, take_over
 from discovery.runtime.store import open_store, refuse_candidate, replace_active
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 Say = Callable[[str], None]
 
@@ -24,6 +28,7 @@ class Session:
         *,
         model: Path | None = None,
         folder: Path | None = None,
+        trusted: Ed25519PublicKey | None = None,
         settings: Settings | None = None,
         rule: Rule | None = None,
         save_every_s: float = 600.0,
@@ -35,7 +40,7 @@ class Session:
         self.resumed: float | None = None
         self.saved: float | None = None
         if folder is not None and model is not None:
-            models = open_store(folder, model, exported)
+            models = open_store(folder, model, exported, trusted)
             exported = models.active
             if models.candidate is not None:
                 self.shadow = begin_shadow(models.candidate, self.settings, rule)

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from discovery.errors import UserError
 from discovery.export.document import Exported, read_document
+from discovery.export.seal import require_trusted
 from discovery.files import write_atomic
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 ACTIVE, PREVIOUS, CANDIDATE, REFUSED = "active.json", "previous.json", "candidate.json", "refused.json"
 
@@ -20,15 +25,22 @@ class Models:
     candidate: Exported | None
 
 
-def open_store(folder: Path, model: Path, exported: Exported) -> Models:
+def open_store(
+    folder: Path, model: Path, exported: Exported, trusted: Ed25519PublicKey | None = None
+) -> Models:
     """The model at work in `folder`, and `model` as candidate where it is another one.
 
     The first model of a folder is at work at once: there is nothing yet that a shadow run could be compared with.
+
+    Raises:
+        UserError: the model at work is damaged, or not signed by `trusted`.
     """
     data = model.read_bytes()
     if not (folder / ACTIVE).exists():
         write_atomic(folder / ACTIVE, data)
     active = read_document(folder / ACTIVE)
+    if trusted is not None:
+        require_trusted(active.seal, trusted, folder / ACTIVE)
     if active.seal.sha256 == exported.seal.sha256:
         return Models(active, None)
     write_atomic(folder / CANDIDATE, data)
