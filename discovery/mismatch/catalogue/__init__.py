@@ -16,7 +16,7 @@ def catalogue() -> dict[str, Effect]:
     """Every effect of the catalogue by its word."""
     found = {}
     for module in sorted(iter_modules(__path__), key=lambda m: m.name):
-        if module.name not in ("effect", "form"):
+        if module.name not in ("effect", "form", "worked"):
             entry: Effect = import_module(f"{__name__}.{module.name}").EFFECT
             found[entry.word] = entry
     return found

@@ -1,4 +1,11 @@
-"""Heat exchange with the air that the model leaves out at this body."""
+"""Heat exchange with the air that the model leaves out at this body.
+
+    q = hA (T_env - T)    [W]
+
+hA in W/K: 5 to 25 W/m2K of free air times the surface, 1 to 25 W/K for a body of 0.2 to 1 m2. Source:
+Newton's law of cooling. Limits: one coefficient for still and moved air; where the model already has a
+path to the air at this body, a refit absorbs it and nothing is left to see.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
 

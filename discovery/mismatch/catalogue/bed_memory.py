@@ -1,6 +1,13 @@
-"""The body exchanges heat with a bed that follows the room over days."""
+"""The body exchanges heat with a bed that follows the room over days.
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Shape
+    t_bed T_bed' = T_env - T_bed,   q = G_bed (T_bed - T)    [W]
+
+G_bed in W/K, 2 to 20; t_bed of 20 to 60 h. Source: Bryan's thermal memory; the bed as one follower of the
+room. Limits: the bed starts settled in the room of the first instant; a recording shorter than a day
+shows little more than a drift, which `sensor_drift` follows as well.
+"""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="bed_memory",
@@ -17,4 +24,9 @@ EFFECT = Effect(
     ),
     source="machine bed as a first-order follower of the room, 20 to 60 h (Bryan's thermal memory)",
     prior=0.5,
+    examples=(
+        Example(
+            {"G_bed": 8.0, "ambient": 23.0, "t_bed": 36000.0, "body": 20.0}, 8.856, {"ambient": 20.0}, 16577.0
+        ),
+    ),
 )

@@ -1,9 +1,13 @@
 """The readings of one recording carry the stamps of another clock.
 
-Written as a delay of every input: what the model is driven by and what the readings say are apart in time.
+    every input u(t) of that recording becomes u(t - t_shift)
+
+t_shift in s, minutes to an hour, positive where the errors come late. Written as a delay of the inputs:
+what drives the model and what the readings say are apart in time. Source: two loggers with clocks of
+their own. Limits: one shift for a whole recording; a clock that runs fast is not covered.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Shape
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="clock_shift",
@@ -21,4 +25,5 @@ EFFECT = Effect(
     confused_with=("fluid_delay", "sensor_lag"),
     source="two loggers with clocks of their own",
     one_recording=True,
+    examples=(Example({"input": 400.0, "t_shift": 900.0}, 100.0, {"input": 100.0}, 600.0),),
 )

@@ -1,4 +1,10 @@
-"""Heat flows between two bodies that the model does not link."""
+"""Heat flows between two bodies that the model does not link.
+
+    q = G_path (T_other - T)    [W] into one body and out of the other
+
+G_path in W/K, 5 to 60: lambda A / L of a steel web, or a joint. Source: Fourier's law. Limits: no storage
+on the way; a long path answers later than this (see `second_thermal_mass`).
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
 

@@ -1,4 +1,11 @@
-"""A joint that conducts better (or worse) as the machine warms up."""
+"""A joint that conducts better (or worse) as the machine warms up.
+
+    q = G_p (T - T_env)/10 (T_other - T)     [W] into one body and out of the other
+
+G_p in W/K per 10 K, of either sign: 10 to 30 % of the link between cold and warm. Source: joint
+conductance against contact pressure. Limits: straight in the temperature rise; the link itself stays in
+the model. Seldom visible.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
 

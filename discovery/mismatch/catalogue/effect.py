@@ -1,9 +1,10 @@
-"""What the catalogue knows of an effect: a formula with holes for bodies and channels, and what is plausible."""
+"""What the catalogue knows of an effect: a formula with holes for bodies and channels."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Literal
 
 Group = Literal["cutting fluid", "drive and cooling", "air and structure", "measuring chain", "user"]
@@ -44,8 +45,9 @@ ROLE_OF = {
 class Amplitude:
     """The number that switches the effect on: the formula is linear in it and zero at zero.
 
-    `plausible` is the spread of sizes seen on machines of this class (one standard deviation), `sign` +1 or -1 where
-    physics fixes it, 0 where it does not. `fixed`: the effect is on or off, its size sits in the shape parameters.
+    `plausible` is the spread of sizes seen on machines of this class (one standard deviation), `sign` +1 or
+    -1 where physics fixes it, 0 where it does not. `fixed`: the effect is on or off, its size sits in the
+    shape parameters.
     """
 
     name: str
@@ -69,19 +71,25 @@ class Shape:
 
 @dataclass(frozen=True)
 class Example:
-    """A worked example: values of the names in the formula, and what it gives."""
+    """A worked example: values of the names in the formula, and what it gives (to four digits, `worked.py`).
+
+    `before`: values of channels and bodies that held until they stepped to those in `values`, `since` seconds
+    ago; it matters to formulas with memory alone. Without it everything is settled.
+    """
 
     values: Mapping[str, float]
     expected: float
+    before: Mapping[str, float] = field(default_factory=dict)
+    since: float = inf
 
 
 @dataclass(frozen=True)
 class Effect:
     """One entry of the catalogue.
 
-    `formula` is a heat flow [W] into `body` (and out of `other` where it names one), or what an output shows more.
-    For "fluid terms" and "cooling terms" it is what the replaced channel becomes; for outputs `y` is the error
-    without the effect. Where states have no capacity (phenomenological models) the same formula is a rate.
+    `formula` is a heat flow [W] into `body` (and out of `other` where it names one), or what an output shows
+    more. For "fluid terms" and "cooling terms" it is what the replaced channel becomes; for outputs `y` is the
+    error without the effect. Where states have no capacity (phenomenological models) the formula is a rate.
     """
 
     word: str

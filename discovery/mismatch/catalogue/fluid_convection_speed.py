@@ -1,6 +1,10 @@
 """Wet coupling that grows with the speed of the table.
 
-The h-law of a well wetted table is nearly invisible; on weakly coupled bodies it is not.
+    q = hN flow (n/1000)^m (T_fluid - T)    [W]
+
+hN in W/K at 1000 rpm, 5 to 100; m of 0.1 (eq. (1) of the paper) to 1. Source: film on a rotating disk.
+Limits: the law of a well wetted table is nearly invisible, on weakly coupled bodies it is not; zero at
+standstill, so that `fluid_convection` may stand beside it.
 """
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape

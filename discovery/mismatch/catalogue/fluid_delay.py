@@ -1,6 +1,12 @@
-"""The fluid reaches the bodies later than its temperature sensor says."""
+"""The fluid reaches the bodies later than its temperature sensor says.
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Shape
+    T_fluid(t) in every wet term of the model becomes T_fluid(t - t_delay)
+
+t_delay in s: 5 to 50 s for the hose alone (not visible), 5 min to 1 h where a tank and channels lie
+between. Source: plug flow. Limits: the same for all bodies; mixing on the way is `fluid_sump`.
+"""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="fluid_delay",
@@ -15,5 +21,12 @@ EFFECT = Effect(
         "fluid_sump",
         "clock_shift",
     ),
-    source="plug flow through the hose; effective dead times of a distribution system are far longer than the hose alone",
+    source=(
+        "plug flow through the hose; effective dead times of a distribution system are far longer than "
+        "the hose alone"
+    ),
+    examples=(
+        Example({"fluid": 26.0, "t_delay": 1200.0}, 22.0, {"fluid": 22.0}, 1000.0),
+        Example({"fluid": 26.0, "t_delay": 1200.0}, 26.0, {"fluid": 22.0}, 1300.0),
+    ),
 )

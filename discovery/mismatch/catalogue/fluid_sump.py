@@ -1,6 +1,12 @@
-"""The fluid that wets the bodies is a mixed volume behind the sensor: it follows with a first-order lag."""
+"""The fluid that wets the bodies is a mixed volume behind the sensor: it follows with a first-order lag.
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Shape
+    t_sump T_mix' = T_fluid - T_mix;  T_mix stands for T_fluid in every wet term of the model
+
+t_sump in s: C/UA of the fluid on the machine, 0.3 to 6 h. Source: heat balance of a stirred volume.
+Limits: settled at the first instant; heat that comes back from the bodies is not part of it.
+"""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="fluid_sump",
@@ -14,4 +20,5 @@ EFFECT = Effect(
     confused_with=("fluid_delay",),
     source="heat balance of the fluid on the machine: C/UA of channels and bed from 0.3 to 6 h",
     prior=0.5,
+    examples=(Example({"fluid": 26.0, "t_sump": 2700.0}, 24.53, {"fluid": 22.0}, 2700.0),),
 )

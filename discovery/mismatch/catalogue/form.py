@@ -24,8 +24,9 @@ class ShapeForm(Strict):
 class EffectForm(Strict):
     """One effect.
 
-    `formula` is a heat flow into `body` (out of `other`, for two bodies) with `amplitude` as a factor; the variables are
-    body, other, y (for outputs) and ambient, fluid, flow, speed, load, cooling, coolant, height, other_input.
+    `formula` is a heat flow into `body` (out of `other`, for two bodies) with `amplitude` as a factor; the
+    variables are body, other, y (for outputs) and ambient, fluid, flow, speed, load, cooling, coolant, height,
+    other_input.
     """
 
     word: str = Field(pattern="^[a-z][a-z0-9_]*$", description="its name in results")
@@ -48,7 +49,9 @@ class EffectForm(Strict):
         where = f"effect '{self.word}'"
         known = {self.amplitude, *self.shapes, *ROLE_OF, "body", "other", "y", "time"}
         for name in sorted(names(parse(self.formula, where)) - known):
-            raise UserError(f"{where}: '{name}' means nothing in its formula; known: {', '.join(sorted(known))}")
+            raise UserError(
+                f"{where}: '{name}' means nothing in its formula; known: {', '.join(sorted(known))}"
+            )
         if self.amplitude not in names(parse(self.formula, where)):
             raise UserError(f"{where}: the amplitude '{self.amplitude}' does not stand in the formula")
         return Effect(
@@ -58,7 +61,9 @@ class EffectForm(Strict):
             place=self.place,
             formula=self.formula,
             amplitude=Amplitude(self.amplitude, self.unit, self.plausible, self.sign),
-            shapes=tuple(Shape(name, s.unit, tuple(s.grid), s.low, s.high) for name, s in self.shapes.items()),
+            shapes=tuple(
+                Shape(name, s.unit, tuple(s.grid), s.low, s.high) for name, s in self.shapes.items()
+            ),
             source=self.source,
             signature="given by the user",
         )

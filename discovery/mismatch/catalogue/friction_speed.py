@@ -1,4 +1,11 @@
-"""Bearing and seal friction as a function of speed, beyond the share of the drive power in the model."""
+"""Bearing and seal friction as a function of speed, beyond the share of the drive power in the model.
+
+    q = P_f (n/1000)^m    [W]
+
+P_f in W at 1000 rpm, 20 to 400; m of 1 to 2.5. Source: Palmgren (M_c + M_v n^(2/3)) n, seals n^2. Limits:
+one power law for both parts; with measured drive power as an input most of it is inside the model
+already.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 
@@ -10,7 +17,9 @@ EFFECT = Effect(
     formula="P_f*(speed/1000)**m",
     amplitude=Amplitude("P_f", "W", 60.0),
     shapes=(Shape("m", "1", (1.0, 1.5, 2.0, 2.5), 0.8, 3.0),),
-    signature="heat in bearings and drive that the drive power does not account for, a smooth power of the speed",
+    signature=(
+        "heat in bearings and drive that the drive power does not account for, a smooth power of the speed"
+    ),
     confused_with=(
         "viscosity_temperature",
         "windage",

@@ -1,4 +1,10 @@
-"""A single reading that is wrong."""
+"""A single reading that is wrong.
+
+    error shown = y + outlier at the one instant t_first    [um]
+
+outlier in the unit of the error, of either sign, far above the noise. Source: a chip in the nest, the
+E_A0C peak of 125 in the paper. Limits: one reading; two in a row are a jump that came back.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 
@@ -12,7 +18,9 @@ EFFECT = Effect(
     shapes=(Shape("t_first", "s", (0.0,), 0.0, 1e9, True),),
     signature="one reading of one error, alone",
     confused_with=("sensor_offset",),
-    source="a chip in the nest: one reading is wrong, the next is right again (the paper's E_A0C peak of 125)",
+    source=(
+        "a chip in the nest: one reading is wrong, the next is right again (the paper's E_A0C peak of 125)"
+    ),
     one_recording=True,
     examples=(Example({"outlier": 20.0, "time": 600.0, "t_first": 600.0}, 20.0),),
 )

@@ -1,4 +1,11 @@
-"""All errors of a recording jump at the same instant and stay."""
+"""All errors of a recording jump at the same instant and stay.
+
+    every error shown = y + zero_j where time >= t_zero    [um]
+
+zero_j in the unit of each error, of either sign, one size per error. Source: the R-Test is set to zero
+again within a recording. Limits: one instant a recording; what jumps in one error alone is
+`sensor_offset`.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 

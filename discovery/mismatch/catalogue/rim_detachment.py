@@ -1,4 +1,11 @@
-"""The film is thrown off the rim, so that a wet body loses its coupling at speed."""
+"""The film is thrown off the rim, so that a wet body loses its coupling at speed.
+
+    q = -hR flow n^2/(n_c^2 + n^2) (T_fluid - T)    [W]
+
+hR in W/K, at most the wet coupling of the body in the model; n_c of 100 to 250 rpm (w^2 r exceeds g from
+about 60 rpm). Source: centrifugal detachment. Limits: needs a wet body in the model, opposite in sign to
+the film law.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 

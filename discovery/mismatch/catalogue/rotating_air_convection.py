@@ -1,4 +1,11 @@
-"""Convection to the air that grows with the speed of the table."""
+"""Convection to the air that grows with the speed of the table.
+
+    q = hR_air (n/1000)^m (T_env - T)    [W]
+
+hR_air in W/K at 1000 rpm, 2 to 20: 5 to 47 W/m2K from standstill to 1200 rpm; m of 0.5 laminar to 0.8
+turbulent (Re > 2.4e5, about 570 rpm). Source: rotating disk, Nu = 0.36 Re^0.5. Limits: one exponent
+across the transition.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 

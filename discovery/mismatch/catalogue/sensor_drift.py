@@ -1,4 +1,11 @@
-"""One error drifts in a straight line through one recording."""
+"""One error drifts in a straight line through one recording.
+
+    error shown = y + drift time/86400    [um]
+
+drift in the unit of the error per day, of either sign: 0.5 to 1 um a day for displacement sensors and
+electronics. Source: data sheets. Limits: straight; over a short recording a slow body or `bed_memory`
+look the same.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
 

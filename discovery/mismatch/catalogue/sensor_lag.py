@@ -1,6 +1,12 @@
-"""One error is read through a first-order lag."""
+"""One error (or measured temperature) is read through a first-order lag.
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Shape
+    t_lag s' = y - s,   s is shown instead of y
+
+t_lag in s: 30 to 300 s behind a wall or in a housing. Source: first-order sensor. Limits: visible only
+where readings come faster than t_lag; settled at the first instant.
+"""
+
+from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="sensor_lag",
@@ -16,4 +22,5 @@ EFFECT = Effect(
         "second_thermal_mass",
     ),
     source="sensors behind a wall or in a housing: 30 to 300 s",
+    examples=(Example({"on": 1.0, "y": 10.0, "t_lag": 60.0}, -3.679, {"y": 0.0}, 60.0),),
 )

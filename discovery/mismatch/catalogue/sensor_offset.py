@@ -1,4 +1,10 @@
-"""One error jumps at an instant of one recording and stays there."""
+"""One error jumps at an instant of one recording and stays there.
+
+    error shown = y + offset where time >= t_step    [um]
+
+offset in the unit of the error, of either sign. Source: a nest or sensor that was touched: heat moves
+neighbouring errors too, this does not. Limits: one jump per error and recording in the search.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 

@@ -1,4 +1,11 @@
-"""Heat (or cold) at a body during a span of one recording that no channel explains."""
+"""Heat (or cold) at a body during a span of one recording that no channel explains.
+
+    q = q_u while t_on <= time < t_off    [W]
+
+q_u in W, of either sign: sun 75 to 200 W on one side, heaters, open doors, an axis under load. Source:
+ISO 230-3 (environment). Limits: constant within its window; when it is needed again and again there is a
+cause to look for, and the verdict is `unexplained`.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 

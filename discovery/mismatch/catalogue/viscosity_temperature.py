@@ -1,4 +1,11 @@
-"""Viscous friction that falls as the oil warms up."""
+"""Viscous friction that falls as the oil warms up.
+
+    q = P_v (n/1000)^m exp(-k_oil (T - 22))    [W]
+
+P_v in W at 1000 rpm and 22 degC, 30 to 400; m of 1.67 to 2; k_oil of 0.03/K for oil, more for stiff
+grease. Source: Palmgren M_v ~ nu^(2/3) with d ln(nu)/dT = -0.045/K. Limits: the body is as warm as its
+bearing.
+"""
 
 from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
 
@@ -18,6 +25,9 @@ EFFECT = Effect(
         "friction_speed",
         "thermal_preload",
     ),
-    source="Palmgren M_v ~ nu^(2/3) with d ln(nu)/dT = -0.045/K: friction falls by 3 % per kelvin or more with stiff grease",
+    source=(
+        "Palmgren M_v ~ nu^(2/3) with d ln(nu)/dT = -0.045/K: friction falls by 3 % per kelvin or more "
+        "with stiff grease"
+    ),
     examples=(Example({"P_v": 80.0, "speed": 1000.0, "m": 2.0, "k_oil": 0.03, "body": 22.0}, 80.0),),
 )
