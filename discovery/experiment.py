@@ -85,8 +85,8 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
 
     Args:
         path: the experiment file.
-        out: folder of the results; default runs/<experiment name>. It is replaced as a whole at the very end, so an
-            interrupted run leaves what was there before.
+        out: folder of the results; default runs/<experiment name>. It is replaced as a whole at the very end, so
+            an interrupted run leaves what was there before.
         progress: told what begins.
 
     Returns:
@@ -113,7 +113,7 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
 
 
 def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
-    """What the model of [mismatch] leaves out, alone: that model, the diagnosis, the repaired model and a report.
+    """What the model of [mismatch] leaves out, alone: that model, the diagnosis, the repaired model, a report.
 
     Without [mismatch] the experiment's only (or first) model is taken. Files and failures as in `run`.
     """
@@ -123,11 +123,14 @@ def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -
     if experiment.form.mismatch is None:
         asked = MismatchForm(model=next(iter(experiment.form.models)))
         experiment = replace(experiment, form=experiment.form.model_copy(update={"mismatch": asked}))
-    experiment = replace(experiment, form=experiment.form.model_copy(update={"cross_validate": False, "export": None}))
+    experiment = replace(
+        experiment, form=experiment.form.model_copy(update={"cross_validate": False, "export": None})
+    )
     folder = out or default_folder(experiment.name)
     with staged(folder) as temporary:
         found = diagnosis(experiment, progress)
-        assert found is not None and experiment.form.mismatch is not None
+        assert found is not None
+        assert experiment.form.mismatch is not None
         name = experiment.form.mismatch.model
         kind = experiment.form.models[name].kind
         fitted = {name: fit_model_of(experiment, name, kind, replace(found.context.model, name=name))}
@@ -139,12 +142,14 @@ def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -
 
 
 def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Progress = silent) -> Fitted:
-    """One model: start values, fit, cross-validation on the fit recordings alone; then free runs on everything."""
+    """One model: start values, fit, cross-validation on the fit recordings alone; then free runs everywhere."""
     began = clock.perf_counter()
     progress(f"fitting {name}")
-    model, report = starting_model(experiment, name, entry)
-    loss = getattr(entry, "loss", "linear")
-    fitted = fit_model_of(experiment, name, entry.kind, model, report, experiment.outputs_of(entry), loss, progress)
+    model, report = starting_model(experiment, name, entry, progress)
+    loss: Loss = getattr(entry, "loss", "linear")
+    fitted = fit_model_of(
+        experiment, name, entry.kind, model, report, experiment.outputs_of(entry), loss, progress
+    )
     return replace(fitted, seconds=clock.perf_counter() - began)
 
 
@@ -178,7 +183,9 @@ def fit_model_of(
     return Fitted(name, kind, fit, predictions, validation, report or {}, tuple(notes), seconds)
 
 
-def starting_model(experiment: Experiment, name: str, entry: ModelEntry) -> tuple[Model, dict[str, Any]]:
+def starting_model(
+    experiment: Experiment, name: str, entry: ModelEntry, progress: Progress = silent
+) -> tuple[Model, dict[str, Any]]:
     """The model that a fit starts from, and what a search reports. From here on nothing asks for the kind."""
     campaign, recordings = experiment.fitting, experiment.fit
     inputs, outputs = experiment.inputs(entry), experiment.outputs_of(entry)
@@ -189,22 +196,25 @@ def starting_model(experiment: Experiment, name: str, entry: ModelEntry) -> tupl
         case ReducedEntry():
             model = warm_start(reduced(inputs, outputs, campaign.channels), campaign, recordings, outputs)
         case SuperpositionEntry(separate=None):
-            model = warm_start(superposition(inputs, outputs, campaign.channels), campaign, recordings, outputs)
+            model = warm_start(
+                superposition(inputs, outputs, campaign.channels), campaign, recordings, outputs
+            )
         case SuperpositionEntry():
             alone = only(experiment.campaign, {one for names in separate(entry).values() for one in names})
             model = fit_one_at_a_time(alone, separate(entry), outputs)
         case SparseOptions():
-            model, report = discovered(experiment, entry)
+            model, report = discovered(experiment, entry, progress)
     return replace(model, name=name), report
 
 
-def discovered(experiment: Experiment, options: SparseOptions) -> tuple[Model, dict[str, Any]]:
+def discovered(
+    experiment: Experiment, options: SparseOptions, progress: Progress = silent
+) -> tuple[Model, dict[str, Any]]:
     """What the sparse search finds on the fit recordings."""
     from discovery.sparse import discover
 
-    if options.built_on_file:
-        options = options.model_copy(update={"baseline": str(experiment.path.parent / options.baseline)})
-    found = discover(experiment.fitting, experiment.fit, experiment.outputs, options)
+    folder = experiment.path.parent
+    found = discover(experiment.fitting, experiment.fit, experiment.outputs, options, progress, folder)
     return found.model, dict(found.report)
 
 
@@ -234,7 +244,13 @@ def diagnosis(experiment: Experiment, progress: Progress = silent) -> Diagnosis 
     effects = [form.effect() for form in wanted.effects]
     progress(f"looking for what {wanted.model} leaves out")
     outputs = experiment.outputs_of(entry)
-    found = find_missing(
-        model, experiment.campaign, experiment.fit, experiment.held_out, outputs, effects, physical=entry.kind == "file", tell=progress
+    return find_missing(
+        model,
+        experiment.campaign,
+        experiment.fit,
+        experiment.held_out,
+        outputs,
+        effects,
+        physical=entry.kind == "file",
+        tell=progress,
     )
-    return found

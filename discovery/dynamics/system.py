@@ -131,7 +131,7 @@ def _state_ends(system: System, x: Array) -> dict[str, Array]:
 def _linearise(system: System, values: Mapping[str, float], x: Array) -> tuple[Array, Array, Array]:
     """State matrices (K, n, n) around a trajectory, forcing left over at both interval ends (K, n) each."""
     count, n = len(system.grid.step), len(system.states)
-    env = {**system.grid.ends, **values, **_state_ends(system, x)}
+    env: dict[str, Array | float] = {**system.grid.ends, **values, **_state_ends(system, x)}
     rates = np.zeros((2 * count, n))
     a = np.zeros((count, n, n))
     variables = frozenset(system.states)
@@ -299,7 +299,7 @@ def sensitivities(
         right,
         read,
     )
-    dy = np.einsum("ryn,rnm->rym", output_matrix(trajectory), s)
+    dy: Array = np.einsum("ryn,rnm->rym", output_matrix(trajectory), s)
     for y, dual in enumerate(outputs(trajectory, wanted) if parameters else []):
         for name, partial in dual.partials.items():
             dy[:, y, parameters.index(name)] += np.broadcast_to(partial, (len(system.grid.time),))[

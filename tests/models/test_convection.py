@@ -103,7 +103,7 @@ def test_the_law_in_the_model_is_the_law_of_the_functions() -> None:
     values = {name: p.value for name, p in thermobalance().parameters.items()} | {"h_nozzle": 100.0}
     for variant in ("none", "printed", "1.5"):
         for speed in (0.0, 100.0, 600.0, 751.0, 1200.0):
-            found = evaluate(parse(film(variant)), values | {"speed": speed}).value  # type: ignore[arg-type]
+            found = evaluate(parse(film(variant)), values | {"speed": speed}).value
             expected = quiet(
                 speed, 0.10, 1000, variant=variant, floor=values["h_still"] if speed == 0 else 0.0
             )

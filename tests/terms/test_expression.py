@@ -24,12 +24,15 @@ leaves = st.one_of(
 
 
 def applied(children: st.SearchStrategy[Expression]) -> st.SearchStrategy[Expression]:
-    def of(function: str, count: int) -> st.SearchStrategy[Expression]:
+    def of(function: str, count: int) -> st.SearchStrategy[Apply]:
         return st.tuples(*[children] * count).map(lambda arguments: Apply(function, arguments))
 
     plain = [name for name in FUNCTIONS if name not in ("delay", "lag", "play")]
     calls = [of(name, FUNCTIONS[name][0]) for name in plain]
-    return st.one_of(*(of(name, 2) for name in BINARY), of("neg", 1), *calls)
+    minus = of("neg", 1).filter(
+        lambda tree: not isinstance(tree.arguments[0], Number)
+    )  # a negative number is one
+    return st.one_of(*(of(name, 2) for name in BINARY), minus, *calls)
 
 
 expressions = st.recursive(leaves, applied, max_leaves=12)
