@@ -32,7 +32,7 @@ from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.starts import warm_start
 from discovery.models import Model
 from discovery.models.convection import validity_of_model
-from discovery.models.dimensions import check_dimensions
+from discovery.models.dimensions import check_dimensions, with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
 from discovery.progress import Progress, silent
@@ -85,8 +85,8 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
 
     Args:
         path: the experiment file.
-        out: folder of the results; default runs/<experiment name>. It is replaced as a whole at the very end, so
-            an interrupted run leaves what was there before.
+        out: folder of the results; default runs/<experiment name>. It is replaced as a whole at the very end,
+            so an interrupted run leaves what was there before.
         progress: told what begins.
 
     Returns:
@@ -113,7 +113,7 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
 
 
 def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
-    """What the model of [mismatch] leaves out, alone: that model, the diagnosis, the repaired model, a report.
+    """What the model of [mismatch] leaves out, alone: that model, the diagnosis, the repaired one, a report.
 
     Without [mismatch] the experiment's only (or first) model is taken. Files and failures as in `run`.
     """
@@ -142,7 +142,7 @@ def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -
 
 
 def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Progress = silent) -> Fitted:
-    """One model: start values, fit, cross-validation on the fit recordings alone; then free runs everywhere."""
+    """One model: start values, fit, cross-validation on the fit recordings alone; then free runs on all."""
     began = clock.perf_counter()
     progress(f"fitting {name}")
     model, report = starting_model(experiment, name, entry, progress)
@@ -215,7 +215,7 @@ def discovered(
 
     folder = experiment.path.parent
     found = discover(experiment.fitting, experiment.fit, experiment.outputs, options, progress, folder)
-    return found.model, dict(found.report)
+    return with_coefficient_units(found.model, experiment.campaign.channels), dict(found.report)
 
 
 def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:

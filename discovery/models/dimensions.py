@@ -4,7 +4,8 @@ wrote.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 Dimension = Mapping[str, float] | None
 _SAME = ("+", "-", "min", "max", *COMPARISONS)
 _PURE = ("exp", "log", "tanh")
+_TURNS = ("revolutions_per_minute", "revolution", "turn", "radian", "degree")
 
 
 class _Mismatch(Exception):  # noqa: N818  (control flow, caught here)
@@ -56,6 +58,74 @@ def check_dimensions(model: Model, channels: Mapping[str, Channel]) -> list[str]
         if found:
             sentences.append(f"model '{model.name}', output '{name}': {found}")
     return sentences
+
+
+def with_coefficient_units(model: Model, channels: Mapping[str, Channel]) -> Model:
+    """The model with the unit that follows for each coefficient of a term `coefficient*(...)`.
+
+    A search knows what it multiplies, not always in which unit the coefficient then is.
+    """
+    units = {name: c.unit for name, c in channels.items()} | {
+        name: p.unit for name, p in model.parameters.items()
+    }
+    units |= {name: s.unit for name, s in model.states.items()}
+    dimensions = {name: _dimension(unit) for name, unit in units.items()}
+    parameters = dict(model.parameters)
+    for term in model.terms:
+        match term.expression:
+            case Apply("*", (Name(coefficient), rest)) if coefficient in parameters:
+                state = model.states[term.into]
+                rate = "W" if state.capacity else f"{_differences(state.unit)}/{model.time_unit}"
+                if not _compare(term.expression, dimensions, _dimension(rate), rate):
+                    continue
+                of = unit_of(rest, units)
+                unit = rate if of == "1" else f"{rate}/({of})" if set("*/") & set(of) else f"{rate}/{of}"
+                parameters[coefficient] = replace(parameters[coefficient], unit=unit)
+            case _:
+                pass
+    return replace(model, parameters=parameters)
+
+
+def unit_of(expression: Expression, units: Mapping[str, str]) -> str:
+    """Unit of an expression from those of its names; literals have none, a difference of degC has K.
+
+    >>> from discovery.terms import parse
+    >>> unit_of(parse("pump*(T_env - 21.9)*speed**2"), {"pump": "1", "T_env": "degC", "speed": "rpm"})
+    'K*rpm**2'
+    """
+    match expression:
+        case Name(id=name):
+            return _differences(units.get(name, "1"))
+        case Apply(function="*" | "/" as sign, arguments=(a, b)):
+            left, right = unit_of(a, units), unit_of(b, units)
+            if right == "1":
+                return left
+            if sign == "*":
+                return right if left == "1" else f"{left}*{right}"
+            return f"{left}/({right})" if set("*/") & set(right) else f"{left}/{right}"
+        case Apply(function="**", arguments=(a, Number(value=power))):
+            base = unit_of(a, units)
+            return (
+                "1"
+                if base == "1"
+                else f"({base})**{power:g}"
+                if set("*/") & set(base)
+                else f"{base}**{power:g}"
+            )
+        case Apply(function=function) if function in (*COMPARISONS, *_PURE, "sign", "**"):
+            return "1"
+        case Apply(function="where", arguments=(_, *others)):
+            return _first_unit(others, units)
+        case Apply(function="lag" | "delay" | "play", arguments=(a, _)):
+            return unit_of(a, units)
+        case Apply(arguments=arguments):
+            return _first_unit(arguments, units)
+        case _:
+            return "1"
+
+
+def _first_unit(expressions: Sequence[Expression], units: Mapping[str, str]) -> str:
+    return next((unit for e in expressions if (unit := unit_of(e, units)) != "1"), "1")
 
 
 def _compare(
@@ -155,13 +225,11 @@ def _dimension(unit: str) -> Dimension:
         return None
     if unit == "1":
         return {}
-    found = _units()(unit).dimensionality
-    return {str(base): float(n) for base, n in found.items()} | _angle(unit)
-
-
-def _angle(unit: str) -> dict[str, float]:
-    """rpm counts turns, which pint holds for a pure number."""
-    return {"[angle]": 1.0} if unit in ("rpm", "rad/s", "deg/s") else {}
+    parsed = _units()(unit)
+    # rpm and rad count turns, which pint holds for a pure number
+    turns = sum(float(n) for name, n in parsed._units.items() if name in _TURNS)
+    found = {str(base): float(n) for base, n in parsed.dimensionality.items()}
+    return found | ({"[angle]": turns} if turns else {})
 
 
 @lru_cache(maxsize=512)

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from discovery.models import Model, Parameter, State
-from discovery.models.dimensions import check_dimensions
+from discovery.models.dimensions import check_dimensions, with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
 from discovery.models.thermobalance import thermobalance
@@ -90,6 +90,24 @@ def test_what_does_not(expression: str, units: dict[str, str], word: str) -> Non
     sentences = one(expression, units)
     assert len(sentences) == 1
     assert word in sentences[0]
+
+
+def test_the_unit_of_a_coefficient_follows_from_what_it_multiplies() -> None:
+    expressions = ("g1*speed", "g2*(pump*(T_env - 21.9))", "g3*x", "g4*(P_drive*speed**2)", "g5*1")
+    state = State("x", "um", None, Number(0.0), 1.0, 1 / 3600)
+    terms = tuple(Term(e, "x", parse(e)) for e in expressions)
+    parameters = {f"g{k}": Parameter(1.0, "um/h") for k in range(1, 6)}
+    model = Model("found", parameters, {"x": state}, terms, {}, "h")
+    assert len(check_dimensions(model, CHANNELS)) == 4
+    mended = with_coefficient_units(model, CHANNELS)
+    assert check_dimensions(mended, CHANNELS) == []
+    assert [p.unit for p in mended.parameters.values()] == [
+        "um/h/rpm",
+        "um/h/K",
+        "um/h/um",
+        "um/h/(W*rpm**2)",
+        "um/h",
+    ]
 
 
 def test_a_rate_is_compared_with_the_state_and_the_time_unit() -> None:
