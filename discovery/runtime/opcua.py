@@ -12,10 +12,12 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import Field
 
 from discovery.errors import UserError
 from discovery.export.document import Exported
+from discovery.export.stepper import Stepper
 from discovery.files import read_toml
 from discovery.runtime.compensator import Settings, Tick
 from discovery.runtime.guards import Reading
@@ -234,6 +236,9 @@ def compensate_opcua(
         UserError: see `Link.connect`.
     """
     from discovery.runtime.shadow import Rule
+
+    warm = Stepper(exported.compiled)  # the kernel is loaded before the first tick is due
+    warm.run(np.array([[0.5 * (i.range.low + i.range.high) for i in exported.inputs]]))
 
     async def work(form: ConnectionForm, place: Path) -> Punctuality:
         link = Link(form, place, exported)
