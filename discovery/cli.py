@@ -67,6 +67,10 @@ def main(
 @app.command()
 def check(
     campaign: Annotated[Path, typer.Argument(help="A campaign file, or a folder that holds campaign.toml.")],
+    models: Annotated[
+        list[Path] | None,
+        typer.Option("--model", help="A model file: do its names and units fit? Repeatable."),
+    ] = None,
 ) -> None:
     """List what is wrong with the recordings of CAMPAIGN: where, and what to do about it.
 
@@ -78,6 +82,11 @@ def check(
     for finding in findings:
         typer.echo(str(finding))
     typer.echo(summary(findings))
+    if models:
+        from discovery.models.check import check_models
+
+        for warning in check_models(campaign, models):
+            typer.echo(f"warning: {warning}")
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(1)
 
@@ -86,7 +95,8 @@ def check(
 def new(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that the files are written into.")],
     sources: Annotated[
-        list[Path], typer.Option("--from", metavar="CSV", help="Your recording; repeat it for several of one machine.")
+        list[Path],
+        typer.Option("--from", metavar="CSV", help="Your recording; repeat it for several of one machine."),
     ],
 ) -> None:
     """Make campaign, model and experiment from your own CSV, and say what was guessed."""
@@ -177,8 +187,12 @@ def record(
 
 @app.command()
 def diagnose(
-    experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, experiments/*.toml.")],
-    out: Annotated[Path | None, typer.Option(help="Folder of the results; default runs/<experiment name>.")] = None,
+    experiment: Annotated[
+        Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, experiments/*.toml.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the results; default runs/<experiment name>.")
+    ] = None,
 ) -> None:
     """Find what the model of [mismatch] leaves out: where, which physics, how sure, and how much better the repair fits.
 
@@ -280,15 +294,26 @@ def export(
 @app.command()
 def compensate(
     model: Annotated[Path, typer.Argument(help="An exported model (.json).")],
-    inputs: Annotated[str | None, typer.Option(help="CSV file with time and the inputs, or - for stdin.")] = None,
+    inputs: Annotated[
+        str | None, typer.Option(help="CSV file with time and the inputs, or - for stdin.")
+    ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="CSV file of the offsets [stdout].")] = None,
     state: Annotated[
-        Path | None, typer.Option(help="Folder that keeps state and models; another MODEL there runs in the shadow first.")
+        Path | None,
+        typer.Option(
+            help="Folder that keeps state and models; another MODEL there runs in the shadow first."
+        ),
     ] = None,
-    trust: Annotated[Path | None, typer.Option(help="Public key (.pub) that must have signed the model.")] = None,
-    allow_unsigned: Annotated[bool, typer.Option("--allow-unsigned", help="Try a model without a key.")] = False,
+    trust: Annotated[
+        Path | None, typer.Option(help="Public key (.pub) that must have signed the model.")
+    ] = None,
+    allow_unsigned: Annotated[
+        bool, typer.Option("--allow-unsigned", help="Try a model without a key.")
+    ] = False,
     shadow_hours: Annotated[float, typer.Option(help="Length of a shadow run.")] = 24.0,
-    back: Annotated[bool, typer.Option("--back", help="One step back to the model before, in --state.")] = False,
+    back: Annotated[
+        bool, typer.Option("--back", help="One step back to the model before, in --state.")
+    ] = False,
     opcua: Annotated[Path | None, typer.Option(help="TOML file of an OPC UA connection.")] = None,
     opcua_demo: Annotated[
         bool, typer.Option("--opcua-demo", help="Start a simulated machine server and compensate it.")
@@ -330,7 +355,36 @@ def compensate(
             exported, inputs, out, model=model, folder=state, trusted=key, shadow_hours=shadow_hours, say=say
         )
     else:
-        raise UserError("say where the readings come from: --inputs FILE, --inputs -, --opcua FILE or --opcua-demo")
+        raise UserError(
+            "say where the readings come from: --inputs FILE, --inputs -, --opcua FILE or --opcua-demo"
+        )
+
+
+@app.command()
+def challenge(
+    cases: Annotated[int | None, typer.Option(min=1, help="How many cases are written [200].")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Everything random comes from it [drawn now].")
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", help="Folder of the challenge.")] = Path("runs/challenge"),
+    jobs: Annotated[int, typer.Option(min=1, help="Processes at a time.")] = 2,
+    baselines: Annotated[bool, typer.Option(help="Solve with the other methods, too.")] = True,
+    cases_from: Annotated[
+        Path | None, typer.Option(help="Take the cases of this folder, with keys.json or answers.json.")
+    ] = None,
+) -> None:
+    """Conceal effects in many cases, seal the answers, solve the cases, score what was found.
+
+    Run it again to go on where it stopped. Writes OUT/report.html, OUT/results.json and OUT/challenge.md.
+    """
+    from discovery.challenge.run import challenge as run_challenge
+    from discovery.progress import shown
+
+    with shown() as progress:
+        outcome = run_challenge(out, cases, seed, jobs, baselines, cases_from, progress)
+    for line in outcome.lines:
+        typer.echo(line)
+    typer.echo(f"report: {outcome.folder / 'report.html'}")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,31 @@
+"""Whether model files fit a campaign: names that it has, units that go together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from discovery.files import read_toml
+from discovery.models.dimensions import check_dimensions
+from discovery.models.modelfile import check_names, read_model
+from discovery.recordings.campaign import make_channel
+from discovery.recordings.campaignfile import CampaignForm, campaign_path
+from discovery.recordings.units import UnitError, conversion
+
+
+def check_models(campaign: Path, models: Sequence[Path]) -> Iterator[str]:
+    """A sentence for each place where the units of a model do not fit.
+
+    Raises UserError: a mistake in a file, or a name that is neither the model's own nor a channel.
+    """
+    form = read_toml(campaign_path(campaign), CampaignForm)
+    channels = {}
+    for name, one in form.channels.items():
+        try:
+            channels[name] = make_channel(name, one, conversion(one.unit, one.role))
+        except UnitError:  # the check of the recordings has said so
+            continue
+    for path in models:
+        model = read_model(path)
+        check_names(model, set(form.channels), path)
+        yield from check_dimensions(model, channels)

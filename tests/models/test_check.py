@@ -1,0 +1,34 @@
+"""`discovery check CAMPAIGN --model FILE`."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from discovery.cli import app
+from discovery.errors import UserError
+from discovery.models.check import check_models
+
+DATA = Path(__file__).parents[2] / "datasets" / "nmv5000"
+
+
+def test_the_models_of_the_dataset_fit_it() -> None:
+    assert list(check_models(DATA, [DATA / "thermobalance.toml", DATA / "dry_thermobalance.toml"])) == []
+
+
+def test_a_unit_that_does_not_fit_is_a_warning(tmp_path: Path) -> None:
+    text = (DATA / "dry_thermobalance.toml").read_text()
+    bad = tmp_path / "bad.toml"
+    bad.write_text(
+        text.replace('hA_table   = { start = 3.0,  unit = "W/K"', 'hA_table   = { start = 3.0,  unit = "W"')
+    )
+    done = CliRunner().invoke(app, ["check", str(DATA), "--model", str(bad)])
+    assert "warning: model 'dry thermobalance, five bodies', term 'air around table'" in done.output
+
+
+def test_a_name_that_the_campaign_does_not_have(tmp_path: Path) -> None:
+    text = (DATA / "dry_thermobalance.toml").read_text()
+    bad = tmp_path / "bad.toml"
+    bad.write_text(text.replace("T_cool", "T_jacket"))
+    with pytest.raises(UserError, match="'T_jacket' is neither"):
+        list(check_models(DATA, [bad]))
