@@ -13,7 +13,7 @@ from discovery.dynamics import Grid
 from discovery.fitting import fit_model
 from discovery.recordings import Campaign
 from discovery.sparse.discovery import Discovery, PathPoint
-from discovery.sparse.folds import Blocks, choose, make_folds
+from discovery.sparse.folds import PREDICT, Blocks, choose, make_folds
 from discovery.sparse.gram import Gram, solve
 from discovery.sparse.masses import MassLibrary, Response, block_grams, free_run, mass_model, pooled
 from discovery.sparse.optimisers import pysindy_path
@@ -78,7 +78,7 @@ def discover_error(
     whole = problem.gram(everything)
     path = _path(whole, problem, options)
     rows = min(len(path), len(errors))
-    row = choose(errors[:rows], options.tolerance)
+    row = choose(errors[:rows], PREDICT if options.tolerance is None else options.tolerance)
     chosen = path[row]
     theta = solve(whole, chosen, problem.low, problem.high)
     labels = data.library.labels

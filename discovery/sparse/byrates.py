@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from discovery.fitting.noise import white_noise
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.sparse.discovery import Discovery, PathPoint
-from discovery.sparse.folds import Blocks, choose, make_blocks, make_folds
+from discovery.sparse.folds import NAME, Blocks, choose, make_blocks, make_folds
 from discovery.sparse.gram import Gram, solve
 from discovery.sparse.optimisers import pysindy_path
 from discovery.sparse.options import SparseOptions
@@ -26,7 +26,7 @@ from discovery.sparse.rates import Evidence, evidence, extended_bic, masked, ref
 
 Array = NDArray[np.float64]
 
-_READINGS = 400  # of one output in one recording: more say nothing new about hours or minutes
+_READINGS = 250  # of one output in one recording: more say nothing new about hours or minutes
 _ROUNDS = 4  # of a fit in a fold: it starts where the normal equations of the fold have their minimum
 _SIZES = 6  # that are refitted and run freely, down from the one that the criterion names
 
@@ -40,6 +40,19 @@ class RateData:
     outputs: tuple[str, ...]
     grids: Mapping[str, Grid]
     blocks: Blocks
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How a model grows: coefficients that are in it from the start and may leave, and how many more may enter.
+
+    A baseline that lacks something large is bent by its fit; so each fit also starts from the values `restart` that the
+    baseline had before, and the better one counts.
+    """
+
+    entered: tuple[str, ...] = ()
+    most: int = 15
+    restart: Mapping[str, float] = field(default_factory=dict)
 
 
 def make_rate_data(
@@ -58,7 +71,7 @@ def discover_rates(
     labels: Mapping[str, str],
     always: Sequence[str],
     options: SparseOptions,
-    first: Mapping[str, float] | None = None,
+    growth: Growth | None = None,
 ) -> Discovery:
     """Choose which coefficients of a model stay, and fit the rest.
 
@@ -66,12 +79,11 @@ def discover_rates(
         model: baseline and all candidates, coefficients at good start values.
         labels: coefficients that may leave, by name; what reports call their terms.
         always: parameters that cannot leave (shapes, baseline terms that are kept).
-        first: values of the baseline before its fit. Given, the model is a fitted baseline with candidates at zero:
-            terms first enter one by one by their score, then those that entered may leave. Else all are fitted at
+        growth: terms first enter one by one by their score, then those that entered may leave; else all are fitted at
             once and leave one by one.
     """
-    if first is not None:
-        model, labels = _grown(data, model, labels, options, first)
+    if growth is not None:
+        model, labels = _grown(data, model, labels, options, growth)
     full = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, _rough_noise(data))
     noise = white_noise(data.outputs, _stated(data), list(full.residuals().values()))
     full = replace(full, noise=noise)
@@ -87,7 +99,7 @@ def discover_rates(
     window = range(max(0, last - _SIZES + 1), last + 1)
 
     errors = np.array([_left_out(data, model, seen, path[k], noise) for k in window])
-    row = choose(errors, options.tolerance)
+    row = choose(errors, NAME if options.tolerance is None else options.tolerance)
     chosen = path[window[row]]
     fit = _refit(data, model, seen, g, chosen, data.grids, None, 25)
     points = tuple(
@@ -153,19 +165,24 @@ def _rough_noise(data: RateData) -> Noise:
 
 
 def _grown(
-    data: RateData, model: Model, labels: Mapping[str, str], options: SparseOptions, first: Mapping[str, float]
+    data: RateData, model: Model, labels: Mapping[str, str], options: SparseOptions, growth: Growth
 ) -> tuple[Model, dict[str, str]]:
     """The baseline with the candidates that its residual asks for, one at a time, each time fitted anew.
-
-    A baseline that lacks something large is bent by its fit; so each fit also starts from the values `first` that
-    the baseline had before, and the better one counts.
 
     A candidate enters by its score: what its column, filtered through the present model, takes off the cost when all
     fitted parameters may follow. Growth ends where the extended criterion does not pay for the next term.
     """
-    entered: list[str] = []
+    entered = list(growth.entered)
     noise = _rough_noise(data)
-    while len(entered) < options.max_terms:
+    for _ in range(growth.most + 1):
+        small = without(model, [name for name in labels if name not in entered])
+        starts = [{}, growth.restart] if growth.restart else [{}]
+        fits = [
+            refit(small, data.campaign, data.recordings, data.outputs, start, data.grids, noise, 40)
+            for start in starts
+        ]
+        fit = min(fits, key=lambda one: one.cost)
+        model = model.with_values({name: fit.model.parameters[name].value for name in small.free})
         here = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, noise, 1)
         seen = evidence(here, data.blocks)
         kept = [i for i, name in enumerate(seen.names) if name in entered or name not in labels]
@@ -179,13 +196,6 @@ def _grown(
         if after >= before:
             break
         entered.append(next(seen.names[i] for i in better[0] if i not in kept))
-        small = without(model, [name for name in labels if name not in entered])
-        fits = [
-            refit(small, data.campaign, data.recordings, data.outputs, start, data.grids, noise, 40)
-            for start in ({}, first)
-        ]
-        fit = min(fits, key=lambda one: one.cost)
-        model = model.with_values({name: fit.model.parameters[name].value for name in small.free})
     grown = without(model, [name for name in labels if name not in entered])
     return grown, {name: labels[name] for name in entered}
 

@@ -26,7 +26,9 @@ def smoothed_derivative(time: Array, series: Array) -> Array:
     """
     import pysindy
 
-    method = pysindy.SmoothedFiniteDifference(smoother_kws={"window_length": min(_WINDOW, len(series) - 1 | 1), "polyorder": 2})
+    method = pysindy.SmoothedFiniteDifference(
+        smoother_kws={"window_length": min(_WINDOW, len(series) - 1 | 1), "polyorder": 2}
+    )
     return np.asarray(method(series[:, None], time)[:, 0])
 
 

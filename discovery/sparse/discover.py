@@ -15,7 +15,7 @@ from discovery.fitting import fit_model
 from discovery.models import Model, Parameter, State
 from discovery.models.modelfile import check_names, read_model
 from discovery.recordings import Campaign
-from discovery.sparse.byrates import RateData, discover_rates, make_rate_data
+from discovery.sparse.byrates import Growth, RateData, discover_rates, make_rate_data
 from discovery.sparse.bymasses import MassData, discover_error
 from discovery.sparse.discovery import Discovery, joined
 from discovery.sparse.drives import AMBIENT, Inputs, make_inputs
@@ -26,12 +26,13 @@ from discovery.sparse.masses import make_mass_library, respond
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.rates import Candidate, with_candidates
 from discovery.sparse.weak import weak_gram, weak_rows
-from discovery.terms import Name, names, parse
+from discovery.terms import Name, Term, names, parse
 
 Progress = Callable[[str], None]
 
-FILE_FAMILIES = ("pump", "speed", "coupling")
-LABORATORY = ("linear", "coupling", "radiation", "natural", "heater", "second mass")
+FILE_FAMILIES = ("wet", "rotation", "coupling")
+LABORATORY = ("linear", "coupling", "radiation", "load", "second mass")
+SECOND_MASS = (300.0, 1200.0)  # s, time constants of a mass behind each body
 SENSOR_LAG = (1.0, 20.0, 300.0)  # s: least, start, most
 START_SD = 5.0  # K: a first reading may be an artefact of switching on
 
@@ -100,7 +101,7 @@ def _error_rates(
     state = State(output, unit, None, None, max(1.0, campaign.channels[output].noise or 0.0), 1 / 3600)
     empty = Model(output, {}, {output: state}, (), {}, "h")
     baseline = ["y", "1", *inputs.of(AMBIENT, "heat load", "fluid temperature")]
-    words = list(dict.fromkeys([*baseline, *(options.library or ("linear", "pump", "speed"))]))
+    words = list(dict.fromkeys([*baseline, *(options.library or ("linear", "wet", "rotation"))]))
     found = candidates([output], empty, campaign, inputs, words, options)
     data = make_rate_data(campaign, recordings, [output], inputs.names, options.blocks)
     model, labels = with_candidates(empty, _started(found, data, {output: output}))
@@ -126,11 +127,11 @@ def _started(
 ) -> list[Candidate]:
     """Candidates with start values from the weak form; `channel` says which readings stand for each state.
 
-    Candidates with memory keep theirs: the weak form sees the present alone.
+    Hidden masses keep theirs: the weak form sees what is measured alone.
     """
     placed = {}
     for state, output in channel.items():
-        mine = [c for c in found if c.into == state and "lag(" not in c.label]
+        mine = [c for c in found if c.into == state and "_mass" not in c.label]
         rows = [weak_rows(data.grids[r], output, [c.expression for c in mine], constants, aliases=channel) for r in data.recordings]
         low, high = (np.array([getattr(c, side) for c in mine]) for side in ("low", "high"))
         theta = 3600 * solve(total([weak_gram(one) for one in rows]), range(len(mine)), low, high)
@@ -144,14 +145,18 @@ def _temperatures(
     """Measured temperatures: a body behind each sensor, all bodies together."""
     room, states = _room(outputs, inputs)
     least, lag, most = SENSOR_LAG
-    parameters, measured = {}, {}
+    parameters, terms = {}, []
     bodies = [f"{name}_body" for name in outputs]
-    for name in outputs:
-        body = f"{name}_body"
-        states[body] = State(body, "degC", None, Name(name), START_SD, 1 / 3600)
+    for name, body in zip(outputs, bodies, strict=True):
         parameters[f"{name}_lag"] = Parameter(lag, "s", least, most)
-        measured[name] = parse(f"lag({body}, {name}_lag)")
-    empty = Model("temperatures", parameters, states, (), measured, "h")
+        states[name] = State(name, "degC", None, None, START_SD, 1.0)
+        terms.append(Term(f"sensor {name} follows", name, parse(f"({body} - {name})/{name}_lag")))
+        states[body] = State(body, "degC", None, Name(name), START_SD, 1 / 3600)
+        for k, tau in enumerate(SECOND_MASS if "second mass" in (options.library or LABORATORY) else (), start=1):
+            mass = f"{body}_mass{k}"
+            states[mass] = State(mass, "degC", None, Name(name), 0.0, 1.0)
+            terms.append(Term(f"{mass} follows", mass, parse(f"({body} - {mass})/{tau:g}")))
+    empty = Model("temperatures", parameters, states, tuple(terms), {}, "h")
     words = options.library or LABORATORY
     own = [Candidate(body, parse(f"{room} - {body}"), 0.0) for body in bodies]
     given = candidates(bodies, empty, campaign, inputs, words, options, room)
@@ -186,7 +191,8 @@ def _on_file(
     if options.keep_baseline is False:
         used = names_of_starts_and_outputs(baseline)
         labels |= {n: n for n in baseline.free if baseline.parameters[n].min <= 0 <= baseline.parameters[n].max and n not in used}
-    return discover_rates(data, model, labels, (), options, None if options.keep_baseline is False else baseline.values())
+    growth = Growth(most=options.max_terms, restart=baseline.values())
+    return discover_rates(data, model, labels, (), options, None if options.keep_baseline is False else growth)
 
 
 def names_of_starts_and_outputs(model: Model) -> frozenset[str]:

@@ -32,7 +32,7 @@ def candidates(
     known = {*inputs.names, *model.states, "y", "time"}
     for state in states:
         for word in families:
-            if word in FAMILIES:
+            if word in FAMILIES and word not in inputs.names:  # a channel of that name wins
                 found += [_bounded(c, options) for c in _family(word, state, states, model, inputs, room)]
                 continue
             expression = parse(word, "library of the discovery")
@@ -95,12 +95,12 @@ def _family(
             own = [name for role in inputs.by_role if role not in _NO_RATE for name in inputs.by_role[role]]
             warm = [(name, f"{name} - {state}") for name in inputs.of(*TEMPERATURES)]
             return plain("1", *own) + towards(*warm)
-        case "pump" if inputs.gate:
+        case "wet" if inputs.gate:
             fluid = inputs.of("fluid temperature")
             wet = [(name, f"{inputs.gate}*({name} - {state})") for name in fluid]
             wet += [(name, f"{inputs.gate}*(abs({n}) > 1)*({name} - {state})") for name in fluid for n in speeds]
             return towards(*wet) + plain(*(f"{inputs.gate}*{name}" for name in heat))
-        case "speed":
+        case "rotation":
             powers = [f"({name}/1000)**{power:g}" for name in speeds for power in (1.5, 2, 3)]
             return plain(*powers) + towards(*((room, f"({name}/1000)*({room} - {state})") for name in speeds))
         case "coupling":
@@ -113,8 +113,8 @@ def _family(
             return towards(
                 *((name, f"({name} - {state})*abs({name} - {state})**0.25") for name in [room, *partners])
             )
-        case "heater":
+        case "load":
             return plain(*(f"{name}*({state} - {room})/100" for name in heat), *(f"({name}/100)**2" for name in heat))
         case "second mass":
-            return towards(*(("", f"lag({state}, {tau:g}) - {state}") for tau in (300, 1200, 4800)))
+            return towards(*((name, f"{name} - {state}") for name in model.states if name.startswith(f"{state}_mass")))
     return []

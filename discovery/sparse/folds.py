@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 _MOST_FOLDS = 4
+PREDICT, NAME = 1.0, 2.0  # default tolerances: of a model that is to predict, and of one that names physics
 
 
 @dataclass(frozen=True)
@@ -56,14 +57,15 @@ def make_folds(blocks: Blocks) -> list[Ints]:
 def choose(errors: Array, tolerance: float) -> int:
     """The sparsest row whose error on what was left out is within `tolerance` standard errors of the best.
 
-    The standard error is that of the paired difference over blocks, so it also holds where residuals are coloured.
+    The standard error is that of the paired difference of logarithms over blocks: it holds where residuals are coloured
+    and where recordings of different violence stand side by side.
 
     Args:
         errors: (sizes, B) mean squared error of each left-out block, sparsest model first.
     """
     best = int(np.argmin(errors.mean(axis=1)))
     for row in range(best):
-        difference = errors[row] - errors[best]
+        difference = np.log(errors[row]) - np.log(errors[best])
         spread = difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
         if difference.mean() <= tolerance * spread:
             return row

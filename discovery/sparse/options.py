@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-FAMILIES = ("linear", "pump", "speed", "coupling", "radiation", "natural", "heater", "second mass")
+FAMILIES = ("linear", "wet", "rotation", "coupling", "radiation", "natural", "load", "second mass")
 
 
 class SparseOptions(BaseModel):
@@ -55,8 +55,11 @@ class SparseOptions(BaseModel):
     optimiser: Literal["elimination", "stlsq", "ssr", "sr3"] = Field(
         "elimination", description="our own search, or an optimiser of PySINDy"
     )
-    tolerance: float = Field(
-        1.0, ge=0, description="standard errors by which a sparser model may be worse on what was left out"
+    tolerance: float | None = Field(
+        None,
+        ge=0,
+        description="standard errors by which a sparser model may be worse on what was left out; default 1 for "
+        "masses, which are to predict, and 2 for rates, which name physics",
     )
     blocks: int = Field(24, ge=4, le=500, description="blocks that the recordings are cut into for bootstraps")
     bootstraps: int = Field(40, ge=0, le=1000, description="block bootstraps for the stability of each term")
