@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from discovery.report.mismatch import sizes
-from discovery.report.ranking import cells, is_discovered, is_error, mean_improvement, ranked, ratio
+from discovery.report.ranking import cells, is_error, mean_improvement, origin, ranked, ratio
 from discovery.report.run import Run
 from discovery.report.text import listed, number, percent, words
 
@@ -49,16 +49,16 @@ def _models(run: Run) -> tuple[str, list[str], list[tuple[str, str]]]:
     best = order[0]
     unseen = run.held_out
     where = f"on {_called(unseen)}" if unseen else "on the recordings it was fitted to"
-    made = "the discovered model" if is_discovered(run, best) else "the hand-built model"
+    named = f" “{best}”" if best != origin(run, best) else ""
     rivals = [model for model in order[1:] if math.isfinite(ratio(run, best, model))]
-    headline = f"{made.capitalize()} “{best}” predicts best {where}."
+    headline = f"The {origin(run, best)} model{named} predicts best {where}."
     points, figures = _removed(run, best) if is_error(run) else _left(run, best)
     compared = [f"{_less(ratio(run, best, model))} {_name(run, model)}" for model in rivals]
     if compared:
         points.append(f"It leaves {listed(compared)}.")
     figures += [
         (_less(ratio(run, best, model), short=True), f"rms left by {best} against {model}")
-        for model in [m for m in rivals if not is_discovered(run, m)][:2]
+        for model in [m for m in rivals if origin(run, m) == "hand-built"][:2]
     ]
     if is_error(run) and (worst := _worst(run, best)):
         points.append(worst)
@@ -99,7 +99,7 @@ def _called(unseen: Sequence[str]) -> str:
 
 
 def _name(run: Run, model: str) -> str:
-    return f"“{model}”{'' if is_discovered(run, model) else ' (hand-built)'}"
+    return f"“{model}”{' (hand-built)' if origin(run, model) == 'hand-built' else ''}"
 
 
 def _less(share: float, short: bool = False) -> str:
@@ -146,7 +146,7 @@ def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
     if p_value is not None:
         chance = "less than 1 in 1000" if p_value < 1e-3 else f"p = {number(p_value, 2)}"
         points.append(f"Chance that a complete model would look this wrong: {chance}.")
-    points += _proof(diagnosis)
+    points += _proof(diagnosis) if found else []
     rivals = [
         one for one in diagnosis.get("alternatives") or [] if one.get("log_evidence_below_best", 99) < 3
     ]

@@ -18,12 +18,12 @@ from discovery.report import equations, mismatch, series
 from discovery.report.answer import answer
 from discovery.report.chart import Chart, Panel, Series, payload
 from discovery.report.printed import Line, Printed, paper_tables, rms_tables, summary
-from discovery.report.ranking import is_discovered, is_error, ranked
+from discovery.report.ranking import is_discovered, is_error, origin, ranked
 from discovery.report.run import Run, load_run
 from discovery.report.text import counted, listed, number, percent
 
 _HERE = Path(__file__).parent
-_BUDGET = 150_000  # numbers that all curves of a page may hold together, about 1 MB
+_BUDGET = 300_000  # numbers that all curves of a page may hold together, below 2 MB
 _MOST_CURVES = 6  # more than that cannot be told apart
 
 
@@ -139,8 +139,8 @@ def _legend(run: Run, order: Sequence[str], curves: Sequence[Chart]) -> list[dic
     if not curves:
         return []
     noise = any(one.color == "noise" for chart in curves for panel in chart.panels for one in panel.series)
-    hand = [name for name in order[1:] if not is_discovered(run, name)] or list(order[1:])
-    first = {*order[:1], *hand[:1]}  # more curves at once hide each other
+    other = [name for name in order[1:] if origin(run, name) != origin(run, order[0])] or list(order[1:])
+    first = {*order[:1], *other[:1]}  # more curves at once hide each other
     items = [{"name": "measured", "color": "measured", "on": True}]
     items += [{"name": name, "color": str(index), "on": name in first} for index, name in enumerate(order)]
     return items + ([{"name": "reading noise, ±2σ", "color": "noise", "on": True}] if noise else [])

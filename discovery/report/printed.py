@@ -7,16 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from discovery.evaluation import tables
-from discovery.report.ranking import (
-    cells,
-    is_discovered,
-    is_error,
-    kind,
-    mean_improvement,
-    mean_rms,
-    ranked,
-    ratio,
-)
+from discovery.report.ranking import cells, is_error, kind, mean_improvement, mean_rms, origin, ranked, ratio
 from discovery.report.run import Run
 from discovery.report.text import number
 
@@ -76,12 +67,14 @@ def summary(run: Run) -> Printed | None:
         entry = run.results["models"][model]
         share = ratio(run, model, order[0])
         scores = [mean_improvement(run, model, r) if removed else mean_rms(run, model, r) for r in shown]
-        made = f"{kind(run, model)}{' (discovered)' if is_discovered(run, model) else ''}"
+        made = dict.fromkeys([origin(run, model), kind(run, model)])
         size = [number(entry.get("terms")), number(entry.get("parameters"))]
         times = "–" if not math.isfinite(share) else f"× {number(share, 3)}"
         figures = [number(score, 2 if removed else 3) for score in scores]
         look = "best" if model == order[0] else ""
-        rows.append(Line((model, made, *size, *figures, times, number(entry.get("seconds"), 2)), look))
+        rows.append(
+            Line((model, ", ".join(made), *size, *figures, times, number(entry.get("seconds"), 2)), look)
+        )
     title = "Mean over all errors" if removed else "Over all outputs"
     return Printed(title, header, tuple(rows), frozenset({1}))
 

@@ -24,6 +24,13 @@ def is_discovered(run: Run, model: str) -> bool:
     )
 
 
+def origin(run: Run, model: str) -> str:
+    """Where a model comes from: "discovered", "repaired" (hand-built plus what a diagnosis found) or "hand-built"."""
+    if kind(run, model) == "repaired":
+        return "repaired"
+    return "discovered" if is_discovered(run, model) else "hand-built"
+
+
 def cells(run: Run, model: str) -> dict[tuple[str, str], Mapping[str, Any]]:
     """Scores of a model by (recording, error), held-out recordings only (all where none is held out)."""
     found = run.results["models"][model].get("recordings", {})

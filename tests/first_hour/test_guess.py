@@ -31,7 +31,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("name", "unit", "values", "role", "expected"), CASES)
-def test_roles_and_units(name: str, unit: str, values: np.ndarray, role: str, expected: str) -> None:  # type: ignore[type-arg]
+def test_roles_and_units(name: str, unit: str, values: np.ndarray, role: str, expected: str) -> None:
     found = guess(Column(name, name.replace(" ", "_"), unit, np.asarray(values, dtype=float)))
     assert (found.role, found.unit) == (role, expected)
     assert found.why

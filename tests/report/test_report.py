@@ -112,7 +112,7 @@ def test_the_answer_agrees_with_an_independent_count(folder: Path, page: str) ->
     scores = {name: entry["recordings"]["validation"] for name, entry in results["models"].items()}
     logs = [np.log(scores["discovered"][o]["rms"] / scores["reduced"][o]["rms"]) for o in sample.OUTPUTS]
     less = 100 * (1 - np.exp(np.mean(logs)))
-    assert "The discovered model “discovered” predicts best on the unseen recording “validation”" in page
+    assert "The discovered model predicts best on the unseen recording “validation”" in page
     assert f"{less:.0f} % less than “reduced” (hand-built)" in page
     removed = np.mean([scores["discovered"][o]["improvement"]["rms"] for o in sample.OUTPUTS])
     assert f"It removes {float(f'{removed:.2g}'):.0f} % of the thermal error" in page
