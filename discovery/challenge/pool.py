@@ -1,0 +1,97 @@
+"""Solving: one process a case, several at a time, resumed where it stopped."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time as clock
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+
+from discovery.challenge.seal import CASES
+from discovery.files import write_atomic
+
+SOLVED = "solved"
+PATIENCE_S = 1800.0  # for all methods on one case
+
+
+def missing(folder: Path, cases: Sequence[str], methods: Sequence[str]) -> dict[str, list[str]]:
+    """Methods that have no answer yet, by case."""
+    todo = {
+        case: [m for m in methods if not (folder / SOLVED / case / f"{m}.json").exists()] for case in cases
+    }
+    return {case: left for case, left in todo.items() if left}
+
+
+def solve_all(
+    folder: Path, cases: Sequence[str], methods: Sequence[str], jobs: int, tell: Callable[[str], None]
+) -> dict[str, str]:
+    """Solve what is not solved yet.
+
+    Returns:
+        What went wrong, by case; such a case is tried again the next time.
+    """
+    todo = missing(folder, cases, methods)
+    failures: dict[str, str] = {}
+    if not todo:
+        return failures
+    began, solved = clock.perf_counter(), len(cases) - len(todo)
+    with ThreadPoolExecutor(jobs) as pool:
+        futures = {pool.submit(_one, folder, case, left): case for case, left in todo.items()}
+        try:
+            for done, future in enumerate(as_completed(futures), start=1):
+                if message := future.result():
+                    failures[futures[future]] = message
+                rest = (clock.perf_counter() - began) / done * (len(todo) - done)
+                tell(f"solved {solved + done} of {len(cases)} cases, {_span(rest)} to go")
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return failures
+
+
+def _one(folder: Path, case: str, methods: Sequence[str]) -> str:
+    """Solve a case on a copy far from the answers. Returns what went wrong, or nothing."""
+    with tempfile.TemporaryDirectory(prefix="case") as place:
+        copy, out = Path(place) / "case", Path(place) / "out"
+        shutil.copytree(folder / CASES / case, copy)
+        out.mkdir()
+        command = [sys.executable, "-m", "discovery.challenge.solve", str(copy), str(out), *methods]
+        try:
+            done = subprocess.run(
+                command,
+                cwd=copy,
+                env=_single_thread(),
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE_S,
+                check=False,
+            )
+            problem = (done.stderr.strip().splitlines() or ["no message"])[-1] if done.returncode else ""
+        except subprocess.TimeoutExpired:
+            problem = f"no answer within {PATIENCE_S:.0f} s"
+        for path in _answers(out, methods):
+            write_atomic(folder / SOLVED / case / path.name, path.read_bytes())
+    return problem
+
+
+def _answers(out: Path, methods: Sequence[str]) -> Iterator[Path]:
+    return (path for m in methods if (path := out / f"{m}.json").exists())
+
+
+def _single_thread() -> dict[str, str]:
+    """The environment with one thread for linear algebra and the package found where it is found now."""
+    import discovery
+
+    home = str(Path(discovery.__file__).parent.parent)
+    paths = [home, *(p for p in [os.environ.get("PYTHONPATH")] if p)]
+    one = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA")}
+    return {**os.environ, **one, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def _span(seconds: float) -> str:
+    return f"{seconds / 60:.0f} min" if seconds >= 90 else f"{seconds:.0f} s"

@@ -1,0 +1,80 @@
+"""What a method is given: the files of one case, read; and what several methods need of them, computed once."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from discovery.experiment import starting_model
+from discovery.experimentfile import Experiment, load_experiment
+from discovery.mismatch.catalogue import catalogue
+from discovery.mismatch.context import Context, make_context
+from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.prove import explained, improvements
+from discovery.mismatch.search import Assessment, assess
+from discovery.models import Model
+
+Answer = dict[str, Any]  # the part of diagnosis.json that is scored
+Method = Callable[["Problem"], Answer]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One case as its experiment file describes it."""
+
+    experiment: Experiment
+
+    @cached_property
+    def model(self) -> Model:
+        """The model that somebody believes in."""
+        form = self.experiment.form
+        name = form.mismatch.model if form.mismatch else next(iter(form.models))
+        return starting_model(self.experiment, name, form.models[name])[0]
+
+    @cached_property
+    def context(self) -> Context:
+        """Baseline fitted to the recordings that may be seen."""
+        outputs = [y for y in self.experiment.outputs if y in self.model.outputs or y in self.model.states]
+        return make_context(
+            self.experiment.fitting, self.model, self.experiment.fit, outputs, list(catalogue().values())
+        )
+
+    @cached_property
+    def baseline(self) -> Assessment:
+        """The baseline under the everyday noise that explains what it leaves best."""
+        return assess(self.context, ())
+
+    def improvement(self, repaired: Model | None, chosen: Sequence[Hypothesis]) -> Answer:
+        """`improvement` of diagnosis.json for a repaired model with `chosen` in it; nothing without one.
+
+        The noise floor is that of the everyday noise beside these effects, as in the workbench's own proof.
+        """
+        if repaired is None:
+            return {"held_out": {}, "explained": None}
+        noise, fitted = assess(self.context, chosen).best_view.noise, self.baseline.fit.model
+        found = improvements(
+            self.experiment.campaign, self.experiment.held_out, self.context.outputs, fitted, repaired, noise
+        )
+        rows = {
+            run: {"rms_before": i.before, "rms_after": i.after, "noise_floor": i.floor}
+            for run, i in found.items()
+        }
+        return {"held_out": rows, "explained": explained(found)}
+
+
+def read_problem(case: Path) -> Problem:
+    """The problem of a case folder. Raises UserError as reading an experiment does."""
+    experiment = load_experiment(case / "experiment.toml")
+    form = experiment.form.model_copy(update={"cross_validate": False, "export": None})
+    return Problem(replace(experiment, form=form))
+
+
+def timed(method: Method, case: Path) -> Answer:
+    """A method's answer to a case with the seconds that it took, reading included."""
+    began = clock.perf_counter()
+    answer = method(read_problem(case))
+    return answer | {"seconds": clock.perf_counter() - began}

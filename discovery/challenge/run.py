@@ -1,0 +1,102 @@
+"""`discovery challenge` from start to end: write, seal, solve, check the seal, score, report."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from discovery.challenge.document import document, markdown, summary
+from discovery.challenge.methods import METHODS, WORKBENCH
+from discovery.challenge.pool import SOLVED, solve_all
+from discovery.challenge.prepare import adopt, opened, prepare
+from discovery.challenge.seal import ANSWERS, SEAL, check_seal, read_seal, sha256
+from discovery.challenge.tally import Tally, score_all, tally
+from discovery.errors import UserError
+from discovery.files import read_text, write_atomic
+from discovery.progress import Progress, silent
+from discovery.results import write_json
+
+COUNT = 200
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A scored challenge: its folder, the text for the terminal."""
+
+    folder: Path
+    tallies: dict[str, Tally]
+    lines: list[str]
+
+
+def challenge(
+    out: Path,
+    count: int | None = None,
+    seed: int | None = None,
+    jobs: int = 2,
+    baselines: bool = True,
+    source: Path | None = None,
+    progress: Progress = silent,
+) -> Outcome:
+    """Run a challenge, or go on with the one in `out`.
+
+    Args:
+        count: cases to write, default 200; on going on, as many as there are.
+        seed: everything random comes from it; default drawn now, after the code is fixed.
+        jobs: processes.
+        baselines: solve with the other methods, too.
+        source: folder of cases that exist, with their keys, instead of new ones.
+
+    Raises:
+        UserError: `out` holds another challenge, or a sealed file was changed.
+    """
+    methods = list(METHODS) if baselines else [WORKBENCH]
+    if (out / SEAL).exists():
+        _same(out, count, seed, source)
+        seal = read_seal(out)
+    elif source is not None:
+        seal = adopt(out, source)
+    else:
+        drawn = secrets.randbelow(2**31) if seed is None else seed
+        progress(f"seed {drawn}")
+        seal = prepare(out, count or COUNT, drawn, jobs, progress)
+    progress(f"sealed {seal['sealed']}: SHA-256 of {SEAL} {sha256((out / SEAL).read_bytes())}")
+    cases = opened(out)
+    failures = solve_all(out, cases, methods, jobs, progress)
+    changed = check_seal(out, seal)
+    progress("scoring")
+    keys = json.loads(read_text(out / ANSWERS))["cases"]
+    tallies = {name: tally(score_all(keys, read_answers(out, cases, name))) for name in methods}
+    write_json(out / "results.json", document(seal, changed, failures, tallies))
+    write_atomic(out / "challenge.md", markdown(tallies, seal))
+    from discovery.challenge.page import render
+
+    write_atomic(out / "report.html", render(seal, changed, tallies))
+    notes = (
+        [f"note: {len(changed)} source files are no longer what was sealed, e.g. {changed[0]}"]
+        if changed
+        else []
+    )
+    failed = [f"{case}: failed, {why}" for case, why in failures.items()]
+    return Outcome(out, tallies, [markdown(tallies, seal), *summary(tallies), *failed, *notes])
+
+
+def read_answers(folder: Path, cases: Sequence[str], method: str) -> dict[str, dict[str, Any] | None]:
+    """What a method answered, by case; None where it failed."""
+    paths = {case: folder / SOLVED / case / f"{method}.json" for case in cases}
+    return {case: json.loads(read_text(path)) if path.exists() else None for case, path in paths.items()}
+
+
+def _same(out: Path, count: int | None, seed: int | None, source: Path | None) -> None:
+    """Refuse to go on with a challenge that is not the one asked for."""
+    answers = json.loads(read_text(out / ANSWERS))
+    there = len(answers["cases"])
+    if (count is not None and count != there) or (seed is not None and seed != answers["seed"]):
+        raise UserError(
+            f"{out}: holds another challenge, of {there} cases; choose another place with --out, or leave out --cases and --seed to go on with it"
+        )
+    if source is not None and answers["seed"] is not None:
+        raise UserError(f"{out}: holds a challenge with cases of its own; choose another place with --out")
