@@ -215,7 +215,8 @@ def log_likelihood(
     gram = x.T @ x + np.diag(prior / scale**2) + 1e-9 * np.eye(x.shape[1])
     chol = np.linalg.cholesky(gram)
     solved = np.linalg.solve(chol, x.T @ r)
-    return total - 0.5 * float(r @ r - solved @ solved) - float(np.sum(np.log(np.diag(chol))))
+    volume = float(np.sum(np.log(np.diag(chol))) + np.sum(np.log(scale)))
+    return total - 0.5 * float(r @ r - solved @ solved) - volume
 
 
 def estimate_noise(

@@ -88,8 +88,8 @@ class Effect:
     """One entry of the catalogue.
 
     `formula` is a heat flow [W] into `body` (and out of `other` where it names one), or what an output shows
-    more. For "fluid terms" and "cooling terms" it is what the replaced channel becomes; for outputs `y` is the
-    error without the effect. Where states have no capacity (phenomenological models) the formula is a rate.
+    more. For "fluid terms" and "cooling terms" it is what the replaced channel becomes; for outputs `y` is
+    the error without the effect. Where states have no capacity (phenomenological models) it is a rate.
     """
 
     word: str

@@ -25,7 +25,7 @@ class EffectForm(Strict):
     """One effect.
 
     `formula` is a heat flow into `body` (out of `other`, for two bodies) with `amplitude` as a factor; the
-    variables are body, other, y (for outputs) and ambient, fluid, flow, speed, load, cooling, coolant, height,
+    variables are body, other, y (for outputs), ambient, fluid, flow, speed, load, cooling, coolant, height and
     other_input.
     """
 

@@ -2,7 +2,7 @@
 
     q = h_nat |T_env - T|^0.3 (T_env - T)    [W]
 
-h_nat in W/K at 1 K, 1 to 15: 1.9 W/m2K at 1 K and 4.2 W/m2K at 10 K. Source: Churchill-Chu, McAdams
+h_nat in W/K^1.3 (W/K at 1 K), 1 to 15: 1.9 W/m2K at 1 K and 4.2 W/m2K at 10 K. Source: Churchill-Chu, McAdams
 (exponents 1/4 laminar to 1/3 turbulent, 0.3 between them). Limits: only what differs from a linear loss
 is seen; beside `radiation` it is rarely decidable.
 """
@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="air and structure",
     place="air body",
     formula="h_nat*abs(ambient - body)**0.3*(ambient - body)",
-    amplitude=Amplitude("h_nat", "W/K", 4.0),
+    amplitude=Amplitude("h_nat", "W/K**1.3", 4.0),
     signature="loss to the air grows faster than the temperature difference: slower tail near equilibrium",
     confused_with=(
         "radiation",

@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="air and structure",
     place="air body",
     formula="A_rad*5.67e-8*((ambient + 273.15)**4 - (body + 273.15)**4)",
-    amplitude=Amplitude("A_rad", "m2", 1.0),
+    amplitude=Amplitude("A_rad", "m**2", 1.0),
     signature=(
         "loss to the surroundings with the fourth power; invisible unless the body is tens of kelvin "
         "above the room"

@@ -1,0 +1,98 @@
+"""The whitening filter against a dense covariance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from discovery.dynamics import Trajectory, make_grid, make_system, simulate
+from discovery.fitting import Noise
+from discovery.fitting.noise import log_likelihood, make_filter
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
+
+Array = NDArray[np.float64]
+
+CAPACITY = np.array([30e3, 90e3])
+SEEN = np.array([[2.0, 0.5], [-1.0, 3.0]])  # um/K
+CASES = {
+    "white": Noise(("y", "z"), (0.5, 1.2)),
+    "slow": Noise(("y", "z"), (0.5, 1.2), (0.3, 0.9), None, 5000.0, 9000.0),
+    "heat": Noise(("y", "z"), (0.5, 1.2), (), {"a": 3.0, "b": 9.0}, 5000.0, 9000.0),
+    "everything": Noise(("y", "z"), (0.5, 1.2), (0.3, 0.9), {"a": 3.0, "b": 0.0}, 5000.0, 9000.0),
+}
+
+
+@pytest.fixture(scope="module")
+def trajectory() -> Trajectory:
+    """Two linked bodies for 20 h, read at irregular times, some of the values missing."""
+    rng = np.random.default_rng(5)
+    time = np.unique(np.concatenate([np.arange(0.0, 72001.0, 1200.0), rng.integers(1, 7200, 30) * 10.0]))
+    read = {n: np.where(rng.random(len(time)) < 0.6, rng.standard_normal(len(time)), np.nan) for n in "yz"}
+    channels = {n: Channel(n, "error", "um", None, "linear") for n in "yz"}
+    channels["T"] = Channel("T", "ambient temperature", "degC", None, "linear")
+    recording = Recording("r", time, {**read, "T": 22 + np.sin(time / 9000)})
+    states = {n: State(n, "degC", c, parse("T"), 0.5, 1 / c) for n, c in zip("ab", CAPACITY, strict=True)}
+    terms = (Term("link", "a", parse("G*(b - a)"), "b"), Term("air", "b", parse("hA*(T - b)")))
+    outputs = {n: parse(f"({row[0]})*a + ({row[1]})*b") for n, row in zip("yz", SEEN, strict=True)}
+    model = Model("two", {"G": Parameter(20.0), "hA": Parameter(6.0)}, states, terms, outputs)
+    grid = make_grid(Campaign("c", channels, {"r": recording}), "r", ["T"], ("y", "z"))
+    return simulate(make_system(model, grid), model.values())
+
+
+def dense(trajectory: Trajectory, noise: Noise) -> Array:
+    """Covariance of the readings in their order, from the definitions; heat is held between readings."""
+    grid = trajectory.system.grid
+    time = grid.time[grid.read]
+    a = np.array([[-20.0, 20.0], [20.0, -26.0]]) / CAPACITY[:, None]
+    count, outs = grid.measured.shape
+    lag = np.abs(np.subtract.outer(time, time))
+    total = np.zeros((count, outs, count, outs))
+    for y, white in enumerate(noise.white):
+        total[:, y, :, y] += white**2 * np.eye(count)
+        if noise.slow:
+            total[:, y, :, y] += noise.slow[y] ** 2 * np.exp(-lag / noise.slow_time)
+    for i, size in enumerate((noise.heat or {}).get(name, 0.0) for name in "ab"):
+        answer = np.zeros((count, count, outs))  # reading, interval of unit heat, output
+        for k in range(count - 1):
+            step = time[k + 1] - time[k]
+            x = np.linalg.solve(a, (expm(a * step) - np.eye(2)) @ np.eye(2)[i] / CAPACITY[i])
+            for r in range(k + 1, count):
+                answer[r, k] = SEEN @ expm(a * (time[r] - time[k + 1])) @ x
+        total += size**2 * np.einsum(
+            "ryk,kl,slz->rysz", answer.transpose(0, 2, 1), np.exp(-lag / noise.heat_time), answer
+        )
+    where = np.flatnonzero(grid.measured.ravel())
+    return total.reshape(count * outs, -1)[np.ix_(where, where)]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_innovations_are_the_rows_of_a_cholesky_factor(name: str, trajectory: Trajectory) -> None:
+    noise, measured = CASES[name], trajectory.system.grid.measured
+    data = np.random.default_rng(0).standard_normal((*measured.shape, 3))
+    data[~measured] = np.nan
+    found, logdet = make_filter(trajectory).apply(noise, data)
+    triangle = np.linalg.cholesky(dense(trajectory, noise))
+    assert np.allclose(found, np.linalg.solve(triangle, data[measured]), atol=1e-7)
+    assert logdet == pytest.approx(np.log(np.diag(triangle)).sum(), abs=1e-7)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_unknowns_are_integrated_out(name: str, trajectory: Trajectory) -> None:
+    """The restricted likelihood is that of readings whose covariance holds the prior of the unknowns."""
+    noise, measured = CASES[name], trajectory.system.grid.measured
+    rng = np.random.default_rng(1)
+    residual, columns = rng.standard_normal(measured.shape), rng.standard_normal((*measured.shape, 2))
+    sd = np.array([0.7, 3.0])
+    parts = [make_filter(trajectory)]
+    found = log_likelihood(parts, noise, [np.where(measured, residual, np.nan)], [columns], sd**-2.0)
+    x = columns[measured] * sd
+    covariance = dense(trajectory, noise) + x @ x.T
+    r = residual[measured]
+    expected = -0.5 * float(r @ np.linalg.solve(covariance, r)) - 0.5 * float(
+        np.linalg.slogdet(covariance)[1]
+    )
+    assert found == pytest.approx(expected + np.log(sd).sum(), abs=1e-5)
