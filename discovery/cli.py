@@ -387,5 +387,30 @@ def challenge(
     typer.echo(f"report: {outcome.folder / 'report.html'}")
 
 
+@app.command()
+def update(
+    model: Annotated[Path, typer.Argument(help="The exported model at work (.json).")],
+    campaign: Annotated[Path, typer.Argument(help="A campaign file with the recordings since its last revision.")],
+    recordings: Annotated[
+        list[str] | None, typer.Option("--recording", help="In order; may be repeated [all of the campaign].")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="File of the next revision [MODEL with .rN].")] = None,
+    sign: Annotated[Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs it.")] = None,
+) -> None:
+    """Keep an exported model up with an ageing machine: noise, drift, or a new effect?
+
+    A drift becomes the next revision, with a changelog entry; `discovery compensate` runs it in the shadow first.
+    """
+    from discovery.export.seal import private_key
+    from discovery.recordings import load_campaign
+    from discovery.runtime.update import next_name, update_file
+
+    loaded = load_campaign(campaign, only=recordings or None)
+    names = recordings or list(loaded.recordings)
+    key = private_key(sign) if sign else None
+    for line in update_file(model, loaded, names, out or next_name(model), key).lines():
+        typer.echo(line)
+
+
 if __name__ == "__main__":
     sys.exit(app())

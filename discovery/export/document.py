@@ -10,9 +10,12 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from discovery import __version__
 from discovery.errors import UserError
 from discovery.export.compiled import Compiled, compile_model, model_inputs
+from discovery.export.knowledge import knowledge
 from discovery.export.ranges import InputRange, OutputRange, input_range, output_ranges
 from discovery.export.seal import Seal, open_seal, seal_bytes
 from discovery.export.stepper import INTEGRATOR
@@ -112,6 +115,7 @@ def make_document(
             )
     compiled = compile_model(model, step_s)
     limits = output_ranges(compiled, campaign, recordings)
+    known_by = knowledge(model, campaign, recordings)
     inputs = []
     for name in compiled.inputs:
         channel = campaign.channels[name]
@@ -161,6 +165,12 @@ def make_document(
             for t in model.terms
         ],
         "outputs": outputs,
+        "knowledge": {
+            "residual": dict(known_by.residual),
+            "parameters": list(known_by.parameters),
+            "covariance": known_by.covariance.tolist(),
+            "first": np.sqrt(np.diag(known_by.covariance)).tolist(),
+        },
         "provenance": {
             "tool": f"discovery {__version__}",
             "campaign": campaign.name,

@@ -98,6 +98,12 @@ class Stepper:
         )
         return values[: len(self.compiled.outputs)]
 
+    def rates(self, u: Array) -> Array:
+        """dx/dt (n,) of the present state under inputs u (U,) [per s]."""
+        time = self.count * self.compiled.step_s
+        values = _run(self._tables.rates, np.asarray(u, dtype=float), self.x, self.delayed, self.plays, time)
+        return values[: len(self.compiled.states)]
+
     def step(self, u: Array) -> Array | None:
         """Outputs (Y,) after one step under inputs u (U,); None, and no change, where the step fails."""
         y = self.run(np.asarray(u, dtype=float)[None, :])

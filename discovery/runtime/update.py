@@ -1,0 +1,302 @@
+"""Keeping up with an ageing machine: few new readings, and what they say of the model at work.
+
+Three hypotheses for what the new readings leave:
+
+* noise: parameters that follow the machine explain them no better than those at work;
+* drift: they do, by more than chance, over all recordings since the last revision. The belief about the parameters is
+  recursive: what was known, forgotten a little with each recording, is the prior of the next (Kalman filter of parameters on a
+  random walk, Ljung, System Identification, chapter 11; with bounds);
+* a new effect: even then the residual stays larger than it was when the model was fitted. The mismatch method is asked.
+"""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.errors import UserError
+from discovery.export.document import Exported, read_document, write_document
+from discovery.fitting.problem import Problem, make_problem
+from discovery.models import Model
+from discovery.recordings import Campaign
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+Array = NDArray[np.float64]
+Verdict = Literal["noise", "drift", "new effect"]
+
+Z95 = 1.959963984540054
+WALK = 0.03  # of a parameter from one recording to the next, relative: how fast a machine may age
+SIGNIFICANT = 0.05  # chance of calling noise a drift; a shadow run stands before every change
+SLOW_SHARE, SLOW_S = 0.3, 7200.0  # of the residual: its part that is correlated in time, and for how long
+EXCESS = 1.6  # residual after the update, as a multiple of that of the fit, from which an effect is new
+WIDEST = 3.0  # prior standard deviations never grow beyond this multiple of the first fit's
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is known of the parameters: values in `model`, covariance (P, P) of those named; and what speaks against the model
+    `at_work` since its revision: `gain` in squared residuals for `effective` parameters."""
+
+    model: Model
+    at_work: Model
+    parameters: tuple[str, ...]
+    covariance: Array
+    first: Array  # (P,) standard deviations at the first fit
+    gain: float = 0.0
+    effective: float = 0.0
+
+    def released(self) -> Belief:
+        """After a revision: the model believed in is the one at work."""
+        return replace(self, at_work=self.model, gain=0.0, effective=0.0)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one recording of new readings said. rms in units of the residual that the fit left (1: as good as new)."""
+
+    recording: str
+    verdict: Verdict
+    readings: int
+    before: float
+    after: float
+    p_value: float
+    moved: Mapping[str, tuple[float, float]]  # parameter: from, to
+
+    def __str__(self) -> str:
+        text = f"{self.recording}: {self.verdict} (p = {self.p_value:.2g}, {self.readings} readings, residual {self.before:.2f}"
+        moved = ", ".join(f"{name} {old:.4g} -> {new:.4g}" for name, (old, new) in self.moved.items())
+        return text + (f" -> {self.after:.2f} of the fit's)" if moved else " of the fit's)") + (f"; {moved}" if moved else "")
+
+
+def belief_of(exported: Exported) -> Belief:
+    """What an exported model says of its parameters.
+
+    Raises:
+        UserError: a model without knowledge of its parameters.
+    """
+    found = exported.document["knowledge"]
+    if not found["parameters"]:
+        raise UserError(f"model '{exported.model.name}' does not say how well its parameters are known; export it again from its run")
+    covariance = np.array(found["covariance"])
+    model = exported.model
+    return Belief(model, model, tuple(found["parameters"]), covariance, np.array(found["first"]))
+
+
+def residual_levels(exported: Exported) -> dict[str, float]:
+    """Residual of the fit by output, where it is known."""
+    return {n: r for n, r in exported.document["knowledge"]["residual"].items() if r is not None}
+
+
+def update_belief(
+    belief: Belief, levels: Mapping[str, float], campaign: Campaign, recording: str
+) -> tuple[Belief, Finding]:
+    """Take in the readings of one recording.
+
+    Args:
+        levels: residual of the fit by output: the noise of a reading, model errors of everyday included.
+
+    Raises:
+        UserError: no reading of any output.
+    """
+    data = campaign.recordings[recording]
+    outputs = [n for n in levels if n in data.values and np.isfinite(data.values[n]).any()]
+    if not outputs:
+        raise UserError(f"{campaign.path}: recording '{recording}' holds no reading of {', '.join(levels)}; there is nothing to learn from")
+    problem = make_problem(belief.model, campaign, [recording], outputs)
+    now = make_problem(belief.at_work, campaign, [recording], outputs)
+    prior = _prior(belief)
+    known = [next(i for i, u in enumerate(problem.unknowns) if u.name == n and not u.is_start) for n in belief.parameters]
+    starts = [i for i, u in enumerate(problem.unknowns) if u.is_start]
+    stretch = _stretch(data.time[np.isfinite(data.values[outputs[0]])])
+    weights = 1.0 / np.array([levels[n] for n in outputs]) / np.sqrt(stretch)
+    fixed = _minimise(now, weights, starts, starts, np.zeros((0, 0)))
+    freed = _minimise(problem, weights, [*known, *starts], starts, prior)
+    from scipy.stats import chi2
+
+    gain, effective = belief.gain + fixed.cost - freed.cost, belief.effective + freed.effective
+    p_value = float(chi2.sf(max(gain, 0.0), max(effective, 1.0)))
+    count = int(np.isfinite(problem.systems[0].grid.readings).sum())
+    before, after = fixed.rms * np.sqrt(stretch), freed.rms * np.sqrt(stretch)
+    if after > EXCESS and count / stretch >= 8:  # nothing is learnt from what the model cannot explain
+        return replace(belief, covariance=prior), Finding(recording, "new effect", count, before, after, p_value, {})
+    sd = np.sqrt(np.maximum(np.diag(freed.covariance), 0.0))
+    values = freed.theta[known]
+    moved = {}
+    for k, name in enumerate(belief.parameters):
+        old = belief.at_work.parameters[name].value
+        if abs(values[k] - old) > 0.25 * belief.first[k]:
+            moved[name] = (old, float(values[k]))
+    verdict: Verdict = "drift" if p_value < SIGNIFICANT else "noise"
+    learnt = replace(
+        belief,
+        model=_with(belief.model, belief.parameters, values, sd),
+        covariance=freed.covariance,
+        gain=gain,
+        effective=effective,
+    )
+    return learnt, Finding(recording, verdict, count, before, after, p_value, moved if verdict == "drift" else {})
+
+
+def _prior(belief: Belief) -> Array:
+    """Covariance before a recording: what was known, a random walk added, never wider than a multiple of the first fit's."""
+    walk = [WALK * abs(belief.model.parameters[name].value) for name in belief.parameters]
+    wider = belief.covariance + np.diag(np.square(walk))
+    sd = np.sqrt(np.maximum(np.diag(wider), 1e-300))
+    shrink = np.minimum(1.0, WIDEST * belief.first / sd)
+    return np.asarray(wider * np.outer(shrink, shrink))
+
+
+def _stretch(times: Array) -> float:
+    """Readings that count as one independent reading: those close together share the slow part of the noise."""
+    gap = float(np.median(np.diff(times))) if len(times) > 1 else SLOW_S
+    rho = SLOW_SHARE * float(np.exp(-gap / SLOW_S))
+    return (1.0 + rho) / (1.0 - rho)
+
+
+@dataclass(frozen=True)
+class _Minimum:
+    theta: Array
+    cost: float  # weighted squares plus priors
+    rms: float  # of the weighted residual
+    covariance: Array  # of the unknowns with a prior covariance
+    effective: float  # directions of the parameters that the readings determine
+
+
+def _minimise(problem: Problem, weights: Array, unknowns: Sequence[int], starts: Sequence[int], prior: Array) -> _Minimum:
+    """Weighted least squares over some unknowns, with the priors of the start values and of the parameters before them."""
+    from scipy.optimize import least_squares
+
+    origin, system = problem.start, problem.systems[0]
+    seen = np.isfinite(system.grid.readings)
+    index, count = list(unknowns), len(prior)
+    root = np.zeros((count, count))
+    if count:
+        values, vectors = np.linalg.eigh(0.5 * (prior + prior.T))
+        keep = np.sqrt(np.maximum(values, 1e-12 * max(values.max(), 1e-300)))
+        root = vectors * keep  # theta = origin + root @ z with z ~ N(0, 1)
+    spread = np.array([p[1] if (p := problem.unknowns[i].prior) else 1.0 for i in starts])
+    low, high = problem.bounds
+
+    def place(z: Array) -> Array:
+        theta = origin.copy()
+        if count:
+            parameters = index[:count]
+            theta[parameters] = np.clip(origin[parameters] + root @ z[:count], low[parameters], high[parameters])
+        theta[list(starts)] = origin[list(starts)] + spread * z[count:]
+        return theta
+
+    def residual(z: Array) -> Array:
+        trajectory = problem.run(system, place(z))
+        return np.concatenate([(problem.residual(trajectory) * weights)[seen], z])
+
+    def jacobian(z: Array) -> Array:
+        slopes = -(problem.jacobian(problem.run(system, place(z))) * weights[None, :, None])[seen]
+        columns = [slopes[:, index[:count]] @ root] if count else []
+        return np.vstack([np.hstack([*columns, slopes[:, list(starts)] * spread]), np.eye(count + len(starts))])
+
+    found = least_squares(residual, np.zeros(count + len(starts)), jac=jacobian, method="trf", max_nfev=12, xtol=1e-6, ftol=1e-6)
+    readings = int(seen.sum())
+    r, j = found.fun, found.jac
+    posterior = np.linalg.inv(j.T @ j)[:count, :count]
+    return _Minimum(
+        place(found.x),
+        float(r @ r),
+        float(np.sqrt(np.mean(r[:readings] ** 2))),
+        root @ posterior @ root.T,
+        float(count - np.trace(posterior)) if count else 0.0,
+    )
+
+
+def _with(model: Model, names: Sequence[str], values: Array, sd: Array) -> Model:
+    parameters = dict(model.parameters)
+    for name, value, s in zip(names, values.tolist(), sd.tolist(), strict=True):
+        p = parameters[name]
+        parameters[name] = replace(p, value=value, low=max(value - Z95 * s, p.min), high=min(value + Z95 * s, p.max))
+    return replace(model, parameters=parameters)
+
+
+@dataclass(frozen=True)
+class Update:
+    """What an update found and wrote; `path` None: nothing to change."""
+
+    findings: tuple[Finding, ...]
+    path: Path | None
+    diagnosis: Mapping[str, Any] | None
+
+    def lines(self) -> list[str]:
+        """What a user wants to know of it."""
+        lines = [str(finding) for finding in self.findings]
+        if self.diagnosis is not None:
+            named = ", ".join(f"{p['effect']} at {'+'.join(p['states'])}" for p in self.diagnosis.get("physics", []))
+            lines.append(f"the mismatch method says: {self.diagnosis['verdict']}{named and ': ' + named}")
+        if self.path is None:
+            lines.append("the model stays as it is")
+        else:
+            lines.append(f"{self.path}: the next revision; `discovery compensate` runs it in the shadow of the one at work first")
+        return lines
+
+
+def update_file(
+    path: Path, campaign: Campaign, recordings: Sequence[str], out: Path, key: Ed25519PrivateKey | None = None
+) -> Update:
+    """`discovery update`: take in recordings one after the other and write the next revision where they ask for it.
+
+    Raises:
+        UserError: a model that cannot be updated, or recordings without readings.
+    """
+    exported = read_document(path)
+    belief, levels, findings = belief_of(exported), residual_levels(exported), []
+    for recording in recordings:
+        belief, finding = update_belief(belief, levels, campaign, recording)
+        findings.append(finding)
+    strange = [f.recording for f in findings if f.verdict == "new effect"]
+    diagnosis = _diagnosis(belief.at_work, campaign, strange) if strange else None
+    written = None
+    if findings and findings[-1].verdict == "drift":
+        write_document(out, next_revision(exported, belief, findings), key)
+        written = out
+    return Update(tuple(findings), written, diagnosis)
+
+
+def next_name(path: Path) -> Path:
+    """Where the next revision of a model goes: beside it."""
+    revision = read_document(path).revision + 1
+    stem = path.stem.removesuffix(f".r{revision - 1}")
+    return path.with_name(f"{stem}.r{revision}{path.suffix}")
+
+
+def next_revision(exported: Exported, belief: Belief, findings: Sequence[Finding]) -> dict[str, Any]:
+    """The document of the updated model with its changelog entry; ranges and limits stay those of the fit."""
+    document = {**exported.document}
+    entries = []
+    for entry in document["parameters"]:
+        p = belief.model.parameters[entry["name"]]
+        entries.append({**entry, "value": p.value, "low": p.low, "high": p.high})
+    revision = exported.revision + 1
+    note = {
+        "revision": revision,
+        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+        "text": "; ".join(map(str, findings)),
+        "of": exported.seal.sha256,
+    }
+    known = {**document["knowledge"], "covariance": belief.covariance.tolist()}
+    return document | {
+        "revision": revision,
+        "parameters": entries,
+        "knowledge": known,
+        "changelog": [*document["changelog"], note],
+    }
+
+
+def _diagnosis(model: Model, campaign: Campaign, recordings: Sequence[str]) -> dict[str, Any]:
+    from discovery.mismatch import diagnose
+
+    return dict(diagnose(model, campaign, recordings).document())
