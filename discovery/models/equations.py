@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from discovery.models.model import Model, Parameter
+from discovery.models.model import Model, Parameter, in_time_unit
 from discovery.terms import Apply, Expression, Name, substitute, text
 
 
@@ -21,6 +21,7 @@ def equations(model: Model) -> list[str]:
     >>> equations(model.with_values({"p1_y": -0.5, "p2_y": 0.25, "p3_y": -3}))
     ['d/dt y = -0.5 [1/h]*y + 0.25 [um/W/h]*u - 3 [um/h]']
     """
+    model = in_time_unit(model)
     values = {name: _printed(parameter) for name, parameter in model.parameters.items()}
     lines = []
     for state in model.states.values():

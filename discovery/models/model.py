@@ -113,6 +113,39 @@ class Model:
         return replace(self, parameters=parameters)
 
 
+def in_time_unit(model: Model) -> Model:
+    """The model with every rate per its time unit, as a file states it.
+
+    A hidden state may count in seconds where the model counts in hours; its terms then take the factor.
+    """
+    unit = 1.0 / TIME_UNITS[model.time_unit]
+    odd = {
+        name: state.scale / unit
+        for name, state in model.states.items()
+        if not state.capacity and not math.isclose(state.scale, unit, rel_tol=1e-12)
+    }
+    if not odd:
+        return model
+    terms = []
+    for term in model.terms:
+        into, out = odd.get(term.into, 1.0), odd.get(term.source or "", 1.0)
+        if (
+            term.source is not None and into != out
+        ):  # what enters and what leaves are no longer the same number
+            leaving = Apply("*", (Number(-out), term.expression))
+            terms.append(
+                replace(term, name=f"{term.name}, leaving", into=term.source, source=None, expression=leaving)
+            )
+            term = replace(term, source=None)
+        terms.append(
+            term if into == 1.0 else replace(term, expression=Apply("*", (Number(into), term.expression)))
+        )
+    states = {
+        name: replace(state, scale=unit) if name in odd else state for name, state in model.states.items()
+    }
+    return replace(model, terms=tuple(terms), states=states)
+
+
 def expanded(model: Model) -> Model:
     """The model with every lag(e, tau) written out as a hidden state: tau ds/dt = e - s, s(0) = e(0).
 

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from discovery.errors import UserError
 from discovery.files import dotted, locate, read_toml, write_toml
-from discovery.models.model import TIME_UNITS, Model, Parameter, State
+from discovery.models.model import TIME_UNITS, Model, Parameter, State, in_time_unit
 from discovery.terms import Expression, Term, names, parse, text
 from discovery.terms.expression import FUNCTIONS
 
@@ -169,6 +169,7 @@ def check_names(model: Model, known: set[str], path: Path | str) -> None:
 
 def model_document(model: Model) -> dict[str, Any]:
     """The model as the nested mapping that its file holds."""
+    model = in_time_unit(model)
 
     def number(value: float) -> float:  # value and bounds alike, so that a value on its bound stays there
         return float(f"{value:.10g}")

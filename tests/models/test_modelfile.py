@@ -82,6 +82,33 @@ def test_a_model_survives_its_file(tmp_path: Path) -> None:
             assert again.parameters[name].unit == p.unit
 
 
+def test_hidden_states_that_count_in_seconds_survive_a_file_in_hours(tmp_path: Path) -> None:
+    """A lag becomes a state in seconds; its file counts in minutes or hours, and the trajectory stays the same."""
+    import numpy as np
+
+    from discovery.dynamics import make_grid, make_system, simulate
+    from discovery.recordings import Campaign, Channel, Recording
+
+    time = np.arange(0.0, 7201.0, 60.0)
+    names = ("P", "T_env", "E")
+    channels = {name: Channel(name, "other input", "1", None, "held") for name in names}
+    values = {"P": 100.0 * (time > 1000), "T_env": np.full(len(time), 22.0), "E": np.zeros(len(time))}
+    campaign = Campaign("c", channels, {"r": Recording("r", time, values)})
+    model = expanded(read_model(written(tmp_path, GOOD)))
+    moved = dataclasses.replace(
+        model.terms[0], into="lag_1", source="y"
+    )  # between states of different clocks
+    for one in (model, dataclasses.replace(model, terms=(*model.terms, moved))):
+        write_model(tmp_path / "again.toml", one)
+        again = read_model(tmp_path / "again.toml")
+        paths = []
+        for m in (one, again):
+            grid = make_grid(campaign, "r", names[:2], ["E"])
+            paths.append(simulate(make_system(m, grid), m.values()).x)
+        assert np.allclose(paths[0], paths[1], rtol=1e-9)
+        assert np.ptp(paths[0][:, 3]) > 50
+
+
 def test_a_value_on_its_bound_is_read_back(tmp_path: Path) -> None:
     model = thermobalance()
     third = dataclasses.replace(model.parameters["G_b1_b2"], value=1 / 48, min=1 / 48, max=1 / 3)
