@@ -4,7 +4,7 @@ PYTHON ?= python3.11
 BIN    := .venv/bin
 STAMP  := .venv/installed.stamp
 
-.PHONY: demo test lint types lock clean
+.PHONY: demo test browser-test lint types lock clean
 
 demo: $(STAMP)
 	$(BIN)/discovery run experiments/nmv5000.toml
@@ -12,6 +12,19 @@ demo: $(STAMP)
 
 test: $(STAMP)
 	$(BIN)/pytest -n auto
+
+# The reports of both demonstrations in a real browser; needs chromium, chromium-driver and npm
+AXE := build/browser/node_modules/axe-core/axe.min.js
+REPORTS := runs/nmv5000/report.html runs/tclab/report.html
+
+browser-test: $(STAMP) $(AXE) $(REPORTS)
+	$(BIN)/python tests/browser/check.py $(AXE) $(REPORTS) --pictures build/browser/pictures
+
+$(AXE):
+	npm install --silent --no-save --prefix build/browser axe-core@4
+
+runs/%/report.html:
+	$(BIN)/discovery run experiments/$*.toml
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

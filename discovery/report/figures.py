@@ -64,9 +64,10 @@ def _draw(figure: Any, chart: Chart) -> None:
     for ax, panel in zip(axes, chart.panels, strict=True):
         _panel(ax, panel, chart)
     axes[-1].set_xlabel(chart.x_label)
-    handles = {
-        label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
+    handles: dict[str, Any] = {}
+    for ax in axes:  # the first panel shows a curve as it is; those below it are thin
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
     if len(handles) > 1:
         figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=3)
 
