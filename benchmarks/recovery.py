@@ -42,12 +42,16 @@ def _columns(campaign: Campaign, recording: str, output: str) -> tuple[np.ndarra
     data = campaign.recordings[recording]
     read = np.isfinite(data.values[output])
     names = ("u1", "u2", "u3", "speed", "pump", "decoy")
-    return data.time[read] / 3600, data.values[output][read], np.column_stack([data.values[n][read] for n in names])
+    return (
+        data.time[read] / 3600,
+        data.values[output][read],
+        np.column_stack([data.values[n][read] for n in names]),
+    )
 
 
 def _library() -> list[Callable[..., object]]:
     source = [word.replace("1", "1", 1) if word != "1" else "1 + 0*y" for word in LIBRARY]
-    return [eval(f"lambda y, u1, u2, u3, speed, pump, decoy: {word}") for word in source]  # noqa: S307
+    return [eval(f"lambda y, u1, u2, u3, speed, pump, decoy: {word}") for word in source]
 
 
 def plain(campaign: Campaign, output: str, truth: Found) -> Found:
@@ -85,7 +89,9 @@ def weak(campaign: Campaign, output: str, truth: Found) -> Found:
             )  # fmt: skip
             joint = np.column_stack([x, u])
             form.fit([pysindy.AxesArray(joint, {"ax_time": 0, "ax_coord": 1})])
-            rows.append(np.asarray(form.transform([pysindy.AxesArray(joint, {"ax_time": 0, "ax_coord": 1})])[0]))
+            rows.append(
+                np.asarray(form.transform([pysindy.AxesArray(joint, {"ax_time": 0, "ax_coord": 1})])[0])
+            )
             targets.append(np.asarray(form.convert_u_dot_integral(joint))[:, :1])
     theta, b = np.concatenate(rows), np.concatenate(targets)
     scale = np.linalg.norm(theta, axis=0)

@@ -87,7 +87,10 @@ def discover_error(
             (output,),
             len(path[k]),
             noise * float(np.sqrt(errors[k].mean())),
-            noise * float(np.sqrt(max(whole.cost(solve(whole, path[k], problem.low, problem.high)), 0) / whole.count)),
+            noise
+            * float(
+                np.sqrt(max(whole.cost(solve(whole, path[k], problem.low, problem.high)), 0) / whole.count)
+            ),
             k == row,
             tuple(labels[j] for j in path[k]),
         )
@@ -115,7 +118,12 @@ def discover_error(
 
 
 def _pose(
-    data: MassData, readings: Sequence[Array], noise: float, start_sd: float, always: Support, options: SparseOptions
+    data: MassData,
+    readings: Sequence[Array],
+    noise: float,
+    start_sd: float,
+    always: Support,
+    options: SparseOptions,
 ) -> _Problem:
     scaled = tuple(series / noise for series in readings)
     grams = tuple(
@@ -154,13 +162,15 @@ def _left_out(problem: _Problem, options: SparseOptions) -> Array:
             for i, (response, readings) in enumerate(zip(data.responses, problem.readings, strict=True)):
                 mine = [b for b in fold if data.blocks.recording[b] == i]
                 if mine:
-                    left = (readings - free_run(data.library, response, theta, readings, problem.start_sd)) ** 2
+                    left = (
+                        readings - free_run(data.library, response, theta, readings, problem.start_sd)
+                    ) ** 2
                     for b in mine:
                         row[b] = np.nanmean(left[data.blocks.of[i] == b])
             errors.append(row)
         found.append(np.array(errors))
     rows = min(len(errors) for errors in found)
-    return np.nansum([errors[:rows] for errors in found], axis=0)
+    return np.asarray(np.nansum([errors[:rows] for errors in found], axis=0))
 
 
 def _stability(

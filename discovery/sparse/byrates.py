@@ -21,7 +21,7 @@ from discovery.sparse.folds import NAME, Blocks, choose, make_blocks, make_folds
 from discovery.sparse.gram import Gram, solve
 from discovery.sparse.optimisers import pysindy_path
 from discovery.sparse.options import SparseOptions
-from discovery.sparse.path import Support, backward, forward
+from discovery.sparse.path import Support, best_of_each_size, forward
 from discovery.sparse.rates import Evidence, evidence, extended_bic, masked, refit, without
 
 Array = NDArray[np.float64]
@@ -91,7 +91,7 @@ def discover_rates(
     kept = [i for i, name in enumerate(seen.names) if name in always or name not in labels]
     g = seen.pooled()
     most = len(kept) + options.max_terms * len(data.outputs)
-    path = [s for s in _path(g, seen, kept, options) if len(s) <= most]
+    path = _path(g, seen, kept, options, most)
     costs = [g.cost(solve(g, s, seen.low, seen.high)) for s in path]
     dispersion = max(min(costs) / max(g.count - len(path[-1]), 1), 1.0)
     criterion = extended_bic(g, [len(s) for s in path], [c / dispersion for c in costs], max(len(labels), 1))
@@ -161,7 +161,9 @@ def _rough_noise(data: RateData) -> Noise:
     """Noise that weighs the outputs before anything is fitted: the stated one, else 2 % of the readings' spread."""
     spread = np.nanstd(np.concatenate([data.grids[r].readings for r in data.recordings]), axis=0)
     stated = _stated(data).values()
-    return Noise(data.outputs, tuple(n or max(0.02 * float(s), 1e-9) for n, s in zip(stated, spread, strict=True)))
+    return Noise(
+        data.outputs, tuple(n or max(0.02 * float(s), 1e-9) for n, s in zip(stated, spread, strict=True))
+    )
 
 
 def _grown(
@@ -200,10 +202,10 @@ def _grown(
     return grown, {name: labels[name] for name in entered}
 
 
-def _path(g: Gram, seen: Evidence, kept: Sequence[int], options: SparseOptions) -> list[Support]:
+def _path(g: Gram, seen: Evidence, kept: Sequence[int], options: SparseOptions, most: int) -> list[Support]:
     if options.optimiser != "elimination":
-        return pysindy_path(g, options.optimiser, kept)
-    return backward(g, kept, seen.low, seen.high)
+        return [s for s in pysindy_path(g, options.optimiser, kept) if len(s) <= most]
+    return best_of_each_size(g, most, kept, seen.low, seen.high)
 
 
 def _refit(
@@ -250,13 +252,16 @@ def _left_out(data: RateData, model: Model, seen: Evidence, support: Support, no
     return np.where(np.isfinite(errors), errors, 1e12)
 
 
-def _stability(seen: Evidence, kept: Sequence[int], chosen: Support, options: SparseOptions) -> dict[int, float]:
+def _stability(
+    seen: Evidence, kept: Sequence[int], chosen: Support, options: SparseOptions
+) -> dict[int, float]:
     """Share of block bootstraps that keep each chosen column."""
     rng = np.random.default_rng(options.seed)
     count = len(seen.blocks)
     found: Counter[int] = Counter()
     for _ in range(options.bootstraps):
         weights = rng.multinomial(count, np.full(count, 1 / count)).astype(float)
-        path = _path(seen.pooled(weights), seen, kept, options)
-        found.update(min(path, key=lambda s: abs(len(s) - len(chosen))))
+        path = _path(seen.pooled(weights), seen, kept, options, len(chosen))
+        nearest: Support = min(path, key=lambda s: abs(len(s) - len(chosen)), default=())
+        found.update(nearest)
     return {j: found[j] / max(options.bootstraps, 1) for j in chosen}

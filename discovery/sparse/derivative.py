@@ -1,6 +1,6 @@
 """The published way to a discrepancy: differentiate what a model leaves, regress it on a library, threshold.
 
-Kaheman et al. (arXiv:1909.08574, 2019). Kept to compare with; the workbench itself takes no derivative of a reading.
+Kaheman et al. (arXiv:1909.08574, 2019). Kept to compare with: the workbench takes no derivative of a reading.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def smoothed_derivative(time: Array, series: Array) -> Array:
 
 
 def discrepancy_terms(blocks: Sequence[tuple[Array, Array]], most: int = 6) -> list[tuple[int, float]]:
-    """Columns that STLSQ of PySINDy keeps, largest contribution first, each with its share of all contributions.
+    """Columns that STLSQ of PySINDy keeps, largest contribution first, each with its share of them all.
 
     The threshold is the one that predicts blocks left out best; no column at all is a choice too.
 

@@ -15,8 +15,8 @@ from discovery.fitting import fit_model
 from discovery.models import Model, Parameter, State
 from discovery.models.modelfile import check_names, read_model
 from discovery.recordings import Campaign
-from discovery.sparse.byrates import Growth, RateData, discover_rates, make_rate_data
 from discovery.sparse.bymasses import MassData, discover_error
+from discovery.sparse.byrates import Growth, RateData, discover_rates, make_rate_data
 from discovery.sparse.discovery import Discovery, joined
 from discovery.sparse.drives import AMBIENT, Inputs, make_inputs
 from discovery.sparse.families import candidates
@@ -85,7 +85,11 @@ def discover(
 
 
 def _mass_data(
-    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Inputs, options: SparseOptions
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    inputs: Inputs,
+    options: SparseOptions,
 ) -> MassData:
     library = make_mass_library(inputs, options.time_constants, options.pump_ratios, options.library or ())
     grids = {r: make_grid(campaign, r, inputs.names, outputs) for r in recordings}
@@ -105,7 +109,11 @@ def _error_rates(
     found = candidates([output], empty, campaign, inputs, words, options)
     data = make_rate_data(campaign, recordings, [output], inputs.names, options.blocks)
     model, labels = with_candidates(empty, _started(found, data, {output: output}))
-    always = [name for name, label in labels.items() if options.keep_baseline and label.split(": ", 1)[1] in (output, *baseline)]
+    always = [
+        name
+        for name, label in labels.items()
+        if options.keep_baseline and label.split(": ", 1)[1] in (output, *baseline)
+    ]
     return discover_rates(data, model, labels, always, options)
 
 
@@ -123,16 +131,22 @@ def _room(outputs: Sequence[str], inputs: Inputs) -> tuple[str, dict[str, State]
 
 
 def _started(
-    found: Sequence[Candidate], data: RateData, channel: Mapping[str, str], constants: Mapping[str, float] | None = None
+    found: Sequence[Candidate],
+    data: RateData,
+    channel: Mapping[str, str],
+    constants: Mapping[str, float] | None = None,
 ) -> list[Candidate]:
     """Candidates with start values from the weak form; `channel` says which readings stand for each state.
 
     Hidden masses keep theirs: the weak form sees what is measured alone.
     """
-    placed = {}
+    placed: dict[Candidate, float] = {}
     for state, output in channel.items():
         mine = [c for c in found if c.into == state and "_mass" not in c.label]
-        rows = [weak_rows(data.grids[r], output, [c.expression for c in mine], constants, aliases=channel) for r in data.recordings]
+        rows = [
+            weak_rows(data.grids[r], output, [c.expression for c in mine], constants, aliases=channel)
+            for r in data.recordings
+        ]
         low, high = (np.array([getattr(c, side) for c in mine]) for side in ("low", "high"))
         theta = 3600 * solve(total([weak_gram(one) for one in rows]), range(len(mine)), low, high)
         placed |= {c: float(np.clip(value, c.low, c.high)) for c, value in zip(mine, theta, strict=True)}
@@ -140,7 +154,11 @@ def _started(
 
 
 def _temperatures(
-    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Inputs, options: SparseOptions
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    inputs: Inputs,
+    options: SparseOptions,
 ) -> Discovery:
     """Measured temperatures: a body behind each sensor, all bodies together."""
     room, states = _room(outputs, inputs)
@@ -152,7 +170,9 @@ def _temperatures(
         states[name] = State(name, "degC", None, None, START_SD, 1.0)
         terms.append(Term(f"sensor {name} follows", name, parse(f"({body} - {name})/{name}_lag")))
         states[body] = State(body, "degC", None, Name(name), START_SD, 1 / 3600)
-        for k, tau in enumerate(SECOND_MASS if "second mass" in (options.library or LABORATORY) else (), start=1):
+        for k, tau in enumerate(
+            SECOND_MASS if "second mass" in (options.library or LABORATORY) else (), start=1
+        ):
             mass = f"{body}_mass{k}"
             states[mass] = State(mass, "degC", None, Name(name), 0.0, 1.0)
             terms.append(Term(f"{mass} follows", mass, parse(f"({body} - {mass})/{tau:g}")))
@@ -162,7 +182,9 @@ def _temperatures(
     given = candidates(bodies, empty, campaign, inputs, words, options, room)
     found = [*own, *(c for c in given if (c.into, c.label) not in {(o.into, o.label) for o in own})]
     data = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
-    model, labels = with_candidates(empty, _started(found, data, dict(zip(bodies, outputs, strict=True)), {room: inputs.reference}))
+    model, labels = with_candidates(
+        empty, _started(found, data, dict(zip(bodies, outputs, strict=True)), {room: inputs.reference})
+    )
     decay = [n for n, label in labels.items() if label.endswith(f": {room} - {label.split(': ')[0]}")]
     return discover_rates(data, model, labels, decay, options)
 
@@ -181,18 +203,28 @@ def _on_file(
     check_names(baseline, set(campaign.channels), path)
     for name in options.into or ():
         if name not in baseline.states:
-            raise UserError(f"{path}: the discovery adds terms into '{name}', which is no state of this model ({', '.join(baseline.states)})")
+            raise UserError(
+                f"{path}: the discovery adds terms into '{name}', which is no state of this model ({', '.join(baseline.states)})"
+            )
     bodies = [name for name, state in baseline.states.items() if state.capacity] or list(baseline.states)
-    found = candidates(list(options.into or bodies), baseline, campaign, inputs, options.library or FILE_FAMILIES, options)
+    found = candidates(
+        list(options.into or bodies), baseline, campaign, inputs, options.library or FILE_FAMILIES, options
+    )
     channels = sorted({*inputs.names, *baseline.inputs} & set(campaign.channels) - set(outputs))
     data = make_rate_data(campaign, recordings, outputs, channels, options.blocks)
     fitted = fit_model(baseline, data.campaign, recordings, outputs, grids=data.grids).model
     model, labels = with_candidates(fitted, found)
     if options.keep_baseline is False:
         used = names_of_starts_and_outputs(baseline)
-        labels |= {n: n for n in baseline.free if baseline.parameters[n].min <= 0 <= baseline.parameters[n].max and n not in used}
+        labels |= {
+            n: n
+            for n in baseline.free
+            if baseline.parameters[n].min <= 0 <= baseline.parameters[n].max and n not in used
+        }
     growth = Growth(most=options.max_terms, restart=baseline.values())
-    return discover_rates(data, model, labels, (), options, None if options.keep_baseline is False else growth)
+    return discover_rates(
+        data, model, labels, (), options, None if options.keep_baseline is False else growth
+    )
 
 
 def names_of_starts_and_outputs(model: Model) -> frozenset[str]:

@@ -35,7 +35,9 @@ def merged(name: str, parts: Sequence[Model]) -> Model:
     """Models of separate outputs side by side in one; equal time units, no shared names."""
     first = parts[0]
     for part in parts[1:]:
-        first = first.with_terms(*part.terms, parameters=part.parameters, states=part.states, outputs=part.outputs)
+        first = first.with_terms(
+            *part.terms, parameters=part.parameters, states=part.states, outputs=part.outputs
+        )
     return replace(first, name=name)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.recordings import Campaign
@@ -71,7 +72,7 @@ def make_inputs(campaign: Campaign, recordings: Sequence[str], asked: Sequence[s
     return Inputs(by_role, float(np.round(np.mean(air[0]), 1)) if air else 20.0, gate)
 
 
-def _known(campaign: Campaign, recording: str, name: str) -> np.ndarray:  # type: ignore[type-arg]
+def _known(campaign: Campaign, recording: str, name: str) -> NDArray[np.float64]:
     series = campaign.recordings[recording].values.get(name)
     return np.empty(0) if series is None else series[np.isfinite(series)]
 

@@ -19,7 +19,13 @@ HEAT = ("heat load", "cooling power")
 
 
 def candidates(
-    states: Sequence[str], model: Model, campaign: Campaign, inputs: Inputs, families: Sequence[str], options: SparseOptions, room: str | None = None
+    states: Sequence[str],
+    model: Model,
+    campaign: Campaign,
+    inputs: Inputs,
+    families: Sequence[str],
+    options: SparseOptions,
+    room: str | None = None,
 ) -> list[Candidate]:
     """Candidates that enter `states`, by family or by expression; bounds of the options applied.
 
@@ -41,7 +47,9 @@ def candidates(
                     f"{campaign.path}: the library of the discovery names '{name}' in '{word}', which is neither a family "
                     f"({', '.join(FAMILIES)}) nor made of inputs and states ({', '.join(sorted(known))})"
                 )
-            found.append(_bounded(Candidate(state, substitute(expression, {"y": Name(state)})), options, word))
+            found.append(
+                _bounded(Candidate(state, substitute(expression, {"y": Name(state)})), options, word)
+            )
     unused = set(options.bounds) - {w for c in found for w in (c.label,)} - set(families)
     if unused:
         raise UserError(
@@ -98,7 +106,9 @@ def _family(
         case "wet" if inputs.gate:
             fluid = inputs.of("fluid temperature")
             wet = [(name, f"{inputs.gate}*({name} - {state})") for name in fluid]
-            wet += [(name, f"{inputs.gate}*(abs({n}) > 1)*({name} - {state})") for name in fluid for n in speeds]
+            wet += [
+                (name, f"{inputs.gate}*(abs({n}) > 1)*({name} - {state})") for name in fluid for n in speeds
+            ]
             return towards(*wet) + plain(*(f"{inputs.gate}*{name}" for name in heat))
         case "rotation":
             powers = [f"({name}/1000)**{power:g}" for name in speeds for power in (1.5, 2, 3)]
@@ -114,7 +124,11 @@ def _family(
                 *((name, f"({name} - {state})*abs({name} - {state})**0.25") for name in [room, *partners])
             )
         case "load":
-            return plain(*(f"{name}*({state} - {room})/100" for name in heat), *(f"({name}/100)**2" for name in heat))
+            return plain(
+                *(f"{name}*({state} - {room})/100" for name in heat), *(f"({name}/100)**2" for name in heat)
+            )
         case "second mass":
-            return towards(*((name, f"{name} - {state}") for name in model.states if name.startswith(f"{state}_mass")))
+            return towards(
+                *((name, f"{name} - {state}") for name in model.states if name.startswith(f"{state}_mass"))
+            )
     return []

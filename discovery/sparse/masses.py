@@ -141,12 +141,12 @@ def block_grams(response: Response, target: Array, block: NDArray[np.intp]) -> d
     """
     columns = np.column_stack([response.columns, response.decays])
     known = np.isfinite(target)
-    return {int(b): gram(columns[known & (block == b)], target[known & (block == b)]) for b in np.unique(block)}
+    return {
+        int(b): gram(columns[known & (block == b)], target[known & (block == b)]) for b in np.unique(block)
+    }
 
 
-def pooled(
-    grams: Sequence[dict[int, Gram]], library_size: int, start_sd: float, weights: Array
-) -> Gram:
+def pooled(grams: Sequence[dict[int, Gram]], library_size: int, start_sd: float, weights: Array) -> Gram:
     """Normal equations of the library over recordings with the start values taken out of each.
 
     Args:
@@ -164,7 +164,9 @@ def pooled(
     return total(parts)
 
 
-def free_run(library: MassLibrary, response: Response, theta: Array, readings: Array, start_sd: float) -> Array:
+def free_run(
+    library: MassLibrary, response: Response, theta: Array, readings: Array, start_sd: float
+) -> Array:
     """Prediction (R,) of a recording that was left out, zeroed on its first reading alone.
 
     The same Bayesian step as `fitting.predict_recording`: the masses in use share what the first reading says.

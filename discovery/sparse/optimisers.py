@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.sparse.gram import Gram, factor, solve
-from discovery.sparse.path import Support
+from discovery.sparse.path import Support, backward
 
 Array = NDArray[np.float64]
 Optimiser = Literal["stlsq", "ssr", "sr3"]
@@ -46,9 +46,10 @@ def stlsq(g: Gram, threshold: float, alpha: float = 0.05) -> Array:
 
 
 def pysindy_path(g: Gram, kind: Optimiser, always: Sequence[int] = (), points: int = 25) -> list[Support]:
-    """Supports that an optimiser of PySINDy finds, smallest first, over a range of thresholds.
+    """Supports that an optimiser of PySINDy finds over a range of thresholds: one of every size, smallest first.
 
-    Columns are scaled to unit length first. `always` columns are added to every support.
+    Columns are scaled to unit length first. `always` columns are added to every support. Sizes that no threshold gives are
+    filled by elimination.
 
     Args:
         kind: "stlsq", "ssr" (one term less in each step) or "sr3" (l0, `always` columns weigh nothing).
@@ -62,7 +63,9 @@ def pysindy_path(g: Gram, kind: Optimiser, always: Sequence[int] = (), points: i
     found: set[Support] = set()
     for optimiser in _optimisers(kind, len(scale), always, np.geomspace(1e-4 * top, top, points)):
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # "sparsity parameter is too big": an empty support, nothing to report
+            warnings.simplefilter(
+                "ignore"
+            )  # "sparsity parameter is too big": an empty support, nothing to report
             optimiser.fit(rows, target[:, None])
         history = optimiser.history_ if kind == "ssr" else [optimiser.coef_]
         for theta in history:
@@ -72,7 +75,13 @@ def pysindy_path(g: Gram, kind: Optimiser, always: Sequence[int] = (), points: i
     for support in found:
         entry = (g.cost(solve(g, support)), support)
         best[len(support)] = min(best.get(len(support), entry), entry)
-    return [best[size][1] for size in sorted(best) if size]
+    path: list[Support] = []
+    for size in range(max(best), max(len(always), 0), -1):
+        if size in best:
+            path.append(best[size][1])
+        else:  # no threshold gives this size: the next larger one loses its weakest member
+            path.append(backward(g, always, within=path[-1])[-2])
+    return path[::-1]
 
 
 def _optimisers(kind: Optimiser, count: int, always: Sequence[int], levels: Array) -> list[Any]:
@@ -82,9 +91,11 @@ def _optimisers(kind: Optimiser, count: int, always: Sequence[int], levels: Arra
         return [pysindy.SSR(alpha=1e-8, criteria="model_residual", max_iter=count)]
     if kind == "stlsq":
         return [pysindy.STLSQ(threshold=float(level), alpha=1e-8) for level in levels]
-    weight = np.ones((count, 1))
-    weight[list(always)] = 0.0
+    weight = np.ones((1, count))
+    weight[0, list(always)] = 0.0
     return [
-        pysindy.SR3(regularizer="weighted_l0", reg_weight_lam=weight * level**2, relax_coeff_nu=1.0, max_iter=1000)
+        pysindy.SR3(
+            regularizer="weighted_l0", reg_weight_lam=weight * level**2, relax_coeff_nu=1.0, max_iter=1000
+        )
         for level in levels
     ]

@@ -16,7 +16,8 @@ class SparseOptions(BaseModel):
 
     kind: Literal["sindy"] = "sindy"
     inputs: tuple[str, ...] | None = Field(
-        None, description="channels that terms may use; default every input that moves in the recordings to fit"
+        None,
+        description="channels that terms may use; default every input that moves in the recordings to fit",
     )
     baseline: str = Field("eq9", description='"eq9", or a gray-box model file whose terms are built upon')
     keep_baseline: bool | None = Field(
@@ -61,7 +62,9 @@ class SparseOptions(BaseModel):
         description="standard errors by which a sparser model may be worse on what was left out; default 1 for "
         "masses, which are to predict, and 2 for rates, which name physics",
     )
-    blocks: int = Field(24, ge=4, le=500, description="blocks that the recordings are cut into for bootstraps")
+    blocks: int = Field(
+        24, ge=4, le=500, description="blocks that the recordings are cut into for bootstraps"
+    )
     bootstraps: int = Field(40, ge=0, le=1000, description="block bootstraps for the stability of each term")
     refine: bool = Field(True, description="fit all numbers of the chosen model by output error at the end")
     seed: int = Field(0, ge=0, description="of the bootstraps")
@@ -77,9 +80,11 @@ class SparseOptions(BaseModel):
     def _consistent(self) -> Self:
         for name, (low, high) in self.bounds.items():
             if not low <= high:
-                raise ValueError(f"the bounds of '{name}' are {low:g} and {high:g}: the smaller one comes first")
+                raise ValueError(
+                    f"the bounds of '{name}' are {low:g} and {high:g}: the smaller one comes first"
+                )
         if self.form == "masses" and self.baseline != "eq9":
-            raise ValueError("a baseline file is built upon by rates; leave out form = \"masses\"")
+            raise ValueError('a baseline file is built upon by rates; leave out form = "masses"')
         return self
 
     @property

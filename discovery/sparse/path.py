@@ -10,14 +10,21 @@ from numpy.typing import NDArray
 from discovery.sparse.gram import RIDGE, Gram, solve
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.signedinteger]
 Support = tuple[int, ...]
 
 _EXCHANGES = 20  # of one member of a support, at most, before the next size
 _HABIT = 0.9  # a column of a group that is not in use yet must beat one that is by this factor
 
 
-def backward(g: Gram, always: Sequence[int] = (), low: Array | None = None, high: Array | None = None) -> list[Support]:
-    """Supports from all columns down to `always`: at each step the column whose loss costs least leaves.
+def backward(
+    g: Gram,
+    always: Sequence[int] = (),
+    low: Array | None = None,
+    high: Array | None = None,
+    within: Sequence[int] | None = None,
+) -> list[Support]:
+    """Supports from all columns (of `within`) down to `always`: at each step the column whose loss costs least leaves.
 
     The rise of the cost is theta_j^2 / (A^-1)_jj. A column whose coefficient stands at a bound of zero goes first.
 
@@ -26,7 +33,7 @@ def backward(g: Gram, always: Sequence[int] = (), low: Array | None = None, high
     """
     scale = g.length
     a = g.matrix / np.outer(scale, scale) + RIDGE * np.eye(len(scale))
-    support = [j for j in range(len(scale)) if g.matrix[j, j] > 0 or j in always]
+    support = [j for j in within or range(len(scale)) if g.matrix[j, j] > 0 or j in always]
     path = [tuple(support)]
     while len(support) > len(always):
         theta = solve(g, support, low, high)[support] * scale[support]
@@ -41,7 +48,7 @@ def forward(
     g: Gram,
     size: int,
     always: Sequence[int] = (),
-    groups: Array | None = None,
+    groups: Ints | None = None,
     max_groups: int | None = None,
     low: Array | None = None,
     high: Array | None = None,
@@ -78,11 +85,26 @@ def forward(
     return path
 
 
+def best_of_each_size(
+    g: Gram, most: int, always: Sequence[int] = (), low: Array | None = None, high: Array | None = None
+) -> list[Support]:
+    """The better of `backward` and `forward` for every size up to `most`, smallest first.
+
+    Elimination loses a term early when two others imitate it together (a square between a line and a cube); growth
+    finds that term first but may pick a proxy where elimination does not.
+    """
+    path = {len(s): s for s in backward(g, always, low, high) if len(s) <= most}
+    for support in forward(g, most, always, low=low, high=high):
+        other = path.get(len(support), support)
+        path[len(support)] = min(support, other, key=lambda s: g.cost(solve(g, s, low, high)))
+    return [path[size] for size in sorted(path)]
+
+
 class _Search:
     """Moves of the forward search on scaled normal equations."""
 
     def __init__(
-        self, g: Gram, groups: Array | None, max_groups: int | None, low: Array | None, high: Array | None
+        self, g: Gram, groups: Ints | None, max_groups: int | None, low: Array | None, high: Array | None
     ) -> None:
         count = len(g.vector)
         self.a = g.matrix / np.outer(g.length, g.length) + RIDGE * np.eye(count)

@@ -52,7 +52,9 @@ def with_candidates(model: Model, candidates: Sequence[Candidate]) -> tuple[Mode
         count[candidate.into] = count.get(candidate.into, 0) + 1
         name = f"{candidate.into}_p{count[candidate.into]}"
         if name in model.parameters or name in model.states:
-            raise UserError(f"model '{model.name}': the name '{name}' is needed for a new term; rename it in the model")
+            raise UserError(
+                f"model '{model.name}': the name '{name}' is needed for a new term; rename it in the model"
+            )
         unit = f"{model.states[candidate.into].unit}/{model.time_unit}"
         if model.states[candidate.into].capacity:
             unit = "W"
@@ -82,10 +84,14 @@ def without(model: Model, gone: Sequence[str]) -> Model:
         own = names(term.expression) & set(model.parameters)
         if not (own and own & dropped and _vanishes(term.expression, own & dropped)):
             terms.append(term)
-    left = frozenset().union(*(names(t.expression) for t in terms), *(names(e) for e in model.outputs.values()))
+    left = frozenset().union(
+        *(names(t.expression) for t in terms), *(names(e) for e in model.outputs.values())
+    )
     left |= frozenset().union(*(names(s.start) for s in model.states.values() if s.start is not None))
     parameters = {
-        name: replace(p, value=0.0, fixed=True, min=min(p.min, 0.0), max=max(p.max, 0.0)) if name in dropped else p
+        name: replace(p, value=0.0, fixed=True, min=min(p.min, 0.0), max=max(p.max, 0.0))
+        if name in dropped
+        else p
         for name, p in model.parameters.items()
         if name in left or name not in dropped
     }
@@ -135,7 +141,9 @@ def evidence(fit: Fit, blocks: Blocks) -> Evidence:
     order = [i for i, u in enumerate(problem.unknowns) if not u.is_start and u.recording is None]
     common = len(order)
     order += [i for i in range(len(problem.unknowns)) if i not in order]
-    centre = np.array([u.prior[0] if u.prior and i not in order[:common] else 0.0 for i, u in enumerate(problem.unknowns)])
+    centre = np.array(
+        [u.prior[0] if u.prior and i not in order[:common] else 0.0 for i, u in enumerate(problem.unknowns)]
+    )
     theta = (fit.theta - centre)[order]
     sd = np.array(fit.noise.white)
     empty = Gram(np.zeros((len(order), len(order))), np.zeros(len(order)), 0.0, 0)
@@ -163,7 +171,8 @@ def extended_bic(g: Gram, sizes: Sequence[int], costs: Sequence[float], library:
 
     The second part pays for the choice among `library` columns, without which one term in eight models is by chance.
     """
-    return np.array(costs) + np.array(sizes) * (np.log(max(g.count, 2)) + 2 * np.log(library))
+    penalty = np.log(max(g.count, 2)) + 2 * np.log(library)
+    return np.asarray(np.array(costs) + np.array(sizes) * penalty)
 
 
 def masked(grid: Grid, keep: NDArray[np.bool_]) -> Grid:
@@ -188,5 +197,11 @@ def refit(
         if name in model.parameters and not model.parameters[name].fixed
     }
     return fit_model(
-        model.with_values(inside), campaign, recordings, outputs, noise=noise, grids=grids, max_rounds=max_rounds
+        model.with_values(inside),
+        campaign,
+        recordings,
+        outputs,
+        noise=noise,
+        grids=grids,
+        max_rounds=max_rounds,
     )
