@@ -167,6 +167,7 @@ def make_document(
         "outputs": outputs,
         "knowledge": {
             "residual": dict(known_by.residual),
+            "slow_share": known_by.slow_share,
             "parameters": list(known_by.parameters),
             "covariance": known_by.covariance.tolist(),
             "first": np.sqrt(np.diag(known_by.covariance)).tolist(),

@@ -15,13 +15,16 @@ from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
 
+SLOW_S = 7200.0  # for which slow noise of sensors and small random heat stay alike
+
 
 @dataclass(frozen=True)
 class Knowledge:
-    """`residual`: rms of readings minus model by output (None: not read). `covariance` (P, P) of `parameters`, wide enough
-    for the residual's correlation in time."""
+    """`residual`: rms of readings minus model by output (None: not read), `slow_share` of its variance is slow noise.
+    `covariance` (P, P) of `parameters`, wide enough for that."""
 
     residual: Mapping[str, float | None]
+    slow_share: float
     parameters: tuple[str, ...]
     covariance: Array
 
@@ -31,24 +34,37 @@ def knowledge(model: Model, campaign: Campaign, recordings: Sequence[str]) -> Kn
     outputs = [name for name in model.outputs if name in campaign.channels and _read(campaign, recordings, name)]
     free = tuple(name for name in model.free if not model.parameters[name].per_recording)
     if not outputs:
-        return Knowledge(dict.fromkeys(model.outputs), (), np.zeros((0, 0)))
+        return Knowledge(dict.fromkeys(model.outputs), 0.0, (), np.zeros((0, 0)))
     problem = make_problem(model, campaign, recordings, outputs)
     residuals, jacobians = settle_starts(problem)
-    level, stretch = {}, 1.0
+    level, share = {}, 0.0
     for j, name in enumerate(outputs):
         series = np.concatenate([r[:, j][np.isfinite(r[:, j])] for r in residuals])
         level[name] = max(float(np.sqrt(np.mean(series**2))), 1e-6)
         rho = float(np.corrcoef(series[1:], series[:-1])[0, 1]) if len(series) > 10 and series.std() > 0 else 0.0
-        stretch = max(stretch, (1 + min(rho, 0.9)) / (1 - min(rho, 0.9)))
+        share = min(max(share, rho), 0.9)
+    times = [system.grid.time[system.grid.read] for system in problem.systems]
+    factor = max(stretch(share, time) for time in times)
     information = prior_information(problem)
     for residual, jacobian in zip(residuals, jacobians, strict=True):
         seen = np.isfinite(residual)
         rows = (jacobian / np.array([level[name] for name in outputs])[None, :, None])[seen]
-        information += rows.T @ rows / stretch
+        information += rows.T @ rows / factor
     index = [i for i, u in enumerate(problem.unknowns) if not u.is_start and u.name in free]
     covariance = np.linalg.pinv(information, rcond=1e-13, hermitian=True)[np.ix_(index, index)]
     names = tuple(problem.unknowns[i].name for i in index)
-    return Knowledge({name: level.get(name) for name in model.outputs}, names, 0.5 * (covariance + covariance.T))
+    return Knowledge({name: level.get(name) for name in model.outputs}, share, names, 0.5 * (covariance + covariance.T))
+
+
+def stretch(slow_share: float, times: Array) -> float:
+    """Readings that count as one independent reading: those close together share the slow part of the noise.
+
+    1 + 2 sum_k rho(k gap) for rho(t) = slow_share exp(-t/SLOW_S): how much slow noise widens the variance of a mean.
+    """
+    if len(times) < 2:
+        return 1.0
+    decay = float(np.exp(-np.median(np.diff(times)) / SLOW_S))
+    return 1.0 + 2.0 * slow_share * decay / (1.0 - decay)
 
 
 def settle_starts(problem: Problem) -> tuple[list[Array], list[Array]]:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.export.document import Exported, read_document, write_document
+from discovery.export.knowledge import stretch
 from discovery.fitting.problem import Problem, make_problem
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -35,7 +36,6 @@ Verdict = Literal["noise", "drift", "new effect"]
 Z95 = 1.959963984540054
 WALK = 0.03  # of a parameter from one recording to the next, relative: how fast a machine may age
 SIGNIFICANT = 0.05  # chance of calling noise a drift; a shadow run stands before every change
-SLOW_SHARE, SLOW_S = 0.3, 7200.0  # of the residual: its part that is correlated in time, and for how long
 EXCESS = 1.6  # residual after the update, as a multiple of that of the fit, from which an effect is new
 WIDEST = 3.0  # prior standard deviations never grow beyond this multiple of the first fit's
 
@@ -50,6 +50,7 @@ class Belief:
     parameters: tuple[str, ...]
     covariance: Array
     first: Array  # (P,) standard deviations at the first fit
+    slow_share: float  # of the variance of the fit's residual
     gain: float = 0.0
     effective: float = 0.0
 
@@ -87,7 +88,7 @@ def belief_of(exported: Exported) -> Belief:
         raise UserError(f"model '{exported.model.name}' does not say how well its parameters are known; export it again from its run")
     covariance = np.array(found["covariance"])
     model = exported.model
-    return Belief(model, model, tuple(found["parameters"]), covariance, np.array(found["first"]))
+    return Belief(model, model, tuple(found["parameters"]), covariance, np.array(found["first"]), found["slow_share"])
 
 
 def residual_levels(exported: Exported) -> dict[str, float]:
@@ -115,17 +116,18 @@ def update_belief(
     prior = _prior(belief)
     known = [next(i for i, u in enumerate(problem.unknowns) if u.name == n and not u.is_start) for n in belief.parameters]
     starts = [i for i, u in enumerate(problem.unknowns) if u.is_start]
-    stretch = _stretch(data.time[np.isfinite(data.values[outputs[0]])])
-    weights = 1.0 / np.array([levels[n] for n in outputs]) / np.sqrt(stretch)
+    grid = problem.systems[0].grid
+    alike = stretch(belief.slow_share, grid.time[grid.read])
+    weights = 1.0 / np.array([levels[n] for n in outputs]) / np.sqrt(alike)
     fixed = _minimise(now, weights, starts, starts, np.zeros((0, 0)))
     freed = _minimise(problem, weights, [*known, *starts], starts, prior)
     from scipy.stats import chi2
 
     gain, effective = belief.gain + fixed.cost - freed.cost, belief.effective + freed.effective
     p_value = float(chi2.sf(max(gain, 0.0), max(effective, 1.0)))
-    count = int(np.isfinite(problem.systems[0].grid.readings).sum())
-    before, after = fixed.rms * np.sqrt(stretch), freed.rms * np.sqrt(stretch)
-    if after > EXCESS and count / stretch >= 8:  # nothing is learnt from what the model cannot explain
+    count = int(np.isfinite(grid.readings).sum())
+    before, after = fixed.rms * np.sqrt(alike), freed.rms * np.sqrt(alike)
+    if after > EXCESS and count / alike >= 8:  # nothing is learnt from what the model cannot explain
         return replace(belief, covariance=prior), Finding(recording, "new effect", count, before, after, p_value, {})
     sd = np.sqrt(np.maximum(np.diag(freed.covariance), 0.0))
     values = freed.theta[known]
@@ -152,13 +154,6 @@ def _prior(belief: Belief) -> Array:
     sd = np.sqrt(np.maximum(np.diag(wider), 1e-300))
     shrink = np.minimum(1.0, WIDEST * belief.first / sd)
     return np.asarray(wider * np.outer(shrink, shrink))
-
-
-def _stretch(times: Array) -> float:
-    """Readings that count as one independent reading: those close together share the slow part of the noise."""
-    gap = float(np.median(np.diff(times))) if len(times) > 1 else SLOW_S
-    rho = SLOW_SHARE * float(np.exp(-gap / SLOW_S))
-    return (1.0 + rho) / (1.0 - rho)
 
 
 @dataclass(frozen=True)
