@@ -98,10 +98,12 @@ def markdown(tallies: Mapping[str, Tally], seal: Mapping[str, Any]) -> str:
     ours = tallies[WORKBENCH]
     quiet = ours.false_alarms
     parts = [
-        f"{len(ours.scored)} concealed cases, sealed {seal['sealed']} (answers {seal['answers'][:16]}…, version {seal['version']}, "
-        f"commit {str(seal['commit'])[:10]}). In brackets: what the workbench is ahead of each other method (− behind).",
+        f"{len(ours.scored)} concealed cases, sealed {seal['sealed']} (answers {seal['answers'][:16]}…, "
+        f"version {seal['version']}, commit {str(seal['commit'])[:10]}). "
+        "In brackets: what the workbench is ahead of each other method (− behind).",
         _table(rows(tallies)),
-        f"False alarms: {quiet.hits:g} of {quiet.count}; with 95 % certainty the rate is below {100 * quiet.upper():.1f} %.",
+        f"False alarms: {quiet.hits:g} of {quiet.count}; with 95 % certainty the rate is below "
+        f"{100 * quiet.upper():.1f} %.",
         _table([["size", "cases", "detected", "named", "right, of those named"], *power_rows(ours)]),
         _table([["probability said", "came true", "named effects"], *reliability_rows(ours)]),
     ]

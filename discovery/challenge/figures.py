@@ -53,8 +53,11 @@ def power(t: Tally) -> str:
 
     def draw(ax: Axes) -> None:
         bins = [b for b in t.power if b.count]
-        lines = (("detected", GREY, [Share(b.detected, b.count) for b in bins]), ("named", BLUE, [Share(b.named, b.count) for b in bins]),
-                 ("right, of those named", GREEN, [Share(b.right, b.named) for b in bins]))  # fmt: skip
+        lines = (
+            ("detected", GREY, [Share(b.detected, b.count) for b in bins]),
+            ("named", BLUE, [Share(b.named, b.count) for b in bins]),
+            ("right, of those named", GREEN, [Share(b.right, b.named) for b in bins]),
+        )
         for k, (label, colour, shares) in enumerate(lines):
             known = [(b.size * 1.04 ** (k - 1), s) for b, s in zip(bins, shares, strict=True) if s.count]
             _points(ax, [x for x, _ in known], [s for _, s in known], colour, label)

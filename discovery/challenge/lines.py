@@ -57,7 +57,7 @@ def _percent(value: float | None) -> float | None:
 
 
 def ahead(line: Line, tallies: Mapping[str, Tally], other: str) -> float | None:
-    """By how much the workbench is better than another method on a line, in its unit; None where one has no figure."""
+    """By how much the workbench is better than another method; None where one has no figure."""
     ours, theirs = line.value(tallies[WORKBENCH]), line.value(tallies[other])
     return None if ours is None or theirs is None else line.sign * (ours - theirs)
 
@@ -82,7 +82,8 @@ def lead(value: float | None, unit: str) -> str:
     """
     if value is None:
         return ""
-    return (f"{value:+.3f}" if not unit else f"{value:+.1f}").replace("-", "−")
+    digits = 1 if unit else 3
+    return f"{round(value, digits) + 0.0:+.{digits}f}".replace("-", "−")
 
 
 def with_interval(line: Line, t: Tally) -> str:
@@ -96,7 +97,7 @@ def with_interval(line: Line, t: Tally) -> str:
 
 
 def rows(tallies: Mapping[str, Tally]) -> list[list[str]]:
-    """The comparison as cells, with a head: question, aim, workbench, then each other method with the workbench's lead."""
+    """The comparison as cells: question, aim, workbench, then each other method with the workbench's lead."""
     others = [name for name in tallies if name != WORKBENCH]
     out = [["", "aim", TITLES[WORKBENCH], *(TITLES[name] for name in others)]]
     for line in LINES:

@@ -9,7 +9,7 @@ Spans = Sequence[tuple[float, float]]
 
 
 def overlap(key: Mapping[str, Any], answer: Mapping[str, Any]) -> float | None:
-    """Intersection over union of the true window and the stated ones of all recordings; None where the key has no window.
+    """Intersection over union of the true window and all stated ones; None where the key has no window.
 
     A named unmeasured_heat states its window in its parameters; otherwise the windows of `location` count.
     """

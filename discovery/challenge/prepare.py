@@ -37,10 +37,10 @@ class Order:
 
 
 def draw_orders(count: int, seed: int) -> list[Order]:
-    """Cases of a challenge. The seed of a case says nothing; its title is its number.
+    """Cases of a challenge; the title of a case is its number.
 
-    Of the cases without effect every second one has slow noise and small heat (which make_case takes from the parity
-    of its seed).
+    Of the cases without effect every second one has slow noise and small heat, which make_case takes from the
+    parity of its seed.
     """
     rng = np.random.default_rng([seed, 7])
     orders, quiet = [], 0
@@ -79,7 +79,7 @@ def prepare(folder: Path, count: int, seed: int, jobs: int, tell: Callable[[str]
 
 
 def adopt(folder: Path, source: Path) -> dict[str, Any]:
-    """Take over cases that exist: folders with an experiment.toml, keys in keys.json or answers.json beside them.
+    """Take over cases that exist: folders with an experiment.toml, keys beside them.
 
     Returns:
         The seal.
@@ -108,14 +108,14 @@ def read_keys(source: Path) -> dict[str, Any]:
     path = next((source / name for name in (ANSWERS, "keys.json") if (source / name).is_file()), None)
     if path is None:
         raise UserError(
-            f"{source}: neither {ANSWERS} nor keys.json there; name the folder that holds the cases and their keys"
+            f"{source}: neither {ANSWERS} nor keys.json there; name the folder of the cases and their keys"
         )
     try:
         found = json.loads(read_text(path))
         keys = found["cases"] if path.name == ANSWERS else found
         return {name: key | {"kind": kind_of(key)} for name, key in sorted(keys.items())}
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise UserError(f"{path}: no keys by the name of their case; see contract for the form") from None
+        raise UserError(f"{path}: not keys by the name of their case, each with effect and states") from None
 
 
 def kind_of(key: dict[str, Any]) -> str:

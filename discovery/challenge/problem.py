@@ -1,4 +1,4 @@
-"""What a method is given: the files of one case, read; and what several methods need of them, computed once."""
+"""What a method is given: the files of one case, read, and what several methods need of them."""
 
 from __future__ import annotations
 

@@ -96,7 +96,8 @@ def _same(out: Path, count: int | None, seed: int | None, source: Path | None) -
     there = len(answers["cases"])
     if (count is not None and count != there) or (seed is not None and seed != answers["seed"]):
         raise UserError(
-            f"{out}: holds another challenge, of {there} cases; choose another place with --out, or leave out --cases and --seed to go on with it"
+            f"{out}: holds another challenge, of {there} cases; choose another place with --out, "
+            "or leave out --cases and --seed to go on with it"
         )
     if source is not None and answers["seed"] is not None:
         raise UserError(f"{out}: holds a challenge with cases of its own; choose another place with --out")

@@ -1,9 +1,10 @@
 """Points for one diagnosis against its key, and the word for it.
 
-Right effect at the right place +1; at another place +0.5; the truth among the alternatives within 3 units of log evidence
-+0.7/sqrt(number of rivals, the answer included); no mismatch where there is none +1; a verdict that the key accepts +1, else
-`unexplained` 0; a missed effect 0; a false alarm, a wrong name, physics taken for the measuring chain or the reverse -2.
-Several effects: the share found, -1 for each that is not there. A place counts if at most one state too many is listed.
+Right effect at the right place +1; at another place +0.5; the truth among the alternatives within 3 units of
+log evidence +0.7/sqrt(number of rivals, the answer included); no mismatch where there is none +1; a verdict
+that the key accepts +1, else `unexplained` 0; a missed effect 0; a false alarm, a wrong name, physics taken
+for the measuring chain or the reverse -2. Several effects: the share found, -1 for each that is not there. A
+place counts if at most one state too many is listed.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ Answer = Mapping[str, Any]
 
 NEAR = 3.0  # log evidence within which an alternative belongs to the answer
 PENALTY = -2.0
+SHOWN = frozenset({"joint_hysteresis"})  # stated at an output, though it sits at a body
 
 RIGHT, ELSEWHERE, IN_SET, MISSED, UNNAMED = (
     "right",
@@ -112,7 +114,12 @@ def truths(key: Key) -> list[Key]:
     return list(key["effects"]) if "effects" in key else [key] if key["effect"] else []
 
 
+def stands(truth: Key, named: Answer) -> bool:
+    """Whether a named effect is a true one at its place."""
+    return named["effect"] in names(truth) and (at_place(truth, named) or named["effect"] in SHOWN)
+
+
 def in_stated_set(truth: Key, answer: Answer) -> bool:
     """Whether a true effect stands at its place among what is named and its near rivals."""
     stated = [*(answer.get("physics") or []), *near_rivals(answer)]
-    return any(s["effect"] in names(truth) and at_place(truth, s) for s in stated)
+    return any(stands(truth, s) for s in stated)

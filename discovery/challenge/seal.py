@@ -89,7 +89,7 @@ def _different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
 
 
 def commit() -> str | None:
-    """Commit of the checkout that the package runs from, with a plus where files differ from it; None elsewhere."""
+    """Commit that the package runs from, with a plus where files differ from it; None elsewhere."""
     root = Path(discovery.__file__).parent.parent
 
     def git(*words: str) -> str:

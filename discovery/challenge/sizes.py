@@ -1,7 +1,7 @@
 """Sizes that key and diagnosis measure alike: amplitude of the diagnosis in the unit of the key.
 
-The plant is finer than the model and its exponents differ, so a true value exists only where the formula is linear in
-the same product; powers of the speed are compared at 600 rpm.
+The plant is finer than the model and its exponents differ, so a true value exists only where the formula is
+linear in the same product; powers of the speed are compared at 600 rpm.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 REFERENCE = 600.0 / 1000.0  # the plant counts speed in 600 rpm, the catalogue in 1000 rpm
 
-# effect -> the parameter of the diagnosis that is compared (its name begins so), and whether a power m of the speed is in it
+# effect -> how the name of the compared parameter begins, whether a power m of the speed is in the formula
 COMPARED: Mapping[str, tuple[str, bool]] = {
     "fluid_convection": ("hF", False),
     "fluid_convection_speed": ("hN", True),
@@ -31,9 +31,10 @@ COMPARED: Mapping[str, tuple[str, bool]] = {
 
 
 def covered(key: Mapping[str, Any], named: Mapping[str, Any]) -> bool | None:
-    """Whether the 95 % interval of a rightly named effect holds the true size; None where they cannot be compared.
+    """Whether the 95 % interval of an effect holds the true size; None where they cannot be compared.
 
-    >>> named = {"effect": "flooded_gap", "parameters": {"G_gap_a_b": {"value": 38, "low": 35, "high": 41, "unit": "W/K"}}}
+    >>> size = {"value": 38, "low": 35, "high": 41, "unit": "W/K"}
+    >>> named = {"effect": "flooded_gap", "parameters": {"G_gap_a_b": size}}
     >>> covered({"effect": "flooded_gap", "size": 40.0, "unit": "W/K"}, named)
     True
     """

@@ -1,4 +1,4 @@
-"""A process of its own that solves one case: `python -m discovery.challenge.solve CASE_FOLDER OUT_FOLDER METHOD...`.
+"""A process that solves one case: `python -m discovery.challenge.solve CASE_FOLDER OUT_FOLDER METHOD...`.
 
 It is told the folder of the case, where to write, and which methods; nothing leads from there to the answers.
 """

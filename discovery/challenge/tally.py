@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from statistics import mean, median
 from typing import Any
 
@@ -23,6 +24,7 @@ from discovery.challenge.scoring import (
     judge,
     names,
     places,
+    stands,
     truths,
 )
 from discovery.challenge.sizes import covered
@@ -152,7 +154,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
         measuring_right=share(
             [s.judgement.word in (RIGHT, ELSEWHERE) for s in inside if s.key["kind"] == "measuring"]
         ),
-        two_found=share([any(f["effect"] in names(t) and at_place(t, f) for f in s.named) for t, s in two]),
+        two_found=share([any(stands(t, f) for f in s.named) for t, s in two]),
         extra=share([_has_extra(s) for s in told]),
         body_first=share(
             [
@@ -233,7 +235,7 @@ def _power(scored: Sequence[Scored]) -> list[Bin]:
 def _confidences(scored: Sequence[Scored]) -> list[tuple[float, bool]]:
     """Probability and truth of every effect that was named: effect and place have to be right."""
     return [
-        (float(f["probability"]), any(f["effect"] in names(t) and at_place(t, f) for t in truths(s.key)))
+        (float(f["probability"]), any(stands(t, f) for t in truths(s.key)))
         for s in scored
         for f in s.named
         if f.get("probability") is not None
@@ -242,7 +244,7 @@ def _confidences(scored: Sequence[Scored]) -> list[tuple[float, bool]]:
 
 def _reliability(confidences: Sequence[tuple[float, bool]]) -> list[Reliability]:
     out = []
-    for low, high in zip(CONFIDENCE[:-1], CONFIDENCE[1:], strict=True):
+    for low, high in pairwise(CONFIDENCE):
         here = [(p, true) for p, true in confidences if low < p <= high or (low == p == 0.0)]
         if here:
             out.append(Reliability(mean(p for p, _ in here), share([true for _, true in here])))

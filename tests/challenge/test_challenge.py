@@ -58,7 +58,7 @@ model = "baseline"
 
 
 def recording(seed: int, pump_heat: float) -> str:
-    """A day of one body of 36 kJ/K by explicit steps of a minute, read every 10 minutes; the pump brings heat."""
+    """A day of one body of 36 kJ/K by explicit steps of a minute, read every 10 minutes."""
     rng = np.random.default_rng(seed)
     air = 22 + np.sin(np.arange(1440) / 200 + seed)
     drive, pump = (np.repeat(rng.integers(0, 2, 24), 60) for _ in range(2))
@@ -77,7 +77,11 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, heat in (("case_1", 0.0), ("case_2", -60.0)):
         (root / name).mkdir()
         texts = {"baseline.toml": MODEL, "campaign.toml": CAMPAIGN, "experiment.toml": EXPERIMENT}
-        texts |= {"a.csv": recording(1, heat), "b.csv": recording(2, heat), "notes.txt": "the answer is evaporation"}
+        texts |= {
+            "a.csv": recording(1, heat),
+            "b.csv": recording(2, heat),
+            "notes.txt": "the answer is evaporation",
+        }
         for file, text in texts.items():
             (root / name / file).write_text(text)
     keys = {
@@ -150,7 +154,9 @@ def test_orders_have_their_shares_and_come_from_the_seed() -> None:
     kinds = [o.kind for o in orders]
     shares = {"none": 50, "one": 80, "two": 20, "measuring": 20, "outside": 30}
     assert {k: kinds.count(k) for k in shares} == shares
-    assert sum(o.seed % 2 for o in orders if o.kind == "none") == 25  # half of them with slow noise and small heat
+    assert (
+        sum(o.seed % 2 for o in orders if o.kind == "none") == 25
+    )  # half of them with slow noise and small heat
     assert draw_orders(200, 5) == orders
     assert draw_orders(200, 6) != orders
     assert len({o.seed for o in orders}) == 200
@@ -159,7 +165,9 @@ def test_orders_have_their_shares_and_come_from_the_seed() -> None:
 def test_a_case_does_not_show_its_seed() -> None:
     order = draw_orders(1, 5)[0]
     files = make(order).files
-    assert not any(str(order.seed).encode() in content for name, content in files.items() if name.endswith(".toml"))
+    assert not any(
+        str(order.seed).encode() in content for name, content in files.items() if name.endswith(".toml")
+    )
 
 
 def test_end_to_end_and_going_on(cases: Path, tmp_path: Path) -> None:
@@ -207,7 +215,9 @@ def test_every_other_method_answers_in_the_form_that_is_scored(cases: Path) -> N
         if name == "diagnosis":
             continue
         answer = method(read_problem(cases / "case_2"))
-        assert answer["verdict"] in ("no mismatch", "missing physics", "measurement fault", "unexplained"), name
+        assert answer["verdict"] in ("no mismatch", "missing physics", "measurement fault", "unexplained"), (
+            name
+        )
         assert all({"effect", "states", "probability"} <= p.keys() for p in answer["physics"]), name
         json.dumps(answer)
 
@@ -217,7 +227,9 @@ def test_ljung_box_against_statsmodels() -> None:
 
     rng = np.random.default_rng(1)
     x = np.convolve(rng.standard_normal(300), [1, 0.15], "same")
-    assert ljung_box(x, 20) == pytest.approx(float(acorr_ljungbox(x, lags=[20])["lb_pvalue"].iloc[0]), rel=1e-9)
+    assert ljung_box(x, 20) == pytest.approx(
+        float(acorr_ljungbox(x, lags=[20])["lb_pvalue"].iloc[0]), rel=1e-9
+    )
 
 
 def test_derivative_of_a_parabola() -> None:
@@ -235,6 +247,8 @@ def test_the_derivative_regression_finds_a_term_in_low_noise() -> None:
 
 
 def test_a_user_is_told_what_is_missing(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["challenge", "--cases-from", str(tmp_path), "--out", str(tmp_path / "out")])
+    done = CliRunner().invoke(
+        app, ["challenge", "--cases-from", str(tmp_path), "--out", str(tmp_path / "out")]
+    )
     assert done.exit_code == 1
     assert "neither answers.json nor keys.json there" in done.output

@@ -54,11 +54,21 @@ UNKNOWN = {"verdict": "unexplained", "physics": [], "alternatives": []}
         (GAP | {"accepts": ["no mismatch"]}, NOTHING, 1.0, scoring.RIGHT),
         (GAP | {"accepts": ["unexplained"]}, UNKNOWN, 1.0, scoring.RIGHT),
         (GAP, said(named("flooded_gap", "c_body_1", "b_corpus")), 1.0, scoring.RIGHT),
-        (GAP, said(named("flooded_gap", "c_body_1", "table", "side")), 1.0, scoring.RIGHT),  # one state too many
+        (
+            GAP,
+            said(named("flooded_gap", "c_body_1", "table", "side")),
+            1.0,
+            scoring.RIGHT,
+        ),  # one state too many
         (GAP, said(named("flooded_gap", "c_body_1", "table", "side", "x")), 0.5, scoring.ELSEWHERE),
         (GAP, said(named("flooded_gap", "table", "side")), 0.5, scoring.ELSEWHERE),
         (GAP | {"also": ["conduction_path"]}, said(named("conduction_path", "b_corpus")), 1.0, scoring.RIGHT),
-        (GAP, said(named("radiation", "table"), below={"flooded_gap": 2.0}), 0.7 / math.sqrt(2), scoring.IN_SET),
+        (
+            GAP,
+            said(named("radiation", "table"), below={"flooded_gap": 2.0}),
+            0.7 / math.sqrt(2),
+            scoring.IN_SET,
+        ),
         (
             GAP,
             said(named("radiation", "table"), below={"flooded_gap": 2.0, "wear": 3.0, "windage": 3.1}),
@@ -71,7 +81,12 @@ UNKNOWN = {"verdict": "unexplained", "physics": [], "alternatives": []}
         (OFFSET, said(named("sensor_drift", "E_Z0T")), -2.0, scoring.WRONG),
         (OFFSET, said(named("sensor_offset", "E_Z0T")), 1.0, scoring.RIGHT),
         ({"effect": "clock_shift", "states": []}, said(named("clock_shift")), 1.0, scoring.RIGHT),
-        (TWO, said(named("friction_speed", "c_body_2"), named("fluid_convection", "c_body_1")), 1.0, scoring.RIGHT),
+        (
+            TWO,
+            said(named("friction_speed", "c_body_2"), named("fluid_convection", "c_body_1")),
+            1.0,
+            scoring.RIGHT,
+        ),
         (TWO, said(named("friction_speed", "c_body_2")), 0.5, scoring.PARTLY),
         (TWO, said(named("friction_speed", "table")), 0.0, scoring.ELSEWHERE),
         (TWO, said(named("friction_speed", "c_body_2"), named("radiation", "side")), -0.5, scoring.WRONG),

@@ -1,4 +1,4 @@
-"""What is compared: the workbench, and what others would do with the same cases. A method is one function in one file."""
+"""What is compared: the workbench, and what others would do with the same cases. One method, one file."""
 
 from collections.abc import Mapping
 

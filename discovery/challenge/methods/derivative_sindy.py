@@ -1,7 +1,8 @@
-"""The published way with a library: the derivative of the residual regressed on terms along the simulated states.
+"""The published way: the derivative of the residual regressed on a library along the simulated states.
 
-Kaheman et al. (arXiv:1909.08574, 2019) and Ebers et al. (SIAM J. Appl. Dyn. Syst. 23, 2024) learn a discrepancy so. The
-library is the workbench's catalogue of physics at every place and shape; the measuring chain has no rate.
+Kaheman et al. (arXiv:1909.08574, 2019) and Ebers et al. (SIAM J. Appl. Dyn. Syst. 23, 2024) learn a
+discrepancy so. The library is the workbench's catalogue of physics at every place and shape; the measuring
+chain has no rate.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ MOST = 3  # effects that may be named
 
 
 def derivative_sindy(problem: Problem) -> Answer:
-    """The effects whose terms the regression keeps, largest first; their shares of the explained rate as probabilities."""
+    """The effects whose terms the regression keeps, largest first, with their shares as probabilities."""
     context, fit = problem.context, problem.context.baseline
     model = fit.problem.model
     claims = hypotheses(
@@ -63,7 +64,7 @@ def derivative_sindy(problem: Problem) -> Answer:
 
 
 def output_rates(trajectory: Trajectory, library: list[Hypothesis]) -> Array:
-    """Rate (R, Y, A) at which a unit of each effect begins to move the outputs, at the readings of a trajectory."""
+    """Rate (R, Y, A) at which a unit of each effect begins to move the outputs, at the readings."""
     system = trajectory.system
     lever = output_matrix(trajectory)
     nodes = trajectory.at_nodes()

@@ -1,7 +1,8 @@
 """Forward selection by BIC with white residuals: the classical way through the same catalogue.
 
-Each step refits the claims that the residual speaks for most and keeps the one with the lowest BIC, until none lowers
-it (Bacher & Madsen, Energy and Buildings 43, 2011, with BIC in place of the likelihood-ratio test).
+Each step refits the claims that the residual speaks for most and keeps the one with the lowest BIC, until
+none lowers it (Bacher & Madsen, Energy and Buildings 43, 2011, with BIC in place of their likelihood-ratio
+test).
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Step:
 
 
 def forward_selection(problem: Problem) -> Answer:
-    """The effects that forward selection adds; weights of BIC within the last step stand for probabilities."""
+    """The effects that forward selection adds; weights of BIC within a step stand for probabilities."""
     context = with_white_noise(problem.context)
     current = _step(context, (), None)
     assert current is not None  # the baseline alone has been fitted before
@@ -85,7 +86,7 @@ def _step(context: Context, chosen: tuple[Hypothesis, ...], start: Assessment | 
 
 
 def bic(found: Assessment) -> float:
-    """sum_y n_y log(RSS_y/n_y) + k log n: white residuals, one variance an output; k counts every fitted number."""
+    """sum_y n_y log(RSS_y/n_y) + k log n: white residuals, one variance an output, k fitted numbers."""
     residuals = np.concatenate(found.lens.residuals)
     counts = np.isfinite(residuals).sum(axis=0)
     squares = np.nansum(residuals**2, axis=0)

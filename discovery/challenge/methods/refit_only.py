@@ -14,7 +14,7 @@ LAGS = 20
 
 
 def refit_only(problem: Problem) -> Answer:
-    """`unexplained` where a test of the residual fires (level 5 % over all outputs and recordings), else `no mismatch`.
+    """`unexplained` where a test of the residual fires (5 % over all of them), else `no mismatch`.
 
     Each series is tested for whiteness, and for its variance by chi-square where the reading noise is stated.
     """
