@@ -108,6 +108,7 @@ class Tally:
     explained_all: float | None  # the same over every case with effects, nothing where nothing is named
     seconds: float | None
     seconds_most: float | None
+    processor: float | None  # median seconds of the processor
     failed: int = field(default=0)
 
 
@@ -129,7 +130,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
     reliability = _reliability(confidences)
     overlaps = [o for s in scored if s.answer and (o := overlap(s.key, s.answer)) is not None]
     gaps = [(s, g) for s in inside if (g := _gap(s)) is not None]
-    seconds = [float(s.answer["seconds"]) for s in scored if s.answer and s.answer.get("seconds") is not None]
+    seconds, processor = _times(scored, "seconds"), _times(scored, "processor_seconds")
     sized = [
         c
         for s in inside
@@ -175,6 +176,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
         explained_all=median([_gap(s) or 0.0 for s in inside if s.key["kind"] != "measuring"] or [0.0]),
         seconds=median(seconds) if seconds else None,
         seconds_most=max(seconds, default=None),
+        processor=median(processor) if processor else None,
         failed=sum(s.answer is None for s in scored),
     )
 
@@ -184,6 +186,10 @@ def _counts(pairs: Any) -> dict[str, dict[str, int]]:
     for row, column in pairs:
         out.setdefault(row, {})[column] = out.get(row, {}).get(column, 0) + 1
     return out
+
+
+def _times(scored: Sequence[Scored], key: str) -> list[float]:
+    return [float(s.answer[key]) for s in scored if s.answer and s.answer.get(key) is not None]
 
 
 def _gap(s: Scored) -> float | None:
