@@ -34,6 +34,7 @@ def _of(title: str, pick: Callable[[Tally], Share], sign: int, target: float | N
 LINES: Sequence[Line] = (
     Line("points a case, −2 to 1", lambda t: t.points, +1, ""),
     _of("false alarms, of cases without effect", lambda t: t.false_alarms, -1, 3.0),
+    _of("… with slow noise and small heat", lambda t: t.false_alarms_coloured, -1, 3.0),
     _of("out of catalogue, wrongly named", lambda t: t.outside_named, -1, 5.0),
     _of("one effect of size ≥ 1: named", lambda t: t.large_named, +1, 80.0),
     _of("… of those, right effect and place", lambda t: t.large_right, +1, 95.0),

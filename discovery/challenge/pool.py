@@ -60,7 +60,7 @@ def _one(folder: Path, case: str, methods: Sequence[str]) -> str:
         copy, out = Path(place) / "case", Path(place) / "out"
         shutil.copytree(folder / CASES / case, copy)
         out.mkdir()
-        command = [sys.executable, "-m", "discovery.challenge.solve", str(copy), str(out), *methods]
+        command = [sys.executable, "-P", "-m", "discovery.challenge.solve", str(copy), str(out), *methods]
         try:
             done = subprocess.run(
                 command,

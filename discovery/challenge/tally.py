@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from statistics import mean, median
 from typing import Any
 
+from discovery.challenge.calibration import Reliability, by_confidence, weighted_gap
 from discovery.challenge.intervals import Share, share
 from discovery.challenge.overlap import overlap
 from discovery.challenge.scoring import (
@@ -30,7 +30,6 @@ from discovery.challenge.scoring import (
 from discovery.challenge.sizes import covered
 
 SIZES = (0.5, 1.0, 2.0, 4.0)  # bins of size, split at their geometric middles
-CONFIDENCE = (0.0, 0.5, 0.7, 0.9, 0.97, 1.0)  # edges of the bins of probability
 NAMING = ("missing physics", "measurement fault")
 
 
@@ -71,14 +70,6 @@ class Bin:
 
 
 @dataclass(frozen=True)
-class Reliability:
-    """Named effects of about one probability: what was said on average, what came true."""
-
-    said: float
-    true: Share
-
-
-@dataclass(frozen=True)
 class Tally:
     """Everything that is known of one method; None and empty shares where nothing of the sort occurred."""
 
@@ -89,6 +80,7 @@ class Tally:
     confusion: Mapping[str, Mapping[str, int]]  # truth -> what was said
     power: Sequence[Bin]
     false_alarms: Share
+    false_alarms_coloured: Share  # of the cases with slow noise and small heat
     outside_named: Share
     large_named: Share
     large_right: Share  # of those named
@@ -127,7 +119,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
     large_told = [s for s in large if s.verdict in NAMING]
     two = [(t, s) for s in scored if s.key["kind"] == "two" for t in truths(s.key)]
     confidences = _confidences(scored)
-    reliability = _reliability(confidences)
+    reliability = by_confidence(confidences)
     overlaps = [o for s in scored if s.answer and (o := overlap(s.key, s.answer)) is not None]
     gaps = [(s, g) for s in inside if (g := _gap(s)) is not None]
     seconds, processor = _times(scored, "seconds"), _times(scored, "processor_seconds")
@@ -147,6 +139,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
         confusion=_counts(pair for s in scored for pair in _confused(s)),
         power=_power([s for s in scored if s.key["kind"] == "one" and "rms_over_noise" in s.key]),
         false_alarms=share([s.verdict != "no mismatch" for s in quiet]),
+        false_alarms_coloured=share([s.verdict != "no mismatch" for s in quiet if s.key.get("coloured")]),
         outside_named=share([s.judgement.word in (WRONG, WRONG_KIND) for s in outside]),
         large_named=share([s.verdict in NAMING for s in large]),
         large_right=share([s.judgement.word == RIGHT for s in large_told]),
@@ -165,7 +158,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
             ]
         ),
         reliability=reliability,
-        calibration_points=_weighted_gap(reliability),
+        calibration_points=weighted_gap(reliability),
         bias_points=100 * (mean(said) - mean(float(c) for _, c in confidences)) if said else None,
         overlap=mean(overlaps) if overlaps else None,
         windows=len(overlaps),
@@ -246,18 +239,3 @@ def _confidences(scored: Sequence[Scored]) -> list[tuple[float, bool]]:
         for f in s.named
         if f.get("probability") is not None
     ]
-
-
-def _reliability(confidences: Sequence[tuple[float, bool]]) -> list[Reliability]:
-    out = []
-    for low, high in pairwise(CONFIDENCE):
-        here = [(p, true) for p, true in confidences if low < p <= high or (low == p == 0.0)]
-        if here:
-            out.append(Reliability(mean(p for p, _ in here), share([true for _, true in here])))
-    return out
-
-
-def _weighted_gap(rows: Sequence[Reliability]) -> float | None:
-    """Expected calibration error in points: |said - true| by bin, weighed by the number in it."""
-    total = sum(r.true.count for r in rows)
-    return 100 * sum(abs(r.said * r.true.count - r.true.hits) for r in rows) / total if total else None

@@ -106,7 +106,7 @@ def test_the_process_that_solves_is_not_told_where_the_answers_are(
     seen: list[list[str]] = []
 
     def look(command: list[str], cwd: Path, **_: Any) -> subprocess.CompletedProcess[str]:
-        seen.append([*command, str(cwd), *(str(p) for p in Path(command[3]).parent.rglob("*"))])
+        seen.append([*command, str(cwd), *(str(p) for p in Path(command[4]).parent.rglob("*"))])
         return subprocess.CompletedProcess(command, 0, "", "")
 
     monkeypatch.setattr(subprocess, "run", look)
