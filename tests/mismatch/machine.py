@@ -109,7 +109,7 @@ def _integrate(
 ) -> Array:
     """Body temperatures (T, 3): one call of scipy between any two switches."""
     table = np.column_stack(list(held.values()))
-    edges = [0, *(np.flatnonzero(np.any(np.diff(table, axis=0) != 0, axis=1)) + 1), len(time) - 1]
+    edges = np.unique([0, *(np.flatnonzero(np.any(np.diff(table, axis=0) != 0, axis=1)) + 1), len(time) - 1])
     capacity, p = np.array(list(BODIES.values())), SIZES
     x = np.empty((len(time), 3))
     x[0] = smooth(0.0)[0]

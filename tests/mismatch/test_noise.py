@@ -55,16 +55,17 @@ def dense(trajectory: Trajectory, noise: Noise) -> Array:
         total[:, y, :, y] += white**2 * np.eye(count)
         if noise.slow:
             total[:, y, :, y] += noise.slow[y] ** 2 * np.exp(-lag / noise.slow_time)
-    for i, size in enumerate((noise.heat or {}).get(name, 0.0) for name in "ab"):
-        answer = np.zeros((count, count, outs))  # reading, interval of unit heat, output
-        for k in range(count - 1):
-            step = time[k + 1] - time[k]
-            x = np.linalg.solve(a, (expm(a * step) - np.eye(2)) @ np.eye(2)[i] / CAPACITY[i])
+    steps = [expm(a * step) for step in np.diff(time)]
+    for i, name in enumerate("ab"):
+        answer = np.zeros((count, outs, count))  # to unit heat held over an interval
+        for k, step in enumerate(steps):
+            x = np.linalg.solve(a, (step - np.eye(2)) @ np.eye(2)[i] / CAPACITY[i])
             for r in range(k + 1, count):
-                answer[r, k] = SEEN @ expm(a * (time[r] - time[k + 1])) @ x
-        total += size**2 * np.einsum(
-            "ryk,kl,slz->rysz", answer.transpose(0, 2, 1), np.exp(-lag / noise.heat_time), answer
-        )
+                answer[r, :, k] = SEEN @ x
+                x = steps[r] @ x if r < count - 1 else x
+        flat = answer.reshape(count * outs, count)
+        kernel = (noise.heat or {}).get(name, 0.0) ** 2 * np.exp(-lag / noise.heat_time)
+        total += (flat @ kernel @ flat.T).reshape(total.shape)
     where = np.flatnonzero(grid.measured.ravel())
     return total.reshape(count * outs, -1)[np.ix_(where, where)]
 

@@ -41,7 +41,7 @@ def test_signatures_equal_differences(effect: Effect) -> None:
 
 
 def test_a_signature_is_what_scipy_sees() -> None:
-    """Fluid on the motor and a path from motor to bed, switched on in another integrator by a small amount."""
+    """Fluid on the motor, and a path from motor to bed: a little of each in another integrator."""
 
     def fluid(_: float, x: machine.Array, u: machine.Inputs) -> tuple[float, float, float]:
         return (0.01 * u["pump"] * (u["T_fluid"] - x[0]), 0.0, 0.0)

@@ -1,0 +1,100 @@
+"""Effects of the user's own, as lines of an experiment file; what is said when they are wrong."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from discovery.errors import UserError
+from discovery.experiment import diagnose
+from discovery.experimentfile import load_experiment
+from discovery.models import write_model
+from tests.mismatch.machine import CHANNELS, Array, Inputs, model, simulated
+
+RUB = """
+[[mismatch.effects]]
+word = "rub"
+title = "Seal that rubs and wears itself free"
+place = "driven body"
+formula = "k_rub*speed*exp(-time/t_free)"
+amplitude = "k_rub"
+unit = "W/rpm"
+plausible = 0.1
+shapes = { t_free = { unit = "s", grid = [10000, 30000], low = 2000, high = 90000 } }
+source = "maintenance log"
+"""
+
+
+def rub(t: float, _: Array, u: Inputs) -> tuple[float, float, float]:
+    return 0.15 * u["speed"] * np.exp(-t / 20000), 0.0, 0.0
+
+
+def experiment(folder: Path, effects: str) -> Path:
+    """An experiment with files of its own: three recordings of the machine with a rubbing seal."""
+    import pandas as pd
+
+    lines = ['name = "three bodies"', "[channels]"]
+    for c in CHANNELS.values():
+        noise = f", noise = {c.noise}" if c.noise else ""
+        lines.append(f'{c.name} = {{ role = "{c.role}", unit = "{c.unit}"{noise} }}')
+    lines.append("[recordings]")
+    for seed in (1, 2, 3):
+        r = simulated(seed, concealed=rub)
+        pd.DataFrame({"time": r.time, **r.values}).to_csv(folder / f"{r.name}.csv", index=False)
+        lines.append(f'{r.name} = {{ file = "{r.name}.csv" }}')
+    (folder / "campaign.toml").write_text("\n".join(lines))
+    write_model(folder / "model.toml", model())
+    path = folder / "experiment.toml"
+    path.write_text(
+        'name = "rub"\ncampaign = "campaign.toml"\nfit = ["r1", "r2"]\nheld_out = ["r3"]\n'
+        '[models]\nbaseline = { file = "model.toml" }\n[mismatch]\nmodel = "baseline"\n' + effects
+    )
+    return path
+
+
+def test_an_effect_in_the_experiment_file_is_found(tmp_path: Path) -> None:
+    folder = diagnose(experiment(tmp_path, RUB), tmp_path / "out")
+    found = json.loads((folder / "diagnosis.json").read_text())
+    (physics,) = found["physics"]
+    assert (physics["effect"], physics["states"], physics["source"]) == ("rub", ["motor"], "maintenance log")
+    sizes = {name.split("_")[0]: p for name, p in physics["parameters"].items()}
+    assert sizes["k"]["low"] < 0.15 < sizes["k"]["high"]
+    assert sizes["k"]["unit"] == "W/rpm"
+    assert sizes["t"]["low"] < 20000 < sizes["t"]["high"]
+    assert found["improvement"]["explained"] > 0.9
+    assert 'effect = "rub"' in (folder / "models" / "repaired.toml").read_text()
+
+
+MISTAKES = {
+    "k_rub*sped": "effect 'rub': 'sped' means nothing in its formula; known: .*speed",
+    "0.1*speed": "effect 'rub': the amplitude 'k_rub' does not stand in the formula",
+    "k_rub*speed*(": "effect 'rub'",
+    "k_rub*__import__('os')": "effect 'rub'",
+}
+
+
+@pytest.mark.parametrize("formula", MISTAKES)
+def test_a_mistake_in_a_formula_is_a_sentence(formula: str, tmp_path: Path) -> None:
+    path = experiment(tmp_path, RUB.replace("k_rub*speed*exp(-time/t_free)", formula))
+    with pytest.raises(UserError, match=MISTAKES[formula]):
+        diagnose(path, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("line", "wrong", "said"),
+    [
+        ('place = "driven body"', 'place = "somewhere"', "place"),
+        ("plausible = 0.1", "plausible = 0", "plausible"),
+        ('word = "rub"', 'word = "Rub it"', "word"),
+        ('unit = "W/rpm"', 'colour = "red"', "colour"),
+        ("grid = [10000, 30000], ", "grid = [], ", "grid"),
+    ],
+)
+def test_a_mistake_in_a_key_names_it(line: str, wrong: str, said: str, tmp_path: Path) -> None:
+    path = experiment(tmp_path, RUB.replace(line, wrong))
+    with pytest.raises(UserError, match=rf"experiment.toml, line \d+.*{said}"):
+        load_experiment(path)
