@@ -58,6 +58,9 @@ def ticks(
         if following is None:
             following = time
         if time - following > LONGEST_SILENCE_S:
+            if newest:
+                yield following, newest, fresh
+                fresh = {}
             following = time
         while following < time:
             yield following, newest, fresh

@@ -36,6 +36,7 @@ Verdict = Literal["noise", "drift", "new effect"]
 Z95 = 1.959963984540054
 WALK = 0.03  # of a parameter from one recording to the next, relative: how fast a machine may age
 SIGNIFICANT = 0.05  # chance of calling noise a drift; a shadow run stands before every change
+AS_NEW = 1.1  # residual, as a multiple of that of the fit, below which there is nothing to gain
 EXCESS = 1.6  # residual after the update, as a multiple of that of the fit, from which an effect is new
 WIDEST = 3.0  # prior standard deviations never grow beyond this multiple of the first fit's
 
@@ -136,7 +137,7 @@ def update_belief(
         old = belief.at_work.parameters[name].value
         if abs(values[k] - old) > 0.25 * belief.first[k]:
             moved[name] = (old, float(values[k]))
-    verdict: Verdict = "drift" if p_value < SIGNIFICANT else "noise"
+    verdict: Verdict = "drift" if p_value < SIGNIFICANT and before > AS_NEW else "noise"
     learnt = replace(
         belief,
         model=_with(belief.model, belief.parameters, values, sd),

@@ -1,0 +1,161 @@
+"""States of the runtime, input guards in their order, and the rows that feed it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from discovery.cli import app
+from discovery.errors import UserError
+from discovery.export.compiled import compile_model
+from discovery.export.document import Exported, Input, Output
+from discovery.export.ranges import InputRange, OutputRange
+from discovery.export.seal import Seal
+from discovery.models import Model, State
+from discovery.runtime.compensator import Compensator, Settings
+from discovery.runtime.compensator import State as Mode
+from discovery.runtime.guards import Fault, InputGuard, Reading
+from discovery.runtime.rows import csv_rows, ticks
+from discovery.terms import Term, parse
+
+TEMPERATURE = Input("T", "ambient temperature", "degC", "linear", InputRange(20, 24, -30, 60, 0.5, 0.001, 300.0))
+POWER = Input("P", "heat load", "W", "held", InputRange(0, 800, 0, 2000, None, None, 300.0))
+
+
+def small(rate: str = "P/1000 - y/600", inputs: tuple[Input, ...] = (POWER,)) -> Exported:
+    """One error that follows a power, at most 100 um and 1 um/s."""
+    model = Model("small", {}, {"y": State("y", "um", None, parse(0.0), 0.0, 1.0)}, (Term("t", "y", parse(rate)),), {"E": parse("y")})
+    outputs = (Output("E", "error", "um", OutputRange(100.0, 1.0)),)
+    return Exported(model, compile_model(model, 1.0), inputs, outputs, 1, {}, (), {}, Seal("0" * 64, None, None))
+
+
+def test_the_checks_come_in_order() -> None:
+    def fault(reading: Reading | None, now: float = 1000.0) -> Fault:
+        guard = InputGuard(TEMPERATURE)
+        guard.check(Reading(22.0, 990.0), 990.0)
+        found = guard.check(reading, now)
+        assert found is not None
+        assert found.value == (22.0 if found.fault & ~Fault.UNTRAINED else reading.value if reading else None)
+        return found.fault
+
+    assert fault(Reading(22.3, 1000.0)) is Fault.NONE
+    assert fault(None) is Fault.NOT_FINITE
+    assert fault(Reading(math.nan, 0.0, False)) is Fault.NOT_FINITE
+    assert fault(Reading(99.0, 0.0, False)) is Fault.QUALITY
+    assert fault(Reading(99.0, 0.0)) is Fault.AGE
+    assert fault(Reading(99.0, 1000.0)) is Fault.IMPLAUSIBLE
+    assert fault(Reading(30.0, 1000.0)) is Fault.JUMP
+
+
+def test_a_jump_stays_latched_until_the_value_is_back() -> None:
+    guard = InputGuard(TEMPERATURE)
+    guard.check(Reading(22.0, 0.0), 0.0)
+    for k in range(1, 200):  # far longer than the drift alone would need to reach it
+        found = guard.check(Reading(37.0, 60.0 * k), 60.0 * k)
+        assert found is not None
+        assert (found.value, found.fault) == (22.0, Fault.JUMP)
+    found = guard.check(Reading(22.9, 12060.0), 12060.0)
+    assert found is not None
+    assert (found.value, found.fault) == (22.9, Fault.NONE)
+
+
+def test_the_gain_fades_beyond_the_trained_range() -> None:
+    guard = InputGuard(TEMPERATURE)
+    assert [guard.gain(v) for v in (20.0, 24.0, 26.0, 34.0, 10.0, 40.0)] == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+    assert 0.0 < guard.gain(29.0) < 1.0
+
+
+def feed(compensator: Compensator, value: object, first: int, count: int, **options: bool) -> list[float]:
+    found = [compensator.tick({"P": Reading(value, float(t))}, float(t), **options) for t in range(first, first + count)]
+    return [tick.offsets["E"] for tick in found]
+
+
+def test_a_model_failure_freezes_and_ramps_out_after_the_part() -> None:
+    compensator = Compensator(small("log(1500 - P)/10 - y/600"), Settings(settle_s=10.0))
+    feed(compensator, 100.0, 0, 60)
+    assert compensator.state is Mode.ACTIVE
+    frozen = feed(compensator, 1600.0, 60, 100)
+    assert compensator.state is Mode.FROZEN
+    assert len(set(frozen)) == 1
+    assert frozen[0] < 0.0
+    done = feed(compensator, 1600.0, 160, 1, part_done=True)
+    assert compensator.state is Mode.FAULT
+    ramp = np.array([frozen[-1], *done, *feed(compensator, 1600.0, 161, 120)])
+    assert ramp[-1] == 0.0
+    assert np.max(np.abs(np.diff(ramp))) <= 1.0 + 1e-9
+    assert feed(compensator, 100.0, 300, 5)[-1] == 0.0  # until somebody has looked at it
+    compensator.acknowledge()
+    feed(compensator, 100.0, 305, 40)
+    assert compensator.state is Mode.ACTIVE
+
+
+def test_a_frozen_model_goes_on_when_it_can() -> None:
+    compensator = Compensator(small("log(1500 - P)/10 - y/600"), Settings(settle_s=10.0))
+    feed(compensator, 100.0, 0, 60)
+    feed(compensator, 1600.0, 60, 30)
+    again = feed(compensator, 100.0, 90, 30)
+    assert compensator.state is Mode.ACTIVE
+    assert all(math.isfinite(value) for value in again)
+
+
+def test_off_means_zero_and_the_model_goes_on() -> None:
+    compensator = Compensator(small(), Settings(settle_s=10.0))
+    feed(compensator, 100.0, 0, 600)
+    before = compensator.offsets[0]
+    off = feed(compensator, 100.0, 600, 400, enabled=False)
+    assert compensator.state is Mode.OFF
+    assert off[-1] == 0.0
+    back = feed(compensator, 100.0, 1000, 400)
+    assert back[-1] < before < 0.0
+
+
+def test_offsets_stay_within_their_limit() -> None:
+    compensator = Compensator(small())
+    found = feed(compensator, 800.0, 0, 4000)
+    assert min(found) == -100.0
+
+
+def test_before_any_good_value_nothing_is_given_out() -> None:
+    compensator = Compensator(small())
+    assert set(feed(compensator, "no number", 0, 20)) == {0.0}
+    assert compensator.state is Mode.OFF
+
+
+def test_rows_are_read_whatever_stands_in_them() -> None:
+    lines = ["time,P,T\n", "0,1,2\n", "x,1,1\n", "10,,abc\n", "5,9,9\n", '20,"3\n', "30,4\n", "1e300,5,5\n", "40,6,7,8\n", "\n"]
+    rows = list(csv_rows(lines))
+    assert [time for time, _ in rows][:2] == [0.0, 10.0]
+    assert max(time for time, _ in rows) <= 40.0
+    assert math.isnan(rows[1][1]["T"].value)  # type: ignore[arg-type]
+    assert "P" not in rows[1][1]
+    with pytest.raises(UserError, match="no column 'time'"):
+        list(csv_rows(["a,b\n", "1,2\n"]))
+
+
+def test_ticks_use_what_was_known_by_then() -> None:
+    rows = [(0.0, {"P": Reading(1.0, 0.0)}), (25.0, {"P": Reading(2.0, 25.0)}), (30.0, {"P": Reading(3.0, 30.0)})]
+    found = [(now, newest["P"].value) for now, newest, _ in ((n, dict(a), f) for n, a, f in ticks(rows, 10.0))]
+    assert found == [(0.0, 1.0), (10.0, 1.0), (20.0, 1.0), (30.0, 3.0)]
+    assert [now for now, _, _ in ticks(rows, 10.0, after=10.0)] == [20.0, 30.0]
+    far = [*rows, (1e5, {"P": Reading(4.0, 1e5)})]
+    assert [now for now, _, _ in ticks(far, 10.0)] == [0.0, 10.0, 20.0, 30.0, 1e5]  # the machine was off
+
+
+def test_the_command_says_what_is_missing(model_file: Path, tmp_path: Path) -> None:
+    runner = CliRunner()
+    for words, sentence in (
+        ([str(model_file)], "no key is trusted"),
+        ([str(model_file), "--allow-unsigned"], "say where the readings come from"),
+        ([str(model_file), "--allow-unsigned", "--inputs", "none.csv"], "there is no such file"),
+        ([str(tmp_path / "none.json")], "there is no such file"),
+        ([str(model_file), "--back"], "--back needs --state"),
+        ([str(model_file), "--back", "--state", str(tmp_path)], "no step back"),
+        ([str(model_file), "--trust", str(tmp_path / "no.pub")], "there is no such key"),
+    ):
+        done = runner.invoke(app, ["compensate", *words])
+        assert done.exit_code == 1
+        assert sentence in done.output
