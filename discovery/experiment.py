@@ -175,7 +175,7 @@ def fit_model_of(
     validation: Mapping[str, Mapping[str, float]] = {}
     if experiment.form.cross_validate:
         progress(f"cross-validating {name}")
-        validation = cross_validate(fit.model, experiment.fitting, experiment.fit, outputs)
+        validation = cross_validate(fit.model, experiment.fitting, experiment.fit, outputs, fit.noise)
     seconds = clock.perf_counter() - began
     predictions = {r: predict(fit, experiment, r) for r in (*experiment.fit, *experiment.held_out)}
     notes = [*fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.evaluation.criteria import criteria
-from discovery.fitting import fit_model, predict_recording
+from discovery.fitting import Noise, fit_model, predict_recording
 from discovery.models import Model
 from discovery.recordings import Campaign, Recording
 
 Array = NDArray[np.float64]
 Window = tuple[float, float]  # s, from and up to
 
+ROUNDS = 6  # of Levenberg-Marquardt: the start is the fit to everything
 MOST_FOLDS = 4  # recordings are left out in groups when there are more
 
 
@@ -48,15 +49,22 @@ def folds(campaign: Campaign, recordings: Sequence[str], blocks: int = 3) -> lis
 
 
 def cross_validate(
-    model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]
+    model: Model,
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    noise: Noise | None = None,
 ) -> dict[str, dict[str, float]]:
     """rms of each output on what was left out, pooled over the folds: {"recordings": {...}, "blocks": {...}}.
 
-    The structure of the model stays; its parameters are fitted anew from where they are.
+    The structure of the model stays; its parameters are fitted anew from where they are, a few steps far.
+
+    Args:
+        noise: of the fit to everything, so that no fold has to find it again.
     """
     left: dict[str, list[Array]] = {}
     for fold in folds(campaign, recordings):
-        for rows in _left_over(model, campaign, recordings, outputs, fold):
+        for rows in _left_over(model, campaign, recordings, outputs, fold, noise):
             left.setdefault("blocks" if fold.windows else "recordings", []).append(rows)
     return {
         kind: {name: criteria(np.concatenate([r[:, y] for r in rows])).rms for y, name in enumerate(outputs)}
@@ -65,19 +73,26 @@ def cross_validate(
 
 
 def _left_over(
-    model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], fold: Fold
+    model: Model,
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    fold: Fold,
+    noise: Noise | None,
 ) -> Iterator[Array]:
     """Readings minus model (R, Y) where the fit did not see them, NaN elsewhere."""
     if fold.windows is None:
         kept = [name for name in recordings if name not in fold.recordings]
         seen = replace(campaign, recordings={name: campaign.recordings[name] for name in kept})
-        fit = fit_model(model, seen, kept, outputs, max_rounds=15)
+        fit = fit_model(model, seen, kept, outputs, noise=noise, max_rounds=ROUNDS)
         for name in fold.recordings:
             trajectory = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)
             yield fit.problem.residual(trajectory)
         return
     masked = {name: _mask(campaign.recordings[name], outputs, fold.windows[name]) for name in recordings}
-    fit = fit_model(model, replace(campaign, recordings=masked), recordings, outputs, max_rounds=15)
+    fit = fit_model(
+        model, replace(campaign, recordings=masked), recordings, outputs, noise=noise, max_rounds=ROUNDS
+    )
     for trajectory in fit.trajectories:
         name = trajectory.system.grid.recording
         whole = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)

@@ -67,7 +67,7 @@ def test_a_model_survives_its_file(tmp_path: Path) -> None:
         fitted = dataclasses.replace(
             model,
             parameters={
-                name: dataclasses.replace(p, value=p.value * 1.1, low=0.0, high=p.value * 2, max=p.value * 9)
+                name: dataclasses.replace(p, value=p.value * 1.1, low=0, high=p.value * 2, max=p.value * 9)
                 for name, p in model.parameters.items()
             },
         )
@@ -83,7 +83,7 @@ def test_a_model_survives_its_file(tmp_path: Path) -> None:
 
 
 def test_hidden_states_that_count_in_seconds_survive_a_file_in_hours(tmp_path: Path) -> None:
-    """A lag becomes a state in seconds; its file counts in minutes or hours, and the trajectory stays the same."""
+    """A lag becomes a state in seconds; its file counts in minutes, and the trajectory stays the same."""
     import numpy as np
 
     from discovery.dynamics import make_grid, make_system, simulate
