@@ -51,7 +51,7 @@ def _models(run: Run) -> tuple[str, list[str], list[tuple[str, str]]]:
     where = f"on {_called(unseen)}" if unseen else "on the recordings it was fitted to"
     named = f" “{best}”" if best != origin(run, best) else ""
     rivals = [model for model in order[1:] if math.isfinite(ratio(run, best, model))]
-    headline = f"The {origin(run, best)} model{named} predicts best {where}."
+    headline = f"The {origin(run, best)} model{named} predicts best {where}{_nearly(run, best, rivals)}."
     points, figures = _removed(run, best) if is_error(run) else _left(run, best)
     compared = [f"{_less(ratio(run, best, model))} {_name(run, model)}" for model in rivals]
     if compared:
@@ -96,6 +96,12 @@ def _called(unseen: Sequence[str]) -> str:
     if len(unseen) > 4:
         return f"{len(unseen)} unseen recordings"
     return f"the unseen recording{'s' * (len(unseen) > 1)} {listed([f'“{name}”' for name in unseen])}"
+
+
+def _nearly(run: Run, best: str, rivals: Sequence[str]) -> str:
+    """A winner by less than 5 % has no lead worth the name."""
+    close = [model for model in rivals if ratio(run, best, model) > 0.95]
+    return f", and {listed([f'“{model}”' for model in close])} nearly as well" if close else ""
 
 
 def _name(run: Run, model: str) -> str:

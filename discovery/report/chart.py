@@ -47,6 +47,12 @@ class Chart:
     group: str = ""  # charts of a group zoom together
     marks: Mapping[str, float] = field(default_factory=dict)  # named vertical lines
 
+    @property
+    def key_items(self) -> list[Series]:
+        """Curves that a legend of the chart's own has to name; charts of a group share one."""
+        named = {s.name: s for panel in self.panels for s in panel.series if s.kind in ("line", "band")}
+        return list(named.values()) if not self.group and len(named) > 1 else []
+
 
 def thinned(x: Array, y: Array, most: int) -> tuple[Array, Array]:
     """At most about `most` points that keep the look of the curve: lowest and highest of each bin, gaps dropped.

@@ -20,10 +20,11 @@
     const digits = Math.abs(value) >= 100 ? 0 : Math.abs(value) >= 10 ? 1 : Math.abs(value) >= 1 ? 2 : 3;
     return Number(value.toFixed(digits)).toString().replace("-", "−");
   };
-  const steps = (low, high, count, isHours) => {
+  const steps = (low, high, count, isHours, isCount) => {
     const raw = (high - low) / Math.max(count, 1);
     const power = 10 ** Math.floor(Math.log10(raw));
     let step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw);
+    if (isCount) step = Math.max(1, step);
     if (isHours && raw > 0.9) step = [1, 2, 3, 6, 12, 24, 48, 96, 168].find((k) => k >= raw) || step;
     const found = [];
     for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; k++) found.push(k * step);
@@ -108,7 +109,7 @@
         element("line", { class: Math.abs(tick) < 1e-12 && panel.zero ? "zero" : "grid", x1: LEFT, x2: this.width - RIGHT, y1: y, y2: y }, svg);
         element("text", { class: "tick", x: LEFT - 7, y: y + 4, "text-anchor": "end" }, svg, show(tick));
       }
-      for (const tick of steps(...this.domain, (this.width - LEFT - RIGHT) / 55, this.chart.x.includes("[h]"))) {
+      for (const tick of steps(...this.domain, (this.width - LEFT - RIGHT) / 55, this.chart.x.includes("[h]"), /\[(-|readings)\]/.test(this.chart.x))) {
         const x = this.at(tick);
         element("line", { class: "grid", x1: x, x2: x, y1: top, y2: bottom }, svg);
         if (area.last) element("text", { class: "tick", x, y: bottom + 17, "text-anchor": "middle" }, svg, show(tick));

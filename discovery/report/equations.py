@@ -55,8 +55,14 @@ def equations(model: Model) -> list[str]:
     signs = symbols(model)
     lines = [_balance(model, state, signs) for state in model.states.values()]
     return lines + [
-        _equation(mathml.symbol(name), _summands(tree, signs)) for name, tree in model.outputs.items()
+        _equation(_read(name, model, signs), _summands(tree, signs)) for name, tree in model.outputs.items()
     ]
+
+
+def _read(name: str, model: Model, signs: Mapping[str, str]) -> str:
+    """The symbol of an output; one that bears the name of a state is what its sensor shows of it."""
+    body = signs.get(name) or mathml.symbol(name)
+    return f"<msup><mrow>{body}</mrow><mtext>read</mtext></msup>" if name in model.states else body
 
 
 def _balance(model: Model, state: State, signs: Mapping[str, str]) -> str:

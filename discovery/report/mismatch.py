@@ -15,6 +15,7 @@ from discovery.report.run import Run, pretty_unit
 from discovery.report.series import time_axis
 from discovery.report.text import listed, number, percent, with_unit, words
 
+_MOST_RIVALS = 6
 _HEAT_NOTE = "What would close the gap, cause unknown, over time and against each input and state (band: 95 %). What it follows is missing."
 
 
@@ -143,29 +144,39 @@ def _outputs(run: Run, d: Mapping[str, Any]) -> Printed:
 
 
 def _windows(run: Run, d: Mapping[str, Any]) -> Printed:
+    windows = (d.get("location") or {}).get("windows") or []
+    long = any((w.get("end_s") or 0.0) > 3 * 3600 for w in windows)
+    scale, unit = (3600.0, "h") if long else (60.0, "min")
+
+    def at(seconds: float | None) -> str:
+        return number(None if seconds is None else seconds / scale)
+
     rows = [
         Line(
             (
                 str(w.get("recording")),
-                _hours(w.get("start_s")),
-                _hours(w.get("end_s")),
+                at(w.get("start_s")),
+                at(w.get("end_s")),
                 str(w.get("state") or ""),
                 number(w.get("heat_W")),
             )
         )
-        for w in (d.get("location") or {}).get("windows") or []
+        for w in windows
     ]
-    header = ("Recording", "From [h]", "To [h]", "Body", with_unit("Missing heat", _heat_unit(run)))
+    heat = _heat_unit(run)
+    header = (
+        "Recording",
+        f"From [{unit}]",
+        f"To [{unit}]",
+        "Body",
+        with_unit("Missing heat" if heat == "W" else "Missing rate", heat),
+    )
     return Printed("When it shows", header, tuple(rows), frozenset({3}))
-
-
-def _hours(seconds: float | None) -> str:
-    return number(None if seconds is None else seconds / 3600)
 
 
 def _rivals(d: Mapping[str, Any]) -> Printed:
     rows = []
-    for one in d.get("alternatives") or []:
+    for one in (d.get("alternatives") or [])[:_MOST_RIVALS]:
         below = one.get("log_evidence_below_best")
         judged = (
             ""
