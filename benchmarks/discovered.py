@@ -1,4 +1,5 @@
-"""The discovered models of the two experiments against eq. (9) and the hand-built ones, on recordings held out.
+"""The discovered models of the two experiments against eq. (9) and the hand-built ones, on recordings held
+out.
 
 python benchmarks/discovered.py [nmv5000] [tclab]
 """

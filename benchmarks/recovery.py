@@ -1,10 +1,11 @@
-"""How often the exact set of terms is found, how well their coefficients, beside plain PySINDy and its weak form.
+"""How often the exact set of terms is found, how well their coefficients, beside plain PySINDy and its weak
+form.
 
     python benchmarks/recovery.py [--sets 25] [--peers]
 
-Each data set has two recordings of 72 h to fit and a third, never fitted nor chosen by, to test on; four outputs with
-different supports; 20 candidate terms; readings every 5 to 15 minutes at irregular instants with 1 um noise; inputs every
-10 s. See `recovery_data.py`.
+Each data set has two recordings of 72 h to fit and a third, never fitted nor chosen by, to test on; four
+outputs with different supports; 20 candidate terms; readings every 5 to 15 minutes at irregular instants with
+1 um noise; inputs every 10 s. See `recovery_data.py`.
 """
 
 from __future__ import annotations
@@ -55,7 +56,9 @@ def _library() -> list[Callable[..., object]]:
 
 
 def plain(campaign: Campaign, output: str, truth: Found) -> Found:
-    """PySINDy as it comes: finite differences, STLSQ; the threshold that comes nearest to the truth (an oracle)."""
+    """PySINDy as it comes: finite differences, STLSQ; the threshold that comes nearest to the truth (an
+    oracle).
+    """
     import pysindy
 
     t, x, u = zip(*(_columns(campaign, r, output) for r in FIT), strict=True)
@@ -74,7 +77,9 @@ def plain(campaign: Campaign, output: str, truth: Found) -> Found:
 
 
 def weak(campaign: Campaign, output: str, truth: Found) -> Found:
-    """PySINDy's weak form, one library a recording, rows stacked by hand, STLSQ on scaled columns; oracle threshold."""
+    """PySINDy's weak form, one library a recording, rows stacked by hand, STLSQ on scaled columns; oracle
+    threshold.
+    """
     import pysindy
 
     rows, targets = [], []
@@ -135,9 +140,9 @@ def main() -> None:
                     print(f"  {name} {seed} {output}: extra {sorted(extra)}, lost {sorted(lost)}", flush=True)
         count = len(exact)
         print(
-            f"{name}: exact {sum(exact)} of {count}, median coefficient error {100 * np.median(errors):.2f} %, "
-            f"mean pole bias {100 * np.mean(poles):+.2f} % (standard error {100 * np.std(poles) / count**0.5:.2f}), "
-            f"{seconds / count:.2f} CPU s an output",
+            f"{name}: exact {sum(exact)} of {count}, "
+            f"median coefficient error {100 * np.median(errors):.2f} %, "
+            f"mean pole bias {100 * np.mean(poles):+.2f} % (standard error {100 * np.std(poles) / count**0.5:.2f}), {seconds / count:.2f} CPU s an output",
             flush=True,
         )
 

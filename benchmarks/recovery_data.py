@@ -22,24 +22,34 @@ CHANNELS = {
     "decoy": ("other input", "1", "linear"),
 }
 LIBRARY = (
-    "y", "1", "u1", "u2", "u3", "speed", "pump", "decoy", "speed**2", "speed**3", "pump*y", "pump*u1", "pump*u2",
-    "pump*u3", "pump*speed", "u1**2", "u2**2", "y**2", "speed*y", "decoy*u1",
+    "y", "1", "u1", "u2", "u3", "speed", "pump", "decoy", "speed**2", "speed**3", "pump*y", "pump*u1",
+    "pump*u2", "pump*u3", "pump*speed", "u1**2", "u2**2", "y**2", "speed*y", "decoy*u1",
 )  # fmt: skip
 
-# True coefficients per hour, each drawn within 30 % of these sizes; one output per support.
+# Time constant in h and coefficients per hour, each drawn within 30 % of these sizes; one output per support.
 TRUTH: dict[str, tuple[float, dict[str, float]]] = {
     "E1": (3.0, {"u1": -2.0, "u2": 12.0, "u3": 2.5, "1": 3.0}),  # eq. (9)
     "E2": (1.2, {"u1": -2.5, "u3": 4.0, "1": 3.0}),  # without the load
     "E3": (4.5, {"u1": -2.0, "u2": 8.0, "u3": 2.0, "speed**2": 6.0, "1": 3.0}),  # losses grow with the speed
-    "E4": (2.0, {"u1": -2.0, "u2": 10.0, "pump*u3": 3.0, "pump*y": -0.3, "1": 3.0}),  # fluid only while it runs
+    "E4": (
+        2.0,
+        {"u1": -2.0, "u2": 10.0, "pump*u3": 3.0, "pump*y": -0.3, "1": 3.0},
+    ),  # fluid only while it runs
 }
 
 
-def make_campaign(seed: int, recordings: int, noise: float = 1.0) -> tuple[Campaign, dict[str, dict[str, float]], dict[str, Array]]:
-    """A data set: campaign, true coefficients by output and term, and the noise-free outputs of the last recording."""
+def make_campaign(
+    seed: int, recordings: int, noise: float = 1.0
+) -> tuple[Campaign, dict[str, dict[str, float]], dict[str, Array]]:
+    """A data set: campaign, true coefficients by output and term, and the noise-free outputs of the last
+    recording.
+    """
     rng = np.random.default_rng(seed)
     truth = {
-        name: {"y": -1.0 / (tau * rng.uniform(0.8, 1.25)), **{k: v * rng.uniform(0.7, 1.3) for k, v in terms.items()}}
+        name: {
+            "y": -1.0 / (tau * rng.uniform(0.8, 1.25)),
+            **{k: v * rng.uniform(0.7, 1.3) for k, v in terms.items()},
+        }
         for name, (tau, terms) in TRUTH.items()
     }
     channels = {n: Channel(n, role, unit, None, between) for n, (role, unit, between) in CHANNELS.items()}  # type: ignore[arg-type]
@@ -95,17 +105,22 @@ def _wander(rng: np.random.Generator, count: int, hours: float, size: float) -> 
 
 
 def _simulate(terms: dict[str, float], u: dict[str, Array]) -> Array:
-    """y' = sum of terms from rest, by exact steps with inputs averaged over each (10 s against hours)."""
-    p = terms["y"] + terms.get("pump*y", 0.0) * u["pump"]
-    drive = terms["1"] + sum(
-        c * np.prod([u[f.split("**")[0]] ** (int(f[-1]) if "**" in f else 1) for f in k.replace("**", "^").replace("*", " ").replace("^", "**").split()], axis=0)
-        for k, c in terms.items() if k not in ("1", "y", "pump*y")
-    )  # fmt: skip
-    y = np.zeros(len(p))
-    h = STEP / 3600
-    held = {"u2", "speed", "pump"}
-    for k in range(len(p) - 1):
-        e = np.exp(p[k] * h)
-        y[k + 1] = e * y[k] + (e - 1) / p[k] * drive[k]
-    _ = held
+    """y' = sum of terms from rest, by exact steps with inputs held over each (10 s against hours)."""
+    pole = terms["y"] + terms.get("pump*y", 0.0) * u["pump"]
+    drive = np.full(len(pole), terms["1"])
+    for word, size in terms.items():
+        if word not in ("1", "y", "pump*y"):
+            drive += size * _product(word, u)
+    y = np.zeros(len(pole))
+    for k in range(len(pole) - 1):
+        decay = np.exp(pole[k] * STEP / 3600)
+        y[k + 1] = decay * y[k] + (decay - 1) / pole[k] * drive[k]
     return y
+
+
+def _product(word: str, u: dict[str, Array]) -> Array:
+    """Value of "u1", "speed**2" or "pump*u3"."""
+    if "**" in word:
+        name, power = word.split("**")
+        return np.asarray(u[name] ** int(power))
+    return np.prod([u[name] for name in word.split("*")], axis=0)

@@ -103,7 +103,7 @@ def discover_error(
             for r in recordings
         }
         model = fit_model(model, campaign, recordings, [output], grids=grids).model
-    terms, drives = _stability(problem, whole, chosen, options)
+    terms, drives = _stability(problem, chosen, options)
     report = {
         "outputs": [output],
         "form": "masses",
@@ -174,7 +174,7 @@ def _left_out(problem: _Problem, options: SparseOptions) -> Array:
 
 
 def _stability(
-    problem: _Problem, whole: Gram, chosen: Support, options: SparseOptions
+    problem: _Problem, chosen: Support, options: SparseOptions
 ) -> tuple[dict[int, float], dict[str, float]]:
     """Share of block bootstraps that keep each chosen column, and each drive through whatever mass."""
     rng = np.random.default_rng(options.seed)

@@ -1,4 +1,6 @@
-"""Discovery of terms in the rates of states: from eq. (9), from measured temperatures, or from a baseline file."""
+"""Discovery of terms in the rates of states: from eq. (9), from measured temperatures, or from a baseline
+file.
+"""
 
 from __future__ import annotations
 
@@ -44,10 +46,11 @@ class RateData:
 
 @dataclass(frozen=True)
 class Growth:
-    """How a model grows: coefficients that are in it from the start and may leave, and how many more may enter.
+    """How a model grows: coefficients that are in it from the start and may leave, and how many more may
+    enter.
 
-    A baseline that lacks something large is bent by its fit; so each fit also starts from the values `restart` that the
-    baseline had before, and the better one counts.
+    A baseline that lacks something large is bent by its fit; so each fit also starts from the values
+    `restart` that the baseline had before, and the better one counts.
     """
 
     entered: tuple[str, ...] = ()
@@ -79,11 +82,11 @@ def discover_rates(
         model: baseline and all candidates, coefficients at good start values.
         labels: coefficients that may leave, by name; what reports call their terms.
         always: parameters that cannot leave (shapes, baseline terms that are kept).
-        growth: terms first enter one by one by their score, then those that entered may leave; else all are fitted at
-            once and leave one by one.
+        growth: terms first enter one by one by their score, then those that entered may leave; else all are
+            fitted at once and leave one by one.
     """
     if growth is not None:
-        model, labels = _grown(data, model, labels, options, growth)
+        model, labels = _grown(data, model, labels, growth)
     full = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, _rough_noise(data))
     noise = white_noise(data.outputs, _stated(data), list(full.residuals().values()))
     full = replace(full, noise=noise)
@@ -158,7 +161,9 @@ def _stated(data: RateData) -> dict[str, float | None]:
 
 
 def _rough_noise(data: RateData) -> Noise:
-    """Noise that weighs the outputs before anything is fitted: the stated one, else 2 % of the readings' spread."""
+    """Noise that weighs the outputs before anything is fitted: the stated one, else 2 % of the readings'
+    spread.
+    """
     spread = np.nanstd(np.concatenate([data.grids[r].readings for r in data.recordings]), axis=0)
     stated = _stated(data).values()
     return Noise(
@@ -167,12 +172,13 @@ def _rough_noise(data: RateData) -> Noise:
 
 
 def _grown(
-    data: RateData, model: Model, labels: Mapping[str, str], options: SparseOptions, growth: Growth
+    data: RateData, model: Model, labels: Mapping[str, str], growth: Growth
 ) -> tuple[Model, dict[str, str]]:
     """The baseline with the candidates that its residual asks for, one at a time, each time fitted anew.
 
-    A candidate enters by its score: what its column, filtered through the present model, takes off the cost when all
-    fitted parameters may follow. Growth ends where the extended criterion does not pay for the next term.
+    A candidate enters by its score: what its column, filtered through the present model, takes off the cost
+    when all fitted parameters may follow. Growth ends where the extended criterion does not pay for the next
+    term.
     """
     entered = list(growth.entered)
     noise = _rough_noise(data)

@@ -47,9 +47,10 @@ def discover(
 ) -> Discovery:
     """Discover a sparse model of `outputs` from `recordings`; no other recording is looked at.
 
-    Errors become sums of hidden thermal masses; measured temperatures, user-given expressions and baseline files get
-    terms in the rates of their states. Sizes are chosen by free runs on what was left out, one recording at a time (or
-    by blocks of a single one); numbers are fitted by output error and carry 95 % intervals.
+    Errors become sums of hidden thermal masses; measured temperatures, user-given expressions and baseline
+    files get terms in the rates of their states. Sizes are chosen by free runs on what was left out, one
+    recording at a time (or by blocks of a single one); numbers are fitted by output error and carry 95 %
+    intervals.
 
     Args:
         recordings: names of the recordings to fit.
@@ -120,8 +121,8 @@ def _error_rates(
 def _room(outputs: Sequence[str], inputs: Inputs) -> tuple[str, dict[str, State]]:
     """The temperature of the room: its channel where it moves, else a constant of each recording.
 
-    Where the sensors start near what is known of the room they stand in it at rest, and their mean tells the room's
-    temperature of that day.
+    Where the sensors start near what is known of the room they stand in it at rest, and their mean tells the
+    room's temperature of that day.
     """
     if air := inputs.of(AMBIENT):
         return air[0], {}
@@ -204,7 +205,8 @@ def _on_file(
     for name in options.into or ():
         if name not in baseline.states:
             raise UserError(
-                f"{path}: the discovery adds terms into '{name}', which is no state of this model ({', '.join(baseline.states)})"
+                f"{path}: the discovery adds terms into '{name}', which is no state of this model "
+                f"({', '.join(baseline.states)}); mend the name under into"
             )
     bodies = [name for name, state in baseline.states.items() if state.capacity] or list(baseline.states)
     found = candidates(

@@ -44,13 +44,13 @@ def make_inputs(campaign: Campaign, recordings: Sequence[str], asked: Sequence[s
     for name in asked or ():
         if name not in campaign.channels:
             raise UserError(
-                f"{campaign.path}: the discovery asks for the input '{name}', which is no channel of the campaign "
-                f"({', '.join(campaign.channels)}); mend the name under inputs"
+                f"{campaign.path}: the discovery asks for the input '{name}', which is no channel "
+                f"of the campaign ({', '.join(campaign.channels)}); mend the name under inputs"
             )
         if campaign.channels[name].role in MEASURED:
             raise UserError(
-                f"{campaign.path}: '{name}' has the role {campaign.channels[name].role} and cannot drive a model; "
-                "take it out of inputs"
+                f"{campaign.path}: '{name}' has the role {campaign.channels[name].role} and cannot drive "
+                "a model; take it out of inputs"
             )
     values = {}
     for name, channel in campaign.channels.items():
@@ -78,7 +78,7 @@ def _known(campaign: Campaign, recording: str, name: str) -> NDArray[np.float64]
 
 
 def mass_drives(inputs: Inputs) -> list[str]:
-    """Expressions that may drive a hidden mass: zero at the reference, temperatures also gated by the pump."""
+    """Expressions that may drive a hidden mass: zero at the reference, heat also gated by the pump."""
     reference = f"{inputs.reference:g}"
     found = [f"{name} - {reference}" for name in inputs.of(*TEMPERATURES)]
     others = [

@@ -44,8 +44,9 @@ def candidates(
             expression = parse(word, "library of the discovery")
             for name in sorted(names(expression) - known):
                 raise UserError(
-                    f"{campaign.path}: the library of the discovery names '{name}' in '{word}', which is neither a family "
-                    f"({', '.join(FAMILIES)}) nor made of inputs and states ({', '.join(sorted(known))})"
+                    f"{campaign.path}: the library of the discovery names '{name}' in '{word}', which is "
+                    f"neither a family ({', '.join(FAMILIES)}) nor made of inputs and states "
+                    f"({', '.join(sorted(known))})"
                 )
             found.append(
                 _bounded(Candidate(state, substitute(expression, {"y": Name(state)})), options, word)
@@ -80,7 +81,8 @@ def _family(
 ) -> list[Candidate]:
     """Terms of a family for one state, with the sign that physics gives them.
 
-    Heat that two bodies of known capacity exchange leaves one and enters the other, so that pair is offered once.
+    Heat that two bodies of known capacity exchange leaves one and enters the other, so that pair is offered
+    once.
     """
     air = inputs.of(AMBIENT)
     room = room or (air[0] if air else f"{inputs.reference:g}")

@@ -17,7 +17,9 @@ PREDICT, NAME = 1.0, 2.0  # default tolerances: of a model that is to predict, a
 
 @dataclass(frozen=True)
 class Blocks:
-    """Contiguous pieces of the recordings, in their order. `of` holds for each recording the block of each reading."""
+    """Contiguous pieces of the recordings, in their order. `of` holds for each recording the block of each
+    reading.
+    """
 
     of: tuple[Ints, ...]  # (R,) each
     recording: Ints  # (B,) index of the recording
@@ -29,7 +31,8 @@ class Blocks:
 
 
 def make_blocks(times: Sequence[Array], count: int) -> Blocks:
-    """Cut recordings with readings at `times` [s] into about `count` blocks of equal duration, at least one each.
+    """Cut recordings with readings at `times` [s] into about `count` blocks of equal duration, at least one
+    each.
 
     A single recording gets at least eight, so that it can be left out in parts.
     """
@@ -46,7 +49,9 @@ def make_blocks(times: Sequence[Array], count: int) -> Blocks:
 
 
 def make_folds(blocks: Blocks) -> list[Ints]:
-    """Blocks left out in each fold: one recording at a time (several when there are many), else a quarter of the one."""
+    """Blocks left out in each fold: one recording at a time (several when there are many), else a quarter of
+    the one.
+    """
     recordings = int(blocks.recording.max()) + 1
     if recordings == 1:
         return list(np.array_split(np.arange(blocks.count), _MOST_FOLDS))
@@ -57,8 +62,8 @@ def make_folds(blocks: Blocks) -> list[Ints]:
 def choose(errors: Array, tolerance: float) -> int:
     """The sparsest row whose error on what was left out is within `tolerance` standard errors of the best.
 
-    The standard error is that of the paired difference of logarithms over blocks: it holds where residuals are coloured
-    and where recordings of different violence stand side by side.
+    The standard error is that of the paired difference of logarithms over blocks: it holds where residuals
+    are coloured and where recordings of different violence stand side by side.
 
     Args:
         errors: (sizes, B) mean squared error of each left-out block, sparsest model first.

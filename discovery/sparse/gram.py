@@ -104,8 +104,8 @@ def solve(g: Gram, support: Sequence[int], low: Array | None = None, high: Array
 def factor(g: Gram) -> tuple[Array, Array]:
     """Rows R (M, M) and z (M,) with the same normal equations: what an optimiser that wants rows is given.
 
-    |z - R theta|^2 differs from the cost by a constant, so any least-squares optimiser finds on these M rows what it
-    would find on all readings.
+    |z - R theta|^2 differs from the cost by a constant, so any least-squares optimiser finds on these M rows
+    what it would find on all readings.
     """
     scale = g.length
     values, vectors = np.linalg.eigh(g.matrix / np.outer(scale, scale))

@@ -2,10 +2,10 @@
 
     ds_j/dt = sum_k g_jk phi_k(u) - (a_j + b_j pump) s_j          E = sum_j s_j + offset
 
-Eq. (8) generalised: there every input has one mass of its own, in eq. (9) all inputs share one. `b_j` lets a mass answer
-quicker while cutting fluid runs over it, which no constant time constant can. On a grid of (dry, wet) time constants the model is
-linear in its gains, so the filtered inputs are the columns of a regression in the *outputs*: readings are used where
-they were taken and nothing is differentiated.
+Eq. (8) generalised: there every input has one mass of its own, in eq. (9) all inputs share one. `b_j` lets a
+mass answer quicker while cutting fluid runs over it, which no constant time constant can. On a grid of (dry,
+wet) time constants the model is linear in its gains, so the filtered inputs are the columns of a regression
+in the *outputs*: readings are used where they were taken and nothing is differentiated.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Mass:
 
 @dataclass(frozen=True)
 class MassLibrary:
-    """Every drive into every mass: column k is drive `drive[k]` into mass `mass[k]`; column 0 is the offset."""
+    """Every drive into every mass: column k is `drive[k]` into `mass[k]`, column 0 the offset."""
 
     masses: tuple[Mass, ...]
     drives: tuple[Expression, ...]
@@ -133,7 +133,8 @@ def _carriers(masses: Sequence[Mass], gate: Expression) -> Model:
 
 
 def block_grams(response: Response, target: Array, block: NDArray[np.intp]) -> dict[int, Gram]:
-    """Normal equations by block of a recording, in columns [library, start values]; readings that are NaN count nowhere.
+    """Normal equations by block of a recording, in columns [library, start values]; readings that are NaN
+    count nowhere.
 
     Args:
         target: (R,) readings over their noise.
@@ -169,7 +170,8 @@ def free_run(
 ) -> Array:
     """Prediction (R,) of a recording that was left out, zeroed on its first reading alone.
 
-    The same Bayesian step as `fitting.predict_recording`: the masses in use share what the first reading says.
+    The same Bayesian step as `fitting.predict_recording`: the masses in use share what the first reading
+    says.
     """
     predicted = response.columns @ theta
     used = sorted(set(library.mass[np.flatnonzero(theta)]) - {-1})

@@ -1,7 +1,7 @@
 """Sequential thresholding on normal equations, and PySINDy's own optimisers on the same matrices.
 
-PySINDy is imported here alone. Its optimisers want rows; they are given the M rows of `gram.factor`, which hold all
-that the readings say, so an optimiser costs the same for a day and for a year of recordings.
+PySINDy is imported here alone. Its optimisers want rows; they are given the M rows of `gram.factor`, which
+hold all that the readings say, so an optimiser costs the same for a day and for a year of recordings.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ _ROUNDS = 20
 
 
 def stlsq(g: Gram, threshold: float, alpha: float = 0.05) -> Array:
-    """Coefficients (M,) by sequentially thresholded ridge regression (Brunton, Proctor & Kutz, PNAS 113, 2016).
+    """Coefficients (M,) by sequentially thresholded ridge regression (Brunton, Proctor & Kutz, PNAS 113,
+    2016).
 
     The same as `pysindy.STLSQ(threshold, alpha)` on the rows behind `g`, coefficient by coefficient.
     """
@@ -46,10 +47,11 @@ def stlsq(g: Gram, threshold: float, alpha: float = 0.05) -> Array:
 
 
 def pysindy_path(g: Gram, kind: Optimiser, always: Sequence[int] = (), points: int = 25) -> list[Support]:
-    """Supports that an optimiser of PySINDy finds over a range of thresholds: one of every size, smallest first.
+    """Supports that an optimiser of PySINDy finds over a range of thresholds: one of every size, smallest
+    first.
 
-    Columns are scaled to unit length first. `always` columns are added to every support. Sizes that no threshold gives are
-    filled by elimination.
+    Columns are scaled to unit length first. `always` columns are added to every support. Sizes that no
+    threshold gives are filled by elimination.
 
     Args:
         kind: "stlsq", "ssr" (one term less in each step) or "sr3" (l0, `always` columns weigh nothing).
@@ -70,7 +72,7 @@ def pysindy_path(g: Gram, kind: Optimiser, always: Sequence[int] = (), points: i
         history = optimiser.history_ if kind == "ssr" else [optimiser.coef_]
         for theta in history:
             chosen = set(np.flatnonzero(np.abs(np.ravel(theta)) > 0).tolist())
-            found.add(tuple([*always, *sorted(chosen - set(always))]))
+            found.add((*always, *sorted(chosen - set(always))))
     best: dict[int, tuple[float, Support]] = {}
     for support in found:
         entry = (g.cost(solve(g, support)), support)

@@ -10,7 +10,7 @@ FAMILIES = ("linear", "wet", "rotation", "coupling", "radiation", "natural", "lo
 
 
 class SparseOptions(BaseModel):
-    """Options of one discovered model; the defaults serve a machine tool and a temperature laboratory alike."""
+    """Options of one discovered model; the defaults serve a machine tool and two heaters alike."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -22,17 +22,19 @@ class SparseOptions(BaseModel):
     baseline: str = Field("eq9", description='"eq9", or a gray-box model file whose terms are built upon')
     keep_baseline: bool | None = Field(
         None,
-        description="true: the baseline's terms are always in; false: free to leave; default true for a file, "
-        "false for eq9",
+        description="true: the baseline's terms are always in; false: free to leave; default true for a "
+        "file, false for eq9",
     )
     form: Literal["auto", "masses", "rates"] = Field(
         "auto",
-        description='"masses": hidden thermal masses driven by the inputs; "rates": terms in the rates of the '
-        'outputs (or of the states of a baseline file); "auto": masses for errors, rates for anything else',
+        description='"masses": hidden thermal masses driven by the inputs; "rates": terms in the rates of '
+        'the outputs (or of the states of a baseline file); "auto": masses for errors, rates for '
+        "anything else",
     )
     library: tuple[str, ...] | None = Field(
         None,
-        description=f"families ({', '.join(FAMILIES)}) or expressions of channels and states; y is the output itself",
+        description=f"families ({', '.join(FAMILIES)}) or expressions of channels and states; y is the "
+        "output itself",
     )
     into: tuple[str, ...] | None = Field(
         None, description="states of a baseline file that candidates may enter; default all"
@@ -59,8 +61,8 @@ class SparseOptions(BaseModel):
     tolerance: float | None = Field(
         None,
         ge=0,
-        description="standard errors by which a sparser model may be worse on what was left out; default 1 for "
-        "masses, which are to predict, and 2 for rates, which name physics",
+        description="standard errors by which a sparser model may be worse on what was left out; default 1 "
+        "for masses, which are to predict, and 2 for rates, which name physics",
     )
     blocks: int = Field(
         24, ge=4, le=500, description="blocks that the recordings are cut into for bootstraps"

@@ -24,9 +24,11 @@ def backward(
     high: Array | None = None,
     within: Sequence[int] | None = None,
 ) -> list[Support]:
-    """Supports from all columns (of `within`) down to `always`: at each step the column whose loss costs least leaves.
+    """Supports from all columns (of `within`) down to `always`: at each step the column whose loss costs
+    least leaves.
 
-    The rise of the cost is theta_j^2 / (A^-1)_jj. A column whose coefficient stands at a bound of zero goes first.
+    The rise of the cost is theta_j^2 / (A^-1)_jj. A column whose coefficient stands at a bound of zero goes
+    first.
 
     Returns:
         supports, smallest first.
@@ -58,8 +60,8 @@ def forward(
     Args:
         size: largest support.
         always: columns that are always in.
-        groups: (M,) group of each column (its hidden mass; -1: none). At most `max_groups` groups are used, so that
-            a few masses carry several drives each.
+        groups: (M,) group of each column (its hidden mass; -1: none). At most `max_groups` groups are used,
+            so that a few masses carry several drives each.
         low, high: (M,) bounds; a column enters only with a coefficient of a sign that they allow.
 
     Returns:
@@ -90,8 +92,8 @@ def best_of_each_size(
 ) -> list[Support]:
     """The better of `backward` and `forward` for every size up to `most`, smallest first.
 
-    Elimination loses a term early when two others imitate it together (a square between a line and a cube); growth
-    finds that term first but may pick a proxy where elimination does not.
+    Elimination loses a term early when two others imitate it together (a square between a line and a cube);
+    growth finds that term first but may pick a proxy where elimination does not.
     """
     path = {len(s): s for s in backward(g, always, low, high) if len(s) <= most}
     for support in forward(g, most, always, low=low, high=high):

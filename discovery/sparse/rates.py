@@ -1,9 +1,9 @@
 """Rates: a baseline model and candidate terms in the rates of its states, every coefficient a parameter.
 
-The whole library is one model, in which a term that has left has the coefficient zero. Its fit by output error gives the
-sensitivity column of every coefficient (the term filtered through the model's own dynamics), and the normal equations
-of these columns rank all subsets at once: `residual = S_params d_theta + S_candidates theta` needs no derivative of a
-reading and works with states that nobody measures.
+The whole library is one model, in which a term that has left has the coefficient zero. Its fit by output
+error gives the sensitivity column of every coefficient (the term filtered through the model's own dynamics),
+and the normal equations of these columns rank all subsets at once: `residual = S_params d_theta +
+S_candidates theta` needs no derivative of a reading and works with states that nobody measures.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A term that may be added: `coefficient * expression` into a state (and out of `source`, where heat is exchanged)."""
+    """A term that may be added: `coefficient * expression` into a state (and out of `source`, where heat is
+    exchanged).
+    """
 
     into: str
     expression: Expression
@@ -121,7 +123,9 @@ def _vanishes(expression: Expression, zero: set[str] | frozenset[str]) -> bool:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Normal equations of all common parameters around a fit, by block; starts and per-recording values ride along."""
+    """Normal equations of all common parameters around a fit, by block; starts and per-recording values ride
+    along.
+    """
 
     names: tuple[str, ...]  # (M,) common parameters
     blocks: tuple[Gram, ...]  # (B,) columns [parameters, nuisance]
@@ -167,9 +171,11 @@ def evidence(fit: Fit, blocks: Blocks) -> Evidence:
 
 
 def extended_bic(g: Gram, sizes: Sequence[int], costs: Sequence[float], library: int) -> Array:
-    """Extended Bayesian criterion (Chen & Chen, Biometrika 95, 2008): cost + k (log n + 2 log p), cost over the noise.
+    """Extended Bayesian criterion (Chen & Chen, Biometrika 95, 2008): cost + k (log n + 2 log p), cost over
+    the noise.
 
-    The second part pays for the choice among `library` columns, without which one term in eight models is by chance.
+    The second part pays for the choice among `library` columns, without which one term in eight models is by
+    chance.
     """
     penalty = np.log(max(g.count, 2)) + 2 * np.log(library)
     return np.asarray(np.array(costs) + np.array(sizes) * penalty)

@@ -1,4 +1,8 @@
-"""Supports of every size: planted terms, groups, signs, and what PySINDy's optimisers find on the same matrix."""
+"""Supports of every size: planted terms, groups, signs, and what PySINDy's optimisers find on the same
+matrix.
+"""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -36,7 +40,7 @@ def test_a_term_that_two_others_imitate_together_is_found() -> None:
 
 def test_each_step_back_costs_as_little_as_any(planted: Gram) -> None:
     path = backward(planted)
-    for small, large in zip(path[1:-1], path[2:], strict=True):
+    for small, large in pairwise(path[1:]):
         best = min(planted.cost(solve(planted, [j for j in large if j != out])) for out in large)
         assert planted.cost(solve(planted, small)) == pytest.approx(best, rel=1e-5)
 
