@@ -58,7 +58,9 @@ def _models(run: Run) -> tuple[str, list[str], list[tuple[str, str]]]:
         points.append(f"It leaves {listed(compared)}.")
     figures += [
         (_less(ratio(run, best, model), short=True), f"rms left by {best} against {model}")
-        for model in [m for m in rivals if origin(run, m) == "hand-built"][:2]
+        for model in [
+            m for m in rivals if origin(run, m) == "hand-built" and abs(ratio(run, best, m) - 1) > 0.02
+        ][:2]
     ]
     if is_error(run) and (worst := _worst(run, best)):
         points.append(worst)

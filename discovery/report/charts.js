@@ -232,9 +232,12 @@
   new ResizeObserver(() => { const now = document.body.clientWidth; if (now !== last) { last = now; drawAll(); } }).observe(document.body);
   window.addEventListener("beforeprint", () => {
     const off = [...document.querySelectorAll(".off")];
+    const shut = [...document.querySelectorAll("details:not([open])")];
     off.forEach((one) => one.classList.remove("off"));
+    shut.forEach((one) => { one.open = true; });
     drawAll();
-    window.addEventListener("afterprint", () => { off.forEach((one) => one.classList.add("off")); drawAll(); }, { once: true });
+    const back = () => { off.forEach((one) => one.classList.add("off")); shut.forEach((one) => { one.open = false; }); drawAll(); };
+    window.addEventListener("afterprint", back, { once: true });
   });
   for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", drawAll);
   drawAll();

@@ -33,6 +33,7 @@ def section(run: Run) -> dict[str, Any] | None:
         "heat_note": _HEAT_NOTE,
         "formula": _formula(d),
         "next": d.get("next_experiment"),
+        "next_title": "What would have been seen" if d.get("verdict") == "no mismatch" else "Next experiment",
     }
 
 
@@ -237,7 +238,9 @@ def network(run: Run) -> dict[str, str] | None:
         if k in model.states and v is not None
     }
     shares = {k: float(v) for k, v in (location.get("states") or {}).items() if k in model.states}
-    if watts and any(watts.values()):
+    if (run.diagnosis or {}).get("verdict") == "no mismatch":
+        note, svg = "", drawing(model, {})
+    elif watts and any(watts.values()):
         note = "The darker a body, the more heat (rms) the recordings ask for there that no term of the model provides."
         svg = drawing(model, watts, _heat_unit(run))
     elif shares:

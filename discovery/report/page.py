@@ -24,6 +24,7 @@ from discovery.report.text import counted, listed, number, percent
 
 _HERE = Path(__file__).parent
 _BUDGET = 300_000  # numbers that all curves of a page may hold together, below 2 MB
+_OFTEN = 0.2  # share of the repeated searches from which a term is listed
 _MOST_CURVES = 6  # more than that cannot be told apart
 
 
@@ -215,7 +216,10 @@ def _discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
         charts += _pareto(name, entry.get("path") or [])
         if entry.get("stability"):
             shares = sorted(entry["stability"].items(), key=lambda pair: -pair[1])
+            rare = [share for _, share in shares if share < _OFTEN]
+            shares = [pair for pair in shares if pair[1] >= _OFTEN]
             rows = tuple(Line((str(term), percent(share))) for term, share in shares)
+            rows += (Line((f"{len(rare)} others", f"< {percent(_OFTEN)}")),) if rare else ()
             tables.append(
                 Printed(
                     f"{name}: how often each term is chosen when the search is repeated on parts of the data",
