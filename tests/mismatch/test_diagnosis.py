@@ -149,6 +149,21 @@ def test_a_window_of_heat_is_found_with_its_body_and_hours() -> None:
     assert np.abs(first.heat["r1"]).mean() < 15.0
 
 
+@pytest.mark.parametrize("size", [-40.0, 15.0, 5.0])
+def test_a_single_wrong_reading_is_a_fault_of_the_measuring_chain(size: float) -> None:
+    one, other = simulated(1), simulated(2)
+    wrong = other.values["E_Z"].copy()
+    at = np.flatnonzero(np.isfinite(wrong))[40]
+    wrong[at] += size
+    found = diagnose(model(), campaign(one, changed(other, E_Z=wrong)), ["r1", "r2"]).document()
+    assert found["verdict"] == "measurement fault"
+    (fault,) = found["physics"]
+    assert (fault["effect"], fault["states"], fault["recording"]) == ("outlier", ["E_Z"], "r2")
+    value = next(iter(fault["parameters"].values()))
+    assert value["low"] < size < value["high"]
+    assert value["value"] == pytest.approx(size, rel=0.2)
+
+
 def small_heat(seed: int) -> Callable[[float, Array, Inputs], tuple[float, float, float]]:
     """First-order random heat of 3 W rms and three hours at the motor and at the bed."""
     rng = np.random.default_rng(1000 + seed)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from discovery.errors import UserError
-from discovery.experiment import diagnose
+from discovery.experiment import diagnose, diagnosis
 from discovery.experimentfile import load_experiment
 from discovery.models import write_model
 from tests.mismatch.machine import CHANNELS, Array, Inputs, model, simulated
@@ -56,8 +55,9 @@ def experiment(folder: Path, effects: str) -> Path:
 
 
 def test_an_effect_in_the_experiment_file_is_found(tmp_path: Path) -> None:
-    folder = diagnose(experiment(tmp_path, RUB), tmp_path / "out")
-    found = json.loads((folder / "diagnosis.json").read_text())
+    answer = diagnosis(load_experiment(experiment(tmp_path, RUB)))
+    assert answer is not None
+    found = answer.document()
     (physics,) = found["physics"]
     assert (physics["effect"], physics["states"], physics["source"]) == ("rub", ["motor"], "maintenance log")
     sizes = {name.split("_")[0]: p for name, p in physics["parameters"].items()}
@@ -65,7 +65,8 @@ def test_an_effect_in_the_experiment_file_is_found(tmp_path: Path) -> None:
     assert sizes["k"]["unit"] == "W/rpm"
     assert sizes["t"]["low"] < 20000 < sizes["t"]["high"]
     assert found["improvement"]["explained"] > 0.9
-    assert 'effect = "rub"' in (folder / "models" / "repaired.toml").read_text()
+    assert answer.repaired is not None
+    assert [t.effect for t in answer.repaired.terms if t.effect] == ["rub"]
 
 
 MISTAKES = {
