@@ -1,9 +1,10 @@
-"""Thirty days of an ageing virtual machine: losses fall, a gap widens; the error left with and without updating.
+"""Thirty days of an ageing virtual machine: losses fall, a gap widens; the error left with and without
+updating.
 
     python benchmarks/ageing.py [days] [seed]
 
-Every day is a random cycle of 24 h. An update sees six readings of a day (one about every four hours); the error is judged
-on all the other readings of the *next* day, which no update has seen yet.
+Every day is a random cycle of 24 h. An update sees six readings of a day (one about every four hours); the
+error is judged on all the other readings of the *next* day, which no update has seen yet.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ ERRORS = ("E_Y0C", "E_Z0T", "E_R0T", "E_A0C")
 
 
 def aged(day: int) -> Machine:
-    """Losses that reach the bodies fall by 1 % a day, the gap between C-Body 1 and B-Body 1 conducts 1.5 % more."""
+    """Losses that reach the bodies fall by 1 % a day, the gap between C-Body 1 and B-Body 1 conducts 1.5 %
+    more.
+    """
     fresh = Machine()
     loss = 1.0 - 0.01 * day
     return fresh._replace(
@@ -75,13 +78,20 @@ def main(days: int, seed: int) -> None:
         name = f"day_{day}"
         fresh = day_of(campaign, day, aged(0), seed, few=False)
         rows.append(
-            (error_left(belief.at_work, whole, name), error_left(model, whole, name), error_left(model, fresh, name))
+            (
+                error_left(belief.at_work, whole, name),
+                error_left(model, whole, name),
+                error_left(model, fresh, name),
+            )
         )
-        belief, finding = update_belief(belief, levels, day_of(campaign, day, aged(day - 1), seed, few=True), name)
+        belief, finding = update_belief(
+            belief, levels, day_of(campaign, day, aged(day - 1), seed, few=True), name
+        )
         belief = belief.released() if finding.verdict == "drift" else belief
         updated, left, fresh_left = rows[-1]
         print(
-            f"day {day:2d}: left {updated:.2f} with updating, {left:.2f} without, {fresh_left:.2f} had it not aged; "
+            f"day {day:2d}: left {updated:.2f} with updating, {left:.2f} without, {fresh_left:.2f} had it "
+            f"not aged; "
             f"{finding.verdict}, p = {finding.p_value:.2g}"
         )
     found = np.array(rows)

@@ -1,6 +1,7 @@
-"""1000 random fault sequences over 72 h of the virtual machine, and the cost of each known fault at every hour.
+"""1000 random fault sequences over 72 h of the virtual machine, and the cost of each known fault at every
+hour.
 
-    python benchmarks/faults.py [sequences]
+python benchmarks/faults.py [sequences]
 """
 
 from __future__ import annotations
@@ -44,10 +45,20 @@ def costs(exported: Exported, inputs: np.ndarray) -> None:
         ("link lost for 2 h", "link", "T_env", 2, 0.0),
     ):
         worst = [
-            np.max(np.abs(try_faults(exported, inputs, [Injection(kind, channel, h * 3600, hours * 3600, size)], TICK).offsets - clean))
+            np.max(
+                np.abs(
+                    try_faults(
+                        exported, inputs, [Injection(kind, channel, h * 3600, hours * 3600, size)], TICK
+                    ).offsets
+                    - clean
+                )
+            )
             for h in range(2, 69)
         ]
-        print(f"{title}: worst extra error {max(worst):.2f} um (median over 67 beginnings {np.median(worst):.2f})")
+        print(
+            f"{title}: worst extra error {max(worst):.2f} um (median over 67 beginnings "
+            f"{np.median(worst):.2f})"
+        )
 
 
 def sequences(exported: Exported, inputs: np.ndarray, count: int) -> None:

@@ -1,6 +1,6 @@
 """Ten minutes of the OPC UA loop at 1 Hz against the simulated machine: share of ticks in time.
 
-    python benchmarks/opcua.py [seconds]
+python benchmarks/opcua.py [seconds]
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ def main(seconds: float) -> None:
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "model.json"
         write_document(path, make_document(model, campaign, ["fit"], step_s=1.0))
-        compensate_opcua(read_document(path), None, model=path, folder=Path(name) / "memory", seconds=seconds, say=print)
+        compensate_opcua(
+            read_document(path), None, model=path, folder=Path(name) / "memory", seconds=seconds, say=print
+        )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
-"""Time of one step: C in double and float, the Python reference, a tick of the compensator; full and reduced model.
+"""Time of one step: C in double and float, the Python reference, a tick of the compensator; full and reduced
+model.
 
-    python benchmarks/step.py
+python benchmarks/step.py
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from discovery.export.document import Exported, from_document, make_document, render
 from discovery.export.c import c_files, c_prefix
+from discovery.export.document import Exported, from_document, make_document, render
 from discovery.export.ranges import sampled_inputs
 from discovery.export.reduce import reduce_model
 from discovery.export.replay import make_reference, reference_files, replay_source, write_files
@@ -29,18 +30,27 @@ def c_step(exported: Exported, u: object, flags: list[str]) -> str:
     """What the shipped replay program says of a million steps."""
     with tempfile.TemporaryDirectory() as name:
         files = {**c_files(exported), **replay_source(exported)}
-        write_files(Path(name), {**files, **reference_files(exported.compiled, make_reference(exported.compiled, u))})
+        write_files(
+            Path(name), {**files, **reference_files(exported.compiled, make_reference(exported.compiled, u))}
+        )
         source = ["replay.c", f"{c_prefix(exported)}.c"]
-        subprocess.run(["gcc", "-std=c99", "-O2", *flags, *source, "-lm", "-o", "replay"], cwd=name, check=True)
+        subprocess.run(
+            ["gcc", "-std=c99", "-O2", *flags, *source, "-lm", "-o", "replay"], cwd=name, check=True
+        )
         command = ["./replay", "reference_inputs.csv", "reference_outputs.csv", "1000000"]
-        return subprocess.run(command, cwd=name, capture_output=True, text=True, check=True).stdout.replace("\n", "; ")
+        return subprocess.run(command, cwd=name, capture_output=True, text=True, check=True).stdout.replace(
+            "\n", "; "
+        )
 
 
 def main() -> None:
     """Print all times."""
     campaign = load_campaign(DATA / "campaign.toml", only=["fit"])
     model = fit_model(read_model(DATA / "thermobalance.toml"), campaign, ["fit"]).model
-    for title, one in (("six states", model), ("three states", reduce_model(model, campaign, ["fit"], 3).model)):
+    for title, one in (
+        ("six states", model),
+        ("three states", reduce_model(model, campaign, ["fit"], 3).model),
+    ):
         exported = from_document(*open_seal(render(make_document(one, campaign, ["fit"])), "model"), "model")
         u = sampled_inputs(campaign, "fit", exported.compiled.inputs, 10.0)
         for kind, flags in (("double", []), ("float", ["-DDISCOVERY_FLOAT"])):
@@ -50,7 +60,10 @@ def main() -> None:
         stepper.run(u[:10])
         began = time.perf_counter()
         stepper.run(u)
-        print(f"{title}, Python reference, many steps: {1e6 * (time.perf_counter() - began) / len(u):.2f} us per step")
+        print(
+            f"{title}, Python reference, many steps: {1e6 * (time.perf_counter() - began) / len(u):.2f} "
+            f"us per step"
+        )
         try_faults(exported, u[:10], [], 10.0)
         began = time.perf_counter()
         try_faults(exported, u[:5000], [], 10.0)

@@ -39,7 +39,7 @@ def agreement(model: Model, campaign: Campaign, recording: str, step_s: float) -
         marks.append(k * step_s)
     if not found:
         return {"integrator_um": 0.0, "held_inputs_um": 0.0}
-    ticks: Array = np.arange(len(u)) * step_s
+    ticks = np.arange(len(u), dtype=float) * step_s
     data = campaign.recordings[recording]
     held, straight = {}, {}
     for i, name in enumerate(compiled.inputs):

@@ -1,7 +1,7 @@
 """C99 of a compiled model: one header, one source file; double, or float with -DDISCOVERY_FLOAT.
 
-No malloc, no recursion, no libraries but the mathematics of the standard; every array has a fixed size. What a controller
-calls is `<name>_start` once and `<name>_step` each step.
+No malloc, no recursion, no libraries but the mathematics of the standard; every array has a fixed size. What
+a controller calls is `<name>_start` once and `<name>_step` each step.
 """
 
 from __future__ import annotations
@@ -86,7 +86,8 @@ def c_files(exported: Exported) -> dict[str, str]:
 
 def _title(exported: Exported) -> str:
     return (
-        f"/* {comment(exported.model.name)}, revision {exported.revision}. Written by discovery {__version__}; do not edit.\n"
+        f"/* {comment(exported.model.name)}, revision {exported.revision}. Written by discovery "
+        f"{__version__}; do not edit.\n"
         f" * sha256 of the exported model: {exported.seal.sha256}\n"
     )
 
@@ -117,8 +118,8 @@ def _header(exported: Exported, prefix: str) -> str:
         if group
     ]
     return f"""{_title(exported)} *
- * {prefix}_start once with the first inputs, then {prefix}_step every {c.step_s:g} s. Compile with -DDISCOVERY_FLOAT for float;
- * never with -ffast-math, which would undo the compensated sums.
+ * {prefix}_start once with the first inputs, then {prefix}_step every {c.step_s:g} s.
+ * Compile with -DDISCOVERY_FLOAT for float; never with -ffast-math, which would undo the compensated sums.
  */
 #ifndef {up}_H
 #define {up}_H
@@ -182,10 +183,12 @@ _MATHS = """typedef {prefix}_real real;
 
 
 def _function(kind: str, program: Program, results: Sequence[str], outputs: str) -> str:
-    return f"""static void {kind}(const real x[], const real u[], const real d[], const real p[], real t, {outputs})
+    given = "const real x[], const real u[], const real d[], const real p[], real t"
+    names = [word.split()[-1].removesuffix("[]") for word in f"{given}, {outputs}".split(", ")]
+    return f"""static void {kind}({given}, {outputs})
 {{
 {body(program, results)}
-    (void)x; (void)u; (void)d; (void)p; (void)t; {" ".join(f"(void){w.split()[1][:-2]};" for w in outputs.split(", "))}
+    {" ".join(f"(void){name};" for name in names)}
 }}
 """
 
@@ -202,6 +205,7 @@ def _source(c: Compiled, prefix: str, title: str) -> str:
         " + ".join(f"R_ABS(a[{k}])" for k, (i, _) in enumerate(c.nonzeros) if i == row) or "R(0.0)"
         for row in range(n)
     ]
+    read = [f"y[{k}]" for k in range(len(c.outputs))] + plays
     start = [f"first[{i}]" for i in range(n)] + [f"moved[{k}]" for k in range(c.plays)]
     product = "\n".join(f"    w[{i}] = {row};" for i, row in enumerate(rows))
     sums = "\n".join(f"    sum = {row};\n    if (sum > norm) {{ norm = sum; }}" for row in norms)
@@ -216,11 +220,13 @@ def _source(c: Compiled, prefix: str, title: str) -> str:
            + {real(delay.part)} * s->ring[{offset}u + (here + 1u) % {length}u];"""
 
     def moved_on(k: int) -> str:
-        return f"    s->position[{k}] = (s->position[{k}] + 1u) % {c.delays[k].whole + 2}u;\n    s->d[{k}] = d[{k}];"
+        length = c.delays[k].whole + 2
+        return f"    s->position[{k}] = (s->position[{k}] + 1u) % {length}u;\n    s->d[{k}] = d[{k}];"
 
     def first(k: int) -> str:
         delay, offset = c.delays[k], offsets[k]
-        return f"""    for (k = 0; k < {delay.whole + 2}u; ++k) {{ s->ring[{offset}u + k] = u[{delay.input}]; }}
+        last = offset + delay.whole + 2
+        return f"""    for (k = {offset}; k < {last}u; ++k) {{ s->ring[k] = u[{delay.input}]; }}
     s->position[{k}] = 0; s->d[{k}] = u[{delay.input}];"""
 
     here = "    uint32_t here;\n" if c.delays else ""
@@ -238,7 +244,7 @@ def _source(c: Compiled, prefix: str, title: str) -> str:
 
 {_function("start_values", c.start, start, "real first[], real moved[]")}
 {_function("rates", c.rates, rates, "real f[], real a[], real moved[]")}
-{_function("outputs", c.results, [f"y[{k}]" for k in range(len(c.outputs))] + plays, "real y[], real moved[]")}
+{_function("outputs", c.results, read, "real y[], real moved[]")}
 /* w = A v */
 static void product(const real a[], const real v[], real w[])
 {{

@@ -1,6 +1,7 @@
 """Expressions into program nodes, with their exact derivatives by the states (forward mode, symbolic).
 
-The rules at kinks are those of `discovery.terms.dual`, so that the exported model linearises as the fitted one did.
+The rules at kinks are those of `discovery.terms.dual`, so that the exported model linearises as the fitted
+one did.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ class Node:
 
 
 class Memory(Protocol):
-    """How `delay` and `play` become nodes: loads from the memory of a running model, or their value at the start."""
+    """How `delay` and `play` become nodes: loads of a running model's memory, or values at the start."""
 
     def delayed(self, build: Builder, expression: Apply) -> int: ...
 

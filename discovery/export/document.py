@@ -100,7 +100,8 @@ def make_document(
         provenance: what else should be known about where it comes from.
 
     Raises:
-        UserError: a model that cannot be exported (with the reason), or inputs that the recordings do not hold.
+        UserError: a model that cannot be exported (with the reason), or inputs that the recordings do not
+        hold.
     """
     if not 0.001 <= step_s <= 3600.0:
         raise UserError(
@@ -111,7 +112,8 @@ def make_document(
     for expression in model.expressions():
         for name in sorted(names(expression) - known):
             raise UserError(
-                f"model '{model.name}': '{name}' is no channel of campaign {campaign.path}; it cannot be exported"
+                f"model '{model.name}': '{name}' is no channel of campaign {campaign.path}; it cannot be "
+                f"exported"
             )
     compiled = compile_model(model, step_s)
     limits = output_ranges(compiled, campaign, recordings)
@@ -204,7 +206,8 @@ def read_document(path: Path) -> Exported:
     """An exported model; every number and formula in it is checked before it is used.
 
     Raises:
-        UserError: not sealed, changed, of another version, not of the schema, or with a formula outside the grammar.
+        UserError: not sealed, changed, of another version, not of the schema, or with a formula outside the
+        grammar.
     """
     if not path.is_file():
         raise UserError(f"{path}: there is no such file; name the .json that `discovery export` wrote")
@@ -222,7 +225,8 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
         )
     if document.get("version") != VERSION:
         raise UserError(
-            f"{place}: version {document.get('version')!r} is not {VERSION}, the one this program reads; update it"
+            f"{place}: version {document.get('version')!r} is not {VERSION}, the one this program reads; "
+            f"update it"
         )
     _check_schema(document, place)
     parameters = {
@@ -263,7 +267,8 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
     for term in terms:
         if term.into not in states or (term.source is not None and term.source not in states):
             raise UserError(
-                f"{place}: term '{term.name}' enters or leaves a state that is not listed; export the model again"
+                f"{place}: term '{term.name}' enters or leaves a state that is not listed; export the "
+                f"model again"
             )
     if model_inputs(model) != tuple(i["name"] for i in document["inputs"]):
         raise UserError(f"{place}: the inputs listed are not those of its formulas; export the model again")

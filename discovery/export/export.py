@@ -1,4 +1,4 @@
-"""Export: a fitted model as a document and as code, each proved equal to the Python model before it is written."""
+"""A fitted model as a document and as code, each proved equal to the Python model before it is written."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ class Export:
     def lines(self) -> list[str]:
         """What a user wants to know of it."""
         step = (
-            f"the fixed step is {self.agreement['integrator_um']:.2g} um from the fitted model under the same inputs, "
+            f"the fixed step is {self.agreement['integrator_um']:.2g} um from the fitted model under the "
+            f"same inputs, "
             f"{self.agreement['held_inputs_um']:.2g} um where inputs are held over a step"
         )
         return [*(str(path) for path in self.files), *(str(proof) for proof in self.proofs), step]
@@ -66,10 +67,10 @@ def export_model(
     key: Ed25519PrivateKey | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Export:
-    """Export a fitted model for the compensation runtime; the JSON document, master of all, is always written.
+    """Export a fitted model; the JSON document, master of all targets, is always written.
 
     Args:
-        recordings: those of the fit; trained ranges, limits and the reference of the replay come from them alone.
+        recordings: those of the fit; ranges, limits and the reference of the replay come from them alone.
         to: targets, some of `TARGETS`.
         out_dir: folder that the files go to.
         step_s: fixed internal step [s].
@@ -78,7 +79,8 @@ def export_model(
         provenance: what else should be known about where the model comes from.
 
     Raises:
-        UserError: an unknown target, a model that cannot be exported, or a target that is not equal; then nothing is written.
+        UserError: an unknown target, a model that cannot be exported, or a target that is not equal; then
+        nothing is written.
     """
     targets = (to,) if isinstance(to, str) else tuple(to)
     for target in targets:
@@ -179,7 +181,8 @@ def export_run(
     results_file = run / "results.json"
     if not results_file.is_file():
         raise UserError(
-            f"{run}: this is no folder of a finished run (results.json is missing); make one with `discovery run`"
+            f"{run}: this is no folder of a finished run (results.json is missing); make one with "
+            f"`discovery run`"
         )
     try:
         results = json.loads(results_file.read_text(encoding="utf-8"))

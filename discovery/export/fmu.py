@@ -1,7 +1,7 @@
 """FMI 2.0 and 3.0 co-simulation units (source and linux64 binary) of an exported model.
 
-Inputs are declared discrete: a simulator then holds them, as the reference does, and does not interpolate. The headers of
-the standard (2-clause BSD) are taken from FMPy and travel with the sources.
+Inputs are declared discrete: a simulator then holds them, as the reference does, and does not interpolate.
+The headers of the standard (2-clause BSD) are taken from FMPy and travel with the sources.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from discovery.export.replay import (
     TEMPLATES,
     Proof,
     Reference,
-    reference_files,
     within,
     write_files,
 )
@@ -89,7 +88,8 @@ def fmu_bytes(exported: Exported, version: int) -> bytes:
 
 
 def prove_fmu(exported: Exported, reference: Reference, version: int, data: bytes) -> Proof:
-    """Validate and simulate a unit through FMPy; it must give the reference, also after a state is saved and restored.
+    """Validate and simulate a unit through FMPy; it must give the reference, also after a state is saved and
+    restored.
 
     Raises:
         UserError: the unit is not valid, or deviates.
@@ -122,11 +122,6 @@ def prove_fmu(exported: Exported, reference: Reference, version: int, data: byte
         y = np.column_stack([result[name] for name in exported.compiled.outputs])[1:]
         deviation = float(np.max(np.abs(y - reference.y))) if len(y) == steps else float("nan")
     return within(Proof(f"FMI {version}.0", deviation, LIMITS["double"], "validated and simulated with FMPy"))
-
-
-def fmu_extras(exported: Exported, reference: Reference) -> dict[str, str]:
-    """The reference that travels beside a unit."""
-    return reference_files(exported.compiled, reference)
 
 
 def _wrapper(exported: Exported, version: int) -> str:
@@ -168,71 +163,79 @@ def _units(exported: Exported) -> str:
 
 def _head(exported: Exported) -> str:
     text = f"{comment(exported.model.name)}, revision {exported.revision}, sha256 {exported.seal.sha256}"
-    return f"modelName={quoteattr(comment(exported.model.name))} description={quoteattr(text)} generationTool={quoteattr('discovery ' + __version__)}"
+    name, tool = quoteattr(comment(exported.model.name)), quoteattr(f"discovery {__version__}")
+    return f"modelName={name} description={quoteattr(text)} generationTool={tool}"
+
+
+def _variables(exported: Exported) -> list[tuple[str, str, str]]:
+    """Name and shared attributes, unit, and start of each variable; its place is its value reference."""
+    found = []
+    for k, (i, start) in enumerate(zip(exported.inputs, _start(exported), strict=True)):
+        shared = (
+            f'valueReference="{k}" causality="input" variability="discrete" description={quoteattr(i.role)}'
+        )
+        found.append(
+            (f"name={quoteattr(i.name)} {shared}", f"unit={quoteattr(i.unit)}", f' start="{start!r}"')
+        )
+    for k, o in enumerate(exported.outputs, start=len(exported.inputs)):
+        shared = f'valueReference="{k}" causality="output" variability="discrete" initial="calculated"'
+        shared += f" description={quoteattr(o.role)}"
+        found.append((f"name={quoteattr(o.name)} {shared}", f"unit={quoteattr(o.unit)}", ""))
+    return found
+
+
+_XML = '<?xml version="1.0" encoding="UTF-8"?>'
 
 
 def _description2(exported: Exported) -> str:
-    prefix = c_prefix(exported)
-    rows = []
-    for k, (i, start) in enumerate(zip(exported.inputs, _start(exported), strict=True)):
-        rows.append(
-            f'    <ScalarVariable name={quoteattr(i.name)} valueReference="{k}" causality="input" variability="discrete" '
-            f'description={quoteattr(i.role)}>\n      <Real unit={quoteattr(i.unit)} start="{start!r}"/>\n    </ScalarVariable>'
-        )
-    n = len(exported.inputs)
-    for k, o in enumerate(exported.outputs):
-        rows.append(
-            f'    <ScalarVariable name={quoteattr(o.name)} valueReference="{n + k}" causality="output" variability="discrete" '
-            f'initial="calculated" description={quoteattr(o.role)}>\n      <Real unit={quoteattr(o.unit)}/>\n    </ScalarVariable>'
-        )
+    prefix, n, step = c_prefix(exported), len(exported.inputs), exported.compiled.step_s
+    rows = "\n".join(
+        f"    <ScalarVariable {attributes}><Real {unit}{start}/></ScalarVariable>"
+        for attributes, unit, start in _variables(exported)
+    )
     unknowns = "".join(f'<Unknown index="{n + k + 1}"/>' for k in range(len(exported.outputs)))
     names = "".join(f'<File name="{name}"/>' for name in (f"{prefix}.c", "fmi2.c"))
-    step = exported.compiled.step_s
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        f'<fmiModelDescription fmiVersion="2.0" guid="{_token(exported)}" {_head(exported)} numberOfEventIndicators="0">\n'
-        f'  <CoSimulation modelIdentifier="{prefix}" canHandleVariableCommunicationStepSize="true" '
-        'canGetAndSetFMUstate="true" canSerializeFMUstate="true">\n'
-        f"    <SourceFiles>{names}</SourceFiles>\n  </CoSimulation>\n"
-        f"{_units(exported)}"
-        f'  <DefaultExperiment startTime="0" stopTime="{3600 * step!r}" stepSize="{step!r}"/>\n'
-        "  <ModelVariables>\n" + "\n".join(rows) + "\n  </ModelVariables>\n"
-        f"  <ModelStructure>\n    <Outputs>{unknowns}</Outputs>\n    <InitialUnknowns>{unknowns}</InitialUnknowns>\n"
-        "  </ModelStructure>\n</fmiModelDescription>\n"
-    )
+    return f"""{_XML}
+<fmiModelDescription fmiVersion="2.0" guid="{_token(exported)}" {_head(exported)} numberOfEventIndicators="0">
+  <CoSimulation modelIdentifier="{prefix}" canHandleVariableCommunicationStepSize="true"
+                canGetAndSetFMUstate="true" canSerializeFMUstate="true">
+    <SourceFiles>{names}</SourceFiles>
+  </CoSimulation>
+{_units(exported)}  <DefaultExperiment startTime="0" stopTime="{3600 * step!r}" stepSize="{step!r}"/>
+  <ModelVariables>
+{rows}
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs>{unknowns}</Outputs>
+    <InitialUnknowns>{unknowns}</InitialUnknowns>
+  </ModelStructure>
+</fmiModelDescription>
+"""
 
 
 def _description3(exported: Exported) -> str:
     prefix, n, step = c_prefix(exported), len(exported.inputs), exported.compiled.step_s
     time = n + len(exported.outputs)
-    rows = [
-        f'    <Float64 name="time" valueReference="{time}" causality="independent" variability="continuous"/>'
-    ]
-    for k, (i, start) in enumerate(zip(exported.inputs, _start(exported), strict=True)):
-        rows.append(
-            f'    <Float64 name={quoteattr(i.name)} valueReference="{k}" causality="input" variability="discrete" '
-            f'description={quoteattr(i.role)} unit={quoteattr(i.unit)} start="{start!r}"/>'
-        )
-    for k, o in enumerate(exported.outputs):
-        rows.append(
-            f'    <Float64 name={quoteattr(o.name)} valueReference="{n + k}" causality="output" variability="discrete" '
-            f'initial="calculated" description={quoteattr(o.role)} unit={quoteattr(o.unit)}/>'
-        )
-    references = range(n, time)
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        f'<fmiModelDescription fmiVersion="3.0" instantiationToken="{_token(exported)}" {_head(exported)}>\n'
-        f'  <CoSimulation modelIdentifier="{prefix}" canHandleVariableCommunicationStepSize="true" '
-        'canGetAndSetFMUState="true" canSerializeFMUState="true"/>\n'
-        f"{_units(exported)}"
-        f'  <DefaultExperiment startTime="0" stopTime="{3600 * step!r}" stepSize="{step!r}"/>\n'
-        "  <ModelVariables>\n"
-        + "\n".join(rows)
-        + "\n  </ModelVariables>\n  <ModelStructure>\n"
-        + "".join(f'    <Output valueReference="{r}"/>\n' for r in references)
-        + "".join(f'    <InitialUnknown valueReference="{r}"/>\n' for r in references)
-        + "  </ModelStructure>\n</fmiModelDescription>\n"
+    rows = "\n".join(
+        f"    <Float64 {attributes} {unit}{start}/>" for attributes, unit, start in _variables(exported)
     )
+    outputs = "".join(f'<Output valueReference="{r}"/>' for r in range(n, time))
+    unknowns = "".join(f'<InitialUnknown valueReference="{r}"/>' for r in range(n, time))
+    return f"""{_XML}
+<fmiModelDescription fmiVersion="3.0" instantiationToken="{_token(exported)}" {_head(exported)}>
+  <CoSimulation modelIdentifier="{prefix}" canHandleVariableCommunicationStepSize="true"
+                canGetAndSetFMUState="true" canSerializeFMUState="true"/>
+{_units(exported)}  <DefaultExperiment startTime="0" stopTime="{3600 * step!r}" stepSize="{step!r}"/>
+  <ModelVariables>
+    <Float64 name="time" valueReference="{time}" causality="independent" variability="continuous"/>
+{rows}
+  </ModelVariables>
+  <ModelStructure>
+    {outputs}
+    {unknowns}
+  </ModelStructure>
+</fmiModelDescription>
+"""
 
 
 def _fmpy() -> Any:

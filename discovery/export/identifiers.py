@@ -37,7 +37,7 @@ def identifiers(names: Sequence[str], taken: frozenset[str] = frozenset()) -> li
 
 
 def comment(text: str) -> str:
-    """Text that is safe inside a comment of C or structured text: printable ASCII, no end of comment, one line."""
+    """Text that is safe inside a comment of any target: printable ASCII on one line, no end of comment."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "replace").decode()
     plain = "".join(c if " " <= c <= "~" else " " for c in plain)
     return re.sub(r"[*?\\(){}$]", lambda m: {"*": "x", "(": "[", ")": "]"}.get(m[0], "."), plain)[:200]

@@ -1,4 +1,4 @@
-"""The compiled interpreter of straight-line programs and of the fixed step (see `INTEGRATOR` for the algorithm).
+"""The compiled interpreter of straight-line programs and of the fixed step (see `stepper.INTEGRATOR`).
 
 One kernel advances any exported model; no code is compiled per model.
 """
@@ -15,13 +15,16 @@ ORDER = 12  # of the Taylor series; with a norm of 1/2 its remainder is below 2e
 LARGEST_NORM = 0.5  # of A times the sub-step
 LARGEST_SUBSTEPS = 4096  # stiffer than this is no thermal model
 
-(_CONSTANT, _INPUT, _STATE, _DELAYED, _PLAYED, _TIME, _NEG, _ABS, _EXP, _LOG, _SQRT, _TANH, _SIGN, _ADD, _SUB, _MUL,
- _DIV, _POW, _LT, _LE, _GT, _GE, _EQ, _NE, _MIN, _MAX, _SELECT) = (int(CODE[name]) for name in OPERATIONS)  # fmt: skip
+(
+    _CONSTANT, _INPUT, _STATE, _DELAYED, _PLAYED, _TIME,
+    _NEG, _ABS, _EXP, _LOG, _SQRT, _TANH, _SIGN,
+    _ADD, _SUB, _MUL, _DIV, _POW, _LT, _LE, _GT, _GE, _EQ, _NE, _MIN, _MAX, _SELECT,
+) = (int(CODE[name]) for name in OPERATIONS)  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
 def run(table, value, r, u, x, d, p, t):  # type: ignore[no-untyped-def]
-    """Fill the numbers r (I,) of a program: table (I, 5) of operation, three arguments and index; value (I,)."""
+    """Fill the numbers r (I,) of a program: table (I, 5) of operation, three arguments, index; value (I,)."""
     for k in range(table.shape[0]):
         op = table[k, 0]
         if op == _CONSTANT:
@@ -97,7 +100,7 @@ def _times(row, column, a, v, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def increment(row, column, a, f, h, z):  # type: ignore[no-untyped-def]
-    """z = h phi1(h A) f, or False where A is too stiff: sub-steps of z' = A z + f, each by its Taylor series."""
+    """z = h phi1(h A) f by sub-steps of z' = A z + f, each by its Taylor series; False: A is too stiff."""
     n = f.shape[0]
     norm = 0.0
     sums = np.zeros(n)

@@ -1,5 +1,5 @@
-"""What the recordings of a fit say about the fitted model, kept with it: the residual it leaves, and how well its parameters
-are known. An update weighs new readings against it."""
+"""What the recordings of a fit say about the fitted model, kept with it: the residual it leaves, and how well
+its parameters are known. An update weighs new readings against it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ SLOW_S = 7200.0  # for which slow noise of sensors and small random heat stay al
 
 @dataclass(frozen=True)
 class Knowledge:
-    """`residual`: rms of readings minus model by output (None: not read), `slow_share` of its variance is slow noise.
-    `covariance` (P, P) of `parameters`, wide enough for that."""
+    """`residual`: rms of readings minus model by output (None: not read), `slow_share` of its variance is
+    slow noise. `covariance` (P, P) of `parameters`, wide enough for that."""
 
     residual: Mapping[str, float | None]
     slow_share: float
@@ -30,8 +30,10 @@ class Knowledge:
 
 
 def knowledge(model: Model, campaign: Campaign, recordings: Sequence[str]) -> Knowledge:
-    """What the recordings say of a model that was fitted to them; parameters of one recording alone are left out."""
-    outputs = [name for name in model.outputs if name in campaign.channels and _read(campaign, recordings, name)]
+    """What the recordings say of a model fitted to them; parameters of one recording alone are left out."""
+    outputs = [
+        name for name in model.outputs if name in campaign.channels and _read(campaign, recordings, name)
+    ]
     free = tuple(name for name in model.free if not model.parameters[name].per_recording)
     if not outputs:
         return Knowledge(dict.fromkeys(model.outputs), 0.0, (), np.zeros((0, 0)))
@@ -41,7 +43,11 @@ def knowledge(model: Model, campaign: Campaign, recordings: Sequence[str]) -> Kn
     for j, name in enumerate(outputs):
         series = np.concatenate([r[:, j][np.isfinite(r[:, j])] for r in residuals])
         level[name] = max(float(np.sqrt(np.mean(series**2))), 1e-6)
-        rho = float(np.corrcoef(series[1:], series[:-1])[0, 1]) if len(series) > 10 and series.std() > 0 else 0.0
+        rho = (
+            float(np.corrcoef(series[1:], series[:-1])[0, 1])
+            if len(series) > 10 and series.std() > 0
+            else 0.0
+        )
         share = min(max(share, rho), 0.9)
     times = [system.grid.time[system.grid.read] for system in problem.systems]
     factor = max(stretch(share, time) for time in times)
@@ -53,13 +59,16 @@ def knowledge(model: Model, campaign: Campaign, recordings: Sequence[str]) -> Kn
     index = [i for i, u in enumerate(problem.unknowns) if not u.is_start and u.name in free]
     covariance = np.linalg.pinv(information, rcond=1e-13, hermitian=True)[np.ix_(index, index)]
     names = tuple(problem.unknowns[i].name for i in index)
-    return Knowledge({name: level.get(name) for name in model.outputs}, share, names, 0.5 * (covariance + covariance.T))
+    return Knowledge(
+        {name: level.get(name) for name in model.outputs}, share, names, 0.5 * (covariance + covariance.T)
+    )
 
 
 def stretch(slow_share: float, times: Array) -> float:
     """Readings that count as one independent reading: those close together share the slow part of the noise.
 
-    1 + 2 sum_k rho(k gap) for rho(t) = slow_share exp(-t/SLOW_S): how much slow noise widens the variance of a mean.
+    1 + 2 sum_k rho(k gap) for rho(t) = slow_share exp(-t/SLOW_S): how much slow noise widens the variance of
+    a mean.
     """
     if len(times) < 2:
         return 1.0
@@ -90,10 +99,13 @@ def settle_starts(problem: Problem) -> tuple[list[Array], list[Array]]:
 
 
 def prior_information(problem: Problem) -> Array:
-    """(U, U): what is known of start values before any reading; a little for the rest, so that it can be inverted."""
+    """(U, U) of start values before any reading; a little for the rest, so that it can be inverted."""
     sizes = [1.0 / u.prior[1] ** 2 if u.prior else 1e-12 / max(u.start**2, 1e-6) for u in problem.unknowns]
     return np.diag(np.array(sizes))
 
 
 def _read(campaign: Campaign, recordings: Sequence[str], name: str) -> bool:
-    return any(name in campaign.recordings[r].values and np.isfinite(campaign.recordings[r].values[name]).any() for r in recordings)
+    return any(
+        name in campaign.recordings[r].values and np.isfinite(campaign.recordings[r].values[name]).any()
+        for r in recordings
+    )

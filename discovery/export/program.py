@@ -1,8 +1,9 @@
 """Straight-line programs: what Python, C and structured text run instead of expressions.
 
-A `Program` is a list of instructions, each a number made from earlier numbers: no loops, no calls of its own functions,
-no memory. Equal instructions are one, constants are folded, products with 0 and 1 vanish. Because every target prints
-or interprets the *same* list, they can differ by the rounding of `pow`, `exp`, `log` and `tanh` alone.
+A `Program` is a list of instructions, each a number made from earlier numbers: no loops, no calls of its own
+functions, no memory. Equal instructions are one, constants are folded, products with 0 and 1 vanish. Because
+every target prints or interprets the *same* list, they can differ by the rounding of `pow`, `exp`, `log` and
+`tanh` alone.
 
 Meaning of the instructions (the same in every target):
 

@@ -1,4 +1,5 @@
-"""What the recordings of a fit say about the inputs and outputs a runtime will meet: ranges, steps, rates, limits.
+"""What the recordings of a fit say about the inputs and outputs a runtime will meet: ranges, steps, rates,
+limits.
 
 Limits come from data, never from a guess: a rate limit that is too tight alone costs more than many a fault.
 """
@@ -27,8 +28,9 @@ AGES = 5.0  # times the usual spacing of the samples until a value is too old
 
 @dataclass(frozen=True)
 class InputRange:
-    """Of one input, in its unit: trained range, physically plausible range, largest step between two samples beyond what
-    `rate` [1/s] explains, and the age [s] at which a value is too old. `step` is None where any step is normal."""
+    """Of one input, in its unit: trained range, physically plausible range, largest step between two samples
+    beyond what `rate` [1/s] explains, and the age [s] at which a value is too old. `step` is None where any
+    step is normal."""
 
     low: float
     high: float
@@ -65,7 +67,8 @@ def sampled_inputs(campaign: Campaign, recording: str, inputs: Sequence[str], st
         )
         if channel is None or not np.isfinite(values).all():
             raise UserError(
-                f"{campaign.path}: recording '{recording}' has no value of '{name}', which the model needs as an input"
+                f"{campaign.path}: recording '{recording}' has no value of '{name}', which the model "
+                f"needs as an input"
             )
         columns.append(values)
     return np.column_stack(columns) if columns else np.zeros((len(at), 0))
@@ -118,7 +121,8 @@ def output_ranges(
         y = stepper.run(inputs)
         if len(y) < len(inputs):
             raise UserError(
-                f"model '{compiled.name}' runs away after {len(y) * compiled.step_s / 3600:.1f} h of recording '{recording}' "
+                f"model '{compiled.name}' runs away after {len(y) * compiled.step_s / 3600:.1f} h of "
+                f"recording '{recording}' "
                 f"with a fixed step of {compiled.step_s:g} s; check the model or export with a shorter --step"
             )
         size = np.maximum(size, np.max(np.abs(y), axis=0))

@@ -1,8 +1,9 @@
 """Reduction: a model with fewer states for a small controller, and what that costs.
 
-Balanced truncation (Moore, IEEE Trans. Automatic Control 26, 1981): the directions of the state space are ranked by how strongly
-the inputs, as large as they were recorded, excite them and how strongly the outputs show them. The model is linearised at its mean
-for the ranking alone; what is projected on the best directions are its own terms, so that gates, powers and delays stay.
+Balanced truncation (Moore, IEEE Trans. Automatic Control 26, 1981): the directions of the state space are
+ranked by how strongly the inputs, as large as they were recorded, excite them and how strongly the outputs
+show them. The model is linearised at its mean for the ranking alone; what is projected on the best directions
+are its own terms, so that gates, powers and delays stay.
 """
 
 from __future__ import annotations
@@ -71,7 +72,9 @@ def reduce_model(
     for recording, u in inputs.items():
         y = _run(small, u)[1]
         if len(y) < len(u):
-            raise UserError(f"model '{model.name}' with {states} states runs away; keep more of its {len(names)} states")
+            raise UserError(
+                f"model '{model.name}' with {states} states runs away; keep more of its {len(names)} states"
+            )
         errors.append(np.abs(y - truth[recording][1]))
     worst = np.max(np.concatenate(errors), axis=0)
     rms = np.sqrt(np.mean(np.concatenate(errors) ** 2, axis=0))
@@ -113,9 +116,9 @@ def _directions(
     return mean, reach @ vh.T[:, :states] * scale, seen @ u[:, :states] * scale, values
 
 
-def _root(gramian: Array) -> Array:
+def _root(gramian: NDArray[np.floating]) -> Array:
     values, vectors = np.linalg.eigh(0.5 * (gramian + gramian.T))
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)), dtype=float)
 
 
 def _linearised(compiled: Compiled, x: Array, u: Array, spread: Array) -> tuple[Array, Array, Array]:
@@ -140,7 +143,11 @@ def _linearised(compiled: Compiled, x: Array, u: Array, spread: Array) -> tuple[
     by_state = slopes(x, np.full(len(x), 1e-3), 0)
     by_input = slopes(u, np.maximum(1e-3 * spread, 1e-9), 1)
     a = np.column_stack([f for f, _ in by_state])
-    b = np.column_stack([f * s for (f, _), s in zip(by_input, spread, strict=True)]) if len(u) else np.zeros((len(x), 1))
+    b = (
+        np.column_stack([f * s for (f, _), s in zip(by_input, spread, strict=True)])
+        if len(u)
+        else np.zeros((len(x), 1))
+    )
     return a, b, np.column_stack([y for _, y in by_state])
 
 
@@ -152,7 +159,7 @@ def _projected(model: Model, mean: Array, right: Array, left: Array) -> Model:
     own = [f"{prefix}{k + 1}" for k in range(count)]
     rebuilt: dict[str, Expression] = {}
     for j, name in enumerate(names):
-        pieces = [(float(right[j, k]), Name(own[k])) for k in range(count)]
+        pieces: list[tuple[float, Expression]] = [(float(right[j, k]), Name(own[k])) for k in range(count)]
         rebuilt[name] = _sum(float(mean[j]), pieces)
     terms = []
     for term in model.terms:
@@ -162,10 +169,12 @@ def _projected(model: Model, mean: Array, right: Array, left: Array) -> Model:
             if term.source is not None:
                 gain -= left[names.index(term.source), k] * model.states[term.source].scale
             if gain:
-                terms.append(Term(term.name, state, Apply("*", (Number(float(gain)), inside)), None, term.effect))
+                terms.append(
+                    Term(term.name, state, Apply("*", (Number(float(gain)), inside)), None, term.effect)
+                )
     states = {}
     for k, state in enumerate(own):
-        pieces = []
+        begin: list[tuple[float, Expression]] = []
         offset = 0.0
         for j, name in enumerate(names):
             start = model.states[name].start
@@ -173,8 +182,8 @@ def _projected(model: Model, mean: Array, right: Array, left: Array) -> Model:
             if isinstance(start, Number):
                 offset += float(left[j, k]) * start.value
             elif start is not None:
-                pieces.append((float(left[j, k]), start))
-        states[state] = State(state, "1", None, _sum(offset, pieces), 0.0, 1.0)
+                begin.append((float(left[j, k]), start))
+        states[state] = State(state, "1", None, _sum(offset, begin), 0.0, 1.0)
     outputs = {name: substitute(expression, rebuilt) for name, expression in model.outputs.items()}
     return Model(model.name, model.parameters, states, tuple(terms), outputs)
 

@@ -39,7 +39,9 @@ class Reference:
 
 @dataclass(frozen=True)
 class Proof:
-    """What a replay found: largest deviation from the Python model in the unit of the outputs; None: not run, and why."""
+    """What a replay found: largest deviation from the Python model in the unit of the outputs; None: not run,
+    and why.
+    """
 
     target: str
     deviation: float | None
@@ -49,7 +51,8 @@ class Proof:
     def __str__(self) -> str:
         if self.deviation is None:
             return f"{self.target}: not run, {self.note}"
-        return f"{self.target}: {self.deviation:.2g} um from the Python model (limit {self.limit:g}){self.note and ', ' + self.note}"
+        note = f", {self.note}" if self.note else ""
+        return f"{self.target}: {self.deviation:.2g} um from the Python model (limit {self.limit:g}){note}"
 
 
 def make_reference(compiled: Compiled, inputs: Array) -> Reference:
@@ -64,7 +67,8 @@ def make_reference(compiled: Compiled, inputs: Array) -> Reference:
     y = stepper.run(inputs)
     if len(y) < len(inputs):
         raise UserError(
-            f"model '{compiled.name}' is not finite after {len(y)} steps of its reference inputs; check it or shorten the step"
+            f"model '{compiled.name}' is not finite after {len(y)} steps of its reference inputs; check "
+            f"it or shorten the step"
         )
     return Reference(inputs, y)
 
@@ -126,7 +130,8 @@ def within(proof: Proof) -> Proof:
     """
     if proof.deviation is not None and not proof.deviation <= proof.limit:
         raise UserError(
-            f"{proof.target} deviates by {proof.deviation:.3g} um from the Python model, more than {proof.limit:g}; nothing was exported: "
+            f"{proof.target} deviates by {proof.deviation:.3g} um from the Python model, more than "
+            f"{proof.limit:g}; nothing was exported: "
             "simplify the model (very large or very stiff terms) or use another target"
         )
     return proof

@@ -1,8 +1,9 @@
 """IEC 61131-3 structured text of a compiled model: one function block, LREAL or REAL.
 
-Written for what controllers are known to get wrong: loops over states are unrolled (a compiler skips `FOR j := 0 TO 0`), every
-literal is typed, both branches of a choice are computed without ever dividing by zero (a PLC may stop there; a result that
-would not be finite becomes 1e30 instead, and the step fails as it does elsewhere).
+Written for what controllers are known to get wrong: loops over states are unrolled (a compiler skips `FOR j
+:= 0 TO 0`), every literal is typed, both branches of a choice are computed without ever dividing by zero (a
+PLC may stop there; a result that would not be finite becomes 1e30 instead, and the step fails as it does
+elsewhere).
 """
 
 from __future__ import annotations
@@ -43,7 +44,10 @@ END_FUNCTION
 
 FUNCTION {f}_EXP : {k}
   VAR_INPUT a : {k}; END_VAR
-  IF a > {k}#{top} THEN {f}_EXP := {k}#1.0e30; ELSIF a < {k}#-{top} THEN {f}_EXP := {k}#0.0; ELSE {f}_EXP := EXP(a); END_IF;
+  IF a > {k}#{top} THEN {f}_EXP := {k}#1.0e30;
+  ELSIF a < {k}#-{top} THEN {f}_EXP := {k}#0.0;
+  ELSE {f}_EXP := EXP(a);
+  END_IF;
 END_FUNCTION
 
 FUNCTION {f}_LOG : {k}
@@ -97,9 +101,11 @@ def st_text(exported: Exported, precision: str = "double") -> str:
         for n, word in zip(c.outputs, identifiers(c.outputs), strict=True)
     )
     top = "300.0" if precision == "double" else "69.0"
-    return f"""(* {comment(exported.model.name)}, revision {exported.revision}. Written by discovery {__version__}; do not edit.
+    title = f"{comment(exported.model.name)}, revision {exported.revision}"
+    return f"""(* {title}. Written by discovery {__version__}; do not edit.
    sha256 of the exported model: {exported.seal.sha256}
-   Call {name} once every {c.step_s:g} s, not in every cycle of a fast task. Set restart for one call to begin anew.
+   Call {name} once every {c.step_s:g} s, not in every cycle of a fast task.
+   Set restart for one call to begin anew.
    failed: a number was not finite; nothing has changed in that call. *)
 
 {_FUNCTIONS.format(f=function, k=kind, top=top)}
@@ -121,8 +127,8 @@ def _declarations(c: Compiled, kind: str) -> str:
     sizes = {
         "u": len(c.inputs), "x": len(c.states), "c": len(c.states), "p": c.plays,
         "e": len(c.delays), "f": len(c.states), "a": len(c.nonzeros), "m": c.plays, "z": len(c.states),
-        "xn": len(c.states), "cn": len(c.states), "y": len(c.outputs), "w": len(c.states), "term": len(c.states),
-        "ring": sum(delay.whole + 2 for delay in c.delays),
+        "xn": len(c.states), "cn": len(c.states), "y": len(c.outputs), "w": len(c.states), "term":
+        len(c.states), "ring": sum(delay.whole + 2 for delay in c.delays),
     }  # fmt: skip
     lines = [f"    {name} : ARRAY [0..{size}] OF {kind};\n" for name, size in sizes.items()]
     lines += [f"    position : ARRAY [0..{len(c.delays)}] OF DINT;\n", "    running : BOOL;\n"]
@@ -208,7 +214,8 @@ def _body(c: Compiled, kind: str, function: str) -> str:
     for k, delay in enumerate(c.delays):
         lines += [
             "k := 0;",
-            f"WHILE k < {delay.whole + 2} DO ring[{offsets[k]} + k] := u[{delay.input}]; k := k + 1; END_WHILE;",
+            f"WHILE k < {delay.whole + 2} DO ring[{offsets[k]} + k] := u[{delay.input}]; k := k + 1; "
+            f"END_WHILE;",
         ]
         lines += [f"position[{k}] := 0;"]
     lines += [
@@ -223,7 +230,8 @@ def _body(c: Compiled, kind: str, function: str) -> str:
             f"here := (position[{k}] + 1) MOD {length};",
             f"ring[{offsets[k]} + here] := u[{delay.input}];",
             f"part := {kind}#1.0 - {part};",
-            f"e[{k}] := part * ring[{offsets[k]} + (here + 2) MOD {length}] + {part} * ring[{offsets[k]} + (here + 1) MOD {length}];",
+            f"e[{k}] := part * ring[{offsets[k]} + (here + 2) MOD {length}] + {part} * ring[{offsets[k]} "
+            f"+ (here + 1) MOD {length}];",
         ]
     rates = [*(f"f[{i}]" for i in n), *(f"a[{k}]" for k in range(len(c.nonzeros))), *moved]
     lines += _program(c.rates, rates, kind, function)

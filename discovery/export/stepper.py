@@ -5,9 +5,10 @@ An explicit member of the family of `discovery.dynamics.kernel`: the exponential
 
     x(t + h) = x + h phi1(h A) f(x, u),    A = df/dx,    phi1(z) = (e^z - 1)/z,
 
-exact for terms linear in x under held inputs however stiff they are, of second order otherwise. `h phi1(hA) f` is the
-solution of z' = A z + f, z(0) = 0 at h. It is taken in sub-steps for which the norm of A is at most 1/2, each by a Taylor
-series of 12 terms that needs products of A with a vector alone: no matrix is inverted, no memory allocated.
+exact for terms linear in x under held inputs however stiff they are, of second order otherwise. `h phi1(hA)
+f` is the solution of z' = A z + f, z(0) = 0 at h. It is taken in sub-steps for which the norm of A is at most
+1/2, each by a Taylor series of 12 terms that needs products of A with a vector alone: no matrix is inverted,
+no memory allocated.
 """
 
 from __future__ import annotations
@@ -28,17 +29,21 @@ Table = tuple[NDArray[np.int64], Array, NDArray[np.int64]]
 
 INTEGRATOR = (
     "Inputs u are held over the step of h = step_s seconds; outputs are valid at its end.",
-    "1. delays: an input d = (whole + part) h seconds ago is (1 - part) u[k - whole] + part u[k - whole - 1]; "
+    "1. delays: an input d = (whole + part) h seconds ago is (1 - part) u[k - whole] + part u[k - whole "
+    "- 1]; "
     "before the start it was u[0].",
     "2. f_i = scale_i (sum of the terms into i - sum of the terms from i) at (x, u, time = k h); "
     "A_ij = df_i/dx_j, exact; comparisons and sign() have no slope, max and min that of the argument taken; "
     "a play has slope 1 in contact, else 0.",
-    "3. play(e, w): p = max(e - |w|, min(e + |w|, p)), evaluated at the beginning of the step and again at its end; "
+    "3. play(e, w): p = max(e - |w|, min(e + |w|, p)), evaluated at the beginning of the step and again "
+    "at its end; "
     "at the start p = e.",
-    "4. s = smallest count of sub-steps for which (largest absolute row sum of A) h/s <= 1/2; tau = h/s; z = 0.",
+    "4. s = smallest count of sub-steps for which (largest absolute row sum of A) h/s <= 1/2; tau = h/s; "
+    "z = 0.",
     "5. s times: v = tau (A z + f), z = z + v; for j = 2 ... 12: v = (tau/j) A v, z = z + v.",
     "6. x = x + z by compensated summation: i = z - c, n = x + i, c = (n - x) - i, x = n.",
-    "7. y = outputs(x, u, time = (k + 1) h). If a state or output is not finite or not below 1e30, or s would be 4096 or more, "
+    "7. y = outputs(x, u, time = (k + 1) h). If a state or output is not finite or not below 1e30, or s "
+    "would be 4096 or more, "
     "the step fails and nothing changes.",
 )
 
@@ -79,7 +84,8 @@ class Stepper:
         values = _run(self._tables.start, u, empty, empty, empty)
         if not np.isfinite(values).all():
             raise UserError(
-                f"model '{self.compiled.name}' has no finite start for these inputs; check that all are measured"
+                f"model '{self.compiled.name}' has no finite start for these inputs; check that all are "
+                f"measured"
             )
         n = len(self.compiled.states)
         self.x[:], self.carry[:], self.plays[:] = values[:n], 0.0, values[n:]
@@ -115,8 +121,8 @@ class Stepper:
         y = np.empty((len(u), len(self.compiled.outputs)))
         t = self._tables
         done = kernel.advance(
-            t.rates, t.outputs, t.row, t.column, t.delays, t.part, self.compiled.step_s, u, self.x, self.carry,
-            self.delayed, self.plays, self.ring, self.position, self.count, y,
+            t.rates, t.outputs, t.row, t.column, t.delays, t.part, self.compiled.step_s, u, self.x,
+            self.carry, self.delayed, self.plays, self.ring, self.position, self.count, y,
         )  # fmt: skip
         self.count += int(done)
         return y[:done]

@@ -20,7 +20,8 @@ STEPS = 360  # of the reference that are read step by step
 
 
 def prove_st(exported: Exported, reference: Reference) -> list[Proof]:
-    """Replay the text in both precisions with the workbench's own reader; compile it where iec2c (matiec) is installed.
+    """Replay the text in both precisions with the workbench's own reader; compile it where iec2c (matiec) is
+    installed.
 
     Raises:
         UserError: a deviation above the limit, or a compiler that refuses the text.

@@ -37,7 +37,8 @@ def trusted_model(
         return exported, key
     if not allow_unsigned:
         raise UserError(
-            f"{model}: no key is trusted, so the model is not run; say --trust KEY.pub of the key that signed it, "
+            f"{model}: no key is trusted, so the model is not run; say --trust KEY.pub of the key that "
+            f"signed it, "
             "or --allow-unsigned to try it where no machine hangs on it"
         )
     return exported, None
@@ -56,12 +57,14 @@ def compensate_rows(
 ) -> None:
     """Ticks over the rows of a CSV file, or of standard input (`-`), to `out` or standard output.
 
-    With `folder` the state is kept there: a restart goes on after the last state saved, and ticks done again stand twice in
-    `out`; the later ones count.
+    With `folder` the state is kept there: a restart goes on after the last state saved, and ticks done again
+    stand twice in `out`; the later ones count.
     """
     step = exported.compiled.step_s
     settings, rule = Settings(tick_s=step), Rule(hours=shadow_hours)
-    session = Session(exported, model=model, folder=folder, trusted=trusted, settings=settings, rule=rule, say=say)
+    session = Session(
+        exported, model=model, folder=folder, trusted=trusted, settings=settings, rule=rule, say=say
+    )
     with ExitStack() as stack:
         lines: Iterable[str] = sys.stdin if source == "-" else stack.enter_context(_open(Path(source)))
         goes_on = out is not None and out.exists() and session.resumed is not None
@@ -85,7 +88,9 @@ def compensate_rows(
 
 
 def header(compensator: Compensator) -> str:
-    """First line of the output: time [s] at which the offsets are valid, state, status word, heartbeat, offsets, model."""
+    """First line of the output: time [s] at which the offsets are valid, state, status word, heartbeat,
+    offsets, model.
+    """
     return ",".join(["time", "state", "status", "heartbeat", *compensator.names, "model"]) + "\n"
 
 
@@ -99,13 +104,18 @@ def line(compensator: Compensator, tick: Tick) -> str:
 def go_back(folder: Path, say: Say) -> None:
     """One step back to the model before."""
     back = step_back(folder)
-    say(f"revision {back.revision} of '{back.model.name}' is at work again; its offsets begin where the last ones were")
+    say(
+        f"revision {back.revision} of '{back.model.name}' is at work again; its offsets begin where the "
+        f"last ones were"
+    )
 
 
 def _open(path: Path) -> TextIO:
     if not path.is_file():
-        raise UserError(f"{path}: there is no such file; name a CSV file with the columns time and the inputs of the model, or -")
+        raise UserError(
+            f"{path}: there is no such file; name a CSV file with the columns time and the inputs of the "
+            f"model, or -"
+        )
     if path.suffix == ".gz":
         return gzip.open(path, "rt", encoding="utf-8", errors="replace", newline="")
     return path.open(encoding="utf-8", errors="replace", newline="")
-

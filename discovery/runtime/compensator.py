@@ -1,6 +1,7 @@
 """The compensator: one tick after the other, readings in, offsets out.
 
-Whatever comes in, an offset is finite, within its limit, and moves from tick to tick no faster than its rate allows.
+Whatever comes in, an offset is finite, within its limit, and moves from tick to tick no faster than its rate
+allows.
 """
 
 from __future__ import annotations
@@ -38,7 +39,9 @@ class State(Enum):
 class Settings:
     """Times of the runtime in s."""
 
-    tick_s: float | None = None  # usual time between ticks, for which an offset may move; default the step of the model
+    tick_s: float | None = (
+        None  # usual time between ticks, for which an offset may move; default the step of the model
+    )
     catch_up_s: float = 600.0  # late ticks are made up for as far as this; a longer gap is fast-forwarded
     longest_gap_s: float = 30 * 24 * 3600.0  # beyond this the model starts anew
     hold_limit_s: float = 4 * 3600.0  # longest replacement of an input
@@ -52,9 +55,9 @@ BUMP, LATE, LIMITED, RATED, UNTIMELY = 1 << 16, 1 << 17, 1 << 18, 1 << 19, 1 << 
 
 @dataclass(frozen=True)
 class Tick:
-    """What a tick gives out. `offsets`: what to add to the position, minus the predicted error, in um or um/m by name of
-    the error, valid at `valid_at` [s]. `status`: state in bits 0 to 7, input faults in 8 to 13, then bump, late, limited,
-    rate-limited, clock not moving forward. `heartbeat` counts ticks."""
+    """What a tick gives out. `offsets`: what to add to the position, minus the predicted error, in um or um/m
+    by name of the error, valid at `valid_at` [s]. `status`: state in bits 0 to 7, input faults in 8 to 13,
+    then bump, late, limited, rate-limited, clock not moving forward. `heartbeat` counts ticks."""
 
     valid_at: float
     offsets: Mapping[str, float]
@@ -86,9 +89,13 @@ class Compensator:
         self.settling = State.COLD
         self.started_at = 0.0
         self.heartbeat = 0
-        self.inherited: Mapping[str, float] | None = None  # states of the model before this one, taken over at the start
+        self.inherited: Mapping[str, float] | None = (
+            None  # states of the model before this one, taken over at the start
+        )
 
-    def tick(self, readings: Mapping[str, Reading], now: float, *, enabled: bool = True, part_done: bool = False) -> Tick:
+    def tick(
+        self, readings: Mapping[str, Reading], now: float, *, enabled: bool = True, part_done: bool = False
+    ) -> Tick:
         """One tick at `now` [s on the clock of the readings]; see `Tick`. Never raises for what comes in."""
         self.heartbeat += 1
         flags = 0
@@ -101,7 +108,9 @@ class Compensator:
             for guard in self.guards:
                 guard.fresh = True
         checked = [guard.check(readings.get(guard.spec.name), now) for guard in self.guards]
-        faults = {g.spec.name: c.fault if c else Fault.NOT_FINITE for g, c in zip(self.guards, checked, strict=True)}
+        faults = {
+            g.spec.name: c.fault if c else Fault.NOT_FINITE for g, c in zip(self.guards, checked, strict=True)
+        }
         good = [c for c in checked if c is not None]
         gain = min((c.gain for c in good), default=1.0)
         failed = False
@@ -136,7 +145,9 @@ class Compensator:
             due -= self.stepper.count - before
         if due <= 0:
             return False, False
-        held = np.tile(u if self.inputs is None else self.inputs, (due, 1))  # missed steps: as the inputs were
+        held = np.tile(
+            u if self.inputs is None else self.inputs, (due, 1)
+        )  # missed steps: as the inputs were
         held[-1] = u
         y = self.stepper.run(held)
         if len(y):
@@ -198,7 +209,9 @@ class Compensator:
         return dict(zip(self.exported.compiled.states, self.stepper.x.tolist(), strict=True))
 
     def succeed(self, states: Mapping[str, float], offsets: Mapping[str, float]) -> None:
-        """Begin where another model stopped: its states by name, its offsets; the difference fades (`bump_s`)."""
+        """Begin where another model stopped: its states by name, its offsets; the difference fades
+        (`bump_s`).
+        """
         self.inherited = dict(states)
         self.offsets = [float(offsets.get(name, 0.0)) for name in self.names]
 
@@ -216,7 +229,9 @@ class Compensator:
         self.inherited = None
 
     def acknowledge(self) -> None:
-        """Go on after a FAULT: the model starts anew with the next good inputs, the offsets from where they are."""
+        """Go on after a FAULT: the model starts anew with the next good inputs, the offsets from where they
+        are.
+        """
         self.state, self.origin, self.predicted = State.OFF, None, None
         self.settling = State.COLD
         self.bump = [0.0] * len(self.places)

@@ -1,7 +1,7 @@
 """Through a gap: what a model does while nobody fed it.
 
-The machine is taken to have been off: flows, speeds and heat are zero, temperatures run straight from the last value known to the
-first one after the gap, everything else stays.
+The machine is taken to have been off: flows, speeds and heat are zero, temperatures run straight from the
+last value known to the first one after the gap, everything else stays.
 """
 
 from __future__ import annotations

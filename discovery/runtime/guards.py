@@ -1,7 +1,7 @@
 """Input guards: what may reach the model, and what stands in for a value that may not.
 
-A bad value is replaced by the last good one and the model goes on integrating. On the virtual machine that costs far less than
-freezing the outputs: bodies are slow, inputs return.
+A bad value is replaced by the last good one and the model goes on integrating. On the virtual machine that
+costs far less than freezing the outputs: bodies are slow, inputs return.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ class Fault(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What a source says of an input: a value in its unit, the instant [s] at which it was measured, its quality."""
+    """What a source says of an input: a value in its unit, the instant [s] at which it was measured, its
+    quality.
+    """
 
     value: object
     time: float
@@ -51,8 +53,8 @@ FADE_FROM, FADE_TO = 0.5, 2.0  # spans beyond the trained range at which the gai
 class InputGuard:
     """Checks one input in order: finite, quality, age, plausible, jump (latched), trained range.
 
-    A jump stays latched until the value comes back to what is held, give or take the drift that the recordings show, but
-    never more than half of the trained range: a sensor that stays wrong stays out.
+    A jump stays latched until the value comes back to what is held, give or take the drift that the
+    recordings show, but never more than half of the trained range: a sensor that stays wrong stays out.
     """
 
     def __init__(self, spec: Input) -> None:
@@ -80,7 +82,9 @@ class InputGuard:
             return 0.0, Fault.NOT_FINITE
         if not reading.good:
             return 0.0, Fault.QUALITY
-        if not abs(now - number(reading.time)) <= r.age_s:  # also a stamp that is no number, or from the future
+        if (
+            not abs(now - number(reading.time)) <= r.age_s
+        ):  # also a stamp that is no number, or from the future
             return 0.0, Fault.AGE
         if not r.plausible_low <= value <= r.plausible_high:
             return 0.0, Fault.IMPLAUSIBLE

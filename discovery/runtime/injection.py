@@ -15,8 +15,9 @@ from discovery.runtime.guards import Reading
 Array = NDArray[np.float64]
 
 KINDS = (
-    "nan", "infinite", "text", "none", "huge", "offset", "drift", "quality", "stale", "future", "no stamp", "missing",
-    "frozen", "link", "clock back", "clock jump", "clock nan", "disabled", "part done", "acknowledge",
+    "nan", "infinite", "text", "none", "huge", "offset", "drift", "quality", "stale", "future", "no stamp",
+    "missing", "frozen", "link", "clock back", "clock jump", "clock nan", "disabled", "part done",
+    "acknowledge",
 )  # fmt: skip
 
 
@@ -41,7 +42,11 @@ class Trial:
 
 
 def try_faults(
-    exported: Exported, inputs: Array, injections: Sequence[Injection], tick_s: float, settings: Settings | None = None
+    exported: Exported,
+    inputs: Array,
+    injections: Sequence[Injection],
+    tick_s: float,
+    settings: Settings | None = None,
 ) -> Trial:
     """Run a compensator on inputs (K, U) at ticks of `tick_s` while faults happen."""
     compensator = Compensator(exported, settings or Settings(tick_s=tick_s))
@@ -79,7 +84,9 @@ def _inject(
     plain = value if isinstance(value, float) else 0.0
     match one.kind:
         case "nan" | "infinite" | "text" | "none" | "huge":
-            wrong = {"nan": np.nan, "infinite": -np.inf, "text": "22.0", "none": None, "huge": 10**400}[one.kind]
+            wrong = {"nan": np.nan, "infinite": -np.inf, "text": "22.0", "none": None, "huge": 10**400}[
+                one.kind
+            ]
             readings[one.input] = Reading(wrong, now)
         case "offset":
             readings[one.input] = Reading(plain + one.size, now)

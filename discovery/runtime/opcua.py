@@ -8,7 +8,7 @@ import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,9 @@ class ConnectionForm(Strict):
     server_certificate: str = Field(description="certificate that the server must have (DER or PEM)")
     tick_s: float = Field(1.0, ge=0.05, le=60.0, description="time between ticks in s")
     inputs: dict[str, str] = Field(description="node id of each input of the model")
-    offsets: dict[str, str] = Field(description="node id of each offset, Double or Float, by name of the error")
+    offsets: dict[str, str] = Field(
+        description="node id of each offset, Double or Float, by name of the error"
+    )
     status: str | None = Field(None, description="node id of the status word, UInt32")
     heartbeat: str | None = Field(None, description="node id of the heartbeat, UInt32")
     enable: str | None = Field(None, description="node id of a Boolean: compensate or not")
@@ -49,7 +51,7 @@ class ConnectionForm(Strict):
 
 @dataclass
 class Punctuality:
-    """How many ticks there were and how many began late by more than a tenth or ended after the next was due."""
+    """Ticks, and how many were late: begun late by a tenth, or not done when the next was due."""
 
     ticks: int = 0
     late: int = 0
@@ -65,7 +67,8 @@ class Punctuality:
     def __str__(self) -> str:
         mean = 1e3 * self.work_s / max(self.ticks, 1)
         return (
-            f"{self.ticks} ticks, {100 * self.share:.2f} % in time, {mean:.1f} ms of work each, worst {1e3 * self.worst_s:.0f} ms; "
+            f"{self.ticks} ticks, {100 * self.share:.2f} % in time, {mean:.1f} ms of work each, worst "
+            f"{1e3 * self.worst_s:.0f} ms; "
             + ", ".join(f"{name} {count}" for name, count in self.states.items())
         )
 
@@ -90,10 +93,15 @@ class Link:
 
         client = asyncua.Client(self.form.url, timeout=4)
         client.application_uri = self.form.application_uri
-        files = {name: self.folder / getattr(self.form, name) for name in ("certificate", "private_key", "server_certificate")}
+        files = {
+            name: self.folder / getattr(self.form, name)
+            for name in ("certificate", "private_key", "server_certificate")
+        }
         for path in files.values():
             if not path.is_file():
-                raise UserError(f"{path}: there is no such file; the connection is signed and encrypted and needs it")
+                raise UserError(
+                    f"{path}: there is no such file; the connection is signed and encrypted and needs it"
+                )
         try:
             await client.set_security(
                 SecurityPolicyBasic256Sha256,
@@ -118,7 +126,11 @@ class Link:
     async def _check_nodes(self, client: Any, ua: Any) -> None:
         wanted = {**{n: (i, _NUMBERS, False) for n, i in self.form.inputs.items()}}
         wanted |= {n: (i, {"Double", "Float"}, True) for n, i in self.form.offsets.items()}
-        for name, kinds, writes in (("status", {"UInt32"}, True), ("heartbeat", {"UInt32"}, True), ("enable", {"Boolean"}, False)):
+        for name, kinds, writes in (
+            ("status", {"UInt32"}, True),
+            ("heartbeat", {"UInt32"}, True),
+            ("enable", {"Boolean"}, False),
+        ):
             if getattr(self.form, name) is not None:
                 wanted[name] = (getattr(self.form, name), kinds, writes)
         for name, (node_id, kinds, writes) in wanted.items():
@@ -126,13 +138,19 @@ class Link:
                 node = client.get_node(node_id)
                 kind = ua.VariantType((await node.read_data_type_as_variant_type()).value)
             except Exception:
-                raise UserError(f"{self.form.url}: there is no variable {node_id} for '{name}'; mend the connection file") from None
+                raise UserError(
+                    f"{self.form.url}: there is no variable {node_id} for '{name}'; mend the connection file"
+                ) from None
             if kind.name not in kinds:
                 raise UserError(
-                    f"{self.form.url}: {node_id} for '{name}' is of type {kind.name}, not {' or '.join(sorted(kinds))}; name another node"
+                    f"{self.form.url}: {node_id} for '{name}' is of type {kind.name}, not "
+                    f"{' or '.join(sorted(kinds))}; name another node"
                 )
             if writes and ua.AccessLevel.CurrentWrite not in await node.get_user_access_level():
-                raise UserError(f"{self.form.url}: {node_id} for '{name}' cannot be written by this user; grant write access to it")
+                raise UserError(
+                    f"{self.form.url}: {node_id} for '{name}' cannot be written by this user; grant write "
+                    f"access to it"
+                )
             self.kinds[name] = kind
 
     async def read(self) -> tuple[dict[str, Reading], bool]:
@@ -144,13 +162,17 @@ class Link:
         values = await self.client.uaclient.read_attributes(ids, ua.AttributeIds.Value)
         now = time.time()
         readings = {name: _reading(value, now) for name, value in zip(names, values, strict=False)}
-        enabled = self.form.enable is None or (values[-1].Value is not None and values[-1].Value.Value is True)
+        enabled = self.form.enable is None or (
+            values[-1].Value is not None and values[-1].Value.Value is True
+        )
         return readings, enabled
 
     async def write(self, tick: Tick) -> None:
         """Offsets, status word and heartbeat."""
         ua = _asyncua().ua
-        values: dict[str, tuple[str, float | int]] = {n: (i, tick.offsets[n]) for n, i in self.form.offsets.items()}
+        values: dict[str, tuple[str, float | int]] = {
+            n: (i, tick.offsets[n]) for n, i in self.form.offsets.items()
+        }
         if self.form.status:
             values["status"] = (self.form.status, tick.status)
         if self.form.heartbeat:
@@ -169,7 +191,7 @@ class Link:
 
 
 async def run_loop(link: Link, session: Session, seconds: float | None, say: Say) -> Punctuality:
-    """Tick until `seconds` are over (None: until stopped); a lost connection is tried again beside the ticks."""
+    """Tick for `seconds` (None: until stopped); a lost connection is tried again beside the ticks."""
     tick_s, found = link.form.tick_s, Punctuality()
     readings: Mapping[str, Reading] = {}
     enabled, again = True, None
@@ -274,11 +296,16 @@ def compensate_opcua(
 def _check_names(form: ConnectionForm, exported: Exported) -> None:
     for name in (i.name for i in exported.inputs):
         if name not in form.inputs:
-            raise UserError(f"the connection names no node for input '{name}' of the model; add it under [inputs]")
+            raise UserError(
+                f"the connection names no node for input '{name}' of the model; add it under [inputs]"
+            )
     errors = {o.name for o in exported.outputs if o.role == "error"}
     for name in form.offsets:
         if name not in errors:
-            raise UserError(f"the connection names an offset '{name}', which the model does not give ({', '.join(sorted(errors))})")
+            raise UserError(
+                f"the connection names an offset '{name}', which the model does not give "
+                f"({', '.join(sorted(errors))})"
+            )
 
 
 def _reading(value: Any, now: float) -> Reading:
@@ -288,22 +315,28 @@ def _reading(value: Any, now: float) -> Reading:
         return Reading(None, 0.0, False)
     age = (server if server is not None else now) - source
     raw = None if value.Value is None else value.Value.Value
-    return Reading(raw, now - age if server is not None and abs(server - now) > 60.0 else source, value.StatusCode.is_good())
+    return Reading(
+        raw,
+        now - age if server is not None and abs(server - now) > 60.0 else source,
+        value.StatusCode.is_good(),
+    )
 
 
 def _seconds(stamp: datetime | None) -> float | None:
     if stamp is None:
         return None
-    return (stamp if stamp.tzinfo else stamp.replace(tzinfo=timezone.utc)).timestamp()
+    return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
 
 
 def _refusal(url: str, error: Exception) -> str:
-    text = f"{type(error).__name__} {error}".strip()
-    if "Certificate" in text or "Security" in text or "certificate" in text:
-        return f"{url}: the connection is refused because of a certificate ({text[:160]}); each side must trust the certificate of the other"
+    text = f"{type(error).__name__} {error}".strip()[:160]
+    if any(word in text for word in ("Certificate", "certificate", "Security")):
+        what = f"refused because of a certificate ({text}); each side must trust the certificate of the other"
+        return f"{url}: the connection is {what}"
     if isinstance(error, OSError | TimeoutError | asyncio.TimeoutError):
-        return f"{url}: no OPC UA server answers ({text[:160]}); check address and port, and that the server trusts this certificate"
-    return f"{url}: the connection is refused ({text[:160]}); check the certificates and the user's rights"
+        advice = "check address and port, and that the server trusts this certificate"
+        return f"{url}: no OPC UA server answers ({text}); {advice}"
+    return f"{url}: the connection is refused ({text}); check the certificates and the user's rights"
 
 
 def _asyncua() -> Any:

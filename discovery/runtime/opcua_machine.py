@@ -1,5 +1,5 @@
-"""A simulated machine server for trying the compensator over OPC UA: inputs that move within the trained ranges, nodes for
-the offsets in a namespace of their own, access for one certificate alone."""
+"""A simulated machine server for trying the compensator over OPC UA: inputs that move within the trained
+ranges, nodes for the offsets in a namespace of their own, access for one certificate alone."""
 
 from __future__ import annotations
 
@@ -108,7 +108,9 @@ async def simulated_machine(exported: Exported, folder: Path, update_s: float = 
                 await task
 
 
-async def _variable(ua: Any, parent: Any, space: int, name: str, value: object, kind: Any, writable: bool = False) -> Any:
+async def _variable(
+    ua: Any, parent: Any, space: int, name: str, value: object, kind: Any, writable: bool = False
+) -> Any:
     node = await parent.add_variable(ua.NodeId(name, space), name, value, kind)
     if writable:
         await node.set_writable()

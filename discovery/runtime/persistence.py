@@ -37,9 +37,11 @@ def save(compensator: Compensator, folder: Path) -> None:
 
 
 def restore(compensator: Compensator, folder: Path) -> float | None:
-    """Go on from the newest whole copy of this model's state; returns its instant [s], None where there is none.
+    """Go on from the newest whole copy of this model's state; returns its instant [s], None where there is
+    none.
 
-    The offsets go on from where they were; the model catches up with the next tick, through a gap by fast-forward.
+    The offsets go on from where they were; the model catches up with the next tick, through a gap by
+    fast-forward.
     """
     for name in NAMES:
         content = _read(folder / name)
@@ -53,7 +55,9 @@ def restore(compensator: Compensator, folder: Path) -> float | None:
 
 
 def succeed(compensator: Compensator, folder: Path) -> bool:
-    """Begin where another model stopped, if its state was saved: states of the same name, and the offsets without a step."""
+    """Begin where another model stopped, if its state was saved: states of the same name, and the offsets
+    without a step.
+    """
     for name in NAMES:
         content = _read(folder / name)
         if content is not None and content["model"] != compensator.exported.seal.sha256:
@@ -100,7 +104,9 @@ def _read(path: Path) -> dict[str, Any] | None:
 def _apply(c: Compensator, content: dict[str, Any]) -> None:
     saved = content["snapshot"]
     arrays = {key: np.array(saved[key], dtype=float) for key in ("x", "carry", "delayed", "plays", "ring")}
-    snapshot = Snapshot(**arrays, position=np.array(saved["position"], dtype=np.int64), count=int(saved["count"]))
+    snapshot = Snapshot(
+        **arrays, position=np.array(saved["position"], dtype=np.int64), count=int(saved["count"])
+    )
     numbers = [*content["offsets"], *content["bump"], *snapshot.x]
     if not all(math.isfinite(value) for value in numbers) or len(content["offsets"]) != len(c.places):
         raise ValueError("not finite")

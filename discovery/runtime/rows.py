@@ -15,7 +15,8 @@ LONGEST_JUMP_S = 400 * 24 * 3600.0  # a row that claims to be later than this is
 
 
 def csv_rows(lines: Iterable[str]) -> Iterator[tuple[float, dict[str, Reading]]]:
-    """Instant [s] and readings by name of each row; an empty cell is no reading, a damaged one is a bad reading.
+    """Instant [s] and readings by name of each row; an empty cell is no reading, a damaged one is a bad
+    reading.
 
     A row whose time cannot be read or runs backwards is left out.
 
@@ -38,14 +39,17 @@ def csv_rows(lines: Iterable[str]) -> Iterator[tuple[float, dict[str, Reading]]]
         if not stamp >= last or (last > -math.inf and stamp - last > LONGEST_JUMP_S):
             continue
         last = stamp
-        cells = {name: cell for name, cell in zip(header, row, strict=False) if name != "time" and cell.strip()}
+        cells = {
+            name: cell for name, cell in zip(header, row, strict=False) if name != "time" and cell.strip()
+        }
         yield stamp, {name: Reading(_number(cell), stamp) for name, cell in cells.items()}
 
 
 def ticks(
     rows: Iterable[tuple[float, Mapping[str, Reading]]], tick_s: float, after: float | None = None
 ) -> Iterator[tuple[float, dict[str, Reading], dict[str, Reading]]]:
-    """Instants of the ticks: with the newest readings of each input, and the readings that are new since the last tick.
+    """Instants of the ticks: with the newest readings of each input, and the readings that are new since the
+    last tick.
 
     Args:
         tick_s: time between ticks [s].

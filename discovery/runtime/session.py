@@ -44,14 +44,23 @@ class Session:
             exported = models.active
             if models.candidate is not None:
                 self.shadow = begin_shadow(models.candidate, self.settings, rule)
-                say(f"revision {models.candidate.revision} runs in the shadow of revision {exported.revision}")
+                say(
+                    f"revision {models.candidate.revision} runs in the shadow of revision {exported.revision}"
+                )
         self.compensator = Compensator(exported, self.settings)
         if folder is not None:
             self.resumed = restore(self.compensator, folder)
             if self.resumed is None:
                 succeed(self.compensator, folder)
 
-    def tick(self, readings: Mapping[str, Reading], measured: Mapping[str, Reading], now: float, *, enabled: bool = True) -> Tick:
+    def tick(
+        self,
+        readings: Mapping[str, Reading],
+        measured: Mapping[str, Reading],
+        now: float,
+        *,
+        enabled: bool = True,
+    ) -> Tick:
         """One tick; `measured`: readings that came since the last one, among them measured errors."""
         found = self.compensator.tick(readings, now, enabled=enabled)
         if self.shadow is not None:

@@ -13,8 +13,8 @@ from discovery.runtime.guards import Reading, number
 
 @dataclass(frozen=True)
 class Rule:
-    """When a shadow run is passed. `least_readings` measured errors decide by their residual; fewer, and the two models may
-    not differ by more than `most_um`."""
+    """When a shadow run is passed. `least_readings` measured errors decide by their residual; fewer, and the
+    two models may not differ by more than `most_um`."""
 
     hours: float = 24.0
     least_readings: int = 5
@@ -33,7 +33,13 @@ class Shadow:
     trouble: bool = False
     residuals: dict[str, list[tuple[float, float]]] = field(default_factory=dict)  # old, new
 
-    def tick(self, active: Compensator, readings: Mapping[str, Reading], measured: Mapping[str, Reading], now: float) -> None:
+    def tick(
+        self,
+        active: Compensator,
+        readings: Mapping[str, Reading],
+        measured: Mapping[str, Reading],
+        now: float,
+    ) -> None:
         """Follow a tick of the model at work."""
         if self.began is None and active.predicted is not None:
             self.began = now
@@ -78,7 +84,9 @@ def predictions(compensator: Compensator) -> dict[str, float]:
     """Predicted errors by name; none before the first step."""
     if compensator.predicted is None:
         return {}
-    return {n: float(compensator.predicted[k]) for n, k in zip(compensator.names, compensator.places, strict=True)}
+    return {
+        n: float(compensator.predicted[k]) for n, k in zip(compensator.names, compensator.places, strict=True)
+    }
 
 
 def begin_shadow(candidate: Exported, settings: Settings, rule: Rule | None = None) -> Shadow:

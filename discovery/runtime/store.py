@@ -30,7 +30,8 @@ def open_store(
 ) -> Models:
     """The model at work in `folder`, and `model` as candidate where it is another one.
 
-    The first model of a folder is at work at once: there is nothing yet that a shadow run could be compared with.
+    The first model of a folder is at work at once: there is nothing yet that a shadow run could be compared
+    with.
 
     Raises:
         UserError: the model at work is damaged, or not signed by `trusted`.

@@ -3,10 +3,12 @@
 Three hypotheses for what the new readings leave:
 
 * noise: parameters that follow the machine explain them no better than those at work;
-* drift: they do, by more than chance, over all recordings since the last revision. The belief about the parameters is
-  recursive: what was known, forgotten a little with each recording, is the prior of the next (Kalman filter of parameters on a
-  random walk, Ljung, System Identification, chapter 11; with bounds);
-* a new effect: even then the residual stays larger than it was when the model was fitted. The mismatch method is asked.
+* drift: they do, by more than chance, over all recordings since the last revision. The belief about the
+parameters is
+  recursive: what was known, forgotten a little with each recording, is the prior of the next (Kalman filter
+  of parameters on a random walk, Ljung, System Identification, chapter 11; with bounds);
+* a new effect: even then the residual stays larger than it was when the model was fitted. The mismatch method
+is asked.
 """
 
 from __future__ import annotations
@@ -43,8 +45,8 @@ WIDEST = 3.0  # prior standard deviations never grow beyond this multiple of the
 
 @dataclass(frozen=True)
 class Belief:
-    """What is known of the parameters: values in `model`, covariance (P, P) of those named; and what speaks against the model
-    `at_work` since its revision: `gain` in squared residuals for `effective` parameters."""
+    """What is known of the parameters: values in `model`, covariance (P, P) of those named; and what speaks
+    against the model `at_work` since its revision: `gain` in squared residuals for `effective` parameters."""
 
     model: Model
     at_work: Model
@@ -62,7 +64,9 @@ class Belief:
 
 @dataclass(frozen=True)
 class Finding:
-    """What one recording of new readings said. rms in units of the residual that the fit left (1: as good as new)."""
+    """What one recording of new readings said. rms in units of the residual that the fit left (1: as good as
+    new).
+    """
 
     recording: str
     verdict: Verdict
@@ -73,9 +77,10 @@ class Finding:
     moved: Mapping[str, tuple[float, float]]  # parameter: from, to
 
     def __str__(self) -> str:
-        text = f"{self.recording}: {self.verdict} (p = {self.p_value:.2g}, {self.readings} readings, residual {self.before:.2f}"
+        text = f"{self.recording}: {self.verdict} (p = {self.p_value:.2g}, {self.readings} readings, "
+        text += f"residual {self.before:.2f}{f' -> {self.after:.2f}' if self.moved else ''} of the fit's)"
         moved = ", ".join(f"{name} {old:.4g} -> {new:.4g}" for name, (old, new) in self.moved.items())
-        return text + (f" -> {self.after:.2f} of the fit's)" if moved else " of the fit's)") + (f"; {moved}" if moved else "")
+        return f"{text}; {moved}" if moved else text
 
 
 def belief_of(exported: Exported) -> Belief:
@@ -86,10 +91,15 @@ def belief_of(exported: Exported) -> Belief:
     """
     found = exported.document["knowledge"]
     if not found["parameters"]:
-        raise UserError(f"model '{exported.model.name}' does not say how well its parameters are known; export it again from its run")
+        raise UserError(
+            f"model '{exported.model.name}' does not say how well its parameters are known; export it "
+            f"again from its run"
+        )
     covariance = np.array(found["covariance"])
     model = exported.model
-    return Belief(model, model, tuple(found["parameters"]), covariance, np.array(found["first"]), found["slow_share"])
+    return Belief(
+        model, model, tuple(found["parameters"]), covariance, np.array(found["first"]), found["slow_share"]
+    )
 
 
 def residual_levels(exported: Exported) -> dict[str, float]:
@@ -111,11 +121,17 @@ def update_belief(
     data = campaign.recordings[recording]
     outputs = [n for n in levels if n in data.values and np.isfinite(data.values[n]).any()]
     if not outputs:
-        raise UserError(f"{campaign.path}: recording '{recording}' holds no reading of {', '.join(levels)}; there is nothing to learn from")
+        raise UserError(
+            f"{campaign.path}: recording '{recording}' holds no reading of {', '.join(levels)}; there is "
+            f"nothing to learn from"
+        )
     problem = make_problem(belief.model, campaign, [recording], outputs)
     now = make_problem(belief.at_work, campaign, [recording], outputs)
     prior = _prior(belief)
-    known = [next(i for i, u in enumerate(problem.unknowns) if u.name == n and not u.is_start) for n in belief.parameters]
+    known = [
+        next(i for i, u in enumerate(problem.unknowns) if u.name == n and not u.is_start)
+        for n in belief.parameters
+    ]
     starts = [i for i, u in enumerate(problem.unknowns) if u.is_start]
     grid = problem.systems[0].grid
     alike = stretch(belief.slow_share, grid.time[grid.read])
@@ -129,7 +145,9 @@ def update_belief(
     count = int(np.isfinite(grid.readings).sum())
     before, after = fixed.rms * np.sqrt(alike), freed.rms * np.sqrt(alike)
     if after > EXCESS and count / alike >= 8:  # nothing is learnt from what the model cannot explain
-        return replace(belief, covariance=prior), Finding(recording, "new effect", count, before, after, p_value, {})
+        return replace(belief, covariance=prior), Finding(
+            recording, "new effect", count, before, after, p_value, {}
+        )
     sd = np.sqrt(np.maximum(np.diag(freed.covariance), 0.0))
     values = freed.theta[known]
     moved = {}
@@ -145,11 +163,15 @@ def update_belief(
         gain=gain,
         effective=effective,
     )
-    return learnt, Finding(recording, verdict, count, before, after, p_value, moved if verdict == "drift" else {})
+    return learnt, Finding(
+        recording, verdict, count, before, after, p_value, moved if verdict == "drift" else {}
+    )
 
 
 def _prior(belief: Belief) -> Array:
-    """Covariance before a recording: what was known, a random walk added, never wider than a multiple of the first fit's."""
+    """Covariance before a recording: what was known, a random walk added, never wider than a multiple of the
+    first fit's.
+    """
     walk = [WALK * abs(belief.model.parameters[name].value) for name in belief.parameters]
     wider = belief.covariance + np.diag(np.square(walk))
     sd = np.sqrt(np.maximum(np.diag(wider), 1e-300))
@@ -166,8 +188,12 @@ class _Minimum:
     effective: float  # directions of the parameters that the readings determine
 
 
-def _minimise(problem: Problem, weights: Array, unknowns: Sequence[int], starts: Sequence[int], prior: Array) -> _Minimum:
-    """Weighted least squares over some unknowns, with the priors of the start values and of the parameters before them."""
+def _minimise(
+    problem: Problem, weights: Array, unknowns: Sequence[int], starts: Sequence[int], prior: Array
+) -> _Minimum:
+    """Weighted least squares over some unknowns, with the priors of the start values and of the parameters
+    before them.
+    """
     from scipy.optimize import least_squares
 
     origin, system = problem.start, problem.systems[0]
@@ -185,7 +211,9 @@ def _minimise(problem: Problem, weights: Array, unknowns: Sequence[int], starts:
         theta = origin.copy()
         if count:
             parameters = index[:count]
-            theta[parameters] = np.clip(origin[parameters] + root @ z[:count], low[parameters], high[parameters])
+            theta[parameters] = np.clip(
+                origin[parameters] + root @ z[:count], low[parameters], high[parameters]
+            )
         theta[list(starts)] = origin[list(starts)] + spread * z[count:]
         return theta
 
@@ -196,11 +224,15 @@ def _minimise(problem: Problem, weights: Array, unknowns: Sequence[int], starts:
     def jacobian(z: Array) -> Array:
         slopes = -(problem.jacobian(problem.run(system, place(z))) * weights[None, :, None])[seen]
         columns = [slopes[:, index[:count]] @ root] if count else []
-        return np.vstack([np.hstack([*columns, slopes[:, list(starts)] * spread]), np.eye(count + len(starts))])
+        return np.vstack(
+            [np.hstack([*columns, slopes[:, list(starts)] * spread]), np.eye(count + len(starts))]
+        )
 
-    found = least_squares(residual, np.zeros(count + len(starts)), jac=jacobian, method="trf", max_nfev=12, xtol=1e-6, ftol=1e-6)
+    found = least_squares(
+        residual, np.zeros(count + len(starts)), jac=jacobian, method="trf", max_nfev=12, xtol=1e-6, ftol=1e-6
+    )
     readings = int(seen.sum())
-    r, j = found.fun, found.jac
+    r, j = np.asarray(found.fun), jacobian(found.x)
     posterior = np.linalg.inv(j.T @ j)[:count, :count]
     return _Minimum(
         place(found.x),
@@ -215,7 +247,9 @@ def _with(model: Model, names: Sequence[str], values: Array, sd: Array) -> Model
     parameters = dict(model.parameters)
     for name, value, s in zip(names, values.tolist(), sd.tolist(), strict=True):
         p = parameters[name]
-        parameters[name] = replace(p, value=value, low=max(value - Z95 * s, p.min), high=min(value + Z95 * s, p.max))
+        parameters[name] = replace(
+            p, value=value, low=max(value - Z95 * s, p.min), high=min(value + Z95 * s, p.max)
+        )
     return replace(model, parameters=parameters)
 
 
@@ -231,19 +265,25 @@ class Update:
         """What a user wants to know of it."""
         lines = [str(finding) for finding in self.findings]
         if self.diagnosis is not None:
-            named = ", ".join(f"{p['effect']} at {'+'.join(p['states'])}" for p in self.diagnosis.get("physics", []))
+            named = ", ".join(
+                f"{p['effect']} at {'+'.join(p['states'])}" for p in self.diagnosis.get("physics", [])
+            )
             lines.append(f"the mismatch method says: {self.diagnosis['verdict']}{named and ': ' + named}")
         if self.path is None:
             lines.append("the model stays as it is")
         else:
-            lines.append(f"{self.path}: the next revision; `discovery compensate` runs it in the shadow of the one at work first")
+            lines.append(
+                f"{self.path}: the next revision; `discovery compensate` runs it in the shadow of the one "
+                f"at work first"
+            )
         return lines
 
 
 def update_file(
     path: Path, campaign: Campaign, recordings: Sequence[str], out: Path, key: Ed25519PrivateKey | None = None
 ) -> Update:
-    """`discovery update`: take in recordings one after the other and write the next revision where they ask for it.
+    """`discovery update`: take in recordings one after the other and write the next revision where they ask
+    for it.
 
     Raises:
         UserError: a model that cannot be updated, or recordings without readings.
@@ -279,7 +319,7 @@ def next_revision(exported: Exported, belief: Belief, findings: Sequence[Finding
     revision = exported.revision + 1
     note = {
         "revision": revision,
-        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "text": "; ".join(map(str, findings)),
         "of": exported.seal.sha256,
     }

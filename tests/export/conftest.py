@@ -55,8 +55,13 @@ def make_model() -> Model:
         Term("radiation", "b", parse("5.67e-8*((T_env + 273.15)**4 - (b + 273.15)**4)")),
         Term("joint", "a", parse("3*play(b - 22, width)")),
     )
-    outputs = {"E_Z0T": parse("1.92*(a - 22) + 3*play(b - 22, 0.2)"), "E_A0C": parse("max(min(4*(a - b), 30), -30)")}
-    return Model("Everything: ä */ model", {k: Parameter(v) for k, v in numbers.items()}, states, terms, outputs)
+    outputs = {
+        "E_Z0T": parse("1.92*(a - 22) + 3*play(b - 22, 0.2)"),
+        "E_A0C": parse("max(min(4*(a - b), 30), -30)"),
+    }
+    return Model(
+        "Everything: ä */ model", {k: Parameter(v) for k, v in numbers.items()}, states, terms, outputs
+    )
 
 
 @pytest.fixture(scope="session")

@@ -38,7 +38,7 @@ def test_what_is_written_is_read_back_and_steps_the_same(
         stepper = Stepper(compiled)
         stepper.start(u[0])
         runs.append(stepper.run(u))
-    assert np.array_equal(*runs)
+    assert np.array_equal(runs[0], runs[1])
     assert back.provenance["experiment"] == "small"
     assert [(i.name, i.role, i.unit) for i in back.inputs][:2] == [
         ("P_drive", "heat load", "W"),
@@ -60,14 +60,16 @@ def test_ranges_and_limits_come_from_the_recordings(document: dict[str, Any], ca
 
 @settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(share=some.floats(0, 1, exclude_max=True), byte=some.integers(0, 255))
-def test_a_changed_byte_is_never_accepted(document: dict[str, Any], share: float, byte: int, tmp_path: Path) -> None:
+def test_a_changed_byte_is_never_accepted(
+    document: dict[str, Any], share: float, byte: int, tmp_path: Path
+) -> None:
     data = bytearray(render(document, private_key(tmp_path / "key.pem")))
     end = data.rindex(b',\n "seal": ')
     place = int(share * end)
     if data[place] == byte:
         return
     data[place] = byte
-    with pytest.raises(UserError, match="changed after it was sealed|no sealed model"):
+    with pytest.raises(UserError, match=r"changed after it was sealed|no sealed model"):
         open_seal(bytes(data), "model.json")
 
 
@@ -76,7 +78,8 @@ def test_a_signature_of_someone_else_is_refused(document: dict[str, Any], tmp_pa
     data = render(document, mine)
     require_trusted(open_seal(data, "m")[1], public_key(tmp_path / "mine.pem.pub"), "m")
     forged = data.replace(
-        mine.public_key().public_bytes_raw().hex().encode(), other.public_key().public_bytes_raw().hex().encode()
+        mine.public_key().public_bytes_raw().hex().encode(),
+        other.public_key().public_bytes_raw().hex().encode(),
     )
     with pytest.raises(UserError, match="signature is not that of its public key"):
         open_seal(forged, "m")
@@ -94,8 +97,10 @@ def altered(document: dict[str, Any], change: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (lambda d: d["terms"][0].update(expression="__import__('os').system('true')"), "not allowed|unknown function"),
-        (lambda d: d["terms"][0].update(expression="9**9**9**9"), "not allowed|finite|runs away|start|^$"),
+        (
+            lambda d: d["terms"][0].update(expression="__import__('os').system('true')"),
+            "not allowed|unknown function",
+        ),
         (lambda d: d["terms"][0].update(expression="a.__class__"), "not allowed"),
         (lambda d: d["terms"][0].update(expression="(" * 3000), "not a formula"),
         (lambda d: d["terms"][0].update(expression="nobody*2"), "inputs listed are not those"),
@@ -109,14 +114,16 @@ def altered(document: dict[str, Any], change: Any) -> dict[str, Any]:
     ],
 )
 def test_mistakes_and_attacks_are_a_sentence(document: dict[str, Any], change: Any, sentence: str) -> None:
-    try:
+    with pytest.raises(UserError, match=sentence):
         from_document(altered(document, change), Seal("", None, None), "model.json")
-    except UserError as error:
-        import re
 
-        assert re.search(sentence, str(error)), str(error)
-    else:
-        assert sentence.endswith("^$")  # a number that is merely infinite is refused when the model is started
+
+def test_a_tower_of_powers_ends_at_once(document: dict[str, Any]) -> None:
+    towering = altered(document, lambda d: d["terms"][0].update(expression="9**9**9**9"))
+    compiled = from_document(towering, Seal("", None, None), "model.json").compiled
+    stepper, u = Stepper(compiled), np.full(len(compiled.inputs), 20.0)
+    stepper.start(u)
+    assert stepper.step(u) is None
 
 
 @pytest.mark.parametrize("data", [b"", b"{}", b'{"a": 1,\n "seal": {}\n}\n', b"\xff\xfe", b"[1, 2]"])
@@ -125,7 +132,7 @@ def test_what_is_no_model_is_refused(data: bytes) -> None:
         open_seal(data, "x")
 
 
-def test_a_key_that_stands_twice_or_is_no_number_is_refused(document: dict[str, Any]) -> None:
+def test_a_key_that_stands_twice_or_is_no_number_is_refused() -> None:
     from discovery.export.seal import seal_bytes
 
     for body in (b'{"name": "a", "name": "b"\n}', b'{"name": NaN\n}', b'{"name": -Infinity\n}'):

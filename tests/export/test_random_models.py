@@ -58,7 +58,14 @@ def models(draw: some.DrawFn) -> Model:
     """One to four bodies with two to four terms each, and two errors of a few hundred um."""
     names = [f"body_{k}" for k in range(draw(some.integers(1, 4)))]
     states = {
-        name: State(name, "degC", 1e4, parse(draw(some.sampled_from(["T_env", "22", "0.5*(T_env + T_fluid)"]))), 0.5, 1 / draw(some.floats(1e4, 3e5)))
+        name: State(
+            name,
+            "degC",
+            1e4,
+            parse(draw(some.sampled_from(["T_env", "22", "0.5*(T_env + T_fluid)"]))),
+            0.5,
+            1 / draw(some.floats(1e4, 3e5)),
+        )
         for name in names
     }
     terms = []
@@ -72,7 +79,13 @@ def models(draw: some.DrawFn) -> Model:
         "E_Z0T": parse(" + ".join(f"{draw(share)}*({name} - 22)" for name in names)),
         "E_A0C": parse(f"{draw(share)}*play({names[0]} - 22, 0.2) + 0.01*P_drive - k*delay(T_env, 33)"),
     }
-    return Model(draw(some.sampled_from(["plain", "a */ b", "Öl"])), {"k": Parameter(draw(share))}, states, tuple(terms), outputs)
+    return Model(
+        draw(some.sampled_from(["plain", "a */ b", "Öl"])),
+        {"k": Parameter(draw(share))},
+        states,
+        tuple(terms),
+        outputs,
+    )
 
 
 def exported(model: Model, step_s: float) -> Exported:
@@ -80,7 +93,9 @@ def exported(model: Model, step_s: float) -> Exported:
     from discovery.export.ranges import InputRange, OutputRange
 
     compiled = compile_model(model, step_s)
-    inputs = tuple(Input(n, "other input", "1", "held", InputRange(0, 1, 0, 1, None, None, 1)) for n in compiled.inputs)
+    inputs = tuple(
+        Input(n, "other input", "1", "held", InputRange(0, 1, 0, 1, None, None, 1)) for n in compiled.inputs
+    )
     outputs = tuple(Output(n, "error", "um", OutputRange(1, 1)) for n in compiled.outputs)
     return Exported(model, compiled, inputs, outputs, 1, {}, (), {}, Seal("0" * 64, None, None))
 
@@ -97,7 +112,9 @@ def random_inputs(names: tuple[str, ...], steps: int, seed: int) -> np.ndarray:
 def test_c_in_double_and_float_is_the_python_model(model: Model, step_s: float, seed: int) -> None:
     one = exported(model, step_s)
     reference = make_reference(one.compiled, random_inputs(one.compiled.inputs, 2000, seed))
-    proofs = {proof.target: proof.deviation for proof in prove_c(one, reference)}  # raises above 1e-9 and 1e-3
+    proofs = {
+        proof.target: proof.deviation for proof in prove_c(one, reference)
+    }  # raises above 1e-9 and 1e-3
     assert set(proofs) == {"C double", "C float"}
 
 

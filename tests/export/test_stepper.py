@@ -74,7 +74,9 @@ def test_agrees_with_the_dynamics_that_fitted_the_model(model: Model, campaign: 
 
 
 def test_a_delay_is_exact_for_held_inputs_and_holds_before_the_start() -> None:
-    model = Model("late", {}, {"x": State("x", "um", None, parse(0.0), 0.0, 1.0)}, (), {"y": parse("delay(u, 25)")})
+    model = Model(
+        "late", {}, {"x": State("x", "um", None, parse(0.0), 0.0, 1.0)}, (), {"y": parse("delay(u, 25)")}
+    )
     stepper = Stepper(compile_model(model, 10.0))
     u = np.array([3.0, 5.0, 9.0, 1.0, 4.0, 4.0])[:, None]
     stepper.start(u[0])
@@ -83,7 +85,9 @@ def test_a_delay_is_exact_for_held_inputs_and_holds_before_the_start() -> None:
 
 
 def test_a_play_follows_only_beyond_its_width() -> None:
-    model = Model("joint", {}, {"x": State("x", "um", None, parse("u"), 0.0, 1.0)}, (), {"y": parse("play(u, 1)")})
+    model = Model(
+        "joint", {}, {"x": State("x", "um", None, parse("u"), 0.0, 1.0)}, (), {"y": parse("play(u, 1)")}
+    )
     stepper = Stepper(compile_model(model, 1.0))
     u = np.array([0.0, 0.5, 3.0, 2.5, 1.5, 0.0, 0.2])[:, None]
     stepper.start(u[0])
@@ -92,7 +96,11 @@ def test_a_play_follows_only_beyond_its_width() -> None:
 
 def test_a_step_that_is_not_finite_changes_nothing() -> None:
     model = Model(
-        "fragile", {}, {"x": State("x", "um", None, parse(1.0), 0.0, 1.0)}, (Term("t", "x", parse("log(u)")),), {"y": parse("x")}
+        "fragile",
+        {},
+        {"x": State("x", "um", None, parse(1.0), 0.0, 1.0)},
+        (Term("t", "x", parse("log(u)")),),
+        {"y": parse("x")},
     )
     stepper = Stepper(compile_model(model, 1.0))
     stepper.start(np.array([1.0]))
@@ -107,7 +115,7 @@ def test_a_step_that_is_not_finite_changes_nothing() -> None:
     assert y[0] == pytest.approx(2.0)
 
 
-def test_a_snapshot_continues_bit_for_bit(model: Model, campaign: Campaign) -> None:
+def test_a_snapshot_continues_bit_for_bit(model: Model) -> None:
     compiled = compile_model(model, 10.0)
     rng = np.random.default_rng(3)
     u = rng.uniform([0, 20, 20, 0, 0], [900, 24, 30, 1, 900], size=(400, 5))

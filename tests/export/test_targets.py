@@ -39,12 +39,29 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_c_files_stand_alone(folder: Path, tmp_path: Path) -> None:
     """As a user would: the shipped files alone, the strictest warnings, a sanitizer."""
     [source] = [p for p in (folder / "c").glob("*.c") if p.name != "replay.c"]
-    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-O1"]
+    strict = [
+        "-std=c99",
+        "-pedantic",
+        "-Wall",
+        "-Wextra",
+        "-Wconversion",
+        "-Wdouble-promotion",
+        "-Werror",
+        "-O1",
+    ]
     for flags in ([], ["-DDISCOVERY_FLOAT"], ["-fsanitize=undefined", "-fno-sanitize-recover"]):
         program = tmp_path / "replay"
-        subprocess.run(["gcc", *strict, *flags, "replay.c", source.name, "-lm", "-o", program], cwd=folder / "c", check=True)
+        subprocess.run(
+            ["gcc", *strict, *flags, "replay.c", source.name, "-lm", "-o", program],
+            cwd=folder / "c",
+            check=True,
+        )
         done = subprocess.run(
-            [program, "reference_inputs.csv", "reference_outputs.csv"], cwd=folder / "c", capture_output=True, text=True, check=False
+            [program, "reference_inputs.csv", "reference_outputs.csv"],
+            cwd=folder / "c",
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert done.returncode == 0, done.stdout + done.stderr
     text = source.read_text()
@@ -61,7 +78,10 @@ def test_the_replay_notices_a_wrong_number(folder: Path, tmp_path: Path) -> None
     [source] = [p.name for p in tmp_path.glob("*.c") if p.name != "replay.c"]
     subprocess.run(["gcc", "-std=c99", "replay.c", source, "-lm", "-o", "replay"], cwd=tmp_path, check=True)
     done = subprocess.run(
-        ["./replay", "reference_inputs.csv", "reference_outputs.csv"], cwd=tmp_path, capture_output=True, check=False
+        ["./replay", "reference_inputs.csv", "reference_outputs.csv"],
+        cwd=tmp_path,
+        capture_output=True,
+        check=False,
     )
     assert done.returncode == 1
 
@@ -155,7 +175,9 @@ def test_reduction_states_its_error(campaign: Campaign, model: Model, tmp_path: 
 
 
 def test_a_linear_reduction_keeps_its_error_below_the_bound_of_the_theory() -> None:
-    """A chain of bodies: the error of balanced truncation is at most twice the sum of the singular values left out."""
+    """A chain of bodies: the error of balanced truncation is at most twice the sum of the singular values
+    left out.
+    """
     from scipy.linalg import expm
 
     from discovery.export.compiled import compile_model
@@ -165,7 +187,9 @@ def test_a_linear_reduction_keeps_its_error_below_the_bound_of_the_theory() -> N
     names = [f"b{k}" for k in range(6)]
     states = {n: State(n, "degC", None, parse(0.0), 0.0, 1.0) for n in names}
     terms = [Term("in", "b0", parse("0.01*u"))]
-    terms += [Term("c", names[k + 1], parse(f"0.005*({names[k]} - {names[k + 1]})"), names[k]) for k in range(5)]
+    terms += [
+        Term("c", names[k + 1], parse(f"0.005*({names[k]} - {names[k + 1]})"), names[k]) for k in range(5)
+    ]
     terms += [Term("air", n, parse(f"-0.001*{n}")) for n in names]
     model = Model("chain", {}, states, tuple(terms), {"y": parse("b5 + 0.5*b2")})
     compiled = compile_model(model, 10.0)
@@ -190,7 +214,9 @@ def test_the_command_exports_a_run(model: Model, tmp_path: Path, monkeypatch: py
 
     run = tmp_path / "run"
     write_model(run / "models" / "everything.toml", model)
-    (run / "results.json").write_text(json.dumps({"experiment": "small", "fit": ["fit"], "campaign_file": "campaign.toml"}))
+    (run / "results.json").write_text(
+        json.dumps({"experiment": "small", "fit": ["fit"], "campaign_file": "campaign.toml"})
+    )
     monkeypatch.chdir(tmp_path)
     rows = make_campaign(2.0).recordings["fit"]
     table = np.column_stack([rows.time, *rows.values.values()])

@@ -1,4 +1,6 @@
-"""The virtual machine's thermobalance, fitted once and exported, and the inputs of a recording no fit has seen."""
+"""The virtual machine's thermobalance, fitted once and exported, and the inputs of a recording no fit has
+seen.
+"""
 
 from __future__ import annotations
 

@@ -52,7 +52,9 @@ def test_a_bad_fluid_sensor_costs_at_most_four_um(
     assert np.max(np.abs(trial.offsets - clean)) <= 4.0
 
 
-def test_a_lost_link_is_held_and_comes_back(exported: Exported, minutes: np.ndarray, clean: np.ndarray) -> None:
+def test_a_lost_link_is_held_and_comes_back(
+    exported: Exported, minutes: np.ndarray, clean: np.ndarray
+) -> None:
     trial = try_faults(exported, minutes, [Injection("link", "T_env", 30 * 3600, 7200)], TICK)
     assert np.max(np.abs(trial.offsets - clean)) < 64.0
     assert np.max(np.abs(trial.offsets[-1] - clean[-1])) < 0.5

@@ -62,14 +62,18 @@ def test_a_damaged_copy_is_passed_over_for_the_one_before(
     assert restore(Compensator(exported), tmp_path) is None
 
 
-def test_a_state_of_another_model_is_not_restored(running: Compensator, exported: Exported, tmp_path: Path) -> None:
+def test_a_state_of_another_model_is_not_restored(
+    running: Compensator, exported: Exported, tmp_path: Path
+) -> None:
     save(running, tmp_path)
     data = json.loads((tmp_path / NAMES[0]).read_text())
     body = json.loads(data["body"]) | {"model": "0" * 64}
     import hashlib
 
     text = json.dumps(body)
-    (tmp_path / NAMES[0]).write_text(json.dumps({"sha256": hashlib.sha256(text.encode()).hexdigest(), "body": text}))
+    (tmp_path / NAMES[0]).write_text(
+        json.dumps({"sha256": hashlib.sha256(text.encode()).hexdigest(), "body": text})
+    )
     assert restore(Compensator(exported), tmp_path) is None
 
 
@@ -103,7 +107,14 @@ def test_killed_at_any_instant_it_returns_to_the_same_offsets(
     def command(folder: str) -> list[str]:
         return [
             *(sys.executable, "-m", "discovery.cli", "compensate", str(model_file), "--allow-unsigned"),
-            *("--inputs", str(source), "--out", str(tmp_path / f"{folder}.csv"), "--state", str(tmp_path / folder)),
+            *(
+                "--inputs",
+                str(source),
+                "--out",
+                str(tmp_path / f"{folder}.csv"),
+                "--state",
+                str(tmp_path / folder),
+            ),
         ]
 
     subprocess.run(command("whole"), check=True)
@@ -111,7 +122,9 @@ def test_killed_at_any_instant_it_returns_to_the_same_offsets(
     for share in instants:
         process = subprocess.Popen(command("killed"))
         deadline = time.monotonic() + 20.0
-        before = (tmp_path / "killed" / NAMES[0]).exists() and (tmp_path / "killed" / NAMES[0]).stat().st_mtime_ns
+        before = (tmp_path / "killed" / NAMES[0]).exists() and (
+            tmp_path / "killed" / NAMES[0]
+        ).stat().st_mtime_ns
         while time.monotonic() < deadline and process.poll() is None:
             now = tmp_path / "killed" / NAMES[0]
             if now.exists() and now.stat().st_mtime_ns != before:
@@ -125,7 +138,9 @@ def test_killed_at_any_instant_it_returns_to_the_same_offsets(
 
     def offsets(name: str) -> dict[str, list[float]]:
         lines = (tmp_path / f"{name}.csv").read_text().splitlines()[1:]
-        rows = [line.split(",") for line in lines if line.count(",") == 8]  # a line cut by the kill is no line
+        rows = [
+            line.split(",") for line in lines if line.count(",") == 8
+        ]  # a line cut by the kill is no line
         return {row[0]: [float(value) for value in row[4:8]] for row in rows}
 
     whole, again = offsets("whole"), offsets("killed")

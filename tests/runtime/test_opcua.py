@@ -59,7 +59,11 @@ def test_the_loop_reads_compensates_and_writes(
         found = await run_loop(link, session, 2.0, said.append)
         await link.connect()
         written = {}
-        for name, node in {**form.offsets, "heartbeat": str(form.heartbeat), "status": str(form.status)}.items():
+        for name, node in {
+            **form.offsets,
+            "heartbeat": str(form.heartbeat),
+            "status": str(form.status),
+        }.items():
             written[name] = await link.client.get_node(node).read_value()
         await link.close()
         return found, written, session
@@ -67,7 +71,7 @@ def test_the_loop_reads_compensates_and_writes(
     found, written, session = asyncio.run(work())
     assert found.ticks >= 19
     assert written["heartbeat"] == session.compensator.heartbeat
-    assert written["status"] & 0xFF == session.compensator.state.value
+    assert int(written["status"]) & 0xFF == session.compensator.state.value
     assert {n: written[n] for n in session.compensator.names} == dict(
         zip(session.compensator.names, session.compensator.offsets, strict=True)
     )
@@ -84,12 +88,16 @@ def refused(form: ConnectionForm, place: Path, exported: Exported, change: Mappi
     return str(caught.value)
 
 
-def test_a_certificate_that_is_not_trusted_is_refused(place: Path, form: ConnectionForm, exported: Exported) -> None:
+def test_a_certificate_that_is_not_trusted_is_refused(
+    place: Path, form: ConnectionForm, exported: Exported
+) -> None:
     said = refused(form, place, exported, {"certificate": "stranger.der", "private_key": "stranger.pem"})
     assert "certificate" in said
 
 
-def test_a_server_that_is_not_the_one_named_is_refused(place: Path, form: ConnectionForm, exported: Exported) -> None:
+def test_a_server_that_is_not_the_one_named_is_refused(
+    place: Path, form: ConnectionForm, exported: Exported
+) -> None:
     said = refused(form, place, exported, {"server_certificate": "impostor.der"})
     assert "refused" in said or "no OPC UA server" in said
 
@@ -98,13 +106,19 @@ def test_a_server_that_is_not_the_one_named_is_refused(place: Path, form: Connec
     ("change", "sentence"),
     [
         (lambda f: {"inputs": {**f.inputs, "T_env": f.enable}}, "'T_env' is of type Boolean, not"),
-        (lambda f: {"offsets": {**f.offsets, "E_Z0T": f.status}}, "'E_Z0T' is of type UInt32, not Double or Float"),
+        (
+            lambda f: {"offsets": {**f.offsets, "E_Z0T": f.status}},
+            "'E_Z0T' is of type UInt32, not Double or Float",
+        ),
         (lambda f: {"offsets": {**f.offsets, "E_Z0T": f.inputs["T_env"]}}, "'E_Z0T' cannot be written"),
-        (lambda f: {"inputs": {**f.inputs, "T_env": "ns=9;s=nowhere"}}, "no variable ns=9;s=nowhere for 'T_env'"),
+        (
+            lambda f: {"inputs": {**f.inputs, "T_env": "ns=9;s=nowhere"}},
+            "no variable ns=9;s=nowhere for 'T_env'",
+        ),
         (lambda f: {"inputs": {"T_env": f.inputs["T_env"]}}, "no node for input"),
         (lambda f: {"offsets": {"E_X0C": f.status}}, "offset 'E_X0C', which the model does not give"),
-        (lambda f: {"url": "opc.tcp://127.0.0.1:9/nobody"}, "no OPC UA server answers"),
-        (lambda f: {"private_key": "none.pem"}, "there is no such file"),
+        (lambda _: {"url": "opc.tcp://127.0.0.1:9/nobody"}, "no OPC UA server answers"),
+        (lambda _: {"private_key": "none.pem"}, "there is no such file"),
     ],
 )
 def test_a_mistake_in_the_connection_is_a_sentence(

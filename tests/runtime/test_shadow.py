@@ -37,7 +37,10 @@ def work(session: Session, minutes: np.ndarray, first: int, measured: np.ndarray
         readings = {n: Reading(v, now) for n, v in zip(names, minutes[k].tolist(), strict=True)}
         found = {}
         if measured is not None and k % 10 == 0:
-            found = {n: Reading(v, now) for n, v in zip(session.compensator.names, measured[k].tolist(), strict=True)}
+            found = {
+                n: Reading(v, now)
+                for n, v in zip(session.compensator.names, measured[k].tolist(), strict=True)
+            }
         out.append(list(session.tick(readings, found, now).offsets.values()))
     session.save(now)
     return np.array(out)
@@ -54,7 +57,9 @@ def files(document: bytes, tmp_path: Path) -> dict[str, Path]:
 
 def begin(path: Path, folder: Path, said: list[str], rule: Rule) -> Session:
     exported, _ = trusted_model(path, None, allow_unsigned=True)
-    return Session(exported, model=path, folder=folder, settings=Settings(tick_s=60.0), rule=rule, say=said.append)
+    return Session(
+        exported, model=path, folder=folder, settings=Settings(tick_s=60.0), rule=rule, say=said.append
+    )
 
 
 def test_a_new_model_takes_over_without_a_step_and_can_be_taken_back(
@@ -78,7 +83,9 @@ def test_a_new_model_takes_over_without_a_step_and_can_be_taken_back(
     assert np.all(np.abs(third[0] - second[-1]) <= rates + 1e-9)
 
 
-def test_a_model_that_is_far_off_is_refused(files: dict[str, Path], minutes: np.ndarray, tmp_path: Path) -> None:
+def test_a_model_that_is_far_off_is_refused(
+    files: dict[str, Path], minutes: np.ndarray, tmp_path: Path
+) -> None:
     memory, said, rule = tmp_path / "memory", list[str](), Rule(hours=3.0, most_um=5.0)
     work(begin(files["old"], memory, said, rule), minutes, 0)
     session = begin(files["far"], memory, said, rule)

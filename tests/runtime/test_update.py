@@ -1,4 +1,6 @@
-"""Keeping up: noise is left alone, a drift is followed, a new effect is handed on, nothing is lost on the way."""
+"""Keeping up: noise is left alone, a drift is followed, a new effect is handed on, nothing is lost on the
+way.
+"""
 
 from __future__ import annotations
 
@@ -116,7 +118,7 @@ def test_a_new_effect_is_handed_to_the_mismatch_method(
 
 def test_readings_close_together_count_less() -> None:
     """Against the variance of a mean of correlated noise, by its full covariance matrix."""
-    times = np.arange(400) * 900.0
+    times = np.linspace(0.0, 399 * 900.0, 400)
     rho = 0.4 * np.exp(-np.abs(times[:, None] - times[None, :]) / 7200.0)
     np.fill_diagonal(rho, 1.0)
     assert stretch(0.4, times) == pytest.approx(rho.sum() / len(times), rel=0.05)
