@@ -168,8 +168,8 @@ def small_heat(seed: int) -> Callable[[float, Array, Inputs], tuple[float, float
     """First-order random heat of 3 W rms and three hours at the motor and at the bed."""
     rng = np.random.default_rng(1000 + seed)
     keep = np.exp(-1 / 6)
-    walk = rng.standard_normal((80, 2))
-    for k in range(1, 80):
+    walk = rng.standard_normal((200, 2))
+    for k in range(1, 200):
         walk[k] = keep * walk[k - 1] + np.sqrt(1 - keep**2) * walk[k]
     return lambda t, _, __: (3.0 * walk[int(t // 1800), 0], 0.0, 3.0 * walk[int(t // 1800), 1])
 
