@@ -67,6 +67,7 @@ def fit_model(
     belief: float | None = None,
     guess: Mapping[str, float] | None = None,
     max_rounds: int = 60,
+    tolerance: float = 1e-9,
 ) -> Fit:
     """Fit the free parameters and start values of a model to recordings.
 
@@ -84,6 +85,7 @@ def fit_model(
         priors, belief: as in `make_problem`.
         guess: parameter values to begin from, where they differ from the model's start values.
         max_rounds: of Levenberg-Marquardt.
+        tolerance: relative change of the cost that ends them.
     """
     began = clock.perf_counter()
     problem = make_problem(model, campaign, recordings, outputs, grids, priors, belief)
@@ -94,7 +96,8 @@ def fit_model(
     rounds = 1 if given else 3
     solution = None
     for k in range(rounds):
-        solution = _solve(problem, theta, current, loss, max_rounds if k == rounds - 1 or k == 0 else 15)
+        most = max_rounds if k in (0, rounds - 1) else 15
+        solution = _solve(problem, theta, current, loss, most, tolerance)
         theta = solution.theta
         if given or k == rounds - 1:
             break
@@ -130,7 +133,7 @@ class _Solution:
     cost: float
 
 
-def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds: int) -> _Solution:
+def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds: int, tolerance: float) -> _Solution:
     from scipy.optimize import least_squares
 
     low, high = problem.bounds
@@ -170,9 +173,9 @@ def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds:
             x_scale="jac",
             loss=loss,
             max_nfev=max_rounds,
-            ftol=1e-9,
-            xtol=1e-9,
-            gtol=1e-9,
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=tolerance,
         )
         x0 = result.x
     left, trajectories = run(x0)

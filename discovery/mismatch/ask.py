@@ -39,14 +39,23 @@ def next_experiment(context: Context, answer: Model, rival: Model | None, white:
         return "record the machine longer, with every input moving on its own"
     separation, text, a, b = max(results, key=lambda r: r[0])
     hours = HOURS * DECISIVE / max(separation, 1e-9)
-    shared = [s for s in a.system.states if s in b.system.states and s not in a.system.grid.outputs and not s.startswith("lag_")]
-    spread = {s: float(np.sqrt(np.mean((a.x[:, a.system.states.index(s)] - b.x[:, b.system.states.index(s)]) ** 2))) for s in shared}
+    shared = [
+        s
+        for s in a.system.states
+        if s in b.system.states and s not in a.system.grid.outputs and not s.startswith("lag_")
+    ]
+    spread = {
+        s: float(np.sqrt(np.mean((a.x[:, a.system.states.index(s)] - b.x[:, b.system.states.index(s)]) ** 2)))
+        for s in shared
+    }
     sensor = max(spread, key=lambda s: spread[s]) if spread else None
     purpose = "tells the rivals apart" if rival else "would confirm the answer"
     if hours > 200:
         sentence = f"no input pattern of {HOURS:.0f} h {purpose} with the errors alone"
     else:
-        sentence = f"{text}: {purpose} within about {max(hours, READ_EVERY / 3600):.1f} h of readings every 10 min"
+        sentence = (
+            f"{text}: {purpose} within about {max(hours, READ_EVERY / 3600):.1f} h of readings every 10 min"
+        )
     if sensor and spread[sensor] > 0.02:
         sentence += f"; a temperature sensor on {sensor} helps most (the two answers differ there by {spread[sensor]:.2f} K rms)"
     return sentence
@@ -57,8 +66,16 @@ def _designs(context: Context) -> dict[str, Mapping[str, Array]]:
     time = np.arange(0.0, HOURS * 3600 + 1, 60.0)
     channels = context.campaign.channels
     known = context.grids[context.recordings[0]].samples
-    middle = {n: float(np.median(np.concatenate([context.grids[r].samples[n].value for r in context.recordings]))) for n in known}
-    high = {n: float(np.quantile(np.concatenate([context.grids[r].samples[n].value for r in context.recordings]), 0.95)) for n in known}
+    middle = {
+        n: float(np.median(np.concatenate([context.grids[r].samples[n].value for r in context.recordings])))
+        for n in known
+    }
+    high = {
+        n: float(
+            np.quantile(np.concatenate([context.grids[r].samples[n].value for r in context.recordings]), 0.95)
+        )
+        for n in known
+    }
     roles = {n: channels[n].role for n in known}
     on = ((time // 7200) % 2 == 0).astype(float)
     quick = ((time // 3600) % 2 == 0).astype(float)
@@ -85,7 +102,9 @@ def _designs(context: Context) -> dict[str, Mapping[str, Array]]:
         wanted["switch the pump every 2 h at full speed"] = build(one, one, on, False)
         wanted["step the speed every hour with the pump running"] = build(quick, quick, one, False)
     if any(r in ("rotation speed", "heat load") for r in roles.values()):
-        wanted["run 6 h at full load dry, then stand still for 6 h"] = build((time < HOURS * 1800) * 1.0, (time < HOURS * 1800) * 1.0, zero, False)
+        wanted["run 6 h at full load dry, then stand still for 6 h"] = build(
+            (time < HOURS * 1800) * 1.0, (time < HOURS * 1800) * 1.0, zero, False
+        )
         wanted["step speed and load every hour, dry"] = build(quick, quick, zero, False)
         wanted["run at half speed and full load, dry"] = build(0.5 * one, one, zero, False)
     wanted["stand still and let the machine follow the room"] = build(zero, zero, zero, False)
@@ -94,10 +113,12 @@ def _designs(context: Context) -> dict[str, Mapping[str, Array]]:
 
 def _run(context: Context, model: Model, inputs: Mapping[str, Array]) -> Trajectory:
     time = np.arange(0.0, HOURS * 3600 + 1, 60.0)
-    samples = {n: Samples(time, v, context.campaign.channels[n].between == "linear") for n, v in inputs.items()}
+    samples = {
+        n: Samples(time, v, context.campaign.channels[n].between == "linear") for n, v in inputs.items()
+    }
     read = np.arange(0, len(time), int(READ_EVERY // 60))
-    grid = Grid("design", time, samples, context.outputs, read, np.full((len(read), len(context.outputs)), np.nan))
+    grid = Grid(
+        "design", time, samples, context.outputs, read, np.full((len(read), len(context.outputs)), np.nan)
+    )
     system = make_system(model, grid)
     return simulate(system, model.values("design"))
-
-

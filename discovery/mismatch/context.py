@@ -13,6 +13,7 @@ from discovery.fitting import Fit, Noise, fit_model
 from discovery.mismatch.catalogue.effect import Effect
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.lens import Lens
+from discovery.mismatch.outliers import Outlier, find_outliers, without
 from discovery.mismatch.signatures import heat_rms
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -41,6 +42,7 @@ class Context:
     heat_limit: Mapping[str, float]
     flows: Mapping[str, float]  # largest heat flow (or rate) by state, rms
     belief: float | None
+    outliers: tuple[Outlier, ...]  # set aside
 
     @property
     def fit_states(self) -> tuple[str, ...]:
@@ -95,6 +97,11 @@ def make_context(
     }
     duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
     white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)
+    outliers = find_outliers(fit, np.array(white.white))
+    if outliers:
+        grids = without(grids, outliers)
+        fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
+        white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)
     settings = tuple(
         replace(
             white,
@@ -105,7 +112,7 @@ def make_context(
         for level in (0.0, 0.35, 0.9)
     )
     return Context(
-        campaign, model, tuple(recordings), tuple(outputs), grids, tuple(effects), fit, settings, limit, flows, belief
+        campaign, model, tuple(recordings), tuple(outputs), grids, tuple(effects), fit, settings, limit, flows, belief, tuple(outliers)
     )
 
 

@@ -50,11 +50,23 @@ def describe(context: Context, current: Assessment, forcing: Forcing) -> Descrip
     for trajectory in current.fit.trajectories:
         env = trajectory.at_ends()
         pieces = [
-            Column(k, forcing.state, np.broadcast_to(evaluate(e, env, memory=trajectory.system.ends).value, (2 * len(trajectory.system.grid.step),)))
+            Column(
+                k,
+                forcing.state,
+                np.broadcast_to(
+                    evaluate(e, env, memory=trajectory.system.ends).value,
+                    (2 * len(trajectory.system.grid.step),),
+                ),
+            )
             for k, (_, e) in enumerate(library)
         ]
         columns.append(sensitivities(trajectory, (), (), pieces, count=len(library)))
-    scale = np.array([max(float(np.max(np.abs(np.concatenate([c[:, :, k].ravel() for c in columns])))), 1e-12) for k in range(len(library))])
+    scale = np.array(
+        [
+            max(float(np.max(np.abs(np.concatenate([c[:, :, k].ravel() for c in columns])))), 1e-12)
+            for k in range(len(library))
+        ]
+    )
     white, _ = current.lens.whiten(view.noise, [c / scale for c in columns])
     z = view.project(white)
     chosen: list[int] = []
@@ -90,19 +102,41 @@ def _library(context: Context, current: Assessment, state: str) -> list[tuple[st
     moving = [n for n in channels if np.ptp(np.asarray(nodes[n])) > 1e-9]
     texts: list[str] = []
     for name in moving:
-        series = np.concatenate([np.asarray(t.at_nodes()[name], dtype=float) for t in current.fit.trajectories])
+        series = np.concatenate(
+            [np.asarray(t.at_nodes()[name], dtype=float) for t in current.fit.trajectories]
+        )
         low, middle, high = (float(np.quantile(series, q)) for q in (0.25, 0.5, 0.75))
         temperature = "temperature" in context.campaign.channels[name].role
         base = f"({name} - {state})" if temperature else name
         texts += [base, f"{base}*abs({base})", f"lag({name}, 1800)", f"lag({name}, 7200)"]
         if high > low:
-            texts += [f"max({name} - {middle:.4g}, 0)", f"min({name}, {middle:.4g})", f"({name} > {middle:.4g})"]
+            texts += [
+                f"max({name} - {middle:.4g}, 0)",
+                f"min({name}, {middle:.4g})",
+                f"({name} > {middle:.4g})",
+            ]
         if not temperature:
-            texts += [f"{name}*{state}", *(f"{name}*{other}" for other in moving if other > name and "temperature" not in context.campaign.channels[other].role)]
-            texts += [f"{name}*({other} - {state})" for other in moving if "temperature" in context.campaign.channels[other].role]
+            texts += [
+                f"{name}*{state}",
+                *(
+                    f"{name}*{other}"
+                    for other in moving
+                    if other > name and "temperature" not in context.campaign.channels[other].role
+                ),
+            ]
+            texts += [
+                f"{name}*({other} - {state})"
+                for other in moving
+                if "temperature" in context.campaign.channels[other].role
+            ]
     body = np.concatenate([np.asarray(t.at_nodes()[state], dtype=float) for t in current.fit.trajectories])
     middle = float(np.median(body))
-    texts += [f"max({state} - {middle:.4g}, 0)", f"abs({state} - {middle:.4g})*({state} - {middle:.4g})", f"(lag({state}, 1800) - {state})", f"(lag({state}, 7200) - {state})"]
+    texts += [
+        f"max({state} - {middle:.4g}, 0)",
+        f"abs({state} - {middle:.4g})*({state} - {middle:.4g})",
+        f"(lag({state}, 1800) - {state})",
+        f"(lag({state}, 7200) - {state})",
+    ]
     return [(text, parse(text)) for text in dict.fromkeys(texts)]
 
 
@@ -129,13 +163,23 @@ def curves(current: Assessment, forcing: Forcing, bins: int = 8) -> list[Curve]:
             continue
         edges = np.unique(np.quantile(x, np.linspace(0, 1, bins + 1)))
         which = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
-        rows = [(float(x[m].mean()), float(y[m].mean()), float(np.sqrt(y[m].var() / m.sum() + (error[m] ** 2).mean() / m.sum()))) for b in range(len(edges) - 1) if (m := which == b).any()]
+        rows = [
+            (
+                float(x[m].mean()),
+                float(y[m].mean()),
+                float(np.sqrt(y[m].var() / m.sum() + (error[m] ** 2).mean() / m.sum())),
+            )
+            for b in range(len(edges) - 1)
+            if (m := which == b).any()
+        ]
         centre, mean, spread = zip(*rows, strict=True)
         found.append(Curve(name, centre, mean, spread))
     return found
 
 
-def heat_over_time(forcing: Forcing, offsets: Mapping[str, float], recordings: Sequence[str]) -> dict[str, dict[str, list[float]]]:
+def heat_over_time(
+    forcing: Forcing, offsets: Mapping[str, float], recordings: Sequence[str]
+) -> dict[str, dict[str, list[float]]]:
     """The missing heat by recording: block centres [s], mean and standard deviation."""
     out = {}
     for run in recordings:

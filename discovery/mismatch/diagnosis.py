@@ -159,7 +159,9 @@ def _on_fit(before: Assessment, after: Assessment) -> Improvement:
 
 def _rival_model(found: Search, rival: Hypothesis) -> Model | None:
     for attempt in found.tried:
-        if any(h.key == rival.key for h in attempt.hypotheses) and len(attempt.hypotheses) == len(found.best.hypotheses):
+        if any(h.key == rival.key for h in attempt.hypotheses) and len(attempt.hypotheses) == len(
+            found.best.hypotheses
+        ):
             return attempt.fit.model
     return None
 
@@ -173,22 +175,38 @@ def _smallest(found: Search) -> str:
             error = abs(claim.size[0] / claim.t)
             seen.append((4.5 * error, claim))
     texts = []
-    for word in ("fluid_convection", "friction_speed", "evaporation_drying", "flooded_gap", "second_thermal_mass"):
+    for word in (
+        "fluid_convection",
+        "friction_speed",
+        "evaporation_drying",
+        "flooded_gap",
+        "second_thermal_mass",
+    ):
         sizes = [(size, c) for size, c in seen if c.hypothesis.effect.word == word]
         if sizes:
             size, c = max(sizes, key=lambda item: item[0])
             texts.append(f"{word} of {size:.2g} {c.hypothesis.effect.amplitude.unit} at any body")
-    return "these recordings would have shown " + ", ".join(texts) if texts else "nothing is missing that these recordings could show"
+    return (
+        "these recordings would have shown " + ", ".join(texts)
+        if texts
+        else "nothing is missing that these recordings could show"
+    )
 
 
 def _repaired(best: Assessment) -> Model:
     """The fitted model with what was found written as an engineer would write it (no switch that is always on)."""
     model = best.fit.model
-    switches = {h.amplitudes[0]: h for h in best.hypotheses if h.effect.amplitude.fixed is not None and not h.recording}
+    switches = {
+        h.amplitudes[0]: h
+        for h in best.hypotheses
+        if h.effect.amplitude.fixed is not None and not h.recording
+    }
 
     def simplify(apply: Apply) -> Expression | None:
         match apply:
-            case Apply(function="*", arguments=(Name(id=name), Apply(function="-", arguments=(changed, _)))) if name in switches:
+            case Apply(
+                function="*", arguments=(Name(id=name), Apply(function="-", arguments=(changed, _)))
+            ) if name in switches:
                 return changed
         return None
 
@@ -197,7 +215,11 @@ def _repaired(best: Assessment) -> Model:
         plain = rewrite(term.expression, simplify)
         if plain != term.expression:
             # the replacement carries the whole term: the original goes
-            terms = [t for t in terms if not (t.into == term.into and t.source == term.source and _is_original(term, t))]
+            terms = [
+                t
+                for t in terms
+                if not (t.into == term.into and t.source == term.source and _is_original(term, t))
+            ]
         terms.append(replace(term, expression=plain))
     parameters = {n: p for n, p in model.parameters.items() if n not in switches or _used(n, terms, model)}
     return replace(model, name=f"{model.name}, repaired", terms=tuple(terms), parameters=parameters)
@@ -211,6 +233,6 @@ def _is_original(replaced: Term, term: Term) -> bool:
 
 
 def _used(name: str, terms: Sequence[Term], model: Model) -> bool:
-    return any(name in text(t.expression) for t in terms) or any(name in text(e) for e in model.outputs.values())
-
-
+    return any(name in text(t.expression) for t in terms) or any(
+        name in text(e) for e in model.outputs.values()
+    )

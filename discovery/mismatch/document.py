@@ -9,7 +9,8 @@ import numpy as np
 from discovery.mismatch.describe import heat_over_time
 from discovery.mismatch.forcing import alike
 from discovery.mismatch.hypotheses import Hypothesis
-from discovery.mismatch.verdict import UNEXPLAINED, Named
+from discovery.mismatch.catalogue import catalogue
+from discovery.mismatch.verdict import FAULT, UNEXPLAINED, Named
 from discovery.terms import text
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
             "regime": d.location.regime,
             "unmodelled_heat_W": {f.state: _number(float(np.sqrt(np.mean(np.concatenate(list(f.heat.values())) ** 2))), 3) for f in d.forcings if f.state in states},
         },
-        "physics": [_physics(d, n, c) for n, c in zip(d.verdict.named, d.checked, strict=True)],
+        "physics": [_physics(d, n, c) for n, c in zip(d.verdict.named, d.checked, strict=True)] or _outliers(d),
         "alternatives": _alternatives(d.verdict.named),
         "considered": [
             {
@@ -86,6 +87,9 @@ def document(d: Diagnosis) -> dict[str, Any]:
             },
             "explained": _number(d.explained, 4),
         },
+        "set_aside": [
+            {"output": o.output, "recording": o.recording, "time_s": _number(o.time, 7), "size": _number(o.size, 4)} for o in d.context.outliers
+        ],
         "missing_heat": _missing_heat(d),
         "description": (
             {"state": d.description.state, "formula": d.description.formula, "log_evidence": _number(d.description.gain, 4), "note": "describes the missing heat; it is not its cause"}
@@ -138,6 +142,34 @@ def _physics(d: Diagnosis, n: Named, checked: float | None) -> dict[str, Any]:
         "source": h.effect.source,
         "confused_with": list(h.effect.confused_with),
     }
+
+
+def _outliers(d: Diagnosis) -> list[dict[str, Any]]:
+    """Single wrong readings, largest first, where they are all that is wrong."""
+    if d.verdict.word != FAULT:
+        return []
+    entry = catalogue()["outlier"]
+    rows = []
+    for o in sorted(d.context.outliers, key=lambda o: -abs(o.size / o.noise))[:12]:
+        unit = d.context.campaign.channels[o.output].unit
+        half = 1.96 * o.noise
+        rows.append(
+            {
+                "effect": entry.word,
+                "title": entry.title,
+                "states": [o.output],
+                "recording": o.recording,
+                "probability": 0.98,
+                "named_again": None,
+                "expression": f"{o.size:.4g} at {o.time:.0f} s",
+                "parameters": {
+                    "outlier": {"value": _number(o.size), "low": _number(o.size - half), "high": _number(o.size + half), "unit": unit}
+                },
+                "source": entry.source,
+                "confused_with": list(entry.confused_with),
+            }
+        )
+    return rows
 
 
 def _interval(d: Diagnosis, name: str) -> tuple[float | None, float | None]:

@@ -22,7 +22,9 @@ COARSE = 60  # steps per recording in the first look
 FINE = 8  # steps on each side of an edge in the second
 
 
-def place_events(lens: Lens, view: View, claims: Iterable[Hypothesis], spread: dict[str, float]) -> list[Hypothesis]:
+def place_events(
+    lens: Lens, view: View, claims: Iterable[Hypothesis], spread: dict[str, float]
+) -> list[Hypothesis]:
     """The claims about events with the instants that speak for them most; claims of other kinds pass unchanged.
 
     Args:
@@ -71,7 +73,9 @@ def heat_steps(trajectory: Trajectory, body: str, instants: Array) -> Array:
     return sensitivities(trajectory, (), (), columns)
 
 
-def _windows(lens: Lens, view: View, run: str, group: list[Hypothesis], spread: dict[str, float]) -> list[Hypothesis]:
+def _windows(
+    lens: Lens, view: View, run: str, group: list[Hypothesis], spread: dict[str, float]
+) -> list[Hypothesis]:
     trajectory = lens.fit.trajectories[_index(lens, run)]
     time = trajectory.system.grid.time
     coarse = np.linspace(time[0], time[-1], COARSE + 1)
@@ -80,7 +84,14 @@ def _windows(lens: Lens, view: View, run: str, group: list[Hypothesis], spread: 
         body, sd = h.states[0], spread[h.amplitudes[0]]
         i, j, _ = _best_window(lens, view, run, heat_steps(trajectory, body, coarse), sd)
         width = coarse[1] - coarse[0]
-        fine = np.unique(np.concatenate([np.clip(c + np.linspace(-width, width, 2 * FINE + 1), time[0], time[-1]) for c in (coarse[i], coarse[j])]))
+        fine = np.unique(
+            np.concatenate(
+                [
+                    np.clip(c + np.linspace(-width, width, 2 * FINE + 1), time[0], time[-1])
+                    for c in (coarse[i], coarse[j])
+                ]
+            )
+        )
         i, j, _ = _best_window(lens, view, run, heat_steps(trajectory, body, fine), sd)
         edges = dict(zip(h.shapes, (float(fine[i]), float(fine[j])), strict=True))
         found.append(replace(h.at(edges), cost=float(2 * np.log(COARSE))))  # two edges were searched
@@ -98,7 +109,9 @@ def _best_window(lens: Lens, view: View, run: str, steps: Array, sd: float) -> t
     return int(i), int(j), float(gain[i, j])
 
 
-def _jumps(lens: Lens, view: View, run: str, group: list[Hypothesis], spread: dict[str, float]) -> list[Hypothesis]:
+def _jumps(
+    lens: Lens, view: View, run: str, group: list[Hypothesis], spread: dict[str, float]
+) -> list[Hypothesis]:
     grid = lens.fit.trajectories[_index(lens, run)].system.grid
     read_time = grid.time[grid.read]
     every = max(1, len(read_time) // (2 * COARSE))

@@ -269,12 +269,18 @@ def _places(
         case "fluid terms" | "cooling terms":
             wanted = "fluid temperature" if effect.place == "fluid terms" else "cooling power"
             terms = tuple(
-                t for t in model.terms if not t.effect and any(role.get(n) == wanted for n in names(t.expression))
+                t
+                for t in model.terms
+                if not t.effect and any(role.get(n) == wanted for n in names(t.expression))
             )
             if terms:
                 yield tuple(dict.fromkeys(t.into for t in terms)), terms, ()
         case "inputs of a recording":
-            terms = tuple(t for t in model.terms if not t.effect and names(t.expression) & set(channels) - set(model.states))
+            terms = tuple(
+                t
+                for t in model.terms
+                if not t.effect and names(t.expression) & set(channels) - set(model.states)
+            )
             if terms:
                 yield (), terms, ()
         case "output" | "output of a recording":

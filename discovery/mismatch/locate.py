@@ -41,7 +41,11 @@ class Location:
 
 
 def locate(
-    context: Context, baseline: Assessment, best: Assessment, named: Sequence[Named], before: Sequence[Forcing]
+    context: Context,
+    baseline: Assessment,
+    best: Assessment,
+    named: Sequence[Named],
+    before: Sequence[Forcing],
 ) -> Location:
     """Location of what the baseline leaves.
 
@@ -104,7 +108,9 @@ def _windows(
             env = {**trajectory.at_ends(), **best.model.values(run)}
             for term in h.terms:
                 if term.into == place or not place:
-                    heat = heat + np.broadcast_to(evaluate(term.expression, env, memory=trajectory.system.ends).value, heat.shape)
+                    heat = heat + np.broadcast_to(
+                        evaluate(term.expression, env, memory=trajectory.system.ends).value, heat.shape
+                    )
             series = 0.5 * (heat[0::2] + heat[1::2])
             found += _spans(time, series, 0.5 * float(np.percentile(np.abs(series), 95)), run, place, offset)
     if not values and before and before[0].gain > 0:
@@ -133,7 +139,12 @@ def _spans(
         width = np.diff(edges[k : end + 2])
         energy = float(np.sum(series[k : end + 1] * width))
         span = float(edges[end + 1] - edges[k])
-        out.append((abs(energy), Window(run, offset + float(edges[k]), offset + float(edges[end + 1]), state, energy / span)))
+        out.append(
+            (
+                abs(energy),
+                Window(run, offset + float(edges[k]), offset + float(edges[end + 1]), state, energy / span),
+            )
+        )
         k = end + 1
     return out
 
@@ -155,7 +166,11 @@ def regime(baseline: Assessment, f: Forcing, seed: int = 0) -> str | None:
         names = list(nodes)
         block = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2)
         counts = np.maximum(np.bincount(block, minlength=len(edges) - 1), 1)
-        features.append(np.column_stack([np.bincount(block, v, minlength=len(edges) - 1) / counts for v in nodes.values()]))
+        features.append(
+            np.column_stack(
+                [np.bincount(block, v, minlength=len(edges) - 1) / counts for v in nodes.values()]
+            )
+        )
         heat.append(f.heat[run])
     x, y = np.concatenate(features), np.concatenate(heat)
     moving = np.ptp(x, axis=0) > 1e-9
@@ -164,7 +179,9 @@ def regime(baseline: Assessment, f: Forcing, seed: int = 0) -> str | None:
         return None
 
     def grow(target: Array) -> DecisionTreeRegressor:
-        return DecisionTreeRegressor(max_depth=2, min_samples_leaf=max(6, len(y) // 12), random_state=0).fit(x, target)
+        return DecisionTreeRegressor(max_depth=2, min_samples_leaf=max(6, len(y) // 12), random_state=0).fit(
+            x, target
+        )
 
     tree = grow(y)
     real = float(tree.score(x, y))

@@ -35,7 +35,12 @@ class Improvement:
 
 
 def improvements(
-    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], before: Model, after: Model, noise: Noise
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    before: Model,
+    after: Model,
+    noise: Noise,
 ) -> dict[str, Improvement]:
     """Free runs on each recording, zeroed on the first reading alone.
 

@@ -20,8 +20,10 @@ from discovery.models import Model
 
 Array = NDArray[np.float64]
 
-REFITS = 8  # claims that are refitted at each step
-NAMED = 5.0  # log evidence that a claim has to add to be taken up
+REFITS = 6  # claims that are refitted at each step
+ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
+NAMED = 6.0  # log evidence that a claim has to add to be taken up
+MINOR = 0.1  # share of the plausible size below which an effect is the coarseness of a model with few bodies
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ def assess(context: Context, chosen: Sequence[Hypothesis], noise: Noise | None =
         priors=priors,
         belief=context.belief,
         guess=guess,
-        max_rounds=40,
+        max_rounds=25,
+        tolerance=ENOUGH,
     )
     lens = Lens(fit)
     views = tuple(lens.view(setting) for setting in context.settings)
@@ -135,20 +138,40 @@ def search(context: Context, most: int = 3, tell: Callable[[str], None] = lambda
         first = looks[-1].claims[0].gain if looks[-1].claims else 0.0
         pool = [c for c in looks[-1].claims[:REFITS] if c.gain > max(2.0, 0.2 * first)]
         attempts = [a for c in pool if (a := _try(context, current, (*current.hypotheses, c.hypothesis))) is not None]
-        tried += attempts
         if not attempts:
             break
         step = max(attempts, key=lambda a: a.evidence)
-        if step.evidence - current.evidence < NAMED:
+        tried += [a for a in attempts if matters(context, a, a.hypotheses[-1])]
+        if step.evidence - current.evidence < NAMED or not matters(context, step, step.hypotheses[-1]):
             break
         tell(f"{step.hypotheses[-1].effect.title} at {', '.join(step.hypotheses[-1].places)}")
         current = step
         looks.append(look(context, current))
-    if len(current.hypotheses) > 1:
+        if recurs(current.hypotheses):
+            break
+    if len(current.hypotheses) > 1 and not recurs(current.hypotheses):
         current, more = _question(context, current)
         tried += more
         looks.append(look(context, current))
     return Search(baseline, current, tuple(tried), tuple(looks))
+
+
+def matters(context: Context, attempt: Assessment, h: Hypothesis) -> bool:
+    """Whether an effect has a size that physics would give it.
+
+    A model with few bodies is a little wrong everywhere; with enough readings that shows, as effects of a few per cent of
+    the usual size. They are not what is missing.
+    """
+    if h.effect.amplitude.fixed is not None or not h.effect.is_physics:
+        return True
+    model = attempt.fit.model
+    sizes = [abs(model.parameters[n].values.get(h.recording or "", model.parameters[n].value)) for n in h.amplitudes]
+    return any(size >= MINOR * sd for size, sd in zip(sizes, context.spread(h), strict=True))
+
+
+def recurs(chosen: Sequence[Hypothesis]) -> bool:
+    """Whether heat without a record was taken up twice: then it is no event, and looking for a third one is idle."""
+    return sum(h.effect.word == "unmeasured_heat" for h in chosen) > 1
 
 
 def _try(context: Context, current: Assessment, chosen: tuple[Hypothesis, ...]) -> Assessment | None:
@@ -171,6 +194,7 @@ def _question(context: Context, current: Assessment) -> tuple[Assessment, list[A
         tried.append(without)
         pool = [c for c in look(context, without).claims[: REFITS // 2] if c.hypothesis.key != h.key and c.gain > 2.0]
         attempts = [a for c in pool if (a := _try(context, without, (*others, c.hypothesis))) is not None]
+        attempts = [a for a in attempts if all(matters(context, a, o) for o in a.hypotheses)]
         tried += attempts
         best = max([*attempts, current], key=lambda a: a.evidence)
         current = best if best.evidence > without.evidence + NAMED else without

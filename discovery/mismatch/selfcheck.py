@@ -31,7 +31,13 @@ def named_again(context: Context, found: Search, h: Hypothesis, seed: int = 0) -
     z = board.projected[view]
     shapes = {name: found.best.model.parameters[name].value for name in h.shapes}
     mine = [k for k in index if board.hypotheses[board.owners[k]].key == h.key]
-    nearest = min(mine, key=lambda k: sum(abs(np.log(max(v, 1e-9) / max(shapes.get(n, v), 1e-9))) for n, v in board.hypotheses[board.owners[k]].shapes.items()))
+    nearest = min(
+        mine,
+        key=lambda k: sum(
+            abs(np.log(max(v, 1e-9) / max(shapes.get(n, v), 1e-9)))
+            for n, v in board.hypotheses[board.owners[k]].shapes.items()
+        ),
+    )
     truth = z[:, nearest] * float(size[0])
     first = _first(board, z, truth, seed)
     return float(np.mean([board.hypotheses[board.owners[k]].key == h.key for k in first]))
@@ -62,7 +68,11 @@ def false_alarm(board: Board, view_index: int, best: float, seed: int = 1) -> fl
     signs = np.array([board.hypotheses[o].effect.amplitude.sign for o in board.owners])
     cost = np.array([board.hypotheses[o].cost for o in board.owners])
     dot = z.T @ rng.standard_normal((z.shape[0], 5 * DRAWS))
-    gain = 0.5 * dot**2 / precision[:, None] - 0.5 * np.log(precision * board.spreads**2)[:, None] - cost[:, None]
+    gain = (
+        0.5 * dot**2 / precision[:, None]
+        - 0.5 * np.log(precision * board.spreads**2)[:, None]
+        - cost[:, None]
+    )
     gain[(signs[:, None] * dot) < 0] = -np.inf
     top = gain.max(axis=0)
     return float((1 + np.sum(top >= best)) / (1 + len(top)))

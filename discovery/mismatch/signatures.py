@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, sensitivities
-from discovery.dynamics.system import predict
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.terms import Expression, evaluate
 
@@ -53,10 +52,23 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
     return out
 
 
+def block_signatures(trajectory: Trajectory, h: Hypothesis, blocks: int, first: int, total: int) -> Array:
+    """Signature (R, Y, total) of a hypothesis cut into blocks of time; block k of this recording is column first + k."""
+    system = trajectory.system
+    values = {**trajectory.at_ends(), **h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
+    steps = len(system.grid.step)
+    middle = 0.5 * (system.grid.time[1:] + system.grid.time[:-1])
+    edges = np.linspace(system.grid.time[0], system.grid.time[-1], blocks + 1)
+    block = np.clip(np.searchsorted(edges, middle, side="right") - 1, 0, blocks - 1)
+    columns = []
+    for term in h.terms:
+        series = np.broadcast_to(evaluate(term.expression, values, memory=system.ends).value, (2 * steps,))
+        columns += [Column(first + k, term.into, series * np.repeat(block == k, 2), term.source) for k in range(blocks)]
+    return sensitivities(trajectory, (), (), columns, count=total)
+
+
 def heat_rms(trajectory: Trajectory, expression: Expression) -> float:
     """Root mean square over time of a heat flow (or rate) along a trajectory."""
     series = evaluate(expression, trajectory.at_ends(), memory=trajectory.system.ends).value
     return float(np.sqrt(np.mean(np.square(series))))
 
-
-__all__ = ["heat_rms", "predict", "signatures"]

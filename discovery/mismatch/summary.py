@@ -13,20 +13,27 @@ def summary(path: Path) -> list[str]:
     lines = [f"{d['verdict']}: what '{d['model']}' leaves out"]
     for p in d["physics"]:
         sizes = ", ".join(
-            f"{name} = {q['value']:.4g} {q['unit']}" + (f" ({q['low']:.4g} to {q['high']:.4g})" if q["low"] != q["high"] else "")
+            f"{name} = {q['value']:.4g} {q['unit']}"
+            + (f" ({q['low']:.4g} to {q['high']:.4g})" if q["low"] != q["high"] else "")
             for name, q in p["parameters"].items()
             if q["low"] is not None
         )
-        lines.append(f"  {p['effect']} at {', '.join(p['states'])}, probability {p['probability']:.2f}: {sizes}")
+        lines.append(
+            f"  {p['effect']} at {', '.join(p['states'])}, probability {p['probability']:.2f}: {sizes}"
+        )
     for a in d["alternatives"]:
         if a["log_evidence_below_best"] <= 3:
             lines.append(f"  could also be {a['effect']} at {', '.join(a['states'])}")
     lines += [f"  {reason}" for reason in d["reasons"]]
     if d["description"]:
-        lines.append(f"  the missing heat at {d['description']['state']} follows {d['description']['formula']} (a description, not a cause)")
+        lines.append(
+            f"  the missing heat at {d['description']['state']} follows {d['description']['formula']} (a description, not a cause)"
+        )
     held = d["improvement"]["held_out"]
     for run, i in held.items():
         if d["physics"]:
-            lines.append(f"  unseen recording {run}: rms {i['rms_before']:.3g} -> {i['rms_after']:.3g} (noise {i['noise_floor']:.3g})")
+            lines.append(
+                f"  unseen recording {run}: rms {i['rms_before']:.3g} -> {i['rms_after']:.3g} (noise {i['noise_floor']:.3g})"
+            )
     lines.append(f"  next: {d['next_experiment']}")
     return lines

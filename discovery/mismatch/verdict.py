@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 from discovery.mismatch.context import Context
 from discovery.mismatch.forcing import Forcing
 from discovery.mismatch.hypotheses import Hypothesis
-from discovery.mismatch.search import Assessment, Search
+from discovery.mismatch.search import MINOR, Assessment, Search, recurs
+from discovery.mismatch.signatures import block_signatures, signatures
 
 Array = NDArray[np.float64]
 
 QUIET = 7.0  # log evidence that nothing left over may add once the answer is in the model
 FREE = 6.0  # log evidence of free heat beyond which something acts, named or not
 RIVAL = 3.0  # log evidence within which a rival stays in the answer
+BLOCKS = 12  # per recording, in which an effect is asked for its size
+STEADY = 6.0  # log evidence for a size that changes with time beyond which the form is wrong
 TRUST = 0.6  # evidence ratios are tempered: models are never exact
 DOUBT = 0.02  # share of the answer that stays with causes outside the catalogue
 
@@ -66,15 +69,16 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
             return Verdict(
                 UNEXPLAINED, (), (), (f"heat of unknown cause acts at {place}; no effect of the catalogue follows it",)
             )
+        if context.outliers:
+            return Verdict(FAULT, (), (), (f"{len(context.outliers)} readings are wrong alone, nothing else is",))
         return Verdict(NO_MISMATCH, (), (), ("no effect of the catalogue and no free heat adds evidence",))
 
     named = tuple(_named(found, h) for h in best.hypotheses)
     named = tuple(sorted(named, key=lambda n: -_weight(found, n.hypothesis)))
     reasons = []
-    events = [h for h in best.hypotheses if h.effect.word == "unmeasured_heat"]
-    if len(events) > 1:
+    if recurs(best.hypotheses):
         reasons.append("unrecorded heat comes again and again: a cause, not an event")
-    left = found.looks[-1].claims
+    left = [c for c in found.looks[-1].claims if abs(c.size[0]) >= MINOR * context.spread(c.hypothesis)[0]]
     if left and left[0].gain > max(QUIET, 0.05 * found.gain):
         other = left[0].hypothesis
         reasons.append(f"{other.effect.word} at {', '.join(other.places)} is still significant after the repair")
@@ -82,7 +86,8 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
         reasons.append(f"free heat at {after[0].state} still explains much after the repair")
     if found.gain < 0.5 * free_before:
         reasons.append("free heat explains more than twice what the best effect does")
-    reasons += [text for h in best.hypotheses if (text := _disagreement(context, best, h))]
+    for h in best.hypotheses:
+        reasons += [text for text in (_disagreement(context, best, h), _at_bound(best, h), _unsteady(best, h)) if text]
     if reasons:
         return Verdict(UNEXPLAINED, (), named, tuple(reasons))
     kinds = {n.hypothesis.effect.is_physics for n in named}
@@ -113,12 +118,52 @@ def _named(found: Search, h: Hypothesis) -> Named:
     return Named(h, (1 - DOUBT) / (1 + odds), rivals)
 
 
+def _at_bound(best: Assessment, h: Hypothesis) -> str | None:
+    """A sentence when a shape parameter presses against the end of its physical range: another law is at work."""
+    for name, shape in zip(h.shapes, h.effect.shapes, strict=True):
+        p = best.model.parameters[name]
+        value = p.values.get(h.recording or "", p.value)
+        if shape.fixed or p.fixed:
+            continue
+        if value < 1.03 * shape.low or value > 0.97 * shape.high:  # relative: ranges span decades
+            return f"{h.effect.word} would need {shape.name} = {value:.3g} {shape.unit}, at the end of what is physical"
+    return None
+
+
+def _unsteady(best: Assessment, h: Hypothesis) -> str | None:
+    """A sentence when the size of an effect would have to change from one part of the recordings to the next.
+
+    Each block of time gets an amplitude of its own; their scatter is tested against a constant (log Bayes factor), and
+    counts only when it is a large share of the amplitude itself: a law that is slightly off in form may stand.
+    """
+    if h.effect.amplitude.fixed is not None or h.shown or h.recording is not None:
+        return None
+    size = best.model.parameters[h.amplitudes[0]].value
+    values = {name: best.model.parameters[name].value for name in h.shapes}
+    columns = []
+    total = BLOCKS * len(best.fit.trajectories)
+    for k, t in enumerate(best.fit.trajectories):
+        columns.append(block_signatures(t, h.at(values), BLOCKS, k * BLOCKS, total))
+    view = best.best_view
+    z = view.project(best.lens.whiten(view.noise, columns)[0])
+    gram, dot = z.T @ z, z.T @ view.residual
+    best_gain, share = 0.0, 0.0
+    for spread in (0.2, 0.5, 1.0, 2.0):
+        sd = spread * abs(size)
+        inner = np.eye(total) + sd * sd * gram
+        solved = sd * np.linalg.solve(inner, sd * dot)
+        gain = 0.5 * float(dot @ solved) - 0.5 * float(np.linalg.slogdet(inner)[1])
+        if gain > best_gain:
+            best_gain, share = gain, spread
+    if best_gain > STEADY and share >= 0.5:
+        return f"the size of {h.effect.word} would have to change with time (log evidence {best_gain:.0f})"
+    return None
+
+
 def _disagreement(context: Context, best: Assessment, h: Hypothesis) -> str | None:
     """A sentence when the recordings ask for different sizes of an effect that should have one."""
     if h.recording is not None or h.effect.amplitude.fixed is not None or len(context.recordings) < 2:
         return None
-    from discovery.mismatch.signatures import signatures
-
     view = best.best_view
     estimates = []
     values = {name: best.model.parameters[name].value for name in h.shapes}
