@@ -142,7 +142,8 @@ def main() -> None:
         print(
             f"{name}: exact {sum(exact)} of {count}, "
             f"median coefficient error {100 * np.median(errors):.2f} %, "
-            f"mean pole bias {100 * np.mean(poles):+.2f} % (standard error {100 * np.std(poles) / count**0.5:.2f}), {seconds / count:.2f} CPU s an output",
+            f"mean pole bias {100 * np.mean(poles):+.2f} % "
+            f"(standard error {100 * np.std(poles) / count**0.5:.2f}), {seconds / count:.2f} CPU s an output",
             flush=True,
         )
 

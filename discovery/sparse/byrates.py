@@ -19,7 +19,7 @@ from discovery.fitting.noise import white_noise
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.sparse.discovery import Discovery, PathPoint
-from discovery.sparse.folds import NAME, Blocks, choose, make_blocks, make_folds
+from discovery.sparse.folds import CLAIM, NAME, Blocks, choose, make_blocks, make_folds
 from discovery.sparse.gram import Gram, solve
 from discovery.sparse.optimisers import pysindy_path
 from discovery.sparse.options import SparseOptions
@@ -29,8 +29,8 @@ from discovery.sparse.rates import Evidence, evidence, extended_bic, masked, ref
 Array = NDArray[np.float64]
 
 _READINGS = 250  # of one output in one recording: more say nothing new about hours or minutes
-_ROUNDS = 4  # of a fit in a fold: it starts where the normal equations of the fold have their minimum
-_SIZES = 6  # that are refitted and run freely, down from the one that the criterion names
+_ROUNDS = 3  # of a fit in a fold: it starts where the normal equations of the fold have their minimum
+_SIZES = 5  # that are refitted and run freely, down from the one that the criterion names
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,8 @@ def discover_rates(
     window = range(max(0, last - _SIZES + 1), last + 1)
 
     errors = np.array([_left_out(data, model, seen, path[k], noise) for k in window])
-    row = choose(errors, NAME if options.tolerance is None else options.tolerance)
+    usual = NAME if growth is None else CLAIM
+    row = choose(errors, usual if options.tolerance is None else options.tolerance)
     chosen = path[window[row]]
     fit = _refit(data, model, seen, g, chosen, data.grids, None, 25)
     points = tuple(

@@ -12,7 +12,9 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 _MOST_FOLDS = 4
-PREDICT, NAME = 1.0, 2.0  # default tolerances: of a model that is to predict, and of one that names physics
+# Default tolerances in standard errors: of a model that is to predict, of one whose terms are read, and of a
+# term that is claimed to be missing from a hand-built model.
+PREDICT, NAME, CLAIM = 1.0, 2.0, 3.0
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class SparseOptions(BaseModel):
         None,
         ge=0,
         description="standard errors by which a sparser model may be worse on what was left out; default 1 "
-        "for masses, which are to predict, and 2 for rates, which name physics",
+        "for masses, which are to predict, 2 for rates, 3 for what is added to a baseline file",
     )
     blocks: int = Field(
         24, ge=4, le=500, description="blocks that the recordings are cut into for bootstraps"
