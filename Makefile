@@ -18,7 +18,7 @@ AXE := build/browser/node_modules/axe-core/axe.min.js
 REPORTS := runs/nmv5000/report.html runs/tclab/report.html
 
 browser-test: $(STAMP) $(AXE) $(REPORTS)
-	$(BIN)/python tests/browser/check.py $(AXE) $(REPORTS) --pictures build/browser/pictures
+	$(BIN)/python -m tests.browser.check $(AXE) $(REPORTS) --pictures build/browser/pictures
 
 $(AXE):
 	npm install --silent --no-save --prefix build/browser axe-core@4

@@ -1,6 +1,7 @@
 """Discovery workbench: models of thermal errors from recordings, and what physics they miss.
 
-Nothing heavy is imported here: ``import discovery`` takes a few milliseconds, each name below loads what it needs.
+Nothing heavy is imported here: ``import discovery`` takes a few milliseconds; each name below loads what
+it needs.
 """
 
 from importlib import import_module

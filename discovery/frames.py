@@ -50,7 +50,8 @@ def campaign_from_frames(
     for key, frame in frames.items():
         missing = next((column for column in channels if column not in frame), None)
         if missing is not None:
-            raise UserError(f"recording '{key}': no column '{missing}'; {suggest(missing, [str(c) for c in frame.columns])}")
+            hint = suggest(missing, [str(c) for c in frame.columns])
+            raise UserError(f"recording '{key}': no column '{missing}'; {hint}")
         values = {c: rule.factor * frame[c].to_numpy(float) + rule.offset for c, rule in rules.items()}
         recordings[key] = Recording(key, _seconds(key, frame), values)
     return Campaign(name, made, recordings, Path(name))
@@ -75,7 +76,9 @@ def recording_frame(campaign: Campaign, recording: str) -> pd.DataFrame:
     return pd.DataFrame(dict(data.values), index=pd.Index(data.time, name="time"))
 
 
-def prediction_frame(model: Model, campaign: Campaign, recording: str, outputs: Sequence[str]) -> pd.DataFrame:
+def prediction_frame(
+    model: Model, campaign: Campaign, recording: str, outputs: Sequence[str]
+) -> pd.DataFrame:
     """Free run of a model on a recording: index time [s] of the readings, for each output NAME the reading,
     what the model predicts (NAME|model) and what is left over (NAME|left)."""
     import pandas as pd

@@ -78,7 +78,8 @@ def explain(word: str) -> Iterator[str]:
     yield f"  formula        {effect.formula}"
     yield f"  acts on        {effect.place}"
     if size.fixed is None:
-        yield f"  size           {size.name}, about {size.plausible:g} {size.unit} on machines of this class{sign}"
+        usual = f"{size.name}, about {size.plausible:g} {size.unit}"
+        yield f"  size           {usual} on machines of this class{sign}"
     for shape in effect.shapes:
         tried = _listed([f"{value:g}" for value in shape.grid])
         limits = "" if shape.fixed else f", refined between {shape.low:g} and {shape.high:g}"

@@ -1,4 +1,4 @@
-"""A first hand-built model for recordings that nobody has modelled yet: first order, each output for itself."""
+"""A first hand-built model where nobody has made one yet: first order, each output for itself."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from discovery.firsthour.guess import Guess
 def first_model(guesses: Mapping[str, Guess], outputs: Sequence[str], *, has_room: bool) -> str:
     """Text of a model file.
 
-    A temperature loses heat to the room and is warmed by the loads; loads and outputs that are numbered alike belong
-    together. An error (no temperature) decays and is driven by each input. The diagnosis then says what is missing.
+    A temperature loses heat to the room and is warmed by the loads; loads and outputs that are numbered alike
+    belong together. An error (no temperature) decays and is driven by each input. A diagnosis then says
+    what is missing.
     """
     roles = {name: one.role for name, one in guesses.items()}
     room = (
@@ -21,7 +22,8 @@ def first_model(guesses: Mapping[str, Guess], outputs: Sequence[str], *, has_roo
         else next((name for name, role in roles.items() if role == "ambient temperature"), None)
     )
     lines = [
-        "# Written by `discovery new`: the simplest model that could work, to be bettered. Each output for itself, first order.",
+        "# Written by `discovery new`: the simplest model that could work, to be bettered.",
+        "# Each output for itself, first order.",
         'name = "first order"',
         "",
         "[parameters]",

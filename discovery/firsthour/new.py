@@ -43,7 +43,8 @@ def new(folder: Path, sources: Sequence[Path]) -> list[str]:
     lines = _said(tables, guesses, recordings, why_room, room)
     if not outputs:
         raise UserError(
-            f"{sources[0]}: no column looks like a measured temperature or error; call it e.g. T_table [degC] or E_Y0C [um]"
+            f"{sources[0]}: no column looks like a measured temperature or error; "
+            "call it e.g. T_table [degC] or E_Y0C [um]"
         )
     write["campaign.toml"] = _campaign(folder, guesses, recordings, room)
     write["model.toml"] = first_model(guesses, outputs, has_room=room is not None)
@@ -59,7 +60,8 @@ def _same_columns(tables: Sequence[OwnTable]) -> None:
         different = first ^ {column.name for column in table.columns}
         if different:
             raise UserError(
-                f"{table.path}: its columns differ from those of {tables[0].path} ({', '.join(sorted(different))}); "
+                f"{table.path}: its columns differ from those of {tables[0].path} "
+                f"({', '.join(sorted(different))}); "
                 "recordings of one campaign have the same columns"
             )
 
@@ -143,7 +145,7 @@ def _campaign(
         for name, (table, _) in recordings.items()
     }
     text = format_toml({"name": folder.resolve().name, "channels": channels, "recordings": entries})
-    head = "# Written by `discovery new`. Look at each role and unit: `discovery list roles` says what the words mean.\n"
+    head = "# Written by `discovery new`. Look at each role and unit: `discovery list roles` explains them.\n"
     lines = text.splitlines()
     for index, line in enumerate(lines):
         one = guesses.get(line.split(" ")[0])
@@ -157,7 +159,7 @@ def _experiment(folder: Path, names: Sequence[str], outputs: Sequence[str]) -> s
         return ", ".join(f'"{word}"' for word in words)
 
     name = re.sub(r"[^\w .+-]+", "_", folder.resolve().name)
-    return f"""# Written by `discovery new`. Fits see the recordings under fit; the held_out ones stay unseen to the end.
+    return f"""# Written by `discovery new`. Fits see the recordings under fit alone.
 name = "{name}"
 campaign = "campaign.toml"
 outputs  = [{listed(outputs)}]
@@ -183,7 +185,8 @@ def _said(
     width = max(len(column.header) for column in tables[0].columns)
     inner = max(len(f"{c.name}: {guesses[c.name].role}, {guesses[c.name].unit}") for c in tables[0].columns)
     lines = [
-        f"{table.path.name}: {len(table.time)} rows over {_duration(float(table.time[-1]))}; time {table.about_time}"
+        f"{table.path.name}: {len(table.time)} rows over {_duration(float(table.time[-1]))}; "
+        f"time {table.about_time}"
         for table in tables
     ]
     lines.append("guessed (? = have a look):")

@@ -12,7 +12,7 @@ import numpy as np
 from discovery.report.mismatch import sizes
 from discovery.report.ranking import cells, is_error, mean_improvement, origin, ranked, ratio
 from discovery.report.run import Run
-from discovery.report.text import listed, number, percent, words
+from discovery.report.text import counted, listed, number, percent, words
 
 _VERDICTS = {
     "no mismatch": "Nothing is missing that these recordings could show",
@@ -24,7 +24,7 @@ _VERDICTS = {
 
 @dataclass(frozen=True)
 class Answer:
-    """`headline`: one sentence. `points`: what supports it. `figures`: (figure, caption) pairs to show large."""
+    """`headline`: one sentence. `points`: what supports it. `figures`: (figure, caption), to show large."""
 
     headline: str
     points: tuple[str, ...]
@@ -86,7 +86,8 @@ def _left(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
     if not scored:
         return [], []
     middle, unit = float(np.median(scored)), run.unit(run.outputs[0]).replace("°C", "K")
-    point = f"It is off by {number(middle, 2)} {unit} (median rms over {_count(run, best)}, at worst {number(max(scored), 2)} {unit})."
+    worst = f"at worst {number(max(scored), 2)} {unit}"
+    point = f"It is off by {number(middle, 2)} {unit} (median rms over {_count(run, best)}, {worst})."
     return [point], [(f"{number(middle, 2)} {unit}", f"left by {best}, {_seen(run)}")]
 
 
@@ -123,7 +124,7 @@ def _count(run: Run, model: str) -> str:
     pairs = cells(run, model)
     recordings, outputs = {r for r, _ in pairs}, {o for _, o in pairs}
     what = "error" if is_error(run) else "output"
-    return f"{len(outputs)} {what}{'s' * (len(outputs) != 1)} and {len(recordings)} recording{'s' * (len(recordings) != 1)}"
+    return f"{counted(len(outputs), what)} and {counted(len(recordings), 'recording')}"
 
 
 def _worst(run: Run, model: str) -> str:
@@ -136,7 +137,8 @@ def _worst(run: Run, model: str) -> str:
         return ""
     (low_r, low_o), low = min(scored.items(), key=lambda item: item[1])
     (high_r, high_o), high = max(scored.items(), key=lambda item: item[1])
-    return f"Between {number(low, 2)} % ({low_o} on {low_r}) and {number(high, 2)} % ({high_o} on {high_r}) of each error is removed."
+    least, most = f"{number(low, 2)} % ({low_o} on {low_r})", f"{number(high, 2)} % ({high_o} on {high_r})"
+    return f"Between {least} and {most} of each error is removed."
 
 
 def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
@@ -183,7 +185,8 @@ def _proof(diagnosis: Mapping[str, Any]) -> list[str]:
     if held:
         each = [f"{number(s['rms_before'])} → {number(s['rms_after'])} on {name}" for name, s in held.items()]
         points.append(
-            f"Repaired and run freely on unseen recordings it leaves (rms, errors weighed by their noise): {listed(each)}."
+            "Repaired and run freely on unseen recordings it leaves (rms, errors weighed by their noise): "
+            f"{listed(each)}."
         )
     if improvement.get("explained") is not None:
         points.append(

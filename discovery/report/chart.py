@@ -15,7 +15,7 @@ Kind = Literal["line", "points", "bars", "band"]
 
 @dataclass(frozen=True)
 class Series:
-    """`x`, `y` (N,); for a band `low`, `high` (N,) as well. `color`: measured, noise, or the number of a model."""
+    """`x`, `y` (N,); for a band `low`, `high` (N,) as well. `color`: measured, noise, or a model's number."""
 
     name: str
     x: Array
@@ -55,7 +55,7 @@ class Chart:
 
 
 def thinned(x: Array, y: Array, most: int) -> tuple[Array, Array]:
-    """At most about `most` points that keep the look of the curve: lowest and highest of each bin, gaps dropped.
+    """At most about `most` points that keep the look of a curve: lowest and highest of each bin.
 
     >>> x = np.arange(1000.0)
     >>> a, b = thinned(x, np.where(x == 500, 9.0, 0.0), 100)

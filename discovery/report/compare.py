@@ -18,8 +18,8 @@ from discovery.report.run import Predictions, Run, load_run
 def write_comparison(run_dirs: Sequence[Path], out: Path) -> Path:
     """Write one page on the models of several runs.
 
-    A recording counts as unseen only where no run has fitted it. Each run is called by the name of its experiment, or
-    of its folder where two experiments have the same name.
+    A recording counts as unseen only where no run has fitted it. Each run is called by the name of its
+    experiment, or of its folder where two experiments have the same name.
 
     Raises:
         UserError: fewer than two runs, runs without a common recording, or a run that cannot be read.

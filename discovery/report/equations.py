@@ -69,7 +69,8 @@ def _balance(model: Model, state: State, signs: Mapping[str, str]) -> str:
     unknown = signs.get(state.name) or mathml.symbol(state.name)
     left = f"<mfrac><mrow><mi>d</mi>{unknown}</mrow><mrow><mi>d</mi><mi>t</mi></mrow></mfrac>"
     if state.capacity:
-        left = f"<msub><mi>C</mi><mtext>{escape(state.name.replace('_', ' '))}</mtext></msub><mspace width='0.17em'/>{left}"
+        index = escape(state.name.replace("_", " "))
+        left = f"<msub><mi>C</mi><mtext>{index}</mtext></msub><mspace width='0.17em'/>{left}"
     parts = []
     for term in model.terms:
         for sign, place in (("+", term.into), ("−", term.source)):

@@ -17,14 +17,33 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLORS = {
-    "measured": "#39424e", "noise": "#8a94a1", "0": "#0a58b0", "1": "#b84a00", "2": "#14683f", "3": "#7a3fc0", "4": "#b3253b", "5": "#00707c",
-}  # fmt: skip
+    "measured": "#39424e",
+    "noise": "#8a94a1",
+    "0": "#0a58b0",
+    "1": "#b84a00",
+    "2": "#14683f",
+    "3": "#7a3fc0",
+    "4": "#b3253b",
+    "5": "#00707c",
+}
 DASHES: dict[str, Any] = {"1": (6, 2.5), "2": (2, 1.5), "3": (7, 2, 1.5, 2), "4": (4, 1.5)}
 STYLE: Any = {
-    "font.family": "sans-serif", "font.size": 8, "axes.linewidth": 0.6, "axes.grid": True, "grid.linewidth": 0.4, "grid.color": "#d8dde3",
-    "lines.linewidth": 1.0, "legend.frameon": False, "legend.fontsize": 7, "xtick.direction": "in", "ytick.direction": "in",
-    "svg.fonttype": "none", "svg.hashsalt": "discovery", "pdf.fonttype": 42, "figure.constrained_layout.use": True,
-}  # fmt: skip
+    "font.family": "sans-serif",
+    "font.size": 8,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "grid.linewidth": 0.4,
+    "grid.color": "#d8dde3",
+    "lines.linewidth": 1.0,
+    "legend.frameon": False,
+    "legend.fontsize": 7,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "svg.fonttype": "none",
+    "svg.hashsalt": "discovery",
+    "pdf.fonttype": 42,
+    "figure.constrained_layout.use": True,
+}
 WIDTH = 3.5  # inches, one column of a journal
 
 

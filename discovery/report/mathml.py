@@ -9,10 +9,28 @@ from html import escape
 from discovery.terms import Apply, Expression, Name, Number
 
 _GREEK = {
-    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "eps": "ε", "epsilon": "ε", "eta": "η", "theta": "θ",
-    "kappa": "κ", "lam": "λ", "lambda": "λ", "mu": "μ", "nu": "ν", "xi": "ξ", "rho": "ρ", "sigma": "σ", "tau": "τ",
-    "phi": "φ", "omega": "ω", "Omega": "Ω", "Delta": "Δ",
-}  # fmt: skip
+    "alpha": "α",
+    "beta": "β",
+    "gamma": "γ",
+    "delta": "δ",
+    "eps": "ε",
+    "epsilon": "ε",
+    "eta": "η",
+    "theta": "θ",
+    "kappa": "κ",
+    "lam": "λ",
+    "lambda": "λ",
+    "mu": "μ",
+    "nu": "ν",
+    "xi": "ξ",
+    "rho": "ρ",
+    "sigma": "σ",
+    "tau": "τ",
+    "phi": "φ",
+    "omega": "ω",
+    "Omega": "Ω",
+    "Delta": "Δ",
+}
 _LEVEL = {
     "<": 1,
     "<=": 1,
@@ -126,8 +144,9 @@ def _called(function: str) -> Callable[..., str]:
 
 
 def _cases(condition: str, then: str, other: str) -> str:
-    rows = f"<mtr><mtd>{then}</mtd><mtd><mtext>if&nbsp;</mtext>{condition}</mtd></mtr><mtr><mtd>{other}</mtd><mtd><mtext>else</mtext></mtd></mtr>"
-    return f'<mtable class="cases">{rows}</mtable>'
+    first = f"<mtr><mtd>{then}</mtd><mtd><mtext>if&nbsp;</mtext>{condition}</mtd></mtr>"
+    second = f"<mtr><mtd>{other}</mtd><mtd><mtext>else</mtext></mtd></mtr>"
+    return f'<mtable class="cases">{first}{second}</mtable>'
 
 
 _FUNCTIONS: dict[str, Callable[..., str]] = {

@@ -16,7 +16,10 @@ from discovery.report.series import time_axis
 from discovery.report.text import listed, number, percent, with_unit, words
 
 _MOST_RIVALS = 6
-_HEAT_NOTE = "What would close the gap, cause unknown, over time and against each input and state (band: 95 %). What it follows is missing."
+_HEAT_NOTE = (
+    "What would close the gap, cause unknown, over time and against each input and state (band: 95 %). "
+    "What it follows is missing."
+)
 
 
 def section(run: Run) -> dict[str, Any] | None:
@@ -241,7 +244,7 @@ def network(run: Run) -> dict[str, str] | None:
     if (run.diagnosis or {}).get("verdict") == "no mismatch":
         note, svg = "", drawing(model, {})
     elif watts and any(watts.values()):
-        note = "The darker a body, the more heat (rms) the recordings ask for there that no term of the model provides."
+        note = "The darker a body, the more heat (rms) the recordings ask for there that no term provides."
         svg = drawing(model, watts, _heat_unit(run))
     elif shares:
         note, svg = "The darker a body, the larger its share of the mismatch.", drawing(model, shares, "")

@@ -64,7 +64,7 @@ def drawing(model: Model, heat: Mapping[str, float], unit: str = "W") -> str:
 
 
 def _layout(bodies: list[str], inputs: list[str], links: list[Edge]) -> dict[str, tuple[float, float]]:
-    """Bodies on an inner ellipse in an order that keeps linked ones together, inputs outside of what they act on."""
+    """Bodies on an inner ellipse, linked ones beside each other; inputs outside of what they act on."""
     order = _chain(bodies, links)
     centre = (WIDTH / 2, HEIGHT / 2)
     place: dict[str, tuple[float, float]] = {}
@@ -124,9 +124,10 @@ def _body(name: str, x: float, y: float, heat: float | None, largest: float, uni
     share = 0.0 if heat is None else min(1.0, abs(heat) / largest)
     said = "" if heat is None else f"{number(heat)} {unit}" if unit else f"{100 * heat:.0f} %"
     width = max(92, 9 * len(name) + 22)
+    box = f'x="{x - width / 2:.0f}" y="{y - 25:.0f}" width="{width}"'
     return (
-        f'<g class="body"><rect x="{x - width / 2:.0f}" y="{y - 25:.0f}" width="{width}" height="50" rx="9"/>'
-        f'<rect class="heat" style="opacity:{0.75 * share:.2f}" x="{x - width / 2:.0f}" y="{y - 25:.0f}" width="{width}" height="50" rx="9"/>'
+        f'<g class="body"><rect {box} height="50" rx="9"/>'
+        f'<rect class="heat" style="opacity:{0.75 * share:.2f}" {box} height="50" rx="9"/>'
         f'<text x="{x:.0f}" y="{y - 2 if said else y + 5:.0f}">{escape(name)}</text>'
         + (f'<text class="watts" x="{x:.0f}" y="{y + 16:.0f}">{escape(said)}</text>' if said else "")
         + "</g>"
@@ -135,7 +136,8 @@ def _body(name: str, x: float, y: float, heat: float | None, largest: float, uni
 
 def _input(name: str, x: float, y: float) -> str:
     width = 8 * len(name) + 18
+    box = f'x="{x - width / 2:.0f}" y="{y - 13:.0f}" width="{width}"'
     return (
-        f'<g class="input"><rect x="{x - width / 2:.0f}" y="{y - 13:.0f}" width="{width}" height="26" rx="13"/>'
+        f'<g class="input"><rect {box} height="26" rx="13"/>'
         f'<text x="{x:.0f}" y="{y + 4:.0f}">{escape(name)}</text></g>'
     )

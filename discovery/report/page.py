@@ -113,10 +113,16 @@ def fill(template: str, view: Mapping[str, Any], charts: Sequence[Chart]) -> str
 
 def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
     parts = [
-        ("predictions", "Measured, predicted"), ("summary", "Models compared"), ("diagnosis", "What was left out"),
-        ("network", "Thermal network"), ("models", ""), ("discovery", "How it was found"),
-        ("residual", "What is left"), ("quality", "The recordings"), ("reproduce", "Reproduce"),
-    ]  # fmt: skip
+        ("predictions", "Measured, predicted"),
+        ("summary", "Models compared"),
+        ("diagnosis", "What was left out"),
+        ("network", "Thermal network"),
+        ("models", ""),
+        ("discovery", "How it was found"),
+        ("residual", "What is left"),
+        ("quality", "The recordings"),
+        ("reproduce", "Reproduce"),
+    ]
     anchors = {"summary": "comparison", "diagnosis": "mismatch"}
     out = [("answer", "The answer")]
     for key, name in parts:
@@ -183,7 +189,8 @@ def _model(run: Run, name: str) -> dict[str, Any]:
     model = run.models[name]
     entry = run.results.get("models", {}).get(name, {})
     shares = entry.get("shares") or {}
-    count = f"{counted(len(model.states), 'state')}, {counted(len(model.terms), 'term')}, {counted(len(model.free), 'free parameter')}"
+    sizes = {"state": model.states, "term": model.terms, "free parameter": model.free}
+    count = ", ".join(counted(len(items), word) for word, items in sizes.items())
     rates = (
         ""
         if model.time_unit == "s" or any(s.capacity for s in model.states.values())
@@ -196,7 +203,8 @@ def _model(run: Run, name: str) -> dict[str, Any]:
         "rows": equations.rows(model, shares),
         "shares": bool(shares),
         "largest": max(shares.values(), default=1.0) or 1.0,
-        "share_note": "Share of the effect: what the errors would lose without the term, to first order; all terms together are 100 %.",
+        "share_note": "Share of the effect: what the errors would lose without the term, to first order; "
+        "all terms together are 100 %.",
         "others": equations.other_values(model),
         "capacities": equations.capacities(model),
         "notes": entry.get("notes") or [],
@@ -227,7 +235,10 @@ def _discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
                     rows,
                 )
             )
-    about = "Each further term must earn its place on data that the choice has not used. Terms that are chosen again and again do not depend on which hours were recorded."
+    about = (
+        "Each further term must earn its place on data that the choice has not used. "
+        "Terms that are chosen again and again do not depend on which hours were recorded."
+    )
     return {"about": about, "charts": charts, "tables": tables}
 
 
@@ -280,7 +291,8 @@ def _residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
         "readings",
     )
     return {
-        "about": f"What “{model}” leaves on {recording}. If only sensor noise were left, neighbours would not be alike and bars would stay inside the band.",
+        "about": f"What “{model}” leaves on {recording}. If only sensor noise were left, neighbours "
+        "would not be alike and bars would stay inside the band.",
         "table": Printed(f"Left over on {recording}", header, lines),
         "charts": series.residual_charts(run, model, recording),
     }

@@ -80,7 +80,7 @@ def summary(run: Run) -> Printed | None:
 
 
 def paper_tables(run: Run) -> list[Printed]:
-    """Table 3 for each recording that was compared, unseen ones first, and Table 1 for a hand-built thermobalance."""
+    """Table 3 for each recording that was compared, unseen ones first, and Table 1 for a thermobalance."""
     found = run.results.get("models", {})
     recordings = list(dict.fromkeys([*run.held_out, *run.results.get("fit", [])]))
     scored = [r for r in recordings if any(r in model.get("recordings", {}) for model in found.values())]
@@ -109,7 +109,7 @@ def _parts(run: Run) -> dict[str, str]:
 
 
 def rms_tables(run: Run) -> list[Printed]:
-    """What each model leaves of temperatures: a row for each recording and output, unseen recordings first."""
+    """What each model leaves of temperatures: a row for each recording and output, unseen ones first."""
     order, found = ranked(run), run.results.get("models", {})
     rows = []
     for recording in dict.fromkeys([*run.held_out, *run.results.get("fit", [])]):

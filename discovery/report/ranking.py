@@ -25,7 +25,7 @@ def is_discovered(run: Run, model: str) -> bool:
 
 
 def origin(run: Run, model: str) -> str:
-    """Where a model comes from: "discovered", "repaired" (hand-built plus what a diagnosis found) or "hand-built"."""
+    """Where a model comes from: "discovered", "hand-built", or "repaired" after a diagnosis."""
     if kind(run, model) == "repaired":
         return "repaired"
     return "discovered" if is_discovered(run, model) else "hand-built"
@@ -39,9 +39,9 @@ def cells(run: Run, model: str) -> dict[tuple[str, str], Mapping[str, Any]]:
 
 
 def ratio(run: Run, model: str, other: str | None) -> float:
-    """Geometric mean over held-out recordings and errors of rms(model)/rms(other), NaN where nothing is shared.
+    """Geometric mean over held-out recordings and errors of rms(model)/rms(other); NaN: nothing is shared.
 
-    With `other` None it is the error without compensation. A ratio has no unit, so that um and um/m can be averaged.
+    With `other` None it is the error without compensation. A ratio has no unit: um and um/m can be averaged.
     """
     mine = cells(run, model)
     theirs = (
@@ -62,7 +62,7 @@ def _positive(value: object) -> bool:
 
 
 def ranked(run: Run) -> list[str]:
-    """Models, best first: by their rms on held-out recordings relative to no compensation; unscored ones last."""
+    """Models, best first, by their rms on held-out recordings; those without a score last."""
     models = list(run.results.get("models", {}))
     if not models:
         return []
@@ -72,7 +72,7 @@ def ranked(run: Run) -> list[str]:
 
 
 def mean_improvement(run: Run, model: str, recording: str | None = None) -> float:
-    """Mean over errors (and held-out recordings) of the improvement of the rms [%]; NaN where there is none."""
+    """Mean over errors (and held-out recordings) of the improvement of the rms [%]; NaN: there is none."""
     found = [
         score["improvement"]["rms"]
         for (name, _), score in cells(run, model).items()
@@ -91,7 +91,7 @@ def is_error(run: Run) -> bool:
 
 
 def mean_rms(run: Run, model: str, recording: str) -> float:
-    """Quadratic mean over errors of what a model leaves on a recording; NaN where units differ or nothing was scored."""
+    """Quadratic mean over outputs of what a model leaves on a recording; NaN: units differ, or no score."""
     if len({run.unit(output) for output in run.outputs}) > 1:
         return math.nan
     found = [

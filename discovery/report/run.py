@@ -101,7 +101,8 @@ def load_run(folder: Path) -> Run:
     results_file, diagnosis_file = folder / "results.json", folder / "diagnosis.json"
     if not results_file.exists() and not diagnosis_file.exists():
         raise UserError(
-            f"{folder}: neither results.json nor diagnosis.json is there; make them with `discovery run EXPERIMENT`"
+            f"{folder}: neither results.json nor diagnosis.json is there; "
+            "make them with `discovery run EXPERIMENT`"
         )
     results = read_json(results_file) if results_file.exists() else {}
     diagnosis = read_json(diagnosis_file) if diagnosis_file.exists() else None

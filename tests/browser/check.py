@@ -1,6 +1,6 @@
 """What a reader meets: reports opened in a real browser. ``make browser-test``
 
-    python tests/browser/check.py AXE REPORT... [--pictures FOLDER]
+    python -m tests.browser.check AXE REPORT... [--pictures FOLDER]
 
 AXE is axe.min.js of the package axe-core. Needs Chromium and its driver (Debian: chromium, chromium-driver).
 """
@@ -11,7 +11,7 @@ import argparse
 import json
 from pathlib import Path
 
-from driver import Browser, browser
+from tests.browser.driver import Browser, browser
 
 WIDTHS = (1440, 800)
 
@@ -45,7 +45,9 @@ def check(page: Path, axe: str, session: Browser, pictures: Path | None) -> list
 
 def _figures(session: Browser) -> list[str]:
     empty = session.run(
-        "return [...document.querySelectorAll('figure[data-chart]')].filter(f => f.offsetParent && !f.querySelector('svg polyline, svg path, svg rect.bars'))"
+        "const drawn = 'svg polyline, svg path, svg rect.bars';"
+        "return [...document.querySelectorAll('figure[data-chart]')]"
+        ".filter(f => f.offsetParent && !f.querySelector(drawn))"
         ".map(f => f.dataset.chart)"
     )
     bad = session.run(
@@ -59,7 +61,8 @@ def _figures(session: Browser) -> list[str]:
 def _rules(session: Browser, axe: str) -> list[str]:
     session.run(axe)
     found = session.run_async(
-        "const done = arguments[0]; axe.run().then(r => done(r.violations), e => done([{id: String(e), nodes: []}]))"
+        "const done = arguments[0];"
+        "axe.run().then(r => done(r.violations), e => done([{id: String(e), nodes: []}]))"
     )
     return [f"{one['id']}: {one.get('help', '')} ({len(one['nodes'])} times, {_first(one)})" for one in found]
 
@@ -72,12 +75,14 @@ def _first(violation: dict[str, list[dict[str, object]]]) -> str:
 def _keyboard(session: Browser) -> list[str]:
     """Every control is reached with the tabulator, and a chart answers to keys."""
     wanted = session.run(
-        "return [...document.querySelectorAll('a[href], button, summary, .plot, input:checked')].filter(e => e.offsetParent && !e.hidden).length"
+        "return [...document.querySelectorAll('a[href], button, summary, .plot, input:checked')]"
+        ".filter(e => e.offsetParent && !e.hidden).length"
     )
     if not wanted:
         return []
     session.run(
-        "document.activeElement.blur(); window.reached = new Set(); document.addEventListener('focusin', e => reached.add(e.target))"
+        "document.activeElement.blur(); window.reached = new Set();"
+        "document.addEventListener('focusin', e => reached.add(e.target))"
     )
     session.press(*["\ue004"] * (wanted + 60))
     reached = session.run("return reached.size")
@@ -85,7 +90,8 @@ def _keyboard(session: Browser) -> list[str]:
     if session.run("const p = document.querySelector('.plot'); if (p) p.focus(); return Boolean(p)"):
         session.press("\ue014", "\ue014", "+")
         said, zoomed = session.run(
-            "const f = document.activeElement.closest('figure'); return [f.querySelector('.readout').textContent, !f.querySelector('.reset').hidden]"
+            "const f = document.activeElement.closest('figure');"
+            "return [f.querySelector('.readout').textContent, !f.querySelector('.reset').hidden]"
         )
         wrong += [] if said and zoomed else ["keyboard: a chart neither reads values nor zooms"]
         session.press("0")
@@ -94,7 +100,9 @@ def _keyboard(session: Browser) -> list[str]:
 
 def _zoom(session: Browser) -> list[str]:
     box = session.run(
-        "const p = document.querySelector('.plot'); if (!p) return null; p.scrollIntoView({block: 'center', behavior: 'instant'}); const b = p.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]"
+        "const p = document.querySelector('.plot'); if (!p) return null;"
+        "p.scrollIntoView({block: 'center', behavior: 'instant'});"
+        "const b = p.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]"
     )
     if not box:
         return []

@@ -1,4 +1,4 @@
-"""A headless Chromium, driven by the WebDriver protocol over plain HTTP: nothing to install but the browser."""
+"""A headless Chromium, driven by WebDriver over plain HTTP: nothing to install but the browser."""
 
 from __future__ import annotations
 
@@ -16,9 +16,16 @@ from pathlib import Path
 from typing import Any
 
 FLAGS = [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--hide-scrollbars",
-]  # fmt: skip
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--hide-scrollbars",
+]
 
 
 @dataclass(frozen=True)
@@ -60,9 +67,11 @@ class Browser:
     def drag(self, start: tuple[int, int], end: tuple[int, int]) -> None:
         """Drag with the mouse, in pixels of the window."""
         steps = [
-            {"type": "pointerMove", "duration": 0, "x": start[0], "y": start[1]}, {"type": "pointerDown", "button": 0},
-            {"type": "pointerMove", "duration": 80, "x": end[0], "y": end[1]}, {"type": "pointerUp", "button": 0},
-        ]  # fmt: skip
+            {"type": "pointerMove", "duration": 0, "x": start[0], "y": start[1]},
+            {"type": "pointerDown", "button": 0},
+            {"type": "pointerMove", "duration": 80, "x": end[0], "y": end[1]},
+            {"type": "pointerUp", "button": 0},
+        ]
         self.send(
             "POST",
             "/actions",

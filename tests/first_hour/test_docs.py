@@ -48,7 +48,8 @@ def test_the_tutorial_prints_what_it_says(place: Path) -> None:
         printed = iter(result.stdout.splitlines())
         for line in expected:
             if line != "...":
-                assert any(_agrees(one, line) for one in printed), f"{first}: not printed: {line}\n{result.stdout}"
+                said = any(_agrees(one, line) for one in printed)
+                assert said, f"{first}: not printed: {line}\n{result.stdout}"
     assert commands == 6
     assert (place / "runs" / "heaters" / "report.html").exists()
     assert list((place / "runs" / "heaters" / "figures").glob("*.pdf"))

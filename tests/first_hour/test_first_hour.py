@@ -19,7 +19,7 @@ HEADER = "Elapsed (min);Heater A 1;Heater A 2;Plate 1 temp;Plate 2 temp"
 
 
 def own_csv(source: str, target: Path, every: int = 1) -> None:
-    """A run of the two heaters as an engineer may have it: semicolons, decimal commas, minutes, Fahrenheit."""
+    """A run of the heaters as an engineer may have it: semicolons, decimal commas, minutes, Fahrenheit."""
     with io.TextIOWrapper(gzip.open(TCLAB / f"{source}.csv.gz")) as file:
         rows = list(csv.DictReader(file))[::every]
     lines = [HEADER]
@@ -58,7 +58,7 @@ def test_from_nothing_to_a_diagnosis_in_four_commands(desk: Path, monkeypatch: p
     diagnosis = json.loads((desk / "answer" / "diagnosis.json").read_text())
     assert diagnosis["verdict"] == "missing physics"
     found = {(one["effect"], *one["states"]): one for one in diagnosis["physics"]}
-    # The source documents heat transfer between the heaters, and conduction to the sensor that lags by about 20 s.
+    # The source documents heat transfer between the heaters and a sensor that lags by about 20 s.
     assert {("conduction_path", "Plate_1_temp", "Plate_2_temp"), ("sensor_lag", "Plate_1_temp")} <= set(found)
     lags = [
         p["value"] for p in found["sensor_lag", "Plate_1_temp"]["parameters"].values() if p["unit"] == "s"
@@ -98,7 +98,8 @@ def test_a_table_of_errors_makes_files_that_load(tmp_path: Path) -> None:
 
     rows = ["time,T_hall [°F],Spindle rpm,P_drive (kW),Coolant temp (°C),E_Y0C [µm],E_A0C [µm/m]"]
     rows += [
-        f"2026-03-01T08:{k:02d}:00,{70 + k / 30:.2f},{600 * (k % 2)},{0.3 + k / 100:.2f},20.5,{k / 9:.2f},{k / 7:.2f}"
+        f"2026-03-01T08:{k:02d}:00,{70 + k / 30:.2f},{600 * (k % 2)},{0.3 + k / 100:.2f},"
+        f"20.5,{k / 9:.2f},{k / 7:.2f}"
         for k in range(60)
     ]
     (tmp_path / "shift.csv").write_text("\n".join(rows), "utf-8")

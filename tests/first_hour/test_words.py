@@ -15,9 +15,13 @@ from discovery.firsthour.schemas import schema
 from discovery.mismatch.catalogue import catalogue
 
 ROOT = Path(__file__).parents[2]
-FILES = [("campaign", ROOT / "datasets/tclab/campaign.toml"), ("campaign", ROOT / "datasets/nmv5000/campaign.toml"),
-         ("model", ROOT / "datasets/nmv5000/thermobalance.toml"), ("experiment", ROOT / "experiments/nmv5000.toml"),
-         ("experiment", ROOT / "experiments/tclab.toml")]  # fmt: skip
+FILES = [
+    ("campaign", ROOT / "datasets/tclab/campaign.toml"),
+    ("campaign", ROOT / "datasets/nmv5000/campaign.toml"),
+    ("model", ROOT / "datasets/nmv5000/thermobalance.toml"),
+    ("experiment", ROOT / "experiments/nmv5000.toml"),
+    ("experiment", ROOT / "experiments/tclab.toml"),
+]
 
 
 @pytest.mark.parametrize("word", sorted(catalogue()))

@@ -1,4 +1,4 @@
-"""A small run folder as `discovery run` leaves it: three errors, two recordings, four models, one diagnosis."""
+"""A small run folder as `discovery run` leaves it: three errors, two recordings, four models."""
 
 from __future__ import annotations
 
@@ -223,7 +223,7 @@ def diagnosed(hours: float) -> dict[str, Any]:
             "held_out": {"validation": {"rms_before": 0.6, "rms_after": 0.5}},
             "explained": 0.99,
         },
-        "next_experiment": "Run the pump for six hours at 900 rpm, then stop it: flooded gap and conduction path part there.",
+        "next_experiment": "Run the pump for six hours at 900 rpm, then stop it: the two rivals part there.",
         "missing_heat": {
             "state": "b_corpus",
             "over_time": {
