@@ -22,13 +22,14 @@ from discovery.export.stepper import INTEGRATOR
 from discovery.files import write_atomic
 from discovery.models import Model, Parameter, State, expanded
 from discovery.recordings import Campaign
-from discovery.terms import Name, Term, names, parse, text
+from discovery.terms import Expression, Name, Number, Term, names, parse, substitute, text
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 FORMAT, VERSION = "discovery-model", 1
 MAX_BYTES = 20_000_000
+START_SD = 2.0  # um or K: of a start value that was a reading and is a guess now
 
 
 @dataclass(frozen=True)
@@ -68,19 +69,41 @@ class Exported:
 
 
 def exportable(model: Model, campaign: Campaign) -> Model:
-    """The model as targets see it: lags as states, and every measured state an output of its own.
+    """The model as targets see it: lags as states, every measured state an output of its own, and start
+    values that need no reading, since a controller has none: errors count from 0, bodies begin at the
+    temperature of the room.
 
     Raises:
-        UserError: a model without outputs.
+        UserError: a model without outputs, or a measured body and no room temperature.
     """
     model = expanded(model)
     own = {
         name: Name(name) for name in model.states if name in campaign.channels and name not in model.outputs
     }
-    model = replace(model, outputs={**model.outputs, **own})
-    if not model.outputs:
+    outputs = {**model.outputs, **own}
+    if not outputs:
         raise UserError(f"model '{model.name}' has no outputs; give it some under [outputs]")
-    return model
+    unread: dict[str, Expression] = {
+        name: Number(0.0) for name, channel in campaign.channels.items() if channel.role == "error"
+    }
+    room = [name for name, channel in campaign.channels.items() if channel.role == "ambient temperature"]
+    bodies = [name for name, channel in campaign.channels.items() if channel.role == "temperature"]
+    unread |= {name: Name(room[0]) for name in bodies if room}
+    states = {}
+    for name, state in model.states.items():
+        start = Name(name) if state.start is None and name in campaign.channels else state.start
+        read = sorted(names(start) & {*unread, *bodies}) if start is not None else []
+        if set(read) & set(bodies) and not room:
+            raise UserError(
+                f"model '{model.name}': state '{name}' starts at the reading of {read[0]}, which a "
+                f"controller does "
+                "not have, and no channel is an ambient temperature; give it a start value"
+            )
+        if start is not None and read:
+            spread = max(state.start_sd, START_SD)
+            state = replace(state, start=substitute(start, unread), start_sd=spread)
+        states[name] = state
+    return replace(model, outputs=outputs, states=states)
 
 
 def make_document(

@@ -7,6 +7,7 @@ import contextlib
 import tempfile
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -266,17 +267,19 @@ def compensate_opcua(
         link = Link(form, place, exported)
         await link.connect()
         say(f"connected to {form.url}, signed and encrypted")
-        session = Session(
-            exported,
-            model=model,
-            folder=folder,
-            trusted=trusted,
-            settings=Settings(tick_s=form.tick_s),
-            rule=Rule(hours=shadow_hours),
-            save_every_s=exported.compiled.step_s,
-            say=say,
-        )
-        return await run_loop(link, session, seconds, say)
+        with ThreadPoolExecutor(max_workers=1) as beside:
+            session = Session(
+                exported,
+                model=model,
+                folder=folder,
+                trusted=trusted,
+                settings=Settings(tick_s=form.tick_s),
+                rule=Rule(hours=shadow_hours),
+                save_every_s=exported.compiled.step_s,
+                beside=beside,
+                say=say,
+            )
+            return await run_loop(link, session, seconds, say)
 
     async def demonstration() -> Punctuality:
         from discovery.runtime.opcua_machine import simulated_machine

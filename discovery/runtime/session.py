@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,9 +33,10 @@ class Session:
         settings: Settings | None = None,
         rule: Rule | None = None,
         save_every_s: float = 600.0,
+        beside: Executor | None = None,
         say: Say = lambda _: None,
     ) -> None:
-        self.folder, self.say, self.save_every_s = folder, say, save_every_s
+        self.folder, self.say, self.save_every_s, self.beside = folder, say, save_every_s, beside
         self.settings = settings or Settings()
         self.shadow: Shadow | None = None
         self.resumed: float | None = None
@@ -87,5 +89,5 @@ class Session:
     def save(self, now: float) -> None:
         """Write the state to disk."""
         if self.folder is not None and self.compensator.origin is not None:
-            save(self.compensator, self.folder)
+            save(self.compensator, self.folder, self.beside)
             self.saved = now

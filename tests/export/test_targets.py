@@ -242,3 +242,36 @@ def test_the_command_exports_a_run(model: Model, tmp_path: Path, monkeypatch: py
         done = runner.invoke(app, ["export", *words])
         assert done.exit_code == 1
         assert sentence in done.output
+
+
+def test_a_controller_needs_no_reading_to_start(campaign: Campaign, tmp_path: Path) -> None:
+    """A state that begins at its first reading begins at 0 (an error) or at the room (a body)."""
+    from dataclasses import replace
+
+    from discovery.export.document import read_document
+    from discovery.recordings import Channel
+
+    channels = {**campaign.channels, "T_table": Channel("T_table", "temperature", "degC", None, "linear")}
+    campaign = replace(campaign, channels=channels)
+    states = {
+        "E_Z0T": State("E_Z0T", "um", None, None, 0.0, 1.0),
+        "slow": State("slow", "um", None, parse("E_A0C"), 0.0, 1.0),
+        "T_table": State("T_table", "degC", None, None, 0.5, 1.0),
+    }
+    terms = (
+        Term("t", "E_Z0T", parse("1e-4*(T_env - 22) - 1e-4*E_Z0T")),
+        Term("b", "T_table", parse("1e-3*(T_env - T_table)")),
+    )
+    model = Model("starts", {}, states, terms, {"E_A0C": parse("slow + T_table")})
+    done = export_model(model, campaign, ["fit"], "json", tmp_path)
+    back = read_document(done.files[0])
+    assert back.compiled.inputs == ("T_env",)
+    assert [o.name for o in back.outputs] == ["E_A0C", "E_Z0T", "T_table"]
+    from discovery.export.stepper import Stepper
+
+    stepper = Stepper(back.compiled)
+    stepper.start(np.array([23.5]))
+    assert stepper.x.tolist() == [0.0, 0.0, 23.5]
+    roomless = replace(campaign, channels={n: c for n, c in channels.items() if n != "T_env"})
+    with pytest.raises(UserError, match="starts at the reading of T_table"):
+        export_model(model, roomless, ["fit"], "json", tmp_path)
