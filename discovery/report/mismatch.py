@@ -5,14 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from discovery.models import Model
-from discovery.report.chart import Array, Chart, Panel, Series
-from discovery.report.network import drawing
+from discovery.report.heat import heat_charts, heat_unit
 from discovery.report.printed import Line, Printed
 from discovery.report.run import Run, pretty_unit
-from discovery.report.series import time_axis
 from discovery.report.text import listed, number, percent, with_unit, words
 
 _MOST_RIVALS = 6
@@ -38,21 +33,6 @@ def section(run: Run) -> dict[str, Any] | None:
         "next": d.get("next_experiment"),
         "next_title": "What would have been seen" if d.get("verdict") == "no mismatch" else "Next experiment",
     }
-
-
-def diagnosed(run: Run) -> Model | None:
-    """The fitted model that the diagnosis is about, by the name of its file or its own."""
-    named = (run.diagnosis or {}).get("model")
-    return next((model for key, model in run.models.items() if named in (key, model.name)), None)
-
-
-def _heat_unit(run: Run) -> str:
-    """W where states have capacities; else heat is a rate of the states."""
-    model = diagnosed(run)
-    if model is None or any(state.capacity for state in model.states.values()):
-        return "W"
-    units = {pretty_unit(state.unit) for state in model.states.values() if state.unit}
-    return f"{units.pop()}/{model.time_unit}" if len(units) == 1 else f"unit of the state/{model.time_unit}"
 
 
 def _about(d: Mapping[str, Any]) -> str:
@@ -167,7 +147,7 @@ def _windows(run: Run, d: Mapping[str, Any]) -> Printed:
         )
         for w in windows
     ]
-    heat = _heat_unit(run)
+    heat = heat_unit(run)
     header = (
         "Recording",
         f"From [{unit}]",
@@ -226,74 +206,3 @@ def _formula(d: Mapping[str, Any]) -> str:
         if found.get("formula")
         else ""
     )
-
-
-def network(run: Run) -> dict[str, str] | None:
-    """The heat map on the thermal network of the diagnosed (else the first thermal) model."""
-    thermal = [m for m in (diagnosed(run), *run.models.values()) if m is not None and _is_thermal(m)]
-    if not thermal:
-        return None
-    model = thermal[0]
-    location = (run.diagnosis or {}).get("location") or {}
-    watts = {
-        k: float(v)
-        for k, v in (location.get("unmodelled_heat_W") or {}).items()
-        if k in model.states and v is not None
-    }
-    shares = {k: float(v) for k, v in (location.get("states") or {}).items() if k in model.states}
-    if (run.diagnosis or {}).get("verdict") == "no mismatch":
-        note, svg = "", drawing(model, {})
-    elif watts and any(watts.values()):
-        note = "The darker a body, the more heat (rms) the recordings ask for there that no term provides."
-        svg = drawing(model, watts, _heat_unit(run))
-    elif shares:
-        note, svg = "The darker a body, the larger its share of the mismatch.", drawing(model, shares, "")
-    else:
-        note, svg = "", drawing(model, {})
-    return {
-        "model": model.name,
-        "note": note,
-        "svg": svg,
-        "title": "Where heat is missing" if note else "The thermal network",
-    }
-
-
-def _is_thermal(model: Model) -> bool:
-    return any(state.capacity or state.unit == "degC" for state in model.states.values())
-
-
-def heat_charts(run: Run) -> list[Chart]:
-    """Missing heat over time and against each input and state, where the diagnosis has reconstructed it."""
-    missing = (run.diagnosis or {}).get("missing_heat") or {}
-    unit, place = _heat_unit(run), missing.get("state", "")
-    label = with_unit("missing heat" if unit == "W" else "missing rate", unit)
-    charts = []
-    for recording, one in (missing.get("over_time") or {}).items():
-        time, heat, sd = (np.array(one[key], dtype=float) for key in ("time_s", "heat", "sd"))
-        x, x_label, _ = time_axis(time)
-        panel = Panel(label, _curves(x, heat, 1.96 * sd), zero=True)
-        charts.append(Chart(f"heat-{recording}", f"At {place}, {recording}", x_label, (panel,)))
-    for name, one in (missing.get("against") or {}).items():
-        order = np.argsort(np.array(one["value"], dtype=float))
-        x, heat, error = (np.array(one[key], dtype=float)[order] for key in ("value", "heat", "error"))
-        if len(x) < 2:
-            continue
-        bins = Series("bins", x, heat, "points", "0")
-        panel = Panel(label, (*_curves(x, heat, 1.96 * error), bins), zero=True)
-        charts.append(Chart(f"heat-against-{name}", f"Against {name}", _axis(run, name), (panel,)))
-    return charts
-
-
-def _curves(x: Array, mean: Array, half: Array) -> tuple[Series, ...]:
-    return (
-        Series("95 %", x, mean, "band", "0", mean - half, mean + half),
-        Series("mean", x, mean, "line", "0"),
-    )
-
-
-def _axis(run: Run, name: str) -> str:
-    model = diagnosed(run)
-    if model and name in model.states:
-        return with_unit(name, pretty_unit(model.states[name].unit))
-    unit = (run.results.get("input_units") or {}).get(name)
-    return with_unit(name, pretty_unit(str(unit))) if unit else name

@@ -1,0 +1,98 @@
+"""Missing heat: on the thermal network, over time, against each input and state."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from discovery.models import Model
+from discovery.report.chart import Array, Chart, Panel, Series
+from discovery.report.network import drawing
+from discovery.report.run import Run, pretty_unit
+from discovery.report.series import time_axis
+from discovery.report.text import with_unit
+
+
+def network(run: Run) -> dict[str, str] | None:
+    """The heat map on the thermal network of the diagnosed (else the first thermal) model."""
+    thermal = [m for m in (diagnosed(run), *run.models.values()) if m is not None and _is_thermal(m)]
+    if not thermal:
+        return None
+    model = thermal[0]
+    location = (run.diagnosis or {}).get("location") or {}
+    watts = {
+        k: float(v)
+        for k, v in (location.get("unmodelled_heat_W") or {}).items()
+        if k in model.states and v is not None
+    }
+    shares = {k: float(v) for k, v in (location.get("states") or {}).items() if k in model.states}
+    if (run.diagnosis or {}).get("verdict") == "no mismatch":
+        note, svg = "", drawing(model, {})
+    elif watts and any(watts.values()):
+        note = "The darker a body, the more heat (rms) the recordings ask for there that no term provides."
+        svg = drawing(model, watts, heat_unit(run))
+    elif shares:
+        note, svg = "The darker a body, the larger its share of the mismatch.", drawing(model, shares, "")
+    else:
+        note, svg = "", drawing(model, {})
+    return {
+        "model": model.name,
+        "note": note,
+        "svg": svg,
+        "title": "Where heat is missing" if note else "The thermal network",
+    }
+
+
+def _is_thermal(model: Model) -> bool:
+    return any(state.capacity or state.unit == "degC" for state in model.states.values())
+
+
+def heat_charts(run: Run) -> list[Chart]:
+    """Missing heat over time and against each input and state, where the diagnosis has reconstructed it."""
+    missing = (run.diagnosis or {}).get("missing_heat") or {}
+    unit, place = heat_unit(run), missing.get("state", "")
+    label = with_unit("missing heat" if unit == "W" else "missing rate", unit)
+    charts = []
+    for recording, one in (missing.get("over_time") or {}).items():
+        time, heat, sd = (np.array(one[key], dtype=float) for key in ("time_s", "heat", "sd"))
+        x, x_label, _ = time_axis(time)
+        panel = Panel(label, _curves(x, heat, 1.96 * sd), zero=True)
+        charts.append(Chart(f"heat-{recording}", f"At {place}, {recording}", x_label, (panel,)))
+    for name, one in (missing.get("against") or {}).items():
+        order = np.argsort(np.array(one["value"], dtype=float))
+        x, heat, error = (np.array(one[key], dtype=float)[order] for key in ("value", "heat", "error"))
+        if len(x) < 2:
+            continue
+        bins = Series("bins", x, heat, "points", "0")
+        panel = Panel(label, (*_curves(x, heat, 1.96 * error), bins), zero=True)
+        charts.append(Chart(f"heat-against-{name}", f"Against {name}", _axis(run, name), (panel,)))
+    return charts
+
+
+def _curves(x: Array, mean: Array, half: Array) -> tuple[Series, ...]:
+    return (
+        Series("95 %", x, mean, "band", "0", mean - half, mean + half),
+        Series("mean", x, mean, "line", "0"),
+    )
+
+
+def _axis(run: Run, name: str) -> str:
+    model = diagnosed(run)
+    if model and name in model.states:
+        return with_unit(name, pretty_unit(model.states[name].unit))
+    unit = (run.results.get("input_units") or {}).get(name)
+    return with_unit(name, pretty_unit(str(unit))) if unit else name
+
+
+def heat_unit(run: Run) -> str:
+    """W where states have capacities; else heat is a rate of the states."""
+    model = diagnosed(run)
+    if model is None or any(state.capacity for state in model.states.values()):
+        return "W"
+    units = {pretty_unit(state.unit) for state in model.states.values() if state.unit}
+    return f"{units.pop()}/{model.time_unit}" if len(units) == 1 else f"unit of the state/{model.time_unit}"
+
+
+def diagnosed(run: Run) -> Model | None:
+    """The fitted model that the diagnosis is about, by the name of its file or its own."""
+    named = (run.diagnosis or {}).get("model")
+    return next((model for key, model in run.models.items() if named in (key, model.name)), None)

@@ -1,0 +1,214 @@
+"""Parts of the page: models in detail, the search, what is left over, recordings, how to reproduce."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from discovery import __version__
+from discovery.report import equations, heat, series
+from discovery.report.chart import Chart, Panel, Series
+from discovery.report.printed import Line, Printed
+from discovery.report.ranking import is_discovered, ranked
+from discovery.report.run import Run
+from discovery.report.text import counted, number, percent
+
+_OFTEN = 0.2  # share of the repeated searches from which a term is listed
+
+
+def detailed(run: Run) -> list[str]:
+    """The models whose equations are worth a section: best, best discovered, diagnosed and repaired ones."""
+    order = [name for name in ranked(run) if name in run.models] or list(run.models)
+    wanted = [*order[:1], *[name for name in order if is_discovered(run, name)][:1]]
+    subject = heat.diagnosed(run)
+    wanted += [
+        name for name, model in run.models.items() if model is subject or any(t.effect for t in model.terms)
+    ]
+    return list(dict.fromkeys(wanted))
+
+
+def model(run: Run, name: str) -> dict[str, Any]:
+    """A model in detail: equations, terms with their numbers and shares, what is worth knowing."""
+    model = run.models[name]
+    entry = run.results.get("models", {}).get(name, {})
+    shares = entry.get("shares") or {}
+    sizes = {"state": model.states, "term": model.terms, "free parameter": model.free}
+    count = ", ".join(counted(len(items), word) for word, items in sizes.items())
+    rates = (
+        ""
+        if model.time_unit == "s" or any(s.capacity for s in model.states.values())
+        else f" Time in {model.time_unit}."
+    )
+    return {
+        "name": name,
+        "about": f"{count}.{rates}",
+        "equations": equations.equations(model),
+        "rows": equations.rows(model, shares),
+        "shares": bool(shares),
+        "largest": max(shares.values(), default=1.0) or 1.0,
+        "share_note": "Share of the effect: what the errors would lose without the term, to first order; "
+        "all terms together are 100 %.",
+        "others": equations.other_values(model),
+        "capacities": equations.capacities(model),
+        "notes": entry.get("notes") or [],
+    }
+
+
+def discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
+    """How models were found: error against size, stability of terms; None where nothing was searched."""
+    names = [
+        name for name in order or ranked(run) if run.results.get("models", {}).get(name, {}).get("search")
+    ]
+    if not names:
+        return None
+    charts: list[Chart] = []
+    tables: list[Printed] = []
+    for name in names:
+        entry = run.results["models"][name]["search"]
+        charts += _pareto(name, entry.get("path") or [])
+        if entry.get("stability"):
+            shares = sorted(entry["stability"].items(), key=lambda pair: -pair[1])
+            rare = [share for _, share in shares if share < _OFTEN]
+            shares = [pair for pair in shares if pair[1] >= _OFTEN]
+            rows = tuple(Line((str(term), percent(share))) for term, share in shares)
+            rows += (Line((f"{len(rare)} others", f"< {percent(_OFTEN)}")),) if rare else ()
+            tables.append(
+                Printed(
+                    f"{name}: how often each term is chosen when the search is repeated on parts of the data",
+                    ("Term", "Chosen"),
+                    rows,
+                )
+            )
+    about = (
+        "Each further term must earn its place on data that the choice has not used. "
+        "Terms that are chosen again and again do not depend on which hours were recorded."
+    )
+    return {"about": about, "charts": charts, "tables": tables}
+
+
+def _pareto(name: str, path: Sequence[Mapping[str, Any]]) -> list[Chart]:
+    """Error against size, one chart for each group of outputs that was searched together."""
+    charts = []
+    for outputs in dict.fromkeys(tuple(point["outputs"]) for point in path):
+        points = sorted((p for p in path if tuple(p["outputs"]) == outputs), key=lambda p: p["terms"])
+        if len(points) < 2:
+            continue
+        terms = np.array([float(p["terms"]) for p in points])
+        curves = []
+        for key, label, color in (
+            ("left_out_rms", "on data left out", "0"),
+            ("fit_rms", "on data fitted", "1"),
+        ):
+            error = np.array([math.nan if p.get(key) is None else float(p[key]) for p in points])
+            curves += [
+                Series(label, terms, error, "line", color),
+                Series(label, terms, error, "points", color),
+            ]
+        chosen = [float(p["terms"]) for p in points if p.get("chosen")]
+        marks = {"chosen": chosen[0]} if chosen else {}
+        title = f"{name}: {', '.join(outputs)}, error against size"
+        panel = Panel("rms [reading noise]", tuple(curves))
+        charts.append(Chart(f"size-{name}-{outputs[0]}", title, "terms [-]", (panel,), marks=marks))
+    return charts
+
+
+def residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
+    """What the best model leaves on the first unseen recording, examined; None without predictions."""
+    recording = next((r for r in run.recordings if r in run.held_out), next(iter(run.recordings), None))
+    if recording is None or not order:
+        return None
+    model = order[0]
+    rows = series.residual_table(run, model, recording)
+    if not rows:
+        return None
+    keys = ("rms", "ratio", "mean", "memory", "largest", "beyond", "count")
+    lines = tuple(
+        Line((f"{row['output']} [{row['unit'] or '-'}]", *(number(row[k]) for k in keys))) for row in rows
+    )
+    header = (
+        "Error",
+        "rms",
+        "rms / noise",
+        "mean",
+        "correlation of neighbours",
+        "largest",
+        "beyond 3σ [%]",
+        "readings",
+    )
+    return {
+        "about": f"What “{model}” leaves on {recording}. If only sensor noise were left, neighbours "
+        "would not be alike and bars would stay inside the band.",
+        "table": Printed(f"Left over on {recording}", header, lines),
+        "charts": series.residual_charts(run, model, recording),
+    }
+
+
+def quality(run: Run) -> dict[str, Any] | None:
+    """Readings of each recording and what was found wrong with them; None without predictions."""
+    rows = []
+    for recording in run.recordings:
+        data = run.predictions[recording]
+        for output, readings in data.readings.items():
+            read = data.time[np.isfinite(readings)]
+            if not len(read):
+                continue
+            every = float(np.median(np.diff(read))) if len(read) > 1 else math.nan
+            gap = float(np.max(np.diff(read))) if len(read) > 1 else math.nan
+            known = readings[np.isfinite(readings)]
+            span = f"{number(float(known.min()))} to {number(float(known.max()))} {run.unit(output)}"
+            rows.append(
+                Line(
+                    (
+                        recording,
+                        output,
+                        number(len(read), 6),
+                        _duration(float(read[-1] - read[0])),
+                        _duration(every),
+                        _duration(gap),
+                        span,
+                    )
+                )
+            )
+    findings = [str(line) for line in run.results.get("findings") or run.results.get("quality") or []]
+    if not rows and not findings:
+        return None
+    header = ("Recording", "Error", "Readings", "Over", "Usually every", "Longest gap", "Range")
+    return {
+        "tables": [Printed("Readings", header, tuple(rows), frozenset({1, 6}))] if rows else [],
+        "findings": findings,
+    }
+
+
+def _duration(seconds: float) -> str:
+    if not math.isfinite(seconds):
+        return "–"
+    for size, unit in ((3600, "h"), (60, "min")):
+        if seconds >= 2 * size:
+            return f"{number(seconds / size)} {unit}"
+    return f"{number(seconds)} s"
+
+
+def reproduce(run: Run) -> dict[str, Any]:
+    """Command, versions and hashes."""
+    versions, inputs = (
+        run.results.get("versions") or {"discovery": __version__},
+        run.results.get("inputs") or {},
+    )
+    rows = [Line((name, str(one))) for name, one in versions.items()]
+    rows += [Line((f"{name}, sha256", str(digest)[:16])) for name, digest in inputs.items()]
+    for name in ("results.json", "diagnosis.json"):
+        path = run.folder / name
+        if path.exists():
+            rows.append(Line((f"{name}, sha256", hashlib.sha256(path.read_bytes()).hexdigest()[:16])))
+    if run.results.get("seconds"):
+        rows.append(Line(("computing time", f"{number(run.results['seconds'])} s")))
+    return {
+        "command": run.results.get("command", ""),
+        "table": Printed(
+            "Versions, and hashes of what went in", ("What", "Value"), tuple(rows), frozenset({1})
+        ),
+    }
