@@ -22,7 +22,7 @@ READ_EVERY = 600.0  # s
 
 
 def next_experiment(context: Context, answer: Model, rival: Model | None, white: Array) -> str:
-    """A sentence: the input pattern that separates two fitted models most, its hours, and the sensor that helps most.
+    """A sentence: the inputs that separate two fitted models most, for how long, and the best new sensor.
 
     Without a rival the answer is compared with the refitted baseline, as a confirmation.
     """
@@ -57,7 +57,8 @@ def next_experiment(context: Context, answer: Model, rival: Model | None, white:
             f"{text}: {purpose} within about {max(hours, READ_EVERY / 3600):.1f} h of readings every 10 min"
         )
     if sensor and spread[sensor] > 0.02:
-        sentence += f"; a temperature sensor on {sensor} helps most (the two answers differ there by {spread[sensor]:.2f} K rms)"
+        apart = f"the two answers differ there by {spread[sensor]:.2f} K rms"
+        sentence += f"; a temperature sensor on {sensor} helps most ({apart})"
     return sentence
 
 
@@ -95,16 +96,14 @@ def _designs(context: Context) -> dict[str, Mapping[str, Array]]:
             out[n] = level
         return out
 
-    zero, one = np.zeros(len(time)), np.ones(len(time))
+    zero, one, first = np.zeros(len(time)), np.ones(len(time)), (time < HOURS * 1800).astype(float)
     wanted: dict[str, dict[str, Array]] = {}
     if any(r == "fluid flow" for r in roles.values()):
         wanted["switch the pump every 2 h at standstill with warm fluid"] = build(zero, zero, on, True)
         wanted["switch the pump every 2 h at full speed"] = build(one, one, on, False)
         wanted["step the speed every hour with the pump running"] = build(quick, quick, one, False)
     if any(r in ("rotation speed", "heat load") for r in roles.values()):
-        wanted["run 6 h at full load dry, then stand still for 6 h"] = build(
-            (time < HOURS * 1800) * 1.0, (time < HOURS * 1800) * 1.0, zero, False
-        )
+        wanted["run 6 h at full load dry, then stand still for 6 h"] = build(first, first, zero, False)
         wanted["step speed and load every hour, dry"] = build(quick, quick, zero, False)
         wanted["run at half speed and full load, dry"] = build(0.5 * one, one, zero, False)
     wanted["stand still and let the machine follow the room"] = build(zero, zero, zero, False)

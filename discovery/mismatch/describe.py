@@ -1,7 +1,7 @@
 """When no effect of the catalogue fits: a formula that describes the missing heat, clearly not its cause.
 
-SINDy in the filtered form: a library of powers, products, thresholds, saturations and lags of the inputs and of the
-body's own temperature, each seen through the model, chosen one after the other by evidence.
+SINDy in the filtered form: a library of powers, products, thresholds, saturations and lags of the inputs and
+of the body's own temperature, each seen through the model, chosen one after the other by evidence.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Curve:
 
 
 def describe(context: Context, current: Assessment, forcing: Forcing) -> Description | None:
-    """The best short formula for the missing heat at the body of a forcing; None when no term adds evidence."""
+    """The best short formula for the heat of a forcing; None when no term adds evidence."""
     library = _library(context, current, forcing.state)
     view = current.best_view
     columns = []
@@ -93,7 +93,7 @@ def describe(context: Context, current: Assessment, forcing: Forcing) -> Descrip
 def _evidence(z: Array, residual: Array) -> float:
     """BIC-like log evidence of a linear model with a unit-information prior."""
     solved = np.linalg.lstsq(z, residual, rcond=1e-10)[0]
-    return 0.5 * float(residual @ z @ solved) - 0.5 * z.shape[1] * float(np.log(len(residual)))
+    return float(0.5 * (residual @ z @ solved) - 0.5 * z.shape[1] * np.log(len(residual)))
 
 
 def _library(context: Context, current: Assessment, state: str) -> list[tuple[str, Expression]]:
@@ -172,8 +172,7 @@ def curves(current: Assessment, forcing: Forcing, bins: int = 8) -> list[Curve]:
             for b in range(len(edges) - 1)
             if (m := which == b).any()
         ]
-        centre, mean, spread = zip(*rows, strict=True)
-        found.append(Curve(name, centre, mean, spread))
+        found.append(Curve(name, *zip(*rows, strict=True)))
     return found
 
 

@@ -24,10 +24,10 @@ from discovery.mismatch.selfcheck import false_alarm, named_again
 from discovery.mismatch.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.terms import Apply, Expression, Name, Term, text
+from discovery.terms import Apply, Expression, Name, Term, names
 from discovery.terms.expression import rewrite
 
-INVISIBLE = 0.05  # share of a signature that a refit leaves, below which a claim cannot be decided from these recordings
+INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,9 @@ def diagnose(
     if verdict.word == NO_MISMATCH:
         question = _smallest(found)
     elif verdict.word == FAULT:
-        question = "repeat the recording after checking the device; a fault of the measuring chain needs no new physics"
+        question = (
+            "check the device and repeat the recording; a fault of the measuring chain needs no new physics"
+        )
     else:
         question = next_experiment(context, found.best.fit.model, rival_model, white)
     levels = [v.level for v in found.baseline.views]
@@ -136,7 +138,7 @@ def diagnose(
         repaired,
         describe(context, found.baseline, before[0]) if unexplained else None,
         tuple(curves(found.baseline, before[0])) if before and verdict.word != NO_MISMATCH else (),
-        tuple(named_again(context, found, n.hypothesis) for n in verdict.named),
+        tuple(named_again(found, n.hypothesis) for n in verdict.named),
         question,
         clock.perf_counter() - began,
     )
@@ -147,11 +149,14 @@ def _on_fit(before: Assessment, after: Assessment) -> Improvement:
         compare(old, new, after.best_view.noise)
         for old, new in zip(before.fit.trajectories, after.fit.trajectories, strict=True)
     ]
-    square = lambda pick: float(np.sqrt(np.mean([pick(p) ** 2 for p in parts])))  # noqa: E731
+
+    def together(values: Sequence[float]) -> float:
+        return float(np.sqrt(np.mean(np.square(values))))
+
     return Improvement(
-        square(lambda p: p.before),
-        square(lambda p: p.after),
-        square(lambda p: p.floor),
+        together([p.before for p in parts]),
+        together([p.after for p in parts]),
+        together([p.floor for p in parts]),
         min(p.low for p in parts),
         max(p.high for p in parts),
     )
@@ -159,15 +164,14 @@ def _on_fit(before: Assessment, after: Assessment) -> Improvement:
 
 def _rival_model(found: Search, rival: Hypothesis) -> Model | None:
     for attempt in found.tried:
-        if any(h.key == rival.key for h in attempt.hypotheses) and len(attempt.hypotheses) == len(
-            found.best.hypotheses
-        ):
+        as_many = len(attempt.hypotheses) == len(found.best.hypotheses)
+        if as_many and any(h.key == rival.key for h in attempt.hypotheses):
             return attempt.fit.model
     return None
 
 
 def _smallest(found: Search) -> str:
-    """What would have been seen: the size at which the most visible and the usual effects reach the threshold."""
+    """What would have been seen: the size at which usual effects reach the threshold."""
     seen: list[tuple[float, Score]] = []
     for claim in found.looks[0].claims:
         h = claim.hypothesis
@@ -194,7 +198,7 @@ def _smallest(found: Search) -> str:
 
 
 def _repaired(best: Assessment) -> Model:
-    """The fitted model with what was found written as an engineer would write it (no switch that is always on)."""
+    """The fitted model with what was found as an engineer would write it (no switch that is always on)."""
     model = best.fit.model
     switches = {
         h.amplitudes[0]: h
@@ -210,7 +214,7 @@ def _repaired(best: Assessment) -> Model:
                 return changed
         return None
 
-    terms = []
+    terms: list[Term] = []
     for term in model.terms:
         plain = rewrite(term.expression, simplify)
         if plain != term.expression:
@@ -233,6 +237,5 @@ def _is_original(replaced: Term, term: Term) -> bool:
 
 
 def _used(name: str, terms: Sequence[Term], model: Model) -> bool:
-    return any(name in text(t.expression) for t in terms) or any(
-        name in text(e) for e in model.outputs.values()
-    )
+    expressions = [*(t.expression for t in terms), *model.outputs.values()]
+    return any(name in names(e) for e in expressions)

@@ -1,7 +1,7 @@
 """Events: when did an unknown heat act, when did a sensor jump, which single reading is wrong.
 
-Steps at many instants are seen through the model at once; a window is the difference of two of them, so all windows
-of a recording are scored from one Gram matrix and only the best edges are refined.
+Steps at many instants are seen through the model at once; a window is the difference of two of them, so all
+windows of a recording are scored from one Gram matrix and only the best edges are refined.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FINE = 8  # steps on each side of an edge in the second
 def place_events(
     lens: Lens, view: View, claims: Iterable[Hypothesis], spread: dict[str, float]
 ) -> list[Hypothesis]:
-    """The claims about events with the instants that speak for them most; claims of other kinds pass unchanged.
+    """Claims about events with the instants that speak for them most; claims of other kinds as they are.
 
     Args:
         spread: prior standard deviation by amplitude name.

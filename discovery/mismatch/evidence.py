@@ -1,4 +1,4 @@
-"""Evidence: how much more likely the readings are with an effect than without it, all unknowns integrated out."""
+"""Evidence: how much more likely an effect makes the readings, all unknowns integrated out."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 class Score:
     """What the linear look says of a hypothesis.
 
-    `gain` is the log Bayes factor against the fit without it (integrated over noise settings), `t` the signed score in
-    standard deviations at the best setting, `size` its amplitudes there, `share` what a refit leaves of the signature.
+    `gain` is the log Bayes factor against the fit without it (integrated over noise settings), `t` the signed
+    score in standard deviations at the best setting, `size` its amplitudes there, `share` what a refit leaves
+    of the signature.
     `decidable`: an effect of plausible size would stand out by three standard deviations.
     """
 
@@ -78,12 +79,13 @@ def scores(board: Board) -> list[Score]:
         dot, gram_diagonal, z = per_view[v]
         if len(mine) == 1:
             k = mine[0]
-            t = float(dot[k] / np.sqrt(max(gram_diagonal[k], 1e-300)))
-            size = (float(dot[k] / max(gram_diagonal[k] + board.spreads[k] ** -2, 1e-300)),)
+            t = float(dot[k] / np.sqrt(max(float(gram_diagonal[k]), 1e-300)))
+            precision = float(gram_diagonal[k] + board.spreads[k] ** -2)
+            size: tuple[float, ...] = (float(dot[k]) / max(precision, 1e-300),)
         else:
             gram = z[:, mine].T @ z[:, mine] + np.diag(board.spreads[mine] ** -2)
             solved = np.linalg.solve(gram, dot[mine])
-            t = float(np.sqrt(max(dot[mine] @ solved, 0.0)))
+            t = float(np.sqrt(max(float(dot[mine] @ solved), 0.0)))
             size = tuple(float(s) for s in solved)
         length = board.lengths[v][mine].max()
         share = float(np.sqrt(gram_diagonal[mine].max()) / length) if length > 0 else 0.0
@@ -124,7 +126,7 @@ def _log_bayes(
 
 
 def by_claim(found: Sequence[Score]) -> list[Score]:
-    """One score per claim (effect and place): its shapes averaged in the gain, the best shape shown; best first.
+    """One score per claim (effect and place), best first: shapes averaged in the gain, the best one shown.
 
     A single claim's gain also carries the effect's prior weight.
     """
@@ -141,7 +143,7 @@ def by_claim(found: Sequence[Score]) -> list[Score]:
 
 
 def pair_gains(board: Board, chosen: Sequence[int]) -> Array:
-    """Log Bayes factor (K, K) of two hypotheses together, on the best view; amplitudes free in sign, -inf on the diagonal.
+    """Log Bayes factor (K, K) of two hypotheses together, on the best view; -inf on the diagonal.
 
     Args:
         chosen: indices of amplitudes of one-amplitude hypotheses.

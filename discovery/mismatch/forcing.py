@@ -1,7 +1,8 @@
 """Free forcing: smooth heat of unknown cause at one body, and what the readings say of it.
 
-The heat is piecewise constant over blocks with a first-order covariance of unknown size; evidence and the curve follow
-in closed form. It asks for no catalogue: it says where something is missing, when, and how much any explanation can gain.
+The heat is piecewise constant over blocks with a first-order covariance of unknown size; evidence and the
+curve follow in closed form. It asks for no catalogue: it says where something is missing, when, and how much
+any explanation can gain.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where each effect of the catalogue could act in a given model: one hypothesis per effect, place and shape."""
+"""Where each effect of the catalogue could act in a model: one hypothesis per effect, place and shape."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from discovery.terms import Apply, Expression, Name, Term, names, parse, substit
 class Hypothesis:
     """An effect at a place with its shape parameters at given values.
 
-    `terms` enter states, `shown` is what outputs show in addition; both hold the amplitudes and shapes as parameters.
+    `terms` enter states, `shown` is what outputs show in addition; both hold the amplitudes and shapes as
+    parameters.
     """
 
     effect: Effect
@@ -86,8 +87,8 @@ def hypotheses(
 ) -> list[Hypothesis]:
     """Every effect at every place where it can act, at every point of its shape grid.
 
-    Effects whose place in time has to be searched (windows, steps) come with their first shape values; `events.py`
-    finds the instants.
+    Effects whose place in time has to be searched (windows, steps) come with their first shape values;
+    `events.py` finds the instants.
     """
     found: list[Hypothesis] = []
     for effect in effects:
@@ -190,7 +191,7 @@ def _claim(
                     for c in names(term.expression) & set(channels) - set(model.states)
                 }
             else:
-                swaps = {c: fresh for c in names(term.expression) & names(fresh) & set(channels)}
+                swaps = dict.fromkeys(names(term.expression) & names(fresh) & set(channels), fresh)
             changed = substitute(term.expression, swaps)
             difference = Apply("*", (amplitude, Apply("-", (changed, term.expression))))
             terms.append(

@@ -1,13 +1,14 @@
 """The residual as the noise model sees it: whitened, with everything that a refit would absorb projected out.
 
-What is left of a signature under this projection is all that can ever speak for its effect; evidence is integrated
-over a few levels of slow sensor noise and small random heat, because their true levels are never known.
+What is left of a signature under this projection is all that can ever speak for its effect; evidence is
+integrated over a few levels of slow sensor noise and small random heat, because their true levels are never
+known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -75,7 +76,7 @@ class Lens:
         return np.flatnonzero((theta > low + scale) & (theta < high - scale))
 
     def whiten(self, noise: Noise, columns: Sequence[Array]) -> tuple[Array, float]:
-        """Columns (R, Y, M) by recording whitened and stacked, with zero rows for the priors; and the log-determinant."""
+        """Columns (R, Y, M) by recording whitened and stacked, zero rows for priors; the log-determinant."""
         parts, logdet = [], 0.0
         for part, column in zip(self.filters, columns, strict=True):
             white, half = part.apply(noise, column)
@@ -106,30 +107,6 @@ class Lens:
         level = -logdet - 0.5 * float(projected @ projected) - volume
         information = (triangle.T @ triangle) * np.outer(scale, scale)
         return View(noise, basis, projected, level, information)
-
-
-@dataclass(frozen=True)
-class Everyday:
-    """Levels of slow noise (share of the reading noise) and small heat (by state) that are no mismatch."""
-
-    settings: tuple[Noise, ...]
-
-
-def everyday(white: Noise, heat_limit: Mapping[str, float], slow_time: float, heat_time: float) -> Everyday:
-    """The noise settings that evidence is integrated over: from none to the everyday limit of both kinds."""
-    settings = []
-    for share in (0.0, 0.25, 0.55):
-        for level in (0.0, 0.35, 0.9):
-            settings.append(
-                replace(
-                    white,
-                    slow=tuple(share * w for w in white.white),
-                    heat={name: level * limit for name, limit in heat_limit.items()},
-                    slow_time=slow_time,
-                    heat_time=heat_time,
-                )
-            )
-    return Everyday(tuple(settings))
 
 
 def log_mean_exp(values: Array, axis: int = 0) -> Array:

@@ -49,8 +49,8 @@ def locate(
 ) -> Location:
     """Location of what the baseline leaves.
 
-    Outputs by the excess of its residual over the reading noise, states by free forcing (and by the named effects where
-    there are some), windows and regime from the missing heat itself.
+    Outputs by the excess of its residual over the reading noise, states by free forcing (and by the named
+    effects where there are some), windows and regime from the missing heat itself.
     """
     return Location(
         _outputs(baseline, best),
@@ -150,7 +150,7 @@ def _spans(
 
 
 def regime(baseline: Assessment, f: Forcing, seed: int = 0) -> str | None:
-    """A rule over inputs and states, at most two deep, that says when the missing heat acts; None where none holds.
+    """A rule over inputs and states, at most two deep, that says when heat is missing; None where none holds.
 
     The tree must beat 95 % of trees grown on heat whose days were shuffled.
     """

@@ -1,4 +1,4 @@
-"""The proof: free runs of the refitted baseline and of the repaired model on recordings that no fit has seen."""
+"""The proof: free runs of the refitted baseline and of the repaired model on recordings that no fit saw."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def improvements(
 ) -> dict[str, Improvement]:
     """Free runs on each recording, zeroed on the first reading alone.
 
-    rms is over all outputs, each weighed by its reading noise and scaled back to the mean noise, so that um and um/m
-    count alike.
+    rms is over all outputs, each weighed by its reading noise and scaled back to the mean noise, so that um
+    and um/m count alike.
     """
     out = {}
     for run in recordings:
@@ -80,7 +80,7 @@ def compare(old: Trajectory, new: Trajectory, noise: Noise) -> Improvement:
 
 
 def noise_floor(trajectory: Trajectory, noise: Noise) -> float:
-    """rms that reading noise, slow noise and everyday heat leave in a free run, scaled as in `improvements`."""
+    """rms that reading noise, slow noise and everyday heat leave in a free run, as in `improvements`."""
     white = np.array(noise.white)
     unit = float(np.sqrt(np.mean(white**2)))
     slow = np.array(noise.slow or np.zeros(len(white)))
@@ -98,7 +98,7 @@ def noise_floor(trajectory: Trajectory, noise: Noise) -> float:
 
 
 def explained(found: Mapping[str, Improvement]) -> float | None:
-    """Share of the closable mismatch that the repair removes, over all recordings; None where there is none."""
+    """Share of the closable mismatch that the repair removes; None where there is none."""
     gap = gain = 0.0
     for i in found.values():
         if i.before > CLOSABLE * i.floor:

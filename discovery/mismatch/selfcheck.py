@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.mismatch.context import Context
 from discovery.mismatch.evidence import Board
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.search import Search
@@ -15,11 +14,11 @@ Array = NDArray[np.float64]
 DRAWS = 400
 
 
-def named_again(context: Context, found: Search, h: Hypothesis, seed: int = 0) -> float | None:
-    """Share of simulated recordings on which an effect stands first again among all that were scored beside it.
+def named_again(found: Search, h: Hypothesis, seed: int = 0) -> float | None:
+    """Share of simulated recordings on which an effect stands first again among all that were scored.
 
-    The readings are those of the repaired model with fresh noise, seen on the first board (to first order in the
-    effect's size); None for an effect that this board did not hold.
+    The readings are those of the repaired model with fresh noise, seen on the first board (to first order in
+    the effect's size); None for an effect that this board did not hold.
     """
     board = found.looks[0].board
     amplitudes = [found.best.model.parameters[name] for name in h.amplitudes]
@@ -57,9 +56,10 @@ def _first(board: Board, z: Array, truth: Array, seed: int) -> list[int]:
 
 
 def false_alarm(board: Board, view_index: int, best: float, seed: int = 1) -> float:
-    """Family-wise p-value: share of noise-only recordings whose best single score reaches `best` (log Bayes factor).
+    """Family-wise p-value: share of noise-only recordings whose best score reaches `best` (log Bayes factor).
 
-    The board's instants were chosen on the data, so events make it slightly too small; they carry their own cost.
+    The board's instants were chosen on the data, so events make it slightly too small; they carry their own
+    cost.
     """
     z = board.projected[view_index]
     rng = np.random.default_rng(seed)

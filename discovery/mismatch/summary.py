@@ -21,19 +21,14 @@ def summary(path: Path) -> list[str]:
         lines.append(
             f"  {p['effect']} at {', '.join(p['states'])}, probability {p['probability']:.2f}: {sizes}"
         )
-    for a in d["alternatives"]:
-        if a["log_evidence_below_best"] <= 3:
-            lines.append(f"  could also be {a['effect']} at {', '.join(a['states'])}")
+    near = [a for a in d["alternatives"] if a["log_evidence_below_best"] <= 3]
+    lines += [f"  could also be {a['effect']} at {', '.join(a['states'])}" for a in near]
     lines += [f"  {reason}" for reason in d["reasons"]]
-    if d["description"]:
-        lines.append(
-            f"  the missing heat at {d['description']['state']} follows {d['description']['formula']} (a description, not a cause)"
-        )
-    held = d["improvement"]["held_out"]
-    for run, i in held.items():
-        if d["physics"]:
-            lines.append(
-                f"  unseen recording {run}: rms {i['rms_before']:.3g} -> {i['rms_after']:.3g} (noise {i['noise_floor']:.3g})"
-            )
+    if about := d["description"]:
+        what = f"the missing heat at {about['state']} follows {about['formula']}"
+        lines.append(f"  {what} (a description, not a cause)")
+    for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
+        rms = f"rms {i['rms_before']:.3g} -> {i['rms_after']:.3g} (noise {i['noise_floor']:.3g})"
+        lines.append(f"  unseen recording {run}: {rms}")
     lines.append(f"  next: {d['next_experiment']}")
     return lines
