@@ -28,6 +28,7 @@ from discovery.experimentfile import Experiment, input_files
 from discovery.files import write_atomic
 from discovery.models import Model, write_model
 from discovery.models.equations import equations
+from discovery.recordings.check import check_campaign
 
 if TYPE_CHECKING:
     from discovery.experiment import Fitted
@@ -112,6 +113,7 @@ def results_document(experiment: Experiment, fitted: Mapping[str, Fitted], secon
     channels = experiment.campaign.channels
     return {
         "experiment": experiment.name,
+        "command": f"discovery run {experiment.path}",
         "campaign": experiment.campaign.name,
         "campaign_file": str(experiment.campaign.path),
         "fit": list(experiment.fit),
@@ -121,11 +123,19 @@ def results_document(experiment: Experiment, fitted: Mapping[str, Fitted], secon
         "input_units": {name: c.unit for name, c in channels.items() if name not in experiment.outputs},
         "noise": {name: channels[name].noise for name in experiment.outputs},
         "parts": parts_of_the_paper(experiment.campaign, experiment.fit, experiment.held_out),
+        "notes": {name: r.note for name, r in experiment.campaign.recordings.items() if r.note},
+        "findings": findings(experiment),
         "models": {name: model_entry(one) for name, one in fitted.items()},
         "seconds": seconds,
         "versions": versions(),
         "inputs": {name: _sha256(path) for name, path in input_files(experiment).items()},
     }
+
+
+def findings(experiment: Experiment) -> list[str]:
+    """What is wrong with the recordings that the experiment uses, a sentence each."""
+    used = {path.resolve() for path in input_files(experiment).values()}
+    return [str(one) for one in check_campaign(experiment.campaign.path) if one.file.resolve() in used]
 
 
 def model_entry(one: Fitted) -> dict[str, Any]:

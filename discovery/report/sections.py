@@ -173,13 +173,14 @@ def quality(run: Run) -> dict[str, Any] | None:
                     )
                 )
             )
-    findings = [str(line) for line in run.results.get("findings") or run.results.get("quality") or []]
+    findings = [str(line) for line in run.results.get("findings") or []]
     if not rows and not findings:
         return None
     header = ("Recording", "Error", "Readings", "Over", "Usually every", "Longest gap", "Range")
     return {
         "tables": [Printed("Readings", header, tuple(rows), frozenset({1, 6}))] if rows else [],
         "findings": findings,
+        "sound": run.results.get("findings") == [],
     }
 
 
