@@ -1,4 +1,4 @@
-"""What a diagnosis works on: the recordings it may see, the noise it has to expect, and how large effects can be."""
+"""What a diagnosis works on: recordings that it may see, noise to expect, and how large effects can be."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Context:
         return tuple(self.heat_limit)
 
     def spread(self, h: Hypothesis) -> tuple[float, ...]:
-        """Prior standard deviation of each amplitude: what is plausible, but no more than the model's own flows."""
+        """Prior standard deviation of each amplitude: plausible, but no more than the model's own flows."""
         size = h.effect.amplitude.plausible
         if h.effect.amplitude.fixed is not None:
             return (size,) * len(h.amplitudes)
@@ -64,15 +64,19 @@ class Context:
         trajectory = self.baseline.trajectories[0]
         values = {**trajectory.at_ends(), **h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
         unit_flow = max(
-            float(np.sqrt(np.mean(np.square(evaluate(t.expression, values, memory=trajectory.system.ends).value))))
-            for t in h.terms
+            _rms(evaluate(t.expression, values, memory=trajectory.system.ends).value) for t in h.terms
         )
         largest = max(self.flows.values())
         return (min(size, largest / unit_flow) if unit_flow > 0 else size,) * len(h.amplitudes)
 
 
 def make_context(
-    campaign: Campaign, model: Model, recordings: Sequence[str], outputs: Sequence[str], effects: Sequence[Effect], physical: bool = True
+    campaign: Campaign,
+    model: Model,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    effects: Sequence[Effect],
+    physical: bool = True,
 ) -> Context:
     """Fit the baseline jointly and find the noise levels that tests must reckon with.
 
@@ -83,7 +87,9 @@ def make_context(
         for name, channel in campaign.channels.items()
         if name not in outputs
         and channel.role not in ("error", "applied correction")
-        and all(np.isfinite(campaign.recordings[r].values.get(name, np.array([np.nan]))).any() for r in recordings)
+        and all(
+            np.isfinite(campaign.recordings[r].values.get(name, np.array([np.nan]))).any() for r in recordings
+        )
     ]
     grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
     belief = BELIEF if physical and any(state.capacity for state in model.states.values()) else None
@@ -112,8 +118,23 @@ def make_context(
         for level in (0.0, 0.35, 0.9)
     )
     return Context(
-        campaign, model, tuple(recordings), tuple(outputs), grids, tuple(effects), fit, settings, limit, flows, belief, tuple(outliers)
+        campaign,
+        model,
+        tuple(recordings),
+        tuple(outputs),
+        grids,
+        tuple(effects),
+        fit,
+        settings,
+        limit,
+        flows,
+        belief,
+        tuple(outliers),
     )
+
+
+def _rms(series: Array | float) -> float:
+    return float(np.sqrt(np.mean(np.square(series))))
 
 
 def _flows(fit: Fit) -> dict[str, float]:
@@ -127,11 +148,13 @@ def _flows(fit: Fit) -> dict[str, float]:
     return flows
 
 
-def reading_noise(fit: Fit, stated: Mapping[str, float | None], limit: Mapping[str, float], duration: float) -> Noise:
+def reading_noise(
+    fit: Fit, stated: Mapping[str, float | None], limit: Mapping[str, float], duration: float
+) -> Noise:
     """White reading noise: what is stated, else the most likely level beside slow noise and heat of any size.
 
-    Heat far above the everyday level is offered, so that a mismatch passes for heat and not for reading noise. Time
-    constants of everyday noise are 2 and 3 h, or a fixed share of shorter recordings.
+    Heat far above the everyday level is offered, so that a mismatch passes for heat and not for reading
+    noise. Time constants of everyday noise are 2 and 3 h, or a fixed share of shorter recordings.
     """
     outputs = fit.problem.outputs
     known = np.array([stated.get(name) is not None for name in outputs])
@@ -149,9 +172,14 @@ def reading_noise(fit: Fit, stated: Mapping[str, float | None], limit: Mapping[s
 
 
 def _white_beside(
-    lens: Lens, known: NDArray[np.bool_], share: float, heat: Mapping[str, float], slow_time: float, heat_time: float
+    lens: Lens,
+    known: NDArray[np.bool_],
+    share: float,
+    heat: Mapping[str, float],
+    slow_time: float,
+    heat_time: float,
 ) -> tuple[Array, float]:
-    """White level (Y,) that makes the innovations unit variance beside given slow noise and heat; its -log likelihood."""
+    """White level (Y,) of unit innovations beside given slow noise and heat, and its -log likelihood."""
     outputs = lens.fit.problem.outputs
     white = np.array(lens.fit.noise.white)
     cost = np.inf
@@ -161,7 +189,8 @@ def _white_beside(
         for part, residual in zip(lens.filters, lens.residuals, strict=True):
             z, logdet = part.apply(noise, residual[:, :, None])
             innovation = np.full(residual.shape, np.nan)
-            innovation[part.measured] = np.clip(z[:, 0], -4.0, 4.0)  # single wrong readings do not count in full
+            # single wrong readings do not count in full
+            innovation[part.measured] = np.clip(z[:, 0], -4.0, 4.0)
             squares += np.nansum(innovation**2, axis=0)
             counts += part.measured.sum(axis=0)
             cost += logdet + 0.5 * float(np.nansum(innovation**2))

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.describe import heat_over_time
 from discovery.mismatch.forcing import alike
 from discovery.mismatch.hypotheses import Hypothesis
-from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.verdict import FAULT, UNEXPLAINED, Named
 from discovery.terms import text
 
@@ -27,7 +27,9 @@ def document(d: Diagnosis) -> dict[str, Any]:
     outputs = context.outputs
     white = dict(zip(baseline.views[0].noise.outputs, baseline.views[0].noise.white, strict=True))
     rms = {
-        name: _number(float(np.sqrt(np.nanmean(np.concatenate([r[:, y] for r in baseline.lens.residuals]) ** 2))))
+        name: _number(
+            float(np.sqrt(np.nanmean(np.concatenate([r[:, y] for r in baseline.lens.residuals]) ** 2)))
+        )
         for y, name in enumerate(outputs)
     }
     noise = best.best_view.noise
@@ -38,7 +40,9 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "model": context.model.name,
         "verdict": d.verdict.word,
         "reasons": list(d.verdict.reasons),
-        "about": "the states of this model are the errors themselves: effects act on their rates" if rate else "heat flows in W",
+        "about": "the states of this model are the errors themselves: effects act on their rates"
+        if rate
+        else "heat flows in W",
         "detection": {
             "p_value": _number(d.p_value, 3),
             "log_evidence": _number(d.search.gain),
@@ -53,13 +57,24 @@ def document(d: Diagnosis) -> dict[str, Any]:
             "states": dict(d.location.states),
             "alike": [list(group) for group in alike(list(d.forcings)) if len(group) > 1],
             "windows": [
-                {"recording": w.recording, "start_s": _number(w.start_s, 7), "end_s": _number(w.end_s, 7), "state": w.state, "heat_W": _number(w.heat, 4)}
+                {
+                    "recording": w.recording,
+                    "start_s": _number(w.start_s, 7),
+                    "end_s": _number(w.end_s, 7),
+                    "state": w.state,
+                    "heat_W": _number(w.heat, 4),
+                }
                 for w in d.location.windows
             ],
             "regime": d.location.regime,
-            "unmodelled_heat_W": {f.state: _number(float(np.sqrt(np.mean(np.concatenate(list(f.heat.values())) ** 2))), 3) for f in d.forcings if f.state in states},
+            "unmodelled_heat_W": {
+                f.state: _number(float(np.sqrt(np.mean(np.concatenate(list(f.heat.values())) ** 2))), 3)
+                for f in d.forcings
+                if f.state in states
+            },
         },
-        "physics": [_physics(d, n, c) for n, c in zip(d.verdict.named, d.checked, strict=True)] or _outliers(d),
+        "physics": [_physics(d, n, c) for n, c in zip(d.verdict.named, d.checked, strict=True)]
+        or _outliers(d),
         "alternatives": _alternatives(d.verdict.named),
         "considered": [
             {
@@ -74,7 +89,11 @@ def document(d: Diagnosis) -> dict[str, Any]:
         ],
         "closest": [_claim(n.hypothesis) for n in d.verdict.candidates],
         "improvement": {
-            "fit": {"rms_before": _number(d.fit.before), "rms_after": _number(d.fit.after), "noise_floor": _number(d.fit.floor)},
+            "fit": {
+                "rms_before": _number(d.fit.before),
+                "rms_after": _number(d.fit.after),
+                "noise_floor": _number(d.fit.floor),
+            },
             "held_out": {
                 run: {
                     "rms_before": _number(i.before),
@@ -88,11 +107,22 @@ def document(d: Diagnosis) -> dict[str, Any]:
             "explained": _number(d.explained, 4),
         },
         "set_aside": [
-            {"output": o.output, "recording": o.recording, "time_s": _number(o.time, 7), "size": _number(o.size, 4)} for o in d.context.outliers
+            {
+                "output": o.output,
+                "recording": o.recording,
+                "time_s": _number(o.time, 7),
+                "size": _number(o.size, 4),
+            }
+            for o in d.context.outliers
         ],
         "missing_heat": _missing_heat(d),
         "description": (
-            {"state": d.description.state, "formula": d.description.formula, "log_evidence": _number(d.description.gain, 4), "note": "describes the missing heat; it is not its cause"}
+            {
+                "state": d.description.state,
+                "formula": d.description.formula,
+                "log_evidence": _number(d.description.gain, 4),
+                "note": "describes the missing heat; it is not its cause",
+            }
             if d.description
             else None
         ),
@@ -102,12 +132,20 @@ def document(d: Diagnosis) -> dict[str, Any]:
 
 
 def _claim(h: Hypothesis) -> dict[str, Any]:
-    return {"effect": h.effect.word, "states": list(h.places), **({"recording": h.recording} if h.recording else {})}
+    return {
+        "effect": h.effect.word,
+        "states": list(h.places),
+        **({"recording": h.recording} if h.recording else {}),
+    }
 
 
 def _alternatives(named: tuple[Named, ...]) -> list[dict[str, Any]]:
     rows = [
-        {**_claim(r.hypothesis), "log_evidence_below_best": round(r.below, 2), "instead_of": n.hypothesis.effect.word}
+        {
+            **_claim(r.hypothesis),
+            "log_evidence_below_best": round(r.below, 2),
+            "instead_of": n.hypothesis.effect.word,
+        }
         for n in named
         for r in n.rivals
     ]
@@ -163,7 +201,12 @@ def _outliers(d: Diagnosis) -> list[dict[str, Any]]:
                 "named_again": None,
                 "expression": f"{o.size:.4g} at {o.time:.0f} s",
                 "parameters": {
-                    "outlier": {"value": _number(o.size), "low": _number(o.size - half), "high": _number(o.size + half), "unit": unit}
+                    "outlier": {
+                        "value": _number(o.size),
+                        "low": _number(o.size - half),
+                        "high": _number(o.size + half),
+                        "unit": unit,
+                    }
                 },
                 "source": entry.source,
                 "confused_with": list(entry.confused_with),
@@ -190,7 +233,11 @@ def _missing_heat(d: Diagnosis) -> dict[str, Any] | None:
         "state": f.state,
         "over_time": heat_over_time(f, offsets, d.context.recordings),
         "against": {
-            c.variable: {"value": [_number(v, 5) for v in c.centre], "heat": [_number(v, 4) for v in c.heat], "error": [_number(v, 3) for v in c.error]}
+            c.variable: {
+                "value": [_number(v, 5) for v in c.centre],
+                "heat": [_number(v, 4) for v in c.heat],
+                "error": [_number(v, 3) for v in c.error],
+            }
             for c in d.curves
         },
         "named": d.verdict.word != UNEXPLAINED,

@@ -19,7 +19,7 @@ LONELY = 0.4  # the neighbours agree with each other within this share of the di
 
 @dataclass(frozen=True)
 class Outlier:
-    """One reading that its neighbours contradict: `size` in the unit of the output, time on the clock of the grid."""
+    """One reading that its neighbours contradict: `size` in the unit of the output, time as in the grid."""
 
     output: str
     recording: str
@@ -29,7 +29,7 @@ class Outlier:
 
 
 def find_outliers(fit: Fit, white: Array) -> list[Outlier]:
-    """Readings far from both neighbours while these agree; the residual is compared, so that steps of inputs do not count.
+    """Readings far from both neighbours while these agree; residuals are compared, so steps of inputs pass.
 
     Args:
         white: (Y,) reading noise.
@@ -47,7 +47,9 @@ def find_outliers(fit: Fit, white: Array) -> list[Outlier]:
             alone = np.abs(r[2:] - r[:-2]) < LONELY * np.abs(jump)
             for k in np.flatnonzero((np.abs(jump) > FAR * white[y] * np.sqrt(1.5)) & alone):
                 at = float(grid.time[grid.read[rows[k + 1]]])
-                found.append(Outlier(name, grid.recording, at, float(jump[k]), float(white[y]) * float(np.sqrt(1.5))))
+                found.append(
+                    Outlier(name, grid.recording, at, float(jump[k]), float(white[y]) * float(np.sqrt(1.5)))
+                )
     return found
 
 

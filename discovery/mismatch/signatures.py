@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Array:
     """dy/d(amplitude) at the reading instants, (R, Y, A), A amplitudes in the order of the hypotheses.
 
-    To first order in the amplitude: bodies answer through the model's own dynamics, memories (lag, delay, play) are
-    taken along the present trajectory. What belongs to another recording is zero.
+    To first order in the amplitude: bodies answer through the model's own dynamics, memories (lag, delay,
+    play) are taken along the present trajectory. What belongs to another recording is zero.
     """
     system = trajectory.system
     run = system.grid.recording
@@ -53,7 +53,7 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
 
 
 def block_signatures(trajectory: Trajectory, h: Hypothesis, blocks: int, first: int, total: int) -> Array:
-    """Signature (R, Y, total) of a hypothesis cut into blocks of time; block k of this recording is column first + k."""
+    """Signature (R, Y, total) in blocks of time; block k of this recording is column first + k."""
     system = trajectory.system
     values = {**trajectory.at_ends(), **h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
     steps = len(system.grid.step)
@@ -63,7 +63,10 @@ def block_signatures(trajectory: Trajectory, h: Hypothesis, blocks: int, first: 
     columns = []
     for term in h.terms:
         series = np.broadcast_to(evaluate(term.expression, values, memory=system.ends).value, (2 * steps,))
-        columns += [Column(first + k, term.into, series * np.repeat(block == k, 2), term.source) for k in range(blocks)]
+        columns += [
+            Column(first + k, term.into, series * np.repeat(block == k, 2), term.source)
+            for k in range(blocks)
+        ]
     return sensitivities(trajectory, (), (), columns, count=total)
 
 
@@ -71,4 +74,3 @@ def heat_rms(trajectory: Trajectory, expression: Expression) -> float:
     """Root mean square over time of a heat flow (or rate) along a trajectory."""
     series = evaluate(expression, trajectory.at_ends(), memory=trajectory.system.ends).value
     return float(np.sqrt(np.mean(np.square(series))))
-

@@ -25,8 +25,8 @@ class EffectForm(Strict):
     """One effect.
 
     `formula` is a heat flow into `body` (out of `other`, for two bodies) with `amplitude` as a factor; the
-    variables are body, other, y (for outputs), ambient, fluid, flow, speed, load, cooling, coolant, height and
-    other_input.
+    variables are body, other, y (for outputs), ambient, fluid, flow, speed, load, cooling, coolant, height
+    and other_input.
     """
 
     word: str = Field(pattern="^[a-z][a-z0-9_]*$", description="its name in results")
