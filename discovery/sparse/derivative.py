@@ -5,17 +5,21 @@ Kaheman et al. (arXiv:1909.08574, 2019). Kept to compare with: the workbench tak
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.sparse.gram import gram, solve, total
-from discovery.sparse.optimisers import pysindy_path
+from discovery.sparse.gram import Gram, factor, gram, solve, total
+from discovery.sparse.path import Support
 
 Array = NDArray[np.float64]
 
 _WINDOW = 11  # readings that the smoother sees
+_RIDGE = 0.05  # PySINDy's own default
+_THRESHOLDS = 16
+_WORTH = 0.98  # share of the cost without any column that a choice must stay below
 
 
 def smoothed_derivative(time: Array, series: Array) -> Array:
@@ -35,27 +39,45 @@ def smoothed_derivative(time: Array, series: Array) -> Array:
 def discrepancy_terms(blocks: Sequence[tuple[Array, Array]], most: int = 6) -> list[tuple[int, float]]:
     """Columns that STLSQ of PySINDy keeps, largest contribution first, each with its share of them all.
 
-    The threshold is the one that predicts blocks left out best; no column at all is a choice too.
+    The threshold is the one that predicts blocks left out best; no column at all wins unless the cost of the
+    blocks left out falls by 2 %.
 
     Args:
         blocks: library (N, M) and target (N,) of each stretch of time.
         most: columns that may be kept.
     """
-    grams = [gram(x, y) for x, y in blocks]
-    whole = total(grams)
+    whole = total([gram(x, y) for x, y in blocks])
     moving = np.flatnonzero(np.diag(whole.matrix) > 0)
     grams = [gram(x[:, moving], y) for x, y in blocks]
     whole = total(grams)
 
     def left_out(support: Sequence[int]) -> float:
-        cost = 0.0
-        for k, block in enumerate(grams):
-            rest = total([g for j, g in enumerate(grams) if j != k])
-            cost += block.cost(solve(rest, support))
-        return cost
+        rest = (total([g for g in grams if g is not block]) for block in grams)
+        return sum(block.cost(solve(r, support)) for block, r in zip(grams, rest, strict=True))
 
-    supports = [(), *(s for s in pysindy_path(whole, "stlsq") if len(s) <= most)]
-    best = min(supports, key=left_out)
+    cost = {support: left_out(support) for support in _supports(whole) if 0 < len(support) <= most}
+    best = min(cost, key=lambda s: cost[s], default=())
+    if not best or cost[best] > _WORTH * left_out(()):
+        return []
     size = np.abs(solve(whole, best)) * whole.length
     order = sorted(best, key=lambda k: -size[k])
     return [(int(moving[k]), float(size[k] / size.sum())) for k in order]
+
+
+def _supports(g: Gram) -> set[Support]:
+    """What STLSQ keeps over a range of thresholds, on columns of unit length."""
+    import pysindy
+
+    rows, target = factor(g)
+    rows = rows / g.length
+    largest = float(np.max(np.abs(rows.T @ target)))
+    found: set[Support] = set()
+    for level in np.geomspace(0.02, 1.0, _THRESHOLDS):
+        optimiser = pysindy.STLSQ(threshold=float(level * largest), alpha=_RIDGE)
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore"
+            )  # "sparsity parameter is too big": an empty support, nothing to report
+            optimiser.fit(rows, target[:, None])
+        found.add(tuple(np.flatnonzero(np.ravel(optimiser.coef_)).tolist()))
+    return found
