@@ -1,8 +1,8 @@
 """Sequential thresholding on normal equations, and PySINDy's own optimisers on the same matrices.
 
 PySINDy is imported here and in `derivative.py` alone. Its optimisers want rows; they are given the M rows of
-`gram.factor`, which hold all that the readings say, so an optimiser costs the same for a day and for a year of
-recordings.
+`gram.factor`, which hold all that the readings say, so an optimiser costs the same for a day and for a year
+of recordings.
 """
 
 from __future__ import annotations
