@@ -2,7 +2,8 @@
 
     python benchmarks/gaps.py
 
-The virtual machine stops 24 h into a wet cycle and cools down; room and fluid go on. Compared with a runtime that was never off.
+The virtual machine stops 24 h into a wet cycle and cools down; room and fluid go on. Compared with a runtime
+that was never off.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ TICK, OFF_AT = 60.0, 24 * 3600.0
 
 
 def offsets(exported: Exported, inputs: np.ndarray, gap_s: float, how: str) -> np.ndarray:
-    """Predicted errors of a runtime that is off from OFF_AT for `gap_s`; how: "always", "cold", "frozen", "forward"."""
+    """Predicted errors after the gap; how: "always" on, or off and then "cold", "frozen" or "forward"."""
     compensator, found = Compensator(exported, Settings(tick_s=TICK)), []
     for k, row in enumerate(inputs):
         now = k * TICK
