@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+import itertools
 import json
 import signal
 import subprocess
@@ -97,12 +99,14 @@ def test_through_a_gap_the_state_is_that_of_a_machine_at_rest(
     assert woken.offsets == pytest.approx(running.offsets, abs=0.05)
 
 
-@pytest.mark.parametrize("instants", [(0.35, 0.15, 0.3, 0.02)])
+@pytest.mark.parametrize("instants", [(0.1, 0.02, 0.15)])
 def test_killed_at_any_instant_it_returns_to_the_same_offsets(
     model_file: Path, tmp_path: Path, instants: tuple[float, ...]
 ) -> None:
     """The command itself, killed with -9 again and again, against one that was left alone."""
-    source = Path(__file__).parents[2] / "datasets" / "nmv5000" / "validation.csv.gz"
+    source = tmp_path / "two_days.csv"
+    with gzip.open(Path(__file__).parents[2] / "datasets" / "nmv5000" / "validation.csv.gz", "rt") as rows:
+        source.write_text("".join(itertools.islice(rows, 3200)))
 
     def command(folder: str) -> list[str]:
         return [
