@@ -390,11 +390,15 @@ def challenge(
 @app.command()
 def update(
     model: Annotated[Path, typer.Argument(help="The exported model at work (.json).")],
-    campaign: Annotated[Path, typer.Argument(help="A campaign file with the recordings since its last revision.")],
+    campaign: Annotated[
+        Path, typer.Argument(help="A campaign file with the recordings since its last revision.")
+    ],
     recordings: Annotated[
         list[str] | None, typer.Option("--recording", help="In order; may be repeated [all of the campaign].")
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="File of the next revision [MODEL with .rN].")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="File of the next revision [MODEL with .rN].")
+    ] = None,
     sign: Annotated[Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs it.")] = None,
 ) -> None:
     """Keep an exported model up with an ageing machine: noise, drift, or a new effect?
