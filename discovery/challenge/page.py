@@ -86,5 +86,5 @@ def _row(s: Scored) -> dict[str, Any]:
         "look": "yes" if s.judgement.points >= 1 else "no" if s.judgement.points < 0 else "",
         "explained": "" if gap is None else f"{100 * gap:.0f} %".replace("-", "−"),
         "seconds": "" if answer.get("seconds") is None else f"{answer['seconds']:.1f}",
-        "reasons": "; ".join(answer.get("reasons") or ()),
+        "reasons": "; ".join(answer.get("reasons") or ()) if s.verdict == "unexplained" else "",
     }
