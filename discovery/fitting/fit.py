@@ -173,9 +173,9 @@ def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds:
             x_scale="jac",
             loss=loss,
             max_nfev=max_rounds,
-            ftol=tolerance,
-            xtol=tolerance,
-            gtol=tolerance,
+            ftol=tolerance,  # alone: scipy's xtol measures all unknowns on one scale, W/K and seconds alike
+            xtol=1e-13,
+            gtol=1e-12,
         )
         x0 = result.x
     left, trajectories = run(x0)

@@ -49,6 +49,15 @@ class Context:
         """States at which heat can be missing."""
         return tuple(self.heat_limit)
 
+    def minor(self, h: Hypothesis) -> tuple[float, ...]:
+        """Size of each amplitude below which an effect is the coarseness of a model with few bodies.
+
+        A tenth of the usual size; where the model is of another scale than the catalogue's machines (its flows bound the
+        spread), a fiftieth of that bound.
+        """
+        usual = h.effect.amplitude.plausible
+        return tuple(0.1 * sd if sd >= usual else 0.02 * sd for sd in self.spread(h))
+
     def spread(self, h: Hypothesis) -> tuple[float, ...]:
         """Prior standard deviation of each amplitude: plausible, but no more than the model's own flows."""
         size = h.effect.amplitude.plausible
@@ -158,7 +167,7 @@ def reading_noise(
     """
     outputs = fit.problem.outputs
     known = np.array([stated.get(name) is not None for name in outputs])
-    slow_time, heat_time = min(7200.0, duration / 36), min(10800.0, duration / 24)
+    slow_time, heat_time = min(7200.0, duration / 12), min(10800.0, duration / 8)
     best, lowest = np.array(fit.noise.white), np.inf
     if not known.all():
         lens = Lens(fit)

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, sensitivities
+from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.forcing import Forcing
-from discovery.mismatch.search import Assessment
 from discovery.terms import Expression, evaluate, parse
 
 Array = NDArray[np.float64]

@@ -11,6 +11,7 @@ import numpy as np
 
 from discovery.errors import UserError
 from discovery.mismatch.ask import next_experiment
+from discovery.mismatch.assess import Assessment
 from discovery.mismatch.catalogue import Effect, catalogue
 from discovery.mismatch.context import Context, make_context
 from discovery.mismatch.describe import Curve, Description, curves, describe
@@ -19,7 +20,7 @@ from discovery.mismatch.forcing import Forcing, free_forcing
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.locate import Location, locate
 from discovery.mismatch.prove import Improvement, compare, explained, improvements
-from discovery.mismatch.search import Assessment, Search, search
+from discovery.mismatch.search import Search, search
 from discovery.mismatch.selfcheck import false_alarm, named_again
 from discovery.mismatch.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
 from discovery.models import Model

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.events import heat_steps
 from discovery.mismatch.lens import log_mean_exp
-from discovery.mismatch.search import Assessment
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.forcing import Forcing
-from discovery.mismatch.search import Assessment
 from discovery.mismatch.verdict import Named
 from discovery.terms import evaluate
 

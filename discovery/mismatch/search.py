@@ -1,97 +1,25 @@
-"""The search: which effects, added to the model and refitted, make the readings most likely."""
+"""The search: which effects, added to the model one by one and questioned, make the readings most likely."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discovery.errors import UserError
-from discovery.fitting import Fit, Noise, fit_model
+from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.context import Context
-from discovery.mismatch.evidence import Board, Score, by_claim, make_board, scores
 from discovery.mismatch.events import place_events
+from discovery.mismatch.evidence import Board, Score, by_claim, make_board, scores
+from discovery.mismatch.gates import bent, matters, objections
 from discovery.mismatch.hypotheses import Hypothesis, hypotheses
-from discovery.mismatch.lens import Lens, View, log_mean_exp
-from discovery.models import Model
-
-Array = NDArray[np.float64]
 
 REFITS = 6  # claims that are refitted at each step
-ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
+SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
+QUESTIONED = 3  # with more effects than this the machine is far from its model, and each one is large
+BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
 NAMED = 6.0  # log evidence that a claim has to add to be taken up
-MINOR = 0.1  # share of the plausible size below which an effect is the coarseness of a model with few bodies
-
-
-@dataclass(frozen=True)
-class Assessment:
-    """The model with a set of effects added and everything refitted."""
-
-    hypotheses: tuple[Hypothesis, ...]
-    model: Model  # fitted, with intervals
-    fit: Fit
-    lens: Lens
-    views: tuple[View, ...]
-    evidence: float
-
-    @property
-    def best_view(self) -> View:
-        """The noise setting that explains the residual best."""
-        return max(self.views, key=lambda view: view.level)
-
-    @cached_property
-    def rms(self) -> float:
-        """Root mean square of all residuals over their reading noise."""
-        white = np.array(self.views[0].noise.white)
-        parts = [(r / white).ravel() for r in self.lens.residuals]
-        z = np.concatenate(parts)
-        return float(np.sqrt(np.nanmean(z**2)))
-
-
-def assess(context: Context, chosen: Sequence[Hypothesis], noise: Noise | None = None, start: Assessment | None = None) -> Assessment:
-    """Refit the model with effects added; evidence with all unknowns and noise levels integrated out (Laplace).
-
-    Args:
-        chosen: effects to add, amplitudes and shapes at their start.
-        noise: noise setting to fit under; default the first.
-        start: a fit to take start values from.
-    """
-    model, priors, offset = context.model, {}, 0.0
-    begin = start.fit.model if start is not None else context.baseline.model
-    for h in chosen:
-        model = h.added_to(model)
-        amplitude = h.effect.amplitude
-        for name, sd in zip(h.amplitudes, context.spread(h), strict=True):
-            if amplitude.fixed is None:
-                priors[name] = (0.0, sd)
-                offset += np.log(2.0) if amplitude.sign else 0.0
-        for name, shape in zip(h.shapes, h.effect.shapes, strict=True):
-            if not shape.fixed:
-                low, high = min(shape.grid), max(shape.grid)
-                centre, width = 0.5 * (low + high), max(high - low, 0.3 * abs(high))
-                priors[name] = (centre, width)
-        offset += float(np.log(h.effect.prior)) - h.cost
-    guess = {name: p.value for name, p in begin.parameters.items() if name in model.parameters and not p.per_recording}
-    fit = fit_model(
-        model,
-        context.campaign,
-        context.recordings,
-        context.outputs,
-        noise=noise or context.settings[0],
-        grids=context.grids,
-        priors=priors,
-        belief=context.belief,
-        guess=guess,
-        max_rounds=25,
-        tolerance=ENOUGH,
-    )
-    lens = Lens(fit)
-    views = tuple(lens.view(setting) for setting in context.settings)
-    evidence = float(log_mean_exp(np.array([view.level for view in views]))) + offset
-    return Assessment(tuple(chosen), fit.model, fit, lens, views, evidence)
 
 
 @dataclass(frozen=True)
@@ -110,7 +38,9 @@ def look(context: Context, current: Assessment) -> Look:
     found = [h for h in found if h.key not in taken]
     spread = {a: s for h in found for a, s in zip(h.amplitudes, context.spread(h), strict=True)}
     found = place_events(current.lens, current.best_view, found, spread)
-    board = make_board(current.lens, current.views, found, np.array([spread[a] for h in found for a in h.amplitudes]))
+    board = make_board(
+        current.lens, current.views, found, np.array([spread[a] for h in found for a in h.amplitudes])
+    )
     return Look(board, tuple(by_claim(scores(board))))
 
 
@@ -129,7 +59,7 @@ class Search:
         return self.best.evidence - self.baseline.evidence
 
 
-def search(context: Context, most: int = 3, tell: Callable[[str], None] = lambda _: None) -> Search:
+def search(context: Context, most: int = 6, tell: Callable[[str], None] = lambda _: None) -> Search:
     """Add effects one by one while each adds evidence, then question each one taken up."""
     current = assess(context, (), context.settings[0])
     current = assess(context, (), current.best_view.noise, current)
@@ -137,10 +67,10 @@ def search(context: Context, most: int = 3, tell: Callable[[str], None] = lambda
     for _ in range(most):
         first = looks[-1].claims[0].gain if looks[-1].claims else 0.0
         pool = [c for c in looks[-1].claims[:REFITS] if c.gain > max(2.0, 0.2 * first)]
-        attempts = [a for c in pool if (a := _try(context, current, (*current.hypotheses, c.hypothesis))) is not None]
+        attempts = [a for c in pool if (a := _try(context, current, current.hypotheses, c)) is not None]
         if not attempts:
             break
-        step = max(attempts, key=lambda a: a.evidence)
+        step = _step(context, attempts, current.evidence)
         tried += [a for a in attempts if matters(context, a, a.hypotheses[-1])]
         if step.evidence - current.evidence < NAMED or not matters(context, step, step.hypotheses[-1]):
             break
@@ -149,24 +79,55 @@ def search(context: Context, most: int = 3, tell: Callable[[str], None] = lambda
         looks.append(look(context, current))
         if recurs(current.hypotheses):
             break
-    if len(current.hypotheses) > 1 and not recurs(current.hypotheses):
+    if 1 < len(current.hypotheses) <= QUESTIONED and not recurs(current.hypotheses):
         current, more = _question(context, current)
+        tried += more
+        looks.append(look(context, current))
+    current, more = _prune(context, baseline, current)
+    if more:
         tried += more
         looks.append(look(context, current))
     return Search(baseline, current, tuple(tried), tuple(looks))
 
 
-def matters(context: Context, attempt: Assessment, h: Hypothesis) -> bool:
-    """Whether an effect has a size that physics would give it.
+def _prune(context: Context, baseline: Assessment, current: Assessment) -> tuple[Assessment, list[Assessment]]:
+    """Drop what is not needed: effects that the others have made idle, and small ones that a gate objects to."""
+    tried: list[Assessment] = []
+    while len(current.hypotheses) > 1:
+        shorter = []
+        for h in current.hypotheses:
+            others = tuple(o for o in current.hypotheses if o.key != h.key)
+            without = _try(context, current, others, None)
+            if without is None:
+                continue
+            tried.append(without)
+            lost = current.evidence - without.evidence
+            small = lost < SMALL * (current.evidence - baseline.evidence)
+            if lost < NAMED or (small and objections(current, h)):
+                shorter.append((lost, without))
+        if not shorter:
+            break
+        current = min(shorter, key=lambda item: item[0])[1]
+    return current, tried
 
-    A model with few bodies is a little wrong everywhere; with enough readings that shows, as effects of a few per cent of
-    the usual size. They are not what is missing.
+
+def _step(context: Context, attempts: Sequence[Assessment], before: float) -> Assessment:
+    """The attempt to go on with: the best of those that pass, unless the very best adds far more.
+
+    An attempt passes when its law is not bent to its limit, its size matters and it acts in every recording. One that
+    does not pass gives way to another that adds half as much, and, where it is a minor size that wins, far more than a
+    coarse model would show.
     """
-    if h.effect.amplitude.fixed is not None or not h.effect.is_physics:
-        return True
-    model = attempt.fit.model
-    sizes = [abs(model.parameters[n].values.get(h.recording or "", model.parameters[n].value)) for n in h.amplitudes]
-    return any(size >= MINOR * sd for size, sd in zip(sizes, context.spread(h), strict=True))
+
+    def passes(a: Assessment) -> bool:
+        h = a.hypotheses[-1]
+        return matters(context, a, h) and bent(a, h) is None and h.recording is None
+
+    best = max(attempts, key=lambda a: a.evidence)
+    minor = not matters(context, best, best.hypotheses[-1])
+    other = max((a for a in attempts if passes(a)), key=lambda a: a.evidence, default=best)
+    enough = max(BLUNT if minor else NAMED, 0.5 * (best.evidence - before))
+    return other if other.evidence - before > enough else best
 
 
 def recurs(chosen: Sequence[Hypothesis]) -> bool:
@@ -174,9 +135,16 @@ def recurs(chosen: Sequence[Hypothesis]) -> bool:
     return sum(h.effect.word == "unmeasured_heat" for h in chosen) > 1
 
 
-def _try(context: Context, current: Assessment, chosen: tuple[Hypothesis, ...]) -> Assessment | None:
+def _try(
+    context: Context, current: Assessment, others: tuple[Hypothesis, ...], claim: Score | None
+) -> Assessment | None:
+    """Refit with a claim beside others, from the sizes that the linear look gives."""
+    chosen = (*others, claim.hypothesis) if claim else others
+    sizes = dict(zip(claim.hypothesis.amplitudes, claim.size, strict=True)) if claim else {}
+    if claim and claim.hypothesis.effect.amplitude.fixed is not None:
+        sizes = {}
     try:
-        return assess(context, chosen, current.best_view.noise, current)
+        return assess(context, chosen, current.best_view.noise, current, sizes)
     except UserError:  # a combination under which the model runs away is no explanation
         return None
 
@@ -188,12 +156,16 @@ def _question(context: Context, current: Assessment) -> tuple[Assessment, list[A
         others = tuple(o for o in current.hypotheses if o.key != h.key)
         if len(others) == len(current.hypotheses) or h.key not in {o.key for o in current.hypotheses}:
             continue
-        without = _try(context, current, others)
+        without = _try(context, current, others, None)
         if without is None:
             continue
         tried.append(without)
-        pool = [c for c in look(context, without).claims[: REFITS // 2] if c.hypothesis.key != h.key and c.gain > 2.0]
-        attempts = [a for c in pool if (a := _try(context, without, (*others, c.hypothesis))) is not None]
+        pool = [
+            c
+            for c in look(context, without).claims[: REFITS // 2]
+            if c.hypothesis.key != h.key and c.gain > 2.0
+        ]
+        attempts = [a for c in pool if (a := _try(context, without, others, c)) is not None]
         attempts = [a for a in attempts if all(matters(context, a, o) for o in a.hypotheses)]
         tried += attempts
         best = max([*attempts, current], key=lambda a: a.evidence)

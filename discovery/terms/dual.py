@@ -178,7 +178,8 @@ def _power(base: Dual, exponent: Dual) -> Dual:
 
 
 def _play(inner: Dual, width: Dual, memory: Memory | None) -> Dual:
-    assert memory is not None
+    if memory is None:  # a single instant: at rest in the middle
+        return inner
     series = np.atleast_1d(np.asarray(inner.value, dtype=float))
     value, follows, contact = memory.play(series, float(np.mean(width.value)))
     partials: dict[str, Value] = {}

@@ -13,10 +13,10 @@ EFFECT = Effect(
     word="fluid_convection_speed",
     title="Convection that follows the speed",
     group="cutting fluid",
-    place="body",
+    place="wet body",
     formula="hN*flow*(speed/1000)**m*(fluid - body)",
     amplitude=Amplitude("hN", "W/K", 40.0),
-    shapes=(Shape("m", "1", (0.5, 1.0), 0.3, 1.5),),
+    shapes=(Shape("m", "1", (0.15, 0.5, 1.0), 0.0, 1.5),),
     signature="wet coupling grows with speed; fast after a speed step while fluid and body differ",
     confused_with=(
         "fluid_convection",
