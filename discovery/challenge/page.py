@@ -13,6 +13,7 @@ from discovery.challenge.lines import LINES, behind, rows
 from discovery.challenge.methods import WORKBENCH
 from discovery.challenge.scoring import RIGHT
 from discovery.challenge.tally import Scored, Tally
+from discovery.report.text import counted
 
 _HERE = Path(__file__).parent
 
@@ -53,9 +54,10 @@ def render(seal: Mapping[str, Any], changed: Sequence[str], tallies: Mapping[str
 def headline(t: Tally) -> str:
     """The answer in a sentence."""
     right = t.words.get(RIGHT, 0)
+    alarms = int(t.false_alarms.hits)
     return (
-        f"{right} of {len(t.scored)} concealed cases answered right, {t.false_alarms.hits:g} false "
-        f"alarms, {len(wrong(t)) - int(t.false_alarms.hits)} wrong names"
+        f"{right} of {counted(len(t.scored), 'concealed case')} answered right, "
+        f"{counted(alarms, 'false alarm')}, {counted(len(wrong(t)) - alarms, 'wrong name')}"
     )
 
 
