@@ -11,11 +11,11 @@ from typing import Any
 
 from discovery.experiment import starting_model
 from discovery.experimentfile import Experiment, load_experiment
+from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.prove import explained, improvements
-from discovery.mismatch.search import Assessment, assess
 from discovery.models import Model
 
 Answer = dict[str, Any]  # the part of diagnosis.json that is scored

@@ -16,8 +16,8 @@ from discovery.challenge.problem import Answer, Problem
 from discovery.dynamics import Trajectory
 from discovery.dynamics.system import output_matrix
 from discovery.errors import UserError
+from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.hypotheses import Hypothesis, hypotheses
-from discovery.mismatch.search import Assessment, assess
 from discovery.sparse.derivative import discrepancy_terms, smoothed_derivative
 from discovery.terms import evaluate
 

@@ -15,11 +15,13 @@ from discovery.challenge.methods.named import named_entry, windows_of
 from discovery.challenge.problem import Answer, Problem
 from discovery.errors import UserError
 from discovery.fitting.noise import white_noise
+from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.context import Context
 from discovery.mismatch.hypotheses import Hypothesis
-from discovery.mismatch.search import REFITS, Assessment, assess, look
+from discovery.mismatch.search import look
 
 MOST = 3  # effects that may be added
+REFITS = 6  # claims that are refitted at each step
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from discovery.mismatch.assess import Assessment
 from discovery.mismatch.hypotheses import Hypothesis
-from discovery.mismatch.search import Assessment
 
 
 def named_entry(found: Assessment, h: Hypothesis, probability: float) -> dict[str, Any]:
