@@ -194,10 +194,11 @@ def diagnose(
         Path | None, typer.Option(help="Folder of the results; default runs/<experiment name>.")
     ] = None,
 ) -> None:
-    """Find what the model of [mismatch] leaves out: where, which physics, how sure, and how much better the repair fits.
+    """Find what the model of [mismatch] leaves out: where, which physics, how sure, and how much better the
+    repair fits.
 
-    Writes diagnosis.json, the repaired model and report.html. "no mismatch" and "unexplained" are answers too: nothing
-    is named that the recordings cannot tell apart.
+    Writes diagnosis.json, the repaired model and report.html. "no mismatch" and "unexplained" are answers
+    too: nothing is named that the recordings cannot tell apart.
     """
     from discovery.experiment import diagnose as find
     from discovery.mismatch.summary import summary
@@ -276,7 +277,8 @@ def export(
         Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs; made when there is none yet.")
     ] = None,
 ) -> None:
-    """Export a fitted model for the compensation runtime, proved equal to the Python model before it is written.
+    """Export a fitted model for the compensation runtime, proved equal to the Python model before it is
+    written.
 
     \b
     discovery export "runs/cutting fluid" --model thermobalance --to c --to fmu
@@ -323,8 +325,8 @@ def compensate(
     """Run an exported model: readings in, offsets [um, um/m] with status word and heartbeat out.
 
     \b
-    discovery compensate model.json --trust machine.pem.pub --inputs today.csv --out offsets.csv --state memory
-    discovery compensate model.json --allow-unsigned --opcua-demo --seconds 60
+    discovery compensate model.json --trust machine.pem.pub --inputs today.csv --out offsets.csv --state
+    memory discovery compensate model.json --allow-unsigned --opcua-demo --seconds 60
     """
     from discovery.runtime.command import compensate_rows, go_back, trusted_model
 
@@ -403,7 +405,8 @@ def update(
 ) -> None:
     """Keep an exported model up with an ageing machine: noise, drift, or a new effect?
 
-    A drift becomes the next revision, with a changelog entry; `discovery compensate` runs it in the shadow first.
+    A drift becomes the next revision, with a changelog entry; `discovery compensate` runs it in the shadow
+    first.
     """
     from discovery.export.seal import private_key
     from discovery.recordings import load_campaign

@@ -53,7 +53,8 @@ def _explain(schema: type[BaseModel], mistake: ErrorDetails, key: Key) -> str:
     if kind in ("literal_error", "enum"):
         return f"{given!r} is not known; {suggest(str(given), _quoted(context['expected']))}"
     if kind == "union_tag_invalid":
-        return f"kind {context['tag']!r} is not known; {suggest(context['tag'], _quoted(context['expected_tags']))}"
+        known = suggest(context["tag"], _quoted(context["expected_tags"]))
+        return f"kind {context['tag']!r} is not known; {known}"
     if kind in ("value_error", "assertion_error"):
         return str(context["error"])
     what = mistake["msg"].replace("Input should be", "should be").removesuffix(".")

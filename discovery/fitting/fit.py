@@ -1,4 +1,6 @@
-"""Output-error fit: the model runs freely, its outputs are compared with the readings where they were taken."""
+"""Output-error fit: the model runs freely, its outputs are compared with the readings where they were
+taken.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
 from discovery.errors import UserError
-from discovery.fitting.noise import Noise, whiten, white_noise
+from discovery.fitting.noise import Noise, white_noise, whiten
 from discovery.fitting.problem import Problem, make_problem
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -71,9 +73,10 @@ def fit_model(
 ) -> Fit:
     """Fit the free parameters and start values of a model to recordings.
 
-    Minimises the sum over recordings of rho(L (y - y_model)) plus ((x0 - start)/start_sd)^2, where L whitens with the
-    noise model. Without `noise` the reading noise is the channel's `noise` where the campaign states it, else it is
-    estimated from the residual.
+    Minimises the sum over recordings of rho(L (y - y_model)) plus ((x0 - start)/start_sd)^2, where L
+    whitens with the noise model. Without `noise` the reading noise is the channel's `noise` where the
+    campaign states it,
+    else it is estimated from the residual.
 
     Args:
         model: start values, bounds and which parameters are free.
@@ -90,7 +93,8 @@ def fit_model(
     began = clock.perf_counter()
     problem = make_problem(model, campaign, recordings, outputs, grids, priors, belief)
     stated = {name: campaign.channels[name].noise for name in problem.outputs}
-    theta = np.array([(guess or {}).get(u.name, u.start) if not u.is_start else u.start for u in problem.unknowns])
+    known = guess or {}
+    theta = np.array([u.start if u.is_start else known.get(u.name, u.start) for u in problem.unknowns])
     given = noise is not None
     current = noise or white_noise(problem.outputs, stated, [s.grid.readings for s in problem.systems])
     rounds = 1 if given else 3
@@ -109,7 +113,8 @@ def fit_model(
     assert solution is not None
     covariance, lost = _covariance(problem, solution.jacobian, theta)
     if not given and loss == "linear":
-        # Stated noise is a claim about the sensor, not about the model: intervals follow the larger of the two.
+        # Stated noise is a claim about the sensor, not about the model: intervals follow the larger of the
+        # two.
         # (With estimated noise the factor is one by construction.)
         freedom = max(1, sum(int(s.grid.measured.sum()) for s in problem.systems) - len(theta))
         covariance = covariance * max(1.0, 2 * solution.cost / freedom)
@@ -133,7 +138,9 @@ class _Solution:
     cost: float
 
 
-def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds: int, tolerance: float) -> _Solution:
+def _solve(
+    problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds: int, tolerance: float
+) -> _Solution:
     from scipy.optimize import least_squares
 
     low, high = problem.bounds
@@ -184,7 +191,7 @@ def _solve(problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds:
 
 def _covariance(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array, list[str]]:
     """Gauss-Newton covariance and a sentence for each parameter that the readings do not tell."""
-    low, high = problem.bounds
+    low = problem.bounds[0]
     total = len(problem.unknowns)
     length = np.linalg.norm(jacobian, axis=0)
     sentences = []

@@ -26,8 +26,8 @@ def predict_recording(
 ) -> Trajectory:
     """Free run of a model on a recording, zeroed on its first reading as a controller would be.
 
-    The start values are the declared ones, corrected by the first complete reading alone within their spread (one
-    Bayesian step); no later reading is used.
+    The start values are the declared ones, corrected by the first complete reading alone within their
+    spread (one Bayesian step); no later reading is used.
 
     Args:
         outputs: measured channels.

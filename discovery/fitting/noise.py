@@ -1,12 +1,14 @@
-"""What a model leaves in the readings: white reading noise, slow sensor noise, and small random heat at the bodies.
+"""What a model leaves in the readings: white reading noise, slow sensor noise, and small random heat at the
+bodies.
 
 All three are one linear Gaussian state-space model around a trajectory,
 
     z = (dx, w, v):   dx' = A dx + w/C,   w_i and v_j first-order noise,   residual = H dx + v + white,
 
-so a Kalman filter whitens residuals and sensitivity columns alike in one pass (Sarkka & Solin, Applied Stochastic
-Differential Equations, 2019, ch. 10) and gives the likelihood of the variances. `w` is held between readings: its
-time constant is hours, readings come in minutes.
+so a Kalman filter whitens residuals and sensitivity columns alike in one pass (Sarkka & Solin, Applied
+Stochastic Differential Equations, 2019, ch. 10) and gives the likelihood of the variances. `w` is held
+between
+readings: its time constant is hours, readings come in minutes.
 """
 
 from __future__ import annotations
@@ -30,7 +32,9 @@ HEAT_TIME = 3 * 3600.0  # s, time constant of small random heat
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: white (Y,) and slow (Y,) in the unit of each output, heat (n,) in W or rate per time unit."""
+    """Standard deviations: white (Y,) and slow (Y,) in the unit of each output, heat (n,) in W or rate per
+    time unit.
+    """
 
     outputs: tuple[str, ...]
     white: tuple[float, ...]
@@ -48,7 +52,9 @@ class Noise:
 def white_noise(
     outputs: Sequence[str], stated: Mapping[str, float | None], residuals: Sequence[Array]
 ) -> Noise:
-    """White noise with the stated standard deviations; where none is stated, that of the residuals (or readings)."""
+    """White noise with the stated standard deviations; where none is stated, that of the residuals (or
+    readings).
+    """
     white = []
     for j, name in enumerate(outputs):
         series = np.concatenate([r[:, j][np.isfinite(r[:, j])] for r in residuals])
@@ -140,7 +146,9 @@ class Filter:
     measured: NDArray[np.bool_]
 
     def apply(self, noise: Noise, data: Array) -> tuple[Array, float]:
-        """Whitened columns (measured readings, M) of data (R, Y, M), and half the log-determinant of the covariance."""
+        """Whitened columns (measured readings, M) of data (R, Y, M), and half the log-determinant of the
+        covariance.
+        """
         heat = np.array([(noise.heat or {}).get(name, 0.0) for name in self.states])
         slow = np.array(noise.slow or ())
         clean = np.where(self.measured[:, :, None], data, 0.0)
@@ -232,8 +240,9 @@ def estimate_noise(
 ) -> Noise:
     """Variances by restricted maximum likelihood.
 
-    The white part stays within a tenth of what the campaign states; slow noise stays below `slow_limit` times the white
-    part and heat below `heat_limit`: that much is the everyday state of a machine, more is a mismatch.
+    The white part stays within a tenth of what the campaign states; slow noise stays below `slow_limit`
+    times the white part and heat below `heat_limit`: that much is the everyday state of a machine, more is
+    a mismatch.
 
     Args:
         heat_limit: largest heat by state, in W (or rate per time unit).

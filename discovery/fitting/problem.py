@@ -28,7 +28,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """One number to find: a parameter (of one recording, or common: ``recording=None``) or a start value of a state."""
+    """One number to find: a parameter (of one recording, or common: ``recording=None``) or a start value of
+    a state.
+    """
 
     name: str
     recording: str | None
@@ -136,7 +138,8 @@ def make_problem(
         outputs: measured channels to compare; default every output of the model that the campaign measures.
         grids: grids made before, by recording (a model with the same inputs may share them).
         priors: (mean, standard deviation) by parameter.
-        belief: believe positive start values within a factor exp(belief), with heavy tails; default not at all.
+        belief: believe positive start values within a factor exp(belief), with heavy tails; default not at
+        all.
     """
     priors = priors or {}
     model = expanded(model)
@@ -175,7 +178,8 @@ def make_problem(
 
 
 def _belief(value: float, start: float, width: float) -> tuple[float, float]:
-    """Residual and slope of a heavy-tailed (Student, 4 degrees of freedom) belief in the logarithm of a parameter.
+    """Residual and slope of a heavy-tailed (Student, 4 degrees of freedom) belief in the logarithm of a
+    parameter.
 
     A third of the start value is added to both, so that a parameter may go to zero.
     """
@@ -183,5 +187,6 @@ def _belief(value: float, start: float, width: float) -> tuple[float, float]:
     u = float(np.log((max(value, 0.0) + shift) / (start + shift))) / width
     freedom = 4.0
     residual = float(np.sign(u) * np.sqrt((freedom + 1) * np.log1p(u * u / freedom)))
-    outer = (freedom + 1) * u / (freedom + u * u) / residual if abs(u) > 1e-6 else float(np.sqrt((freedom + 1) / freedom))
+    flat = float(np.sqrt((freedom + 1) / freedom))
+    outer = (freedom + 1) * u / (freedom + u * u) / residual if abs(u) > 1e-6 else flat
     return residual, outer / (width * (max(value, 0.0) + shift))

@@ -49,7 +49,8 @@ def assess(
     start: Assessment | None = None,
     sizes: Mapping[str, float] | None = None,
 ) -> Assessment:
-    """Refit the model with effects added; evidence with all unknowns and noise levels integrated out (Laplace).
+    """Refit the model with effects added; evidence with all unknowns and noise levels integrated out
+    (Laplace).
 
     Args:
         chosen: effects to add, amplitudes and shapes at their start.

@@ -52,8 +52,8 @@ class Context:
     def minor(self, h: Hypothesis) -> tuple[float, ...]:
         """Size of each amplitude below which an effect is the coarseness of a model with few bodies.
 
-        A tenth of the usual size; where the model is of another scale than the catalogue's machines (its flows bound the
-        spread), a fiftieth of that bound.
+        A tenth of the usual size; where the model is of another scale than the catalogue's machines (its
+        flows bound the spread), a fiftieth of that bound.
         """
         usual = h.effect.amplitude.plausible
         return tuple(0.1 * sd if sd >= usual else 0.02 * sd for sd in self.spread(h))
@@ -117,15 +117,7 @@ def make_context(
         grids = without(grids, outliers)
         fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
         white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)
-    settings = tuple(
-        replace(
-            white,
-            slow=tuple(share * w for w in white.white),
-            heat={name: level * value for name, value in limit.items()},
-        )
-        for share in (0.0, 0.5 * SLOW_LIMIT, SLOW_LIMIT)
-        for level in (0.0, 0.35, 0.9)
-    )
+    settings = everyday(white, limit)
     return Context(
         campaign,
         model,
@@ -144,6 +136,32 @@ def make_context(
 
 def _rms(series: Array | float) -> float:
     return float(np.sqrt(np.mean(np.square(series))))
+
+
+def everyday(white: Noise, limit: Mapping[str, float]) -> tuple[Noise, ...]:
+    """The noise settings that evidence is integrated over: slow noise and heat from none to the everyday
+    limit.
+    """
+    return tuple(
+        replace(
+            white,
+            slow=tuple(share * w for w in white.white),
+            heat={name: level * value for name, value in limit.items()},
+        )
+        for share in (0.0, 0.5 * SLOW_LIMIT, SLOW_LIMIT)
+        for level in (0.0, 0.35, 0.9)
+    )
+
+
+def seen_beside(context: Context, fit: Fit) -> Context:
+    """The context with the reading noise as it stands beside a better fit, where the campaign does not
+    state it.
+    """
+    channels = context.campaign.channels
+    stated = {name: channels[name].noise for name in context.outputs}
+    duration = max(float(g.time[-1] - g.time[0]) for g in context.grids.values())
+    white = reading_noise(fit, stated, context.heat_limit, duration)
+    return replace(context, settings=everyday(white, context.heat_limit))
 
 
 def _flows(fit: Fit) -> dict[str, float]:

@@ -13,7 +13,7 @@ from discovery.errors import UserError
 from discovery.mismatch.ask import next_experiment
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.catalogue import Effect, catalogue
-from discovery.mismatch.context import Context, make_context
+from discovery.mismatch.context import Context, make_context, seen_beside
 from discovery.mismatch.describe import Curve, Description, curves, describe
 from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
@@ -29,6 +29,8 @@ from discovery.terms import Apply, Expression, Name, Term, names
 from discovery.terms.expression import rewrite
 
 INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
+
+ANOTHER_NOISE = 0.05  # relative change of a channel's reading noise that calls for another search
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,11 @@ def diagnose(
     context = make_context(seen, model, fit, outputs, list(entries.values()), physical)
     tell("scoring the catalogue")
     found = search(context, tell=lambda what: tell(f"found so far: {what}"))
+    beside = seen_beside(context, found.best.fit)
+    change = np.log(np.array(beside.settings[0].white) / np.array(context.settings[0].white))
+    if found.best.hypotheses and np.max(np.abs(change)) > ANOTHER_NOISE:
+        tell("once more, with the reading noise as it stands beside the answer")
+        context, found = beside, search(beside, tell=lambda what: tell(f"found so far: {what}"))
     tell("locating")
     before = free_forcing(context, found.baseline)
     after = free_forcing(context, found.best) if found.best is not found.baseline else before

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from discovery.mismatch.diagnosis import Diagnosis
 
 
+FORM = 0.08  # no size of an effect is known better than this: a model of few bodies never has the exact form
+
+
 def _number(value: float | None, digits: int = 5) -> float | None:
     return None if value is None or not np.isfinite(value) else float(f"{value:.{digits}g}")
 
@@ -160,6 +163,9 @@ def _physics(d: Diagnosis, n: Named, checked: float | None) -> dict[str, Any]:
         value = p.values.get(h.recording, p.value) if h.recording else p.value
         low, high = (p.low, p.high) if not h.recording else _interval(d, name)
         fixed = p.fixed
+        if h.effect.is_physics and low is not None and high is not None:
+            low = max(min(low, value - FORM * abs(value)), p.min)
+            high = min(max(high, value + FORM * abs(value)), p.max)
         parameters[name] = {
             "value": _number(value),
             "low": _number(value if fixed else low),

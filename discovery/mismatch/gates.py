@@ -11,21 +11,30 @@ from discovery.mismatch.signatures import block_signatures
 
 BLOCKS = 12  # per recording, in which an effect is asked for its size
 STEADY = 6.0  # log evidence for a size that changes with time beyond which the form is wrong
+FORM = 0.03  # share of the gain that a law slightly off in form may leave unsteady
 PRESSED = 0.03  # relative distance from the end of a physical range
 
 
-def objections(best: Assessment, h: Hypothesis) -> list[str]:
-    """Sentences that speak against naming an effect of the best model; empty where none does."""
+def objections(best: Assessment, h: Hypothesis, gain: float) -> list[str]:
+    """Sentences that speak against naming an effect of the best model; empty where none does.
+
+    Args:
+        gain: log evidence of the best model over the baseline; the larger it is, the more of a wrong form
+        may show.
+    """
+    limit = STEADY + FORM * max(gain, 0.0)
     found = (
         bent(best, h),
-        _unsteady(best, h, 1, "from recording to recording"),
-        _unsteady(best, h, BLOCKS, "with time"),
+        _unsteady(best, h, 1, limit, "from recording to recording"),
+        _unsteady(best, h, BLOCKS, limit, "with time"),
     )
     return [text for text in found if text]
 
 
 def bent(attempt: Assessment, h: Hypothesis) -> str | None:
-    """A sentence when a shape parameter presses against the end of its physical range: another law is at work."""
+    """A sentence when a shape parameter presses against the end of its physical range: another law is at
+    work.
+    """
     for name, shape in zip(h.shapes, h.effect.shapes, strict=True):
         p = attempt.fit.model.parameters[name]
         value = p.values.get(h.recording or "", p.value)
@@ -34,15 +43,16 @@ def bent(attempt: Assessment, h: Hypothesis) -> str | None:
         if not (shape.fixed or p.fixed or h.recording) and not (
             inside and value < shape.high * (1 - PRESSED)
         ):
-            return f"{h.effect.word} would need {shape.name} = {value:.3g} {shape.unit}, at the end of what is physical"
+            size = f"{shape.name} = {value:.3g} {shape.unit}"
+            return f"{h.effect.word} would need {size}, at the end of what is physical"
     return None
 
 
 def matters(context: Context, attempt: Assessment, h: Hypothesis) -> bool:
     """Whether an effect has a size that physics would give it.
 
-    A model with few bodies is a little wrong everywhere; with enough readings that shows, as effects of a few per cent of
-    the usual size. They are not what is missing.
+    A model with few bodies is a little wrong everywhere; with enough readings that shows, as effects of a
+    few per cent of the usual size. They are not what is missing.
     """
     if h.effect.amplitude.fixed is not None or not h.effect.is_physics:
         return True
@@ -54,11 +64,12 @@ def matters(context: Context, attempt: Assessment, h: Hypothesis) -> bool:
     return any(size >= least for size, least in zip(sizes, context.minor(h), strict=True))
 
 
-def _unsteady(best: Assessment, h: Hypothesis, blocks: int, text: str) -> str | None:
+def _unsteady(best: Assessment, h: Hypothesis, blocks: int, limit: float, text: str) -> str | None:
     """A sentence when the size of an effect would have to change from one block of time to the next.
 
-    Each block gets an amplitude of its own; their scatter is tested against a constant (log Bayes factor), and counts
-    only when it is a large share of the amplitude itself: a law that is slightly off in form may stand.
+    Each block gets an amplitude of its own; their scatter is tested against a constant (log Bayes factor),
+    and counts only when it is a large share of the amplitude itself: a law that is slightly off in form may
+    stand.
     """
     if h.effect.amplitude.fixed is not None or h.shown or h.recording is not None:
         return None
@@ -67,7 +78,9 @@ def _unsteady(best: Assessment, h: Hypothesis, blocks: int, text: str) -> str | 
         return None
     size = best.model.parameters[h.amplitudes[0]].value
     there = h.at({name: best.model.parameters[name].value for name in h.shapes})
-    columns = [block_signatures(t, there, blocks, k * blocks, total) for k, t in enumerate(best.fit.trajectories)]
+    columns = [
+        block_signatures(t, there, blocks, k * blocks, total) for k, t in enumerate(best.fit.trajectories)
+    ]
     view = best.best_view
     z = view.project(best.lens.whiten(view.noise, columns)[0])
     gram, dot = z.T @ z, z.T @ view.residual
@@ -79,6 +92,6 @@ def _unsteady(best: Assessment, h: Hypothesis, blocks: int, text: str) -> str | 
         gain = 0.5 * float(dot @ solved) - 0.5 * float(np.linalg.slogdet(inner)[1])
         if gain > best_gain:
             best_gain, share = gain, spread
-    if best_gain > STEADY and share >= 0.5:
+    if best_gain > limit and share >= 0.5:
         return f"the size of {h.effect.word} would have to change {text} (log evidence {best_gain:.0f})"
     return None

@@ -19,7 +19,7 @@ REFITS = 6  # claims that are refitted at each step
 SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
 QUESTIONED = 3  # with more effects than this the machine is far from its model, and each one is large
 BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
-NAMED = 6.0  # log evidence that a claim has to add to be taken up
+NAMED = 8.0  # log evidence that a claim has to add to be taken up
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,23 @@ def look(context: Context, current: Assessment) -> Look:
     found = [h for h in found if h.key not in taken]
     spread = {a: s for h in found for a, s in zip(h.amplitudes, context.spread(h), strict=True)}
     found = place_events(current.lens, current.best_view, found, spread)
+    found = [h for h in found if not _start_of_shift(current, h)]
     board = make_board(
         current.lens, current.views, found, np.array([spread[a] for h in found for a in h.amplitudes])
     )
     return Look(board, tuple(by_claim(scores(board))))
+
+
+def _start_of_shift(current: Assessment, h: Hypothesis) -> bool:
+    """Whether an event only fills the start of a recording whose clock is shifted: no input is known
+    there.
+    """
+    for o in current.hypotheses:
+        if o.effect.word == "clock_shift" and o.recording == h.recording and o.shapes and h.shapes:
+            (name,) = o.shapes
+            shift = abs(current.model.parameters[name].values.get(h.recording or "", 0.0))
+            return max(h.shapes.values()) <= 1.5 * shift
+    return False
 
 
 @dataclass(frozen=True)
@@ -90,8 +103,12 @@ def search(context: Context, most: int = 6, tell: Callable[[str], None] = lambda
     return Search(baseline, current, tuple(tried), tuple(looks))
 
 
-def _prune(context: Context, baseline: Assessment, current: Assessment) -> tuple[Assessment, list[Assessment]]:
-    """Drop what is not needed: effects that the others have made idle, and small ones that a gate objects to."""
+def _prune(
+    context: Context, baseline: Assessment, current: Assessment
+) -> tuple[Assessment, list[Assessment]]:
+    """Drop what is not needed: effects that the others have made idle, and small ones that a gate objects
+    to.
+    """
     tried: list[Assessment] = []
     while len(current.hypotheses) > 1:
         shorter = []
@@ -103,7 +120,7 @@ def _prune(context: Context, baseline: Assessment, current: Assessment) -> tuple
             tried.append(without)
             lost = current.evidence - without.evidence
             small = lost < SMALL * (current.evidence - baseline.evidence)
-            if lost < NAMED or (small and objections(current, h)):
+            if lost < NAMED or (small and objections(current, h, current.evidence - baseline.evidence)):
                 shorter.append((lost, without))
         if not shorter:
             break
@@ -114,9 +131,10 @@ def _prune(context: Context, baseline: Assessment, current: Assessment) -> tuple
 def _step(context: Context, attempts: Sequence[Assessment], before: float) -> Assessment:
     """The attempt to go on with: the best of those that pass, unless the very best adds far more.
 
-    An attempt passes when its law is not bent to its limit, its size matters and it acts in every recording. One that
-    does not pass gives way to another that adds half as much, and, where it is a minor size that wins, far more than a
-    coarse model would show.
+    An attempt passes when its law is not bent to its limit, its size matters and it acts in every
+    recording. One that does not pass gives way to another that adds half as much, and, where it is a minor
+    size that wins, far
+    more than a coarse model would show.
     """
 
     def passes(a: Assessment) -> bool:
@@ -131,7 +149,9 @@ def _step(context: Context, attempts: Sequence[Assessment], before: float) -> As
 
 
 def recurs(chosen: Sequence[Hypothesis]) -> bool:
-    """Whether heat without a record was taken up twice: then it is no event, and looking for a third one is idle."""
+    """Whether heat without a record was taken up twice: then it is no event, and looking for a third one is
+    idle.
+    """
     return sum(h.effect.word == "unmeasured_heat" for h in chosen) > 1
 
 

@@ -1,4 +1,6 @@
-"""The verdict: what may be named, how sure it is, what else it could be, and when to say that nothing is known."""
+"""The verdict: what may be named, how sure it is, what else it could be, and when to say that nothing is
+known.
+"""
 
 from __future__ import annotations
 
@@ -76,9 +78,7 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
                 (f"heat of unknown cause acts at {place}; no effect of the catalogue follows it",),
             )
         if context.outliers:
-            return Verdict(
-                FAULT, (), (), (f"single wrong readings ({len(context.outliers)}), nothing else",)
-            )
+            return Verdict(FAULT, (), (), (f"single wrong readings ({len(context.outliers)}), nothing else",))
         return Verdict(NO_MISMATCH, (), (), ("no effect of the catalogue and no free heat adds evidence",))
 
     named = tuple(_named(found, h) for h in best.hypotheses)
@@ -96,7 +96,7 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
         reasons.append(f"free heat at {after[0].state} still explains much after the repair")
     if found.gain < 0.5 * free_before:
         reasons.append("free heat explains more than twice what the best effect does")
-    reasons += [text for h in best.hypotheses for text in objections(best, h)]
+    reasons += [text for h in best.hypotheses for text in objections(best, h, found.gain)]
     if reasons:
         return Verdict(UNEXPLAINED, (), named, tuple(reasons))
     kinds = {n.hypothesis.effect.is_physics for n in named}
