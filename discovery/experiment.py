@@ -105,7 +105,8 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
             fitted[name] = fit_entry(experiment, name, entry, progress)
         found = diagnosis(experiment, progress)
         if found is not None and found.repaired is not None:
-            fitted["repaired"] = fit_model_of(experiment, "repaired", "repaired", found.repaired)
+            name = _free_name("repaired", fitted)
+            fitted[name] = fit_model_of(experiment, name, "repaired", found.repaired)
         seconds = clock.perf_counter() - began
         progress("writing the report")
         write_run(temporary, experiment, fitted, found.document() if found else None, seconds)
@@ -135,10 +136,16 @@ def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -
         kind = experiment.form.models[name].kind
         fitted = {name: fit_model_of(experiment, name, kind, replace(found.context.model, name=name))}
         if found.repaired is not None:
-            fitted["repaired"] = fit_model_of(experiment, "repaired", "repaired", found.repaired)
+            name = _free_name("repaired", fitted)
+            fitted[name] = fit_model_of(experiment, name, "repaired", found.repaired)
         progress("writing the report")
         write_run(temporary, experiment, fitted, found.document(), clock.perf_counter() - began)
     return folder
+
+
+def _free_name(wanted: str, taken: Mapping[str, Fitted]) -> str:
+    """A name that no model of the experiment has."""
+    return wanted if wanted not in taken else _free_name(f"{wanted}_", taken)
 
 
 def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Progress = silent) -> Fitted:

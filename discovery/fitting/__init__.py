@@ -2,7 +2,7 @@
 
 from discovery.fitting.fit import Fit, fit_model
 from discovery.fitting.heldout import predict_recording
-from discovery.fitting.noise import Noise, estimate_noise
+from discovery.fitting.noise import Noise
 from discovery.fitting.problem import Problem, Unknown, make_problem
 
 __all__ = [
@@ -10,7 +10,6 @@ __all__ = [
     "Noise",
     "Problem",
     "Unknown",
-    "estimate_noise",
     "fit_model",
     "make_problem",
     "predict_recording",

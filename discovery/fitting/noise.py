@@ -14,7 +14,7 @@ readings: its time constant is hours, readings come in minutes.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -195,85 +195,3 @@ def whiten(trajectory: Trajectory, noise: Noise, data: Array) -> Array:
             (np.where(measured[:, :, None], data, 0.0) / np.array(noise.white)[None, :, None])[measured]
         )
     return make_filter(trajectory).apply(noise, data)[0]
-
-
-def log_likelihood(
-    filters: Sequence[Filter],
-    noise: Noise,
-    residuals: Sequence[Array],
-    columns: Sequence[Array],
-    prior: Array,
-) -> float:
-    """Restricted log-likelihood: the unknowns behind `columns` are integrated out.
-
-    Args:
-        residuals: (R, Y) by recording.
-        columns: (R, Y, U) by recording, sensitivities of the unknowns.
-        prior: (U,) precision (1/sd^2) of each unknown, 0 for none.
-    """
-    total, rows = 0.0, []
-    for part, residual, column in zip(filters, residuals, columns, strict=True):
-        white, logdet = part.apply(noise, np.concatenate([residual[:, :, None], column], axis=2))
-        rows.append(white)
-        total -= logdet
-    stacked = np.concatenate(rows)
-    r, x = stacked[:, 0], stacked[:, 1:]
-    scale = np.maximum(np.linalg.norm(x, axis=0), 1e-12)
-    x = x / scale
-    gram = x.T @ x + np.diag(prior / scale**2) + 1e-9 * np.eye(x.shape[1])
-    chol = np.linalg.cholesky(gram)
-    solved = np.linalg.solve(chol, x.T @ r)
-    volume = float(np.sum(np.log(np.diag(chol))) + np.sum(np.log(scale)))
-    return total - 0.5 * float(r @ r - solved @ solved) - volume
-
-
-def estimate_noise(
-    filters: Sequence[Filter],
-    start: Noise,
-    residuals: Sequence[Array],
-    columns: Sequence[Array],
-    prior: Array,
-    *,
-    stated: Mapping[str, float | None],
-    heat_limit: Mapping[str, float],
-    slow_limit: float = 0.6,
-) -> Noise:
-    """Variances by restricted maximum likelihood.
-
-    The white part stays within a tenth of what the campaign states; slow noise stays below `slow_limit`
-    times the white part and heat below `heat_limit`: that much is the everyday state of a machine, more is
-    a mismatch.
-
-    Args:
-        heat_limit: largest heat by state, in W (or rate per time unit).
-    """
-    from scipy.optimize import minimize
-
-    outs = len(start.outputs)
-    names = tuple(heat_limit)
-
-    def unpack(v: Array) -> Noise:
-        white = np.exp(v[:outs])
-        share = 1.0 / (1.0 + np.exp(-v[outs : outs + 1]))
-        level = 1.0 / (1.0 + np.exp(-v[outs + 1]))
-        heat = {name: float(level * heat_limit[name]) for name in names}
-        return replace(
-            start,
-            white=tuple(float(w) for w in white),
-            slow=tuple(float(slow_limit * share[0] * w) for w in white),
-            heat=heat,
-        )
-
-    def objective(v: Array) -> float:
-        noise = unpack(v)
-        penalty = 0.0
-        for j, name in enumerate(start.outputs):
-            given = stated.get(name)
-            if given:
-                penalty += 0.5 * ((v[j] - np.log(given)) / 0.05) ** 2
-        penalty += 0.5 * float(np.sum((v[outs:] / 4.0) ** 2))
-        return penalty - log_likelihood(filters, noise, residuals, columns, prior)
-
-    v0 = np.concatenate([np.log(start.white), [-1.5, -1.5]])
-    result = minimize(objective, v0, method="L-BFGS-B", options={"maxiter": 25, "ftol": 1e-7})
-    return unpack(result.x)

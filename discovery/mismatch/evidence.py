@@ -140,32 +140,3 @@ def by_claim(found: Sequence[Score]) -> list[Score]:
         mean = float(log_mean_exp(gains)) + float(np.log(best.hypothesis.effect.prior)) - best.hypothesis.cost
         out.append(replace(best, gain=mean))
     return sorted(out, key=lambda s: -s.gain)
-
-
-def pair_gains(board: Board, chosen: Sequence[int]) -> Array:
-    """Log Bayes factor (K, K) of two hypotheses together, on the best view; -inf on the diagonal.
-
-    Args:
-        chosen: indices of amplitudes of one-amplitude hypotheses.
-    """
-    v = int(np.argmax(board.levels))
-    index = np.asarray(chosen)
-    z = board.projected[v][:, index]
-    dot = z.T @ board.views[v].residual
-    gram = z.T @ z
-    s = board.spreads[index] ** -2
-    a = np.diag(gram) + s
-    determinant = np.maximum(np.outer(a, a) - gram**2, 1e-300)
-    quadratic = (
-        np.outer(dot**2, np.ones_like(dot)) * a[None, :]
-        + np.outer(np.ones_like(dot), dot**2) * a[:, None]
-        - 2 * np.outer(dot, dot) * gram
-    ) / determinant
-    gains = 0.5 * quadratic - 0.5 * np.log(determinant) + 0.5 * np.add.outer(np.log(s), np.log(s))
-    first = (dot[:, None] * a[None, :] - dot[None, :] * gram) / determinant
-    second = first.T
-    signs = np.array([board.hypotheses[board.owners[k]].effect.amplitude.sign for k in index])
-    wrong = (signs[:, None] * first < 0) | (signs[None, :] * second < 0)
-    gains[wrong] = -np.inf
-    np.fill_diagonal(gains, -np.inf)
-    return np.asarray(gains)

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
 from discovery.fitting import Noise
-from discovery.fitting.noise import log_likelihood, make_filter
+from discovery.fitting.noise import make_filter
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -79,21 +79,3 @@ def test_innovations_are_the_rows_of_a_cholesky_factor(name: str, trajectory: Tr
     triangle = np.linalg.cholesky(dense(trajectory, noise))
     assert np.allclose(found, np.linalg.solve(triangle, data[measured]), atol=1e-7)
     assert logdet == pytest.approx(np.log(np.diag(triangle)).sum(), abs=1e-7)
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_unknowns_are_integrated_out(name: str, trajectory: Trajectory) -> None:
-    """The restricted likelihood is that of readings whose covariance holds the prior of the unknowns."""
-    noise, measured = CASES[name], trajectory.system.grid.measured
-    rng = np.random.default_rng(1)
-    residual, columns = rng.standard_normal(measured.shape), rng.standard_normal((*measured.shape, 2))
-    sd = np.array([0.7, 3.0])
-    parts = [make_filter(trajectory)]
-    found = log_likelihood(parts, noise, [np.where(measured, residual, np.nan)], [columns], sd**-2.0)
-    x = columns[measured] * sd
-    covariance = dense(trajectory, noise) + x @ x.T
-    r = residual[measured]
-    expected = -0.5 * float(r @ np.linalg.solve(covariance, r)) - 0.5 * float(
-        np.linalg.slogdet(covariance)[1]
-    )
-    assert found == pytest.approx(expected + np.log(sd).sum(), abs=1e-5)
