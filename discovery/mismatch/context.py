@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 BELIEF = 0.5  # a hand-built model's start values are believed within a factor of about two
 EVERYDAY_HEAT = 4.0  # W rms at a body that no machine is free of
 BUSY_FLOW = 100.0  # W; a model whose largest heat flow is smaller has a smaller everyday heat
+MOST_READINGS = 6000  # instants, over all recordings
 SLOW_LIMIT = 0.55  # everyday slow sensor noise, as a share of the reading noise
 
 
@@ -100,7 +101,7 @@ def make_context(
             np.isfinite(campaign.recordings[r].values.get(name, np.array([np.nan]))).any() for r in recordings
         )
     ]
-    grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
+    grids = thinned({r: make_grid(campaign, r, inputs, outputs) for r in recordings})
     belief = BELIEF if physical and any(state.capacity for state in model.states.values()) else None
     fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
     flows = _flows(fit)
@@ -136,6 +137,15 @@ def make_context(
 
 def _rms(series: Array | float) -> float:
     return float(np.sqrt(np.mean(np.square(series))))
+
+
+def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:
+    """The grids with every k-th reading, where there are more than a search can use in reasonable time.
+
+    Sensors that are read every second say little more than every few seconds: slow noise limits a diagnosis.
+    """
+    every = -(-sum(len(g.read) for g in grids.values()) // MOST_READINGS)
+    return {r: replace(g, read=g.read[::every], readings=g.readings[::every]) for r, g in grids.items()}
 
 
 def everyday(white: Noise, limit: Mapping[str, float]) -> tuple[Noise, ...]:

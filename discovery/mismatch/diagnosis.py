@@ -133,7 +133,7 @@ def diagnose(
     else:
         question = next_experiment(context, found.best.fit.model, rival_model, white)
     levels = [v.level for v in found.baseline.views]
-    top = found.looks[0].claims[0].gain if found.looks[0].claims else 0.0
+    top = found.looks[0][0].gain if found.looks[0] else 0.0
     return Diagnosis(
         context,
         found,
@@ -142,7 +142,7 @@ def diagnose(
         tuple(before),
         on_fit,
         proof,
-        false_alarm(found.looks[0].board, int(np.argmax(levels)), top),
+        false_alarm(found.board, int(np.argmax(levels)), top),
         repaired,
         describe(context, found.baseline, before[0]) if unexplained else None,
         tuple(curves(found.baseline, before[0])) if before and verdict.word != NO_MISMATCH else (),
@@ -181,7 +181,7 @@ def _rival_model(found: Search, rival: Hypothesis) -> Model | None:
 def _smallest(found: Search) -> str:
     """What would have been seen: the size at which usual effects reach the threshold."""
     seen: list[tuple[float, Score]] = []
-    for claim in found.looks[0].claims:
+    for claim in found.looks[0]:
         h = claim.hypothesis
         if h.effect.amplitude.fixed is None and h.recording is None and claim.t and claim.share > INVISIBLE:
             error = abs(claim.size[0] / claim.t)

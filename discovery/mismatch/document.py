@@ -36,7 +36,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         for y, name in enumerate(outputs)
     }
     noise = best.best_view.noise
-    top = d.search.looks[0].claims[:12]
+    top = d.search.looks[0][:12]
     states = context.fit_states
     rate = not any(s.capacity for s in context.model.states.values())
     return {

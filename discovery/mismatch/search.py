@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from discovery.mismatch.events import place_events
 from discovery.mismatch.evidence import Board, Score, by_claim, make_board, scores
 from discovery.mismatch.gates import bent, matters, objections
 from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+from discovery.mismatch.lens import Lens
 
 REFITS = 6  # claims that are refitted at each step
 SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
@@ -63,8 +64,11 @@ class Search:
 
     baseline: Assessment
     best: Assessment
-    tried: tuple[Assessment, ...]
-    looks: tuple[Look, ...]  # one per model that was taken up, the last on what the best model leaves
+    tried: tuple[Assessment, ...]  # without their views
+    board: Board  # signatures of all claims on what the baseline leaves
+    looks: tuple[
+        tuple[Score, ...], ...
+    ]  # claims on each model taken up, the last on what the best one leaves
 
     @property
     def gain(self) -> float:
@@ -76,31 +80,32 @@ def search(context: Context, most: int = 6, tell: Callable[[str], None] = lambda
     """Add effects one by one while each adds evidence, then question each one taken up."""
     current = assess(context, (), context.settings[0])
     current = assess(context, (), current.best_view.noise, current)
-    baseline, tried, looks = current, [], [look(context, current)]
+    whole = look(context, current)
+    baseline, tried, looks = current, [], [whole.claims]
     for _ in range(most):
-        first = looks[-1].claims[0].gain if looks[-1].claims else 0.0
-        pool = [c for c in looks[-1].claims[:REFITS] if c.gain > max(2.0, 0.2 * first)]
+        first = looks[-1][0].gain if looks[-1] else 0.0
+        pool = [c for c in looks[-1][:REFITS] if c.gain > max(2.0, 0.2 * first)]
         attempts = [a for c in pool if (a := _try(context, current, current.hypotheses, c)) is not None]
         if not attempts:
             break
         step = _step(context, attempts, current.evidence)
-        tried += [a for a in attempts if matters(context, a, a.hypotheses[-1])]
+        tried += [_light(a) for a in attempts if matters(context, a, a.hypotheses[-1])]
         if step.evidence - current.evidence < NAMED or not matters(context, step, step.hypotheses[-1]):
             break
         tell(f"{step.hypotheses[-1].effect.title} at {', '.join(step.hypotheses[-1].places)}")
         current = step
-        looks.append(look(context, current))
+        looks.append(look(context, current).claims)
         if recurs(current.hypotheses):
             break
     if 1 < len(current.hypotheses) <= QUESTIONED and not recurs(current.hypotheses):
         current, more = _question(context, current)
         tried += more
-        looks.append(look(context, current))
+        looks.append(look(context, current).claims)
     current, more = _prune(context, baseline, current)
     if more:
         tried += more
-        looks.append(look(context, current))
-    return Search(baseline, current, tuple(tried), tuple(looks))
+        looks.append(look(context, current).claims)
+    return Search(baseline, current, tuple(_light(a) for a in tried), whole.board, tuple(looks))
 
 
 def _prune(
@@ -146,6 +151,11 @@ def _step(context: Context, attempts: Sequence[Assessment], before: float) -> As
     other = max((a for a in attempts if passes(a)), key=lambda a: a.evidence, default=best)
     enough = max(BLUNT if minor else NAMED, 0.5 * (best.evidence - before))
     return other if other.evidence - before > enough else best
+
+
+def _light(attempt: Assessment) -> Assessment:
+    """An attempt without what takes memory and is not asked for again: its views and sensitivities."""
+    return replace(attempt, views=(), lens=Lens(attempt.fit))
 
 
 def recurs(chosen: Sequence[Hypothesis]) -> bool:

@@ -20,7 +20,7 @@ def named_again(found: Search, h: Hypothesis, seed: int = 0) -> float | None:
     The readings are those of the repaired model with fresh noise, seen on the first board (to first order in
     the effect's size); None for an effect that this board did not hold.
     """
-    board = found.looks[0].board
+    board = found.board
     amplitudes = [found.best.model.parameters[name] for name in h.amplitudes]
     size = np.array([p.values[h.recording] if h.recording and p.values else p.value for p in amplitudes])
     index = [k for k, owner in enumerate(board.owners) if board.hypotheses[owner].key == h.key]

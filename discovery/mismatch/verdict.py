@@ -86,7 +86,7 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     reasons = []
     if recurs(best.hypotheses):
         reasons.append("unrecorded heat comes again and again: a cause, not an event")
-    left = [c for c in found.looks[-1].claims if abs(c.size[0]) >= context.minor(c.hypothesis)[0]]
+    left = [c for c in found.looks[-1] if abs(c.size[0]) >= context.minor(c.hypothesis)[0]]
     if left and left[0].gain > max(QUIET, 0.05 * found.gain):
         other = left[0].hypothesis
         reasons.append(
@@ -105,7 +105,7 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
 
 def _coarse(context: Context, found: Search, free: float) -> bool:
     """Whether an effect too small to matter explains what free heat does."""
-    claims = found.looks[0].claims
+    claims = found.looks[0]
     if not claims:
         return False
     top = claims[0]
