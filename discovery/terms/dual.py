@@ -116,7 +116,8 @@ def _apply(function: str, a: list[Dual]) -> Dual:
         case "*":
             return _chain(x * y, [(y, a[0]), (x, a[1])])
         case "/":
-            return _chain(x / y, [(1.0 / y, a[0]), (-x / (y * y), a[1])])
+            below = np.float64(y) if np.ndim(y) == 0 else y  # numpy divides by zero without an exception
+            return _chain(x / below, [(1.0 / below, a[0]), (-x / (below * below), a[1])])
         case "**":
             return _power(a[0], a[1])
         case "neg":
