@@ -17,7 +17,6 @@ from discovery.mismatch.hypotheses import Hypothesis, hypotheses
 from discovery.mismatch.lens import Lens
 
 REFITS = 6  # claims that are refitted at each step
-TRACES = 1.0  # on the root of the evidence found so far
 SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
 QUESTIONED = 3  # with more effects than this the machine is far from its model, and each one is large
 BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
@@ -91,9 +90,7 @@ def search(context: Context, most: int = 6, tell: Callable[[str], None] = lambda
             break
         step = _step(context, attempts, current.evidence)
         tried += [_light(a) for a in attempts if matters(context, a, a.hypotheses[-1])]
-        if step.evidence - current.evidence < _needed(baseline, current) or not matters(
-            context, step, step.hypotheses[-1]
-        ):
+        if step.evidence - current.evidence < NAMED or not matters(context, step, step.hypotheses[-1]):
             break
         tell(f"{step.hypotheses[-1].effect.title} at {', '.join(step.hypotheses[-1].places)}")
         current = step
@@ -128,9 +125,7 @@ def _prune(
             tried.append(without)
             lost = current.evidence - without.evidence
             small = lost < SMALL * (current.evidence - baseline.evidence)
-            if lost < _needed(baseline, without) or (
-                small and objections(current, h, current.evidence - baseline.evidence)
-            ):
+            if lost < NAMED or (small and objections(current, h, current.evidence - baseline.evidence)):
                 shorter.append((lost, without))
         if not shorter:
             break
@@ -156,11 +151,6 @@ def _step(context: Context, attempts: Sequence[Assessment], before: float) -> As
     other = max((a for a in attempts if passes(a)), key=lambda a: a.evidence, default=best)
     enough = max(BLUNT if minor else NAMED, 0.5 * (best.evidence - before))
     return other if other.evidence - before > enough else best
-
-
-def _needed(baseline: Assessment, current: Assessment) -> float:
-    """Log evidence that the next effect has to add: a large one whose law is slightly off leaves traces."""
-    return NAMED + TRACES * float(np.sqrt(max(current.evidence - baseline.evidence, 0.0)))
 
 
 def _light(attempt: Assessment) -> Assessment:
