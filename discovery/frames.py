@@ -12,6 +12,7 @@ from discovery.errors import UserError
 from discovery.recordings import Campaign, Recording
 from discovery.recordings.campaign import make_channel
 from discovery.recordings.campaignfile import ChannelForm
+from discovery.recordings.correction import pair_corrections, uncompensated
 from discovery.recordings.units import UnitError, conversion
 from discovery.schema import suggest
 
@@ -35,17 +36,21 @@ def campaign_from_frames(
     """
     from pydantic import ValidationError
 
-    made, rules = {}, {}
+    forms, rules = {}, {}
     for column, entry in channels.items():
         try:
-            form = ChannelForm.model_validate(dict(entry))
+            form = forms[column] = ChannelForm.model_validate(dict(entry))
             rules[column] = conversion(form.unit, form.role)
         except UnitError as error:
             raise UserError(f"channel '{column}': {error}") from None
         except ValidationError as error:
             what = error.errors(include_url=False)[0]
-            raise UserError(f"channel '{column}', {'.'.join(map(str, what['loc']))}: {what['msg']}") from None
-        made[column] = make_channel(column, form, rules[column])
+            place = "".join(f", {key}" for key in what["loc"])
+            raise UserError(f"channel '{column}'{place}: {what['msg']}") from None
+    pairs, mistakes = pair_corrections(forms, {column: rule.unit for column, rule in rules.items()})
+    for where, sentence in mistakes:
+        raise UserError(f"channel '{where[1]}': {sentence}")
+    made = {column: make_channel(column, form, rules[column]) for column, form in forms.items()}
     recordings = {}
     for key, frame in frames.items():
         missing = next((column for column in channels if column not in frame), None)
@@ -53,7 +58,10 @@ def campaign_from_frames(
             hint = suggest(missing, [str(c) for c in frame.columns])
             raise UserError(f"recording '{key}': no column '{missing}'; {hint}")
         values = {c: rule.factor * frame[c].to_numpy(float) + rule.offset for c, rule in rules.items()}
-        recordings[key] = Recording(key, _seconds(key, frame), values)
+        time = _seconds(key, frame)
+        recordings[key] = Recording(
+            key, time, uncompensated(f"recording '{key}'", time, values, forms, pairs)
+        )
     return Campaign(name, made, recordings, Path(name))
 
 

@@ -44,11 +44,13 @@ def _effects() -> Iterator[str]:
 
 
 def _roles() -> Iterator[str]:
-    from discovery.recordings.roles import ROLES
+    from discovery.recordings.roles import CORRECTION, ROLES
 
     for role, facts in ROLES.items():
         unit = " or ".join(facts.units) if facts.units else "any unit"
         kind = "read now and then" if facts.measured else f"input, {facts.between} between its stamps"
+        if role == CORRECTION:
+            kind = 'added to the readings of its error: corrects = "E_Y0C"'
         yield f"{role:20} {unit:12} {kind}"
 
 

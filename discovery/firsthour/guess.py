@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.firsthour.table import Column
+from discovery.recordings.correction import corrected_by_name
 
 Array = NDArray[np.float64]
 
@@ -21,11 +23,12 @@ class Guess:
     unit: str
     why: str
     sure: bool = True
+    corrects: str | None = None  # of an applied correction
 
 
 # words of a name -> role; the first match counts
 _WORDS: tuple[tuple[str, str], ...] = (
-    (r"correction|comp(ensation)?|offset", "applied correction"),
+    (r"corr(ection)?|comp(ensation)?|offset|applied", "applied correction"),
     (
         r"e [xyzabcr]\d?[0a-z]*|e[xyzabc]\d[abct]|error|dev(iation)?|displacement",
         "error",
@@ -106,6 +109,26 @@ _USUAL = {
     "nozzle side": "1",
 }
 _ROOM_F = (55.0, 100.0)  # a machine starts near room temperature: 13 to 38 degC
+
+
+def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
+    """Role and unit of each column by name, and which error a correction belongs to."""
+    guesses, stated = {column.name: guess(column) for column in columns}, {c.name: c.unit for c in columns}
+    errors = [name for name, one in guesses.items() if one.role == "error"]
+    corrections = [name for name, one in guesses.items() if one.role == "applied correction"]
+    for name in corrections:
+        one, error = guesses[name], corrected_by_name(name, errors, only=len(corrections) == 1)
+        if not errors:
+            why = f"{one.why}, but there is no error that it could correct"
+            guesses[name] = replace(one, role="other input", why=why, sure=False)
+        elif error is None:
+            why = f'{one.why}; say which error it corrects: corrects = "{errors[0]}"'
+            guesses[name] = replace(one, why=why, sure=False)
+        else:
+            why = f"{one.why}; it is added to {error} (what was added to the position needs sign = -1)"
+            unit = one.unit if stated[name] else guesses[error].unit
+            guesses[name] = replace(one, unit=unit, why=why, sure=False, corrects=error)
+    return guesses
 
 
 def guess(column: Column) -> Guess:

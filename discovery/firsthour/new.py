@@ -13,7 +13,7 @@ import numpy as np
 from discovery.errors import UserError
 from discovery.files import format_toml, write_atomic
 from discovery.firsthour.firstmodel import first_model
-from discovery.firsthour.guess import Guess, guess
+from discovery.firsthour.guess import Guess, guess_all
 from discovery.firsthour.table import Array, OwnTable, read_own
 
 _LAST_THIRD = 2 / 3
@@ -35,7 +35,7 @@ def new(folder: Path, sources: Sequence[Path]) -> list[str]:
         raise UserError(f"{folder}: campaign.toml is there already; name another folder, or delete it first")
     tables = [read_own(Path(source)) for source in sources]
     _same_columns(tables)
-    guesses = {column.name: guess(column) for column in tables[0].columns}
+    guesses = guess_all(tables[0].columns)
     recordings = _recordings(tables)
     room, why_room = _room(tables, guesses)
     write = {f"{name}.csv": _csv(table, rows) for name, (table, rows) in recordings.items()}
@@ -137,6 +137,9 @@ def _campaign(
     channels: dict[str, dict[str, object]] = {
         name: {"role": one.role, "unit": one.unit} for name, one in guesses.items()
     }
+    for name, guessed in guesses.items():
+        if guessed.corrects:
+            channels[name]["corrects"] = guessed.corrects
     if room is not None:
         channels["T_env"] = {"role": "ambient temperature", "unit": "degC"}
     given = {"set": {"T_env": room}} if room is not None else {}

@@ -14,6 +14,7 @@ from discovery.files import dotted, locate, read_text, read_toml
 from discovery.recordings.campaignfile import CampaignForm, ChannelForm, RecordingForm, campaign_path
 from discovery.recordings.clockcheck import clock_findings
 from discovery.recordings.columns import Columns
+from discovery.recordings.correction import pair_corrections, uncompensated
 from discovery.recordings.reading import read_columns
 from discovery.recordings.roles import ROLES, Between
 from discovery.recordings.units import Conversion, UnitError, conversion
@@ -40,7 +41,8 @@ class Channel:
 
 @dataclass(frozen=True)
 class Recording:
-    """`time` (T,): seconds since the first stamp, increasing. `values`: each (T,), NaN: not measured.
+    """`time` (T,): seconds since the first stamp, increasing. `values`: each (T,), NaN: not measured; errors
+    as they were without compensation, whatever correction the machine applied.
 
     `origin`: ISO 8601 instant of time 0 when the file had instants. `start`: seconds of time 0 on the file's
     clock, so that a stamp in the file is start + time.
@@ -67,6 +69,8 @@ class Campaign:
 def load_campaign(path: str | os.PathLike[str], only: Collection[str] | None = None) -> Campaign:
     """The campaign at `path` (the file or its folder) in canonical units; with `only`, those recordings.
 
+    Applied corrections are added to the readings of their errors: what follows sees uncompensated errors.
+
     Raises UserError with file, line and what to do: mistakes in the campaign file, an unknown unit, a missing
     column, text in number cells, time that does not increase.
     """
@@ -74,11 +78,14 @@ def load_campaign(path: str | os.PathLike[str], only: Collection[str] | None = N
     form = read_toml(path, CampaignForm)
     conversions = {name: _conversion(path, name, channel) for name, channel in form.channels.items()}
     channels = {name: make_channel(name, one, conversions[name]) for name, one in form.channels.items()}
+    pairs, mistakes = pair_corrections(form.channels, {name: to.unit for name, to in conversions.items()})
+    for key, what in mistakes:
+        raise UserError(f"{path}, line {locate(read_text(path), key)}: {dotted(key)}: {what}")
     for name in only or ():
         if name not in form.recordings:
             raise UserError(f"{path}: no recording '{name}'; {suggest(name, list(form.recordings))}")
     recordings = {
-        name: _load(path, name, one, form.channels, conversions)
+        name: _load(path, name, one, form.channels, conversions, pairs)
         for name, one in form.recordings.items()
         if only is None or name in only
     }
@@ -125,6 +132,7 @@ def _load(
     form: RecordingForm,
     channels: Mapping[str, ChannelForm],
     conversions: Mapping[str, Conversion],
+    pairs: Mapping[str, str],
 ) -> Recording:
     file = path.parent / form.file
     wanted = wanted_columns(form, channels)
@@ -145,10 +153,11 @@ def _load(
         if column not in columns.values:
             do = f"{suggest(column, list(columns.header))}; or say set = {{ {channel} = ... }} in {path}"
             raise UserError(f"{file}, line 1: no column '{column}'; {do}")
+    values = channel_values(columns, form, channels, conversions)
     return Recording(
         name,
         columns.time - columns.time[0],
-        MappingProxyType(channel_values(columns, form, channels, conversions)),
+        MappingProxyType(uncompensated(str(file), columns.time, values, channels, pairs)),
         form.note,
         columns.origin,
         float(columns.time[0]),

@@ -3,11 +3,11 @@
 import keyword
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
-from discovery.recordings.roles import Between, Role
+from discovery.recordings.roles import CORRECTION, Between, Role
 from discovery.schema import Strict
 
 _FUNCTIONS = ("abs", "min", "max", "exp", "log", "sqrt", "sign", "where", "tanh", "delay", "lag", "play")
@@ -38,6 +38,26 @@ class ChannelForm(Strict):
     noise: float | None = Field(None, gt=0, description="standard deviation of a reading, in the unit")
     between: Between | None = Field(None, description="what the value does between stamps")
     column: str | None = Field(None, description="the header in the files, when it is not the channel's name")
+    corrects: str | None = Field(
+        None,
+        description="of an applied correction: the error to whose readings it is added; "
+        "default: the one whose name stands in its own",
+    )
+    sign: Literal[1, -1] = Field(
+        1,
+        description="of an applied correction: 1 for what was taken off the error, "
+        "-1 for what was added to the position, as `discovery compensate` gives it out",
+    )
+
+    @model_validator(mode="after")
+    def _corrections_alone_correct(self) -> Self:
+        given = [name for name in ("corrects", "sign") if name in self.model_fields_set]
+        if given and self.role != CORRECTION:
+            raise ValueError(
+                f"{' and '.join(given)} belong to the role '{CORRECTION}' alone; "
+                f"take them away or change the role"
+            )
+        return self
 
 
 class RecordingForm(Strict):

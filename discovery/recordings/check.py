@@ -11,7 +11,9 @@ from discovery.files import Key, dotted, locate, parse_toml, read_text
 from discovery.recordings.campaign import Channel, channel_values, make_channel, wanted_columns
 from discovery.recordings.campaignfile import CampaignForm, RecordingForm, campaign_path
 from discovery.recordings.clockcheck import clock_findings
-from discovery.recordings.columns import TIME, Columns
+from discovery.recordings.columns import TIME, Columns, FloatArray
+from discovery.recordings.correction import pair_corrections
+from discovery.recordings.correctioncheck import correction_findings
 from discovery.recordings.finding import Finding
 from discovery.recordings.inputcheck import input_findings
 from discovery.recordings.reading import read_columns
@@ -37,12 +39,14 @@ def check_campaign(path: str | os.PathLike[str]) -> list[Finding]:
             conversions[name] = conversion(channel.unit, channel.role)
         except UnitError as error:
             findings.append(_in_campaign(path, text, ("channels", name, "unit"), str(error)))
+    pairs, wrong = pair_corrections(form.channels, {name: to.unit for name, to in conversions.items()})
+    findings.extend(_in_campaign(path, text, key, what) for key, what in wrong)
     for name, recording in form.recordings.items():
         for constant in recording.set:
             if constant not in data["channels"]:
                 what = f"no such channel; {suggest(constant, list(form.channels))}"
                 findings.append(_in_campaign(path, text, ("recordings", name, "set", constant), what))
-        findings.extend(_recording_findings(path, form, recording, conversions))
+        findings.extend(_recording_findings(path, form, recording, conversions, pairs))
     return findings
 
 
@@ -85,7 +89,11 @@ def _in_campaign(path: Path, text: str, key: Key, what: str) -> Finding:
 
 
 def _recording_findings(
-    path: Path, form: CampaignForm, recording: RecordingForm, conversions: Mapping[str, Conversion]
+    path: Path,
+    form: CampaignForm,
+    recording: RecordingForm,
+    conversions: Mapping[str, Conversion],
+    pairs: Mapping[str, str],
 ) -> list[Finding]:
     file = path.parent / recording.file
     wanted = wanted_columns(recording, form.channels)
@@ -99,7 +107,9 @@ def _recording_findings(
         for name, one in form.channels.items()
         if name in conversions
     }
-    findings.extend(_content_findings(file, columns, channels, recording, form, conversions))
+    values = channel_values(columns, recording, form.channels, conversions)
+    findings.extend(_content_findings(file, columns, channels, recording, values))
+    findings.extend(correction_findings(file, columns, values, pairs))
     return findings
 
 
@@ -128,10 +138,8 @@ def _content_findings(
     columns: Columns,
     channels: Mapping[str, Channel],
     recording: RecordingForm,
-    form: CampaignForm,
-    conversions: Mapping[str, Conversion],
+    values: Mapping[str, FloatArray],
 ) -> Iterator[Finding]:
-    values = channel_values(columns, recording, form.channels, conversions)
     for name, column in values.items():
         yield from range_findings(file, columns.lines, channels[name], column)
         if name not in recording.set:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Columns, FloatArray
 from discovery.recordings.finding import Finding, more
+from discovery.recordings.roles import CORRECTION
 
 _GAP = 20.0  # a stretch of so many usual steps without a value is a gap
 
@@ -20,22 +21,22 @@ def input_findings(
     """Inputs without any value (an error) or with long empty stretches, and readings in those (warnings)."""
     uncovered = {}
     for name, column in values.items():
-        if channels[name].measured:
+        if channels[name].measured or channels[name].role == CORRECTION:
             continue
         known = np.isfinite(column)
         if not known.any():
             do = f"measure it, or say set = {{ {name} = ... }} in the campaign file"
             yield Finding("error", file, None, f"the input '{name}' has no value at all", do)
             continue
-        gaps = _gaps(columns.time, known)
+        gaps = long_gaps(columns.time, known)
         yield from _told(file, columns, channels[name], gaps)
-        uncovered[name] = _inside(gaps, columns.time.size) & ~known
+        uncovered[name] = inside(gaps, columns.time.size) & ~known
     for name, column in values.items():
         if channels[name].measured:
             yield from _alone(file, columns, name, np.isfinite(column), uncovered)
 
 
-def _gaps(time: FloatArray, known: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def long_gaps(time: FloatArray, known: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last row of each long stretch of rows without a value."""
     rows = np.flatnonzero(known)
     usual = float(np.median(np.diff(time[rows]))) if rows.size > 1 else 0.0
@@ -62,11 +63,12 @@ def _told(file: Path, columns: Columns, channel: Channel, gaps: list[tuple[int, 
     yield Finding("warning", file, int(columns.lines[first]), what + more(len(gaps)), do)
 
 
-def _inside(gaps: list[tuple[int, int]], size: int) -> NDArray[np.bool_]:
-    inside = np.zeros(size, dtype=np.bool_)
+def inside(gaps: list[tuple[int, int]], size: int) -> NDArray[np.bool_]:
+    """Whether each of `size` rows lies in a gap, (size,)."""
+    found = np.zeros(size, dtype=np.bool_)
     for first, last in gaps:
-        inside[first : last + 1] = True
-    return inside
+        found[first : last + 1] = True
+    return found
 
 
 def _alone(

@@ -18,6 +18,7 @@ def read_columns(path: Path, wanted: Collection[str]) -> tuple[Columns | None, l
 
     A wanted column that the file does not have is left out; the columns are None when nothing is readable.
     """
+    wanted = list(dict.fromkeys(wanted))  # two channels may read one column
     if path.suffix in PARQUET_SUFFIXES:
         try:
             return read_parquet(path, wanted), []

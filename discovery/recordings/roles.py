@@ -19,6 +19,7 @@ Role = Literal[
     "applied correction",
     "other input",
 ]
+CORRECTION: Role = "applied correction"
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,6 @@ ROLES: dict[str, RoleFacts] = {
     "nozzle height": RoleFacts(("mm",), ranges={"mm": Range((0.0, 2000.0))}),
     "nozzle side": RoleFacts(("1",), ranges={"1": Range((-2.0, 2.0))}),
     "error": RoleFacts(("um", "um/m"), ranges=_DEVIATION, measured=True),
-    "applied correction": RoleFacts(("um", "um/m"), ranges=_DEVIATION),
+    CORRECTION: RoleFacts(("um", "um/m"), ranges=_DEVIATION),
     "other input": RoleFacts(()),
 }

@@ -40,7 +40,11 @@ class Shadow:
         measured: Mapping[str, Reading],
         now: float,
     ) -> None:
-        """Follow a tick of the model at work."""
+        """Follow a tick of the model at work.
+
+        A measured error counts as uncompensated; where the machine was compensated, `NAME_applied` says by
+        how much, and is added.
+        """
         if self.began is None and active.predicted is not None:
             self.began = now
             self.compensator.succeed(active.states(), dict(zip(active.names, active.offsets, strict=True)))
@@ -52,6 +56,8 @@ class Shadow:
         for name in old.keys() & new.keys():
             self.difference = max(self.difference, abs(old[name] - new[name]))
             reading = number(measured[name].value) if name in measured else math.nan
+            if (applied := f"{name}_applied") in readings:
+                reading += number(readings[applied].value)
             if math.isfinite(reading):
                 self.residuals.setdefault(name, []).append((reading - old[name], reading - new[name]))
 

@@ -96,10 +96,10 @@ def test_nothing_is_overwritten(desk: Path) -> None:
 def test_a_table_of_errors_makes_files_that_load(tmp_path: Path) -> None:
     from discovery.experimentfile import load_experiment
 
-    rows = ["time,T_hall [°F],Spindle rpm,P_drive (kW),Coolant temp (°C),E_Y0C [µm],E_A0C [µm/m]"]
+    rows = ["time,T_hall [°F],Spindle rpm,P_drive (kW),Coolant temp (°C),E_Y0C [µm],E_A0C [µm/m],comp E_Y0C"]
     rows += [
         f"2026-03-01T08:{k:02d}:00,{70 + k / 30:.2f},{600 * (k % 2)},{0.3 + k / 100:.2f},"
-        f"20.5,{k / 9:.2f},{k / 7:.2f}"
+        f"20.5,{k / 9:.2f},{k / 7:.2f},3"
         for k in range(60)
     ]
     (tmp_path / "shift.csv").write_text("\n".join(rows), "utf-8")
@@ -116,7 +116,9 @@ def test_a_table_of_errors_makes_files_that_load(tmp_path: Path) -> None:
         "Coolant_temp": ("coolant temperature", "degC"),
         "E_Y0C": ("error", "um"),
         "E_A0C": ("error", "um/m"),
+        "comp_E_Y0C": ("applied correction", "um"),
     }
+    assert experiment.campaign.recordings["first_part"].values["E_Y0C"][9] == pytest.approx(4.0)
     assert experiment.outputs == ("E_Y0C", "E_A0C")
     assert experiment.campaign.recordings["first_part"].values["P_drive"][0] == pytest.approx(300.0)
     assert experiment.model_file("first_order").outputs == {}

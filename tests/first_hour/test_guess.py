@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from discovery.errors import UserError
-from discovery.firsthour.guess import guess
+from discovery.firsthour.guess import guess, guess_all
 from discovery.firsthour.table import Column, read_own
 
 CASES = [
@@ -35,6 +35,17 @@ def test_roles_and_units(name: str, unit: str, values: np.ndarray, role: str, ex
     found = guess(Column(name, name.replace(" ", "_"), unit, np.asarray(values, dtype=float)))
     assert (found.role, found.unit) == (role, expected)
     assert found.why
+
+
+def test_a_correction_is_given_to_the_error_of_its_name() -> None:
+    def found(*names: str) -> list[tuple[str, str, str | None]]:
+        columns = [Column(n, n, "um/m" if n == "E_A0C" else "", np.linspace(0, 9, 50)) for n in names]
+        return [(one.role, one.unit, one.corrects) for one in guess_all(columns).values()]
+
+    assert found("E_A0C", "E_A0C_applied")[1] == ("applied correction", "um/m", "E_A0C")
+    assert found("E_Y0C", "offset")[1] == ("applied correction", "um", "E_Y0C")
+    assert found("E_Y0C", "E_A0C", "offset")[2] == ("applied correction", "um", None)
+    assert found("T_bed", "offset")[1] == ("other input", "um", None)
 
 
 def _file(folder: Path, *lines: str) -> Path:

@@ -57,3 +57,12 @@ def test_schemas_accept_our_files(kind: str, path: Path) -> None:
     jsonschema.validate(data, document)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(data | {"misspelt": 1}, document)
+
+
+def test_the_schema_of_campaigns_knows_what_a_correction_corrects() -> None:
+    data = tomllib.loads((ROOT / "datasets/nmv5000/campaign.toml").read_text("utf-8"))
+    applied = {"role": "applied correction", "unit": "um", "corrects": "E_Y0C", "sign": -1}
+    document = json.loads(schema("campaign"))
+    jsonschema.validate(data | {"channels": data["channels"] | {"applied": applied}}, document)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(data | {"channels": {"applied": applied | {"sign": 2}}}, document)

@@ -29,17 +29,32 @@ def changed(document: bytes, factor: float) -> bytes:
     return render(body | {"revision": 2})
 
 
-def work(session: Session, minutes: np.ndarray, first: int, measured: np.ndarray | None = None) -> np.ndarray:
-    """Offsets of ticks every minute; `measured` errors come every 10 min."""
+def work(
+    session: Session,
+    minutes: np.ndarray,
+    first: int,
+    measured: np.ndarray | None = None,
+    compensated: bool = False,
+) -> np.ndarray:
+    """Offsets of ticks every minute; `measured` errors come every 10 min, if `compensated` less what the last
+    offsets took off in steps of 1 um, with that beside them.
+    """
     names, out = session.compensator.exported.compiled.inputs, []
     for k in range(first, first + 400):
         now = k * 60.0
         readings = {n: Reading(v, now) for n, v in zip(names, minutes[k].tolist(), strict=True)}
         found = {}
         if measured is not None and k % 10 == 0:
+            names_of_errors, applied = session.compensator.names, np.zeros(len(session.compensator.names))
+            if compensated:
+                applied = np.round(-np.array(session.compensator.offsets))
+                readings |= {
+                    f"{n}_applied": Reading(v, now)
+                    for n, v in zip(names_of_errors, applied.tolist(), strict=True)
+                }
             found = {
                 n: Reading(v, now)
-                for n, v in zip(session.compensator.names, measured[k].tolist(), strict=True)
+                for n, v in zip(names_of_errors, (measured[k] - applied).tolist(), strict=True)
             }
         out.append(list(session.tick(readings, found, now).offsets.values()))
     session.save(now)
@@ -95,9 +110,10 @@ def test_a_model_that_is_far_off_is_refused(
     assert (memory / REFUSED).read_bytes() == files["far"].read_bytes()
 
 
+@pytest.mark.parametrize("compensated", [False, True])
 @pytest.mark.parametrize(("truth", "passes"), [("near", True), ("old", False)])
 def test_measured_errors_decide_where_there_are_enough(
-    files: dict[str, Path], minutes: np.ndarray, tmp_path: Path, truth: str, passes: bool
+    files: dict[str, Path], minutes: np.ndarray, tmp_path: Path, truth: str, passes: bool, compensated: bool
 ) -> None:
     from discovery.export.document import read_document
     from discovery.export.stepper import Stepper
@@ -107,7 +123,7 @@ def test_measured_errors_decide_where_there_are_enough(
     measured = stepper.run(np.repeat(minutes, 6, axis=0))[::6]
     memory, said, rule = tmp_path / "memory", list[str](), Rule(hours=3.0, most_um=0.0)
     work(begin(files["old"], memory, said, rule), minutes, 0)
-    work(begin(files["near"], memory, said, rule), minutes, 400, measured)
+    work(begin(files["near"], memory, said, rule), minutes, 400, measured, compensated)
     assert ("takes over" in said[-1]) is passes
 
 
