@@ -50,13 +50,18 @@ def fit_one_at_a_time(
 def compensated(
     campaign: Campaign, recording: str, known: Sequence[Model], outputs: Sequence[str]
 ) -> Recording:
-    """The recording as a machine would show it that compensates the known influences from the start."""
+    """The recording as a machine would show it that compensates the known influences.
+
+    As in the whole of eq. (8), the first influence takes up the first reading and forgets it at its own pace:
+    left in the readings, it would become a zero balance of the next influence, in that recording alone right.
+    """
     data = campaign.recordings[recording]
-    values = {name: np.array(series) for name, series in data.values.items()}
     for model in known:
-        trajectory = predict_recording(model, campaign, recording, outputs)
-        time = trajectory.system.grid.time
+        rest = replace(campaign, recordings={recording: data})
+        trajectory = predict_recording(model, rest, recording, outputs)
+        time, values = trajectory.system.grid.time, dict(data.values)
         for name, dual in zip(outputs, model_outputs(trajectory), strict=True):
-            series = np.broadcast_to(dual.value, time.shape)
-            values[name] -= np.interp(data.time, time, series - series[0])
-    return replace(data, values=values)
+            part = np.broadcast_to(dual.value, time.shape)
+            values[name] = values[name] - np.interp(data.time, time, part)
+        data = replace(data, values=values)
+    return data

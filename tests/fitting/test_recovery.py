@@ -121,10 +121,13 @@ def test_the_fit_does_not_need_a_good_start() -> None:
     assert costs[0] == pytest.approx(costs[1], rel=1e-3)
 
 
-def separate_runs() -> tuple[Campaign, dict[str, dict[str, float]]]:
+def separate_runs(
+    starts: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+) -> tuple[Campaign, dict[str, dict[str, float]]]:
     """The truth is eq. (8): three influences with poles of their own, each recorded alone, then all together.
 
-    The machine starts at rest, the fluid at the reference temperature of 20 degC.
+    The machine starts at rest, the fluid at the reference temperature of 20 degC. `starts`: what
+    is left in each recording of a room that was warmer or colder before.
     """
     truth = {
         "T_env": {"pole": -0.08, "gain": -0.25, "zero": -22.0},
@@ -138,14 +141,16 @@ def separate_runs() -> tuple[Campaign, dict[str, dict[str, float]]]:
         for one in ("T_env", "T_fluid"):
             u[one] = u[one] - u[one][0] - truth[one]["zero"]
         y = sum(
-            solved(time, u, t["pole"], {c: t["gain"]}, t["gain"] * t["zero"], 0.0) for c, t in truth.items()
+            solved(time, u, t["pole"], {c: t["gain"]}, t["gain"] * t["zero"], starts[seed] * (c == "T_env"))
+            for c, t in truth.items()
         )
         recordings[name] = Recording(name, time, {**u, "E": read(time, np.asarray(y), 0.1, seed)})
     return Campaign("c", CHANNELS, recordings), truth
 
 
-def test_equation_8_one_influence_at_a_time() -> None:
-    campaign, truth = separate_runs()
+@pytest.mark.parametrize("starts", [(0.0, 0.0, 0.0, 0.0), (-12.0, 9.0, 6.0, -7.0)])
+def test_equation_8_one_influence_at_a_time(starts: tuple[float, float, float, float]) -> None:
+    campaign, truth = separate_runs(starts)
     model = fit_one_at_a_time(campaign, {"T_env": ["room"], "T_fluid": ["fluid"], "P": ["load"]}, ["E"])
     for k, channel in enumerate(("T_env", "T_fluid", "P")):
         pole, gain, zero = (model.parameters[f"p{3 * k + j}_E"] for j in (1, 2, 3))
