@@ -36,8 +36,8 @@ class _Part:
 
 
 def warm_start(model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> Model:
-    """The model with start values from a regression on filtered inputs; unchanged where it is not of
-    first-order parts.
+    """The model with start values from a regression on filtered inputs, and poles no slower than a third of
+    the longest recording; unchanged where it is not of first-order parts.
 
     Args:
         recordings: recordings to fit; nothing else is looked at.
@@ -56,11 +56,22 @@ def warm_start(model: Model, campaign: Campaign, recordings: Sequence[str], outp
         ]
         if mine:
             found |= _best(model, mine, banks, y, taus)
+    model = _poles_that_can_be_told(model, parts, float(taus[-1]))
     inside = {
         name: min(max(value, model.parameters[name].min), model.parameters[name].max)
         for name, value in found.items()
     }
     return model.with_values(inside)
+
+
+def _poles_that_can_be_told(model: Model, parts: Mapping[str, _Part], slowest: float) -> Model:
+    """The model with no time constant beyond `slowest` [s]: there an influence only adds up its input, fits
+    every trend of these recordings and runs away in others.
+    """
+    limit = -TIME_UNITS[model.time_unit] / slowest
+    poles = {part.pole: model.parameters[part.pole] for part in parts.values()}
+    bounded = {name: replace(p, max=min(p.max, limit)) for name, p in poles.items()}
+    return replace(model, parameters={**model.parameters, **bounded})
 
 
 def _parts(model: Model) -> dict[str, _Part] | None:

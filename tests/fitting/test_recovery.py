@@ -121,6 +121,18 @@ def test_the_fit_does_not_need_a_good_start() -> None:
     assert costs[0] == pytest.approx(costs[1], rel=1e-3)
 
 
+def test_an_influence_that_only_drifts_is_kept_from_running_away() -> None:
+    """Two days of a trend: as an integrator of the room it would go on for ever in the next recording."""
+    time, u = inputs(3)
+    trend = Recording("fit", time, {**u, "E": read(time, 0.2 * time / HOUR, 0.1, 3)})
+    campaign = Campaign("c", CHANNELS, {"fit": trend})
+    model = warm_start(superposition(INPUTS, ["E"], CHANNELS), campaign, ["fit"], ["E"])
+    fitted = fit_model(model, campaign, ["fit"]).model
+    poles = [fitted.parameters[f"p{k}_E"].value for k in (1, 4, 7)]
+    assert max(poles) <= -1 / 16 + 1e-9  # a third of 48 h
+    assert max(poles) == pytest.approx(-1 / 16)  # where it wants to go further
+
+
 def separate_runs(
     starts: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> tuple[Campaign, dict[str, dict[str, float]]]:
