@@ -12,15 +12,9 @@ def summary(path: Path) -> list[str]:
     d: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     lines = [f"{d['verdict']}: what '{d['model']}' leaves out"]
     for p in d["physics"]:
-        sizes = ", ".join(
-            f"{name} = {q['value']:.4g} {q['unit']}"
-            + (f" ({q['low']:.4g} to {q['high']:.4g})" if q["low"] != q["high"] else "")
-            for name, q in p["parameters"].items()
-            if q["low"] is not None
-        )
-        lines.append(
-            f"  {p['effect']} at {', '.join(p['states'])}, probability {p['probability']:.2f}: {sizes}"
-        )
+        sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q))
+        said = f"  {p['effect']} at {', '.join(p['states'])}, probability {p['probability']:.2f}"
+        lines.append(f"{said}: {sizes}" if sizes else said)
     near = [a for a in d["alternatives"] if a["log_evidence_below_best"] <= 3]
     lines += [f"  could also be {a['effect']} at {', '.join(a['states'])}" for a in near]
     lines += [f"  {reason}" for reason in d["reasons"]]
@@ -32,3 +26,16 @@ def summary(path: Path) -> list[str]:
         lines.append(f"  unseen recording {run}: {rms}")
     lines.append(f"  next: {d['next_experiment']}")
     return lines
+
+
+def _is_told(q: dict[str, Any]) -> bool:
+    """Whether a number says something: a switch that is fixed at 1 only says that its effect is there."""
+    switch = q["unit"] == "1" and q["low"] == q["value"] == q["high"] == 1.0
+    return q["low"] is not None and not switch
+
+
+def _size(name: str, q: dict[str, Any]) -> str:
+    """A number with its unit and its 95 % interval."""
+    unit = "" if q["unit"] == "1" else f" {q['unit']}"
+    interval = f" ({q['low']:.4g} to {q['high']:.4g})" if q["low"] != q["high"] else ""
+    return f"{name} = {q['value']:.4g}{unit}{interval}"

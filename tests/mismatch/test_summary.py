@@ -1,0 +1,42 @@
+"""The lines for the terminal: sizes with units and intervals, no switches."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from discovery.mismatch.summary import summary
+
+
+def number(value: float, low: float | None, high: float | None, unit: str) -> dict[str, Any]:
+    return {"value": value, "low": low, "high": high, "unit": unit}
+
+
+def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Path) -> None:
+    def named(effect: str, **parameters: dict[str, Any]) -> dict[str, Any]:
+        return {"effect": effect, "states": ["T1"], "probability": 0.9, "parameters": parameters}
+
+    physics = [
+        named("sensor_lag", on_T1=number(1.0, 1.0, 1.0, "1"), t_lag_T1=number(18.0, 17.0, 19.0, "s")),
+        named("cooling_hysteresis", on=number(1.0, 1.0, 1.0, "1")),
+        named("thermal_preload", k=number(0.03, 0.02, 0.04, "1/K"), share=number(0.5, 0.4, 0.6, "1")),
+        named("radiation", area=number(0.4, None, None, "m2"), power=number(4.0, 4.0, 4.0, "1")),
+    ]
+    document = {
+        "verdict": "missing physics",
+        "model": "m",
+        "physics": physics,
+        "alternatives": [],
+        "reasons": [],
+        "description": None,
+        "improvement": {"held_out": {}},
+        "next_experiment": "none",
+    }
+    (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
+    assert summary(tmp_path / "diagnosis.json")[1:-1] == [
+        "  sensor_lag at T1, probability 0.90: t_lag_T1 = 18 s (17 to 19)",
+        "  cooling_hysteresis at T1, probability 0.90",
+        "  thermal_preload at T1, probability 0.90: k = 0.03 1/K (0.02 to 0.04), share = 0.5 (0.4 to 0.6)",
+        "  radiation at T1, probability 0.90: power = 4",
+    ]
