@@ -23,7 +23,7 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
         named("thermal_preload", k=number(0.03, 0.02, 0.04, "1/K"), share=number(0.5, 0.4, 0.6, "1")),
         named("radiation", area=number(0.4, None, None, "m2"), power=number(4.0, 4.0, 4.0, "1")),
     ]
-    document = {
+    document: dict[str, Any] = {
         "verdict": "missing physics",
         "model": "m",
         "physics": physics,
