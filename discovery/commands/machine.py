@@ -1,0 +1,133 @@
+"""Verbs from a fitted model to a compensated machine."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from discovery.errors import UserError
+
+
+def export(
+    run: Annotated[Path, typer.Argument(help="Folder of a finished run.")],
+    model: Annotated[str, typer.Option(help="Name of one of its models.")],
+    to: Annotated[list[str], typer.Option(help="json, c, fmu, fmu3 or st; may be repeated.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder of the files [RUN/export/MODEL].")] = None,
+    campaign: Annotated[Path | None, typer.Option(help="Campaign file [the one of the run].")] = None,
+    step: Annotated[float, typer.Option(help="Fixed internal step, s.")] = 10.0,
+    states: Annotated[int | None, typer.Option(help="Reduce the model to so many states first.")] = None,
+    sign: Annotated[
+        Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs; made when there is none yet.")
+    ] = None,
+) -> None:
+    """Export a fitted model for the compensation runtime, proved equal to the Python model before it is
+    written.
+
+    \b
+    discovery export "runs/cutting fluid" --model thermobalance --to c --to fmu
+    discovery export "runs/cutting fluid" --model thermobalance --to json --sign machine.pem
+    """
+    from discovery.export import export_run
+    from discovery.export.seal import private_key
+
+    key = private_key(sign) if sign else None
+    done = export_run(run, model, to, out, campaign=campaign, step_s=step, states=states, key=key)
+    for line in done.lines():
+        typer.echo(line)
+
+
+def compensate(
+    model: Annotated[Path, typer.Argument(help="An exported model (.json).")],
+    inputs: Annotated[
+        str | None, typer.Option(help="CSV file with time and the inputs, or - for stdin.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="CSV file of the offsets [stdout].")] = None,
+    state: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder that keeps state and models; another MODEL there runs in the shadow first."
+        ),
+    ] = None,
+    trust: Annotated[
+        Path | None, typer.Option(help="Public key (.pub) that must have signed the model.")
+    ] = None,
+    allow_unsigned: Annotated[
+        bool, typer.Option("--allow-unsigned", help="Try a model without a key.")
+    ] = False,
+    shadow_hours: Annotated[float, typer.Option(help="Length of a shadow run.")] = 24.0,
+    back: Annotated[
+        bool, typer.Option("--back", help="One step back to the model before, in --state.")
+    ] = False,
+    opcua: Annotated[Path | None, typer.Option(help="TOML file of an OPC UA connection.")] = None,
+    opcua_demo: Annotated[
+        bool, typer.Option("--opcua-demo", help="Start a simulated machine server and compensate it.")
+    ] = False,
+    seconds: Annotated[float | None, typer.Option(help="Stop OPC UA after so long.")] = None,
+) -> None:
+    """Run an exported model: readings in, offsets [um, um/m] with status word and heartbeat out.
+
+    \b
+    discovery compensate model.json --trust machine.pem.pub --inputs in.csv --out offsets.csv --state memory
+    discovery compensate model.json --allow-unsigned --opcua-demo --seconds 60
+    """
+    from discovery.runtime.command import compensate_rows, go_back, trusted_model
+
+    def say(text: str) -> None:
+        typer.echo(text, err=True)
+
+    if back:
+        if state is None:
+            raise UserError("--back needs --state, the folder that keeps the models")
+        go_back(state, say)
+        return
+    exported, key = trusted_model(model, trust, allow_unsigned=allow_unsigned)
+    if opcua is not None or opcua_demo:
+        from discovery.runtime.opcua import compensate_opcua
+
+        compensate_opcua(
+            exported,
+            opcua,
+            model=model,
+            folder=state,
+            trusted=key,
+            seconds=seconds,
+            shadow_hours=shadow_hours,
+            say=say,
+        )
+    elif inputs is not None:
+        compensate_rows(
+            exported, inputs, out, model=model, folder=state, trusted=key, shadow_hours=shadow_hours, say=say
+        )
+    else:
+        raise UserError(
+            "say where the readings come from: --inputs FILE, --inputs -, --opcua FILE or --opcua-demo"
+        )
+
+
+def update(
+    model: Annotated[Path, typer.Argument(help="The exported model at work (.json).")],
+    campaign: Annotated[
+        Path, typer.Argument(help="A campaign file with the recordings since its last revision.")
+    ],
+    recordings: Annotated[
+        list[str] | None, typer.Option("--recording", help="In order; may be repeated [all of the campaign].")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="File of the next revision [MODEL with .rN].")
+    ] = None,
+    sign: Annotated[Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs it.")] = None,
+) -> None:
+    """Keep an exported model up with an ageing machine: noise, drift, or a new effect?
+
+    A drift becomes the next revision, with a changelog entry; `discovery compensate` runs it in the shadow
+    first.
+    """
+    from discovery.export.seal import private_key
+    from discovery.recordings import load_campaign
+    from discovery.runtime.update import next_name, update_file
+
+    loaded = load_campaign(campaign, only=recordings or None)
+    names = recordings or list(loaded.recordings)
+    key = private_key(sign) if sign else None
+    for line in update_file(model, loaded, names, out or next_name(model), key).lines():
+        typer.echo(line)

@@ -1,0 +1,92 @@
+"""Verbs on recordings: look at them, make a campaign of them, record the virtual machine."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def check(
+    campaign: Annotated[Path, typer.Argument(help="A campaign file, or a folder that holds campaign.toml.")],
+    models: Annotated[
+        list[Path] | None,
+        typer.Option("--model", help="A model file: do its names and units fit? Repeatable."),
+    ] = None,
+) -> None:
+    """List what is wrong with the recordings of CAMPAIGN: where, and what to do about it.
+
+    An `error` keeps the recording from being used (exit status 1); a `warning` is worth a look.
+    """
+    from discovery.recordings.check import check_campaign, summary
+
+    findings = check_campaign(campaign)
+    for finding in findings:
+        typer.echo(str(finding))
+    typer.echo(summary(findings))
+    if models:
+        from discovery.models.check import check_models
+
+        for warning in check_models(campaign, models):
+            typer.echo(f"warning: {warning}")
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(1)
+
+
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that the files are written into.")],
+    sources: Annotated[
+        list[Path],
+        typer.Option("--from", metavar="CSV", help="Your recording; repeat it for several of one machine."),
+    ],
+) -> None:
+    """Make campaign, model and experiment from your own CSV, and say what was guessed."""
+    from discovery.firsthour.new import new as make
+
+    for line in make(folder, sources):
+        typer.echo(line)
+
+
+def record(
+    out: Annotated[Path, typer.Option("--out", help="Folder of the campaign that is written.")],
+    campaign: Annotated[
+        str | None,
+        typer.Option(help="Record a known campaign, e.g. nmv5000; no other option but --out counts."),
+    ] = None,
+    recordings: Annotated[
+        int, typer.Option(min=1, max=100, help="How many recordings, each with the next seed.")
+    ] = 1,
+    cycle: Annotated[
+        str,
+        typer.Option(help="fit, validation, dry, flow, environment, fluid, internal or warm_up."),
+    ] = "fit",
+    seed: Annotated[int, typer.Option(min=0, help="Everything random comes from it.")] = 1,
+    hours: Annotated[float, typer.Option(help="Length of a recording.")] = 72.0,
+    nozzle_height: Annotated[float, typer.Option(help="Nozzle above the table, mm.")] = 50.0,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME[@BODY[+BODY]]=SIZE, may be repeated; --effect help lists them."),
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME[@CHANNEL]=SIZE: a fault of measuring, in the first recording."),
+    ] = None,
+    conceal: Annotated[bool, typer.Option("--conceal", help="Hide an effect drawn by seed.")] = False,
+    reveal: Annotated[bool, typer.Option("--reveal", help="Put the answer into OUT, too.")] = False,
+) -> None:
+    """Record the virtual machine: a rotary table of five bodies under cutting fluid, with R-Test readings.
+
+    The same options give the same files, bit for bit. What was concealed stands in OUT.answer.json.
+
+    \b
+    discovery record --out runs/plain --recordings 2
+    discovery record --effect radiation=0.5 --nozzle-height 100 --seed 3 --out runs/radiating
+    discovery record --conceal --seed 7 --recordings 3 --out runs/riddle
+    discovery record --campaign nmv5000 --out datasets/nmv5000
+    """
+    from discovery.virtual.command import orders_of, record_orders
+
+    title, orders = orders_of(
+        campaign, recordings, cycle, seed, hours, nozzle_height, effect or [], fault or [], conceal
+    )
+    for line in record_orders(out, title, orders, reveal=reveal, envelope=campaign is None):
+        typer.echo(line)

@@ -1,0 +1,81 @@
+"""Verbs on experiments and their results."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def run(
+    experiment: Annotated[Path, typer.Argument(help="An experiment file, e.g. experiments/nmv5000.toml.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder of the results [runs/NAME].")] = None,
+) -> None:
+    """Do the main job: fit, discover, cross-validate, compare, diagnose, report, export.
+
+    The folder of results is written as a whole at the end; an interrupted run leaves nothing behind.
+    """
+    from discovery.experiment import run as run_experiment
+    from discovery.progress import shown
+    from discovery.summary import summary
+
+    with shown() as progress:
+        folder = run_experiment(experiment, out, progress)
+    for line in summary(folder):
+        typer.echo(line)
+
+
+def diagnose(
+    experiment: Annotated[
+        Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, experiments/*.toml.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the results; default runs/<experiment name>.")
+    ] = None,
+) -> None:
+    """Find what the model of [mismatch] leaves out: where, which physics, how sure, and how much better the
+    repair fits.
+
+    Writes diagnosis.json, the repaired model and report.html. "no mismatch" and "unexplained" are answers
+    too: nothing is named that the recordings cannot tell apart.
+    """
+    from discovery.experiment import diagnose as find
+    from discovery.mismatch.summary import summary
+    from discovery.progress import shown
+
+    with shown() as progress:
+        folder = find(experiment, out, progress)
+    for line in summary(folder / "diagnosis.json"):
+        typer.echo(line)
+    typer.echo(f"report: {folder / 'report.html'}")
+
+
+def compare(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders of results.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Write a page on them: FILE.html, or a folder.")
+    ] = None,
+) -> None:
+    """Put the models of several runs side by side: rms of each error, recording by recording."""
+    from discovery.summary import comparison
+
+    for line in comparison(runs):
+        typer.echo(line)
+    if out:
+        from discovery.report import write_comparison
+
+        typer.echo(write_comparison(runs, out))
+
+
+def report(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A folder of results.")],
+    figures: Annotated[
+        bool, typer.Option("--figures", help="Also write RUN/figures/*.svg and *.pdf.")
+    ] = False,
+) -> None:
+    """Write the report of RUN anew: one page that opens offline."""
+    from discovery.report import write_figures, write_report
+
+    typer.echo(write_report(run))
+    if figures:
+        written = write_figures(run)
+        typer.echo(f"{written[0].parent}: {len(written)} figures")
