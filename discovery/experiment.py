@@ -27,7 +27,7 @@ from discovery.experimentfile import (
     separate,
 )
 from discovery.fitting import Fit, fit_model, predict_recording
-from discovery.fitting.fit import Loss
+from discovery.fitting.fit import Loss, written_with
 from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.starts import warm_start
 from discovery.models import Model
@@ -36,6 +36,7 @@ from discovery.models.dimensions import check_dimensions, with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
 from discovery.progress import Progress, silent
+from discovery.recordings import Channel
 from discovery.results import default_folder, staged, write_run
 from discovery.sparse.options import SparseOptions
 
@@ -106,7 +107,7 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
         found = diagnosis(experiment, progress)
         if found is not None and found.repaired is not None:
             name = _free_name("repaired", fitted)
-            fitted[name] = fit_model_of(experiment, name, "repaired", found.repaired)
+            fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
         seconds = clock.perf_counter() - began
         progress("writing the report")
         write_run(temporary, experiment, fitted, found.document() if found else None, seconds)
@@ -137,7 +138,7 @@ def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -
         fitted = {name: fit_model_of(experiment, name, kind, replace(found.context.model, name=name))}
         if found.repaired is not None:
             name = _free_name("repaired", fitted)
-            fitted[name] = fit_model_of(experiment, name, "repaired", found.repaired)
+            fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
         progress("writing the report")
         write_run(temporary, experiment, fitted, found.document(), clock.perf_counter() - began)
     return folder
@@ -179,6 +180,31 @@ def fit_model_of(
             "write them under [outputs] of the model"
         )
     fit = fit_model(model, experiment.fitting, experiment.fit, outputs, loss=loss)
+    seconds = clock.perf_counter() - began
+    return judged(experiment, name, kind, model, fit, report, seconds, progress)
+
+
+def repaired_of(
+    experiment: Experiment, name: str, found: Diagnosis, repaired: Model, progress: Progress = silent
+) -> Fitted:
+    """The repaired model of a diagnosis with the very numbers that the diagnosis found and proved."""
+    fit = written_with(found.search.best.fit, repaired, experiment.fitting)
+    return judged(experiment, name, "repaired", repaired, fit, None, 0.0, progress)
+
+
+def judged(
+    experiment: Experiment,
+    name: str,
+    kind: str,
+    model: Model,
+    fit: Fit,
+    report: Mapping[str, Any] | None = None,
+    seconds: float = 0.0,
+    progress: Progress = silent,
+) -> Fitted:
+    """A model and its fit: cross-validation on the fit recordings alone, free runs on all, notes."""
+    began = clock.perf_counter() - seconds
+    outputs = fit.problem.outputs
     validation: Mapping[str, Mapping[str, float]] = {}
     if experiment.form.cross_validate:
         progress(f"cross-validating {name}")
@@ -186,8 +212,23 @@ def fit_model_of(
     seconds = clock.perf_counter() - began
     predictions = {r: predict(fit, experiment, r) for r in (*experiment.fit, *experiment.held_out)}
     notes = [*fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]
+    notes += offset_notes(fit, experiment.campaign.channels)
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
     return Fitted(name, kind, fit, predictions, validation, report or {}, tuple(notes), seconds)
+
+
+def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
+    """One sentence for each input known only within a spread: what the fit makes of it."""
+    notes = []
+    for name, found in fit.offsets.items():
+        low, high = (pick(found, key=lambda r: found[r][0]) for pick in (min, max))
+        unit = "K" if channels[name].unit == "degC" else channels[name].unit
+        notes.append(
+            f"{name} is known within {channels[name].spread:.3g} {unit}: the fit takes it for off by "
+            f"{found[low][0]:+.2g} {unit} in '{low}' to {found[high][0]:+.2g} {unit} in '{high}'; in an "
+            "unseen recording the first reading alone tells"
+        )
+    return notes
 
 
 def starting_model(

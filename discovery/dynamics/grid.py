@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -53,6 +53,12 @@ class Grid:
     outputs: tuple[str, ...]
     read: Ints  # (R,) nodes at which at least one output was read
     readings: Array  # (R, Y), NaN where an output was not read
+    spread: Mapping[str, float] = field(default_factory=dict)  # of channels known only within one
+    offset: Mapping[str, float] = field(default_factory=dict)  # what `ends` and `nodes` have on the samples
+
+    def shifted(self, offset: Mapping[str, float]) -> Grid:
+        """The grid with channels moved by constants from what was recorded (whatever moved them before)."""
+        return replace(self, offset=dict(offset))
 
     @cached_property
     def step(self) -> Array:
@@ -64,12 +70,16 @@ class Grid:
         """Channels and `time` at the interval ends, each (2(T - 1),)."""
         left, right = self.time[:-1], self.time[1:]
         values = {name: _interleave(s.at(left), s.at(right, "left")) for name, s in self.samples.items()}
-        return {**values, "time": _interleave(left, right)}
+        return {**self._moved(values), "time": _interleave(left, right)}
 
     @cached_property
     def nodes(self) -> dict[str, Array]:
         """Channels and `time` at the nodes, each (T,)."""
-        return {**{name: s.at(self.time) for name, s in self.samples.items()}, "time": self.time}
+        values = {name: s.at(self.time) for name, s in self.samples.items()}
+        return {**self._moved(values), "time": self.time}
+
+    def _moved(self, values: dict[str, Array]) -> dict[str, Array]:
+        return values | {name: values[name] + by for name, by in self.offset.items()}
 
     @cached_property
     def measured(self) -> NDArray[np.bool_]:
@@ -91,16 +101,17 @@ class Memory:
         mean and the delay differentiable.
         """
         samples, time = self.grid.samples[channel], self.grid.time - seconds
+        offset = self.grid.offset.get(channel, 0.0)
         if samples.linear:
-            values = samples.at(time)
+            values = samples.at(time) + offset
             width = 30.0
             slope = (samples.at(time - width) - samples.at(time + width)) / (2 * width)
             if not self.at_ends:
                 return values, slope
             return _interleave(values[:-1], values[1:]), _interleave(slope[:-1], slope[1:])
         if not self.at_ends:
-            return samples.at(time), np.zeros_like(time)
-        mean = np.diff(samples.integral(time)) / self.grid.step
+            return samples.at(time) + offset, np.zeros_like(time)
+        mean = np.diff(samples.integral(time)) / self.grid.step + offset
         now = samples.at(time)
         slope = -np.diff(now) / self.grid.step
         return np.repeat(mean, 2), np.repeat(slope, 2)
@@ -177,4 +188,5 @@ def make_grid(
             if gap > max_step
         ]
         time = np.sort(np.concatenate([time, *extra]))
-    return Grid(recording, time, samples, outputs, np.searchsorted(time, read_time), table[taken])
+    spread = {name: s for name in samples if (s := campaign.channels[name].spread) > 0}
+    return Grid(recording, time, samples, outputs, np.searchsorted(time, read_time), table[taken], spread)

@@ -5,7 +5,7 @@ terms.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,12 +96,7 @@ def start_values(system: System, values: Mapping[str, float]) -> Array:
     """Declared start values (n,): an expression at the first instant, or the first reading of the state's
     channel.
     """
-    first = {name: float(series[0]) for name, series in system.grid.nodes.items()}
-    for i, name in enumerate(system.grid.outputs):
-        read = system.grid.readings[:, i]
-        read = read[np.isfinite(read)]
-        if len(read):
-            first[name] = float(read[0])
+    first = _first(system.grid)
     known: dict[str, float] = {**first, **values}
     out = np.zeros(len(system.states))
     for i, name in enumerate(system.states):
@@ -117,6 +112,31 @@ def start_values(system: System, values: Mapping[str, float]) -> Array:
                 f"which recording '{system.grid.recording}' does not give"
             ) from None
     return out
+
+
+def shifted(system: System, offset: Mapping[str, float]) -> System:
+    """The system with channels moved by constants from what was recorded; all that reads them follows."""
+    grid = system.grid.shifted(offset)
+    return replace(system, grid=grid, ends=Memory(grid, True), nodes=Memory(grid, False))
+
+
+def uncertain(system: System) -> tuple[str, ...]:
+    """Channels known only within a spread that the model uses."""
+    model = system.model
+    used = set(model.inputs).union(*(names(s.start) for s in model.states.values() if s.start is not None))
+    own = {*model.parameters, *model.states}
+    return tuple(name for name in system.grid.spread if name in used - own)
+
+
+def _first(grid: Grid) -> dict[str, float]:
+    """Channels at the first instant, outputs at their first reading."""
+    first = {name: float(series[0]) for name, series in grid.nodes.items()}
+    for i, name in enumerate(grid.outputs):
+        read = grid.readings[:, i]
+        read = read[np.isfinite(read)]
+        if len(read):
+            first[name] = float(read[0])
+    return first
 
 
 def _state_ends(system: System, x: Array) -> dict[str, Array]:
@@ -238,7 +258,8 @@ def sensitivities(
     Columns stand in this order: `parameters`, `starts` (start values of states), candidate owners 0, 1, ...
 
     Args:
-        parameters: names of parameters.
+        parameters: names of parameters, or of channels that move by a constant (start values declared from
+            them move along).
         starts: names of states whose start value moves.
         candidates: forcing pieces of candidate terms.
         count: number of candidate owners; default the largest owner plus one.
@@ -271,12 +292,12 @@ def sensitivities(
     start = np.zeros((n, total))
     for k, name in enumerate(starts):
         start[system.states.index(name), len(parameters) + k] = 1.0
-    for i, state in enumerate(
-        system.model.states.values()
-    ):  # a start that a parameter sets, unless it moves freely
-        if state.start is not None and not wanted.isdisjoint(names(state.start)) and state.name not in starts:
-            first = {name: float(series[0]) for name, series in system.grid.nodes.items()}
-            for name, slope in evaluate(state.start, {**first, **trajectory.values}, wanted).partials.items():
+    for i, state in enumerate(system.model.states.values()):
+        # a start that a parameter sets, unless it moves freely; around a channel it moves freely with it
+        by = wanted & system.grid.spread.keys() if state.name in starts else wanted
+        if state.start is not None and not by.isdisjoint(names(state.start)):
+            known = {**_first(system.grid), **trajectory.values}
+            for name, slope in evaluate(state.start, known, frozenset(by)).partials.items():
                 start[i, parameters.index(name)] = float(np.mean(slope))
     stacked = np.array(series).reshape(len(series), steps, 2)
     left = np.ascontiguousarray(stacked[:, :, 0].T)

@@ -79,7 +79,7 @@ def stretch(slow_share: float, times: Array) -> float:
 def settle_starts(problem: Problem) -> tuple[list[Array], list[Array]]:
     """Two Gauss-Newton steps on the start values alone: residuals (R, Y) and Jacobians (R, Y, U)."""
     theta = problem.start
-    starts = [i for i, u in enumerate(problem.unknowns) if u.is_start]
+    starts = [i for i, u in enumerate(problem.unknowns) if u.is_nuisance]
     for last in (False, False, True):
         trajectories = [problem.run(system, theta) for system in problem.systems]
         residuals = [problem.residual(t) for t in trajectories]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
 from discovery.errors import UserError
-from discovery.fitting.noise import Noise, white_noise, whiten
+from discovery.fitting.noise import Noise, innovations, readings_as_one, white_noise, whiten
 from discovery.fitting.problem import Problem, make_problem
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -40,6 +40,7 @@ class Fit:
     cost: float  # half the sum of squared whitened residuals and priors
     unidentified: tuple[str, ...]  # one sentence for each parameter that these recordings do not tell
     seconds: float
+    together: float = 1.0  # readings that count as one against what is known of inputs with a spread
 
     @property
     def model(self) -> Model:
@@ -54,6 +55,15 @@ class Fit:
     def residuals(self) -> dict[str, Array]:
         """Readings minus model by recording, (R, Y)."""
         return {t.system.grid.recording: self.problem.residual(t) for t in self.trajectories}
+
+    @property
+    def offsets(self) -> dict[str, dict[str, tuple[float, float]]]:
+        """By channel known only within a spread and by recording: what it is off by, and standard error."""
+        found: dict[str, dict[str, tuple[float, float]]] = {}
+        for u, value, error in zip(self.problem.unknowns, self.theta, self.standard_errors, strict=True):
+            if u.is_offset and u.recording is not None:
+                found.setdefault(u.name, {})[u.recording] = (float(value), float(error))
+        return found
 
 
 def fit_model(
@@ -73,10 +83,10 @@ def fit_model(
 ) -> Fit:
     """Fit the free parameters and start values of a model to recordings.
 
-    Minimises the sum over recordings of rho(L (y - y_model)) plus ((x0 - start)/start_sd)^2, where L
-    whitens with the noise model. Without `noise` the reading noise is the channel's `noise` where the
-    campaign states it,
-    else it is estimated from the residual.
+    Minimises the sum over recordings of rho(L (y - y_model)) plus ((x0 - start)/start_sd)^2 plus
+    n (offset/spread)^2 for inputs known only within a spread, where L whitens with the noise model and n
+    readings count as one (`readings_as_one`: 1 where the model lacks nothing). Without `noise` the reading
+    noise is the channel's `noise` where the campaign states it, else it is estimated from the residual.
 
     Args:
         model: start values, bounds and which parameters are free.
@@ -94,20 +104,33 @@ def fit_model(
     problem = make_problem(model, campaign, recordings, outputs, grids, priors, belief)
     stated = {name: campaign.channels[name].noise for name in problem.outputs}
     known = guess or {}
-    theta = np.array([u.start if u.is_start else known.get(u.name, u.start) for u in problem.unknowns])
+    theta = np.array([u.start if u.is_nuisance else known.get(u.name, u.start) for u in problem.unknowns])
     given = noise is not None
     current = noise or white_noise(problem.outputs, stated, [s.grid.readings for s in problem.systems])
-    rounds = 1 if given else 3
+    uncertain = any(u.is_offset for u in problem.unknowns)
+    together = 1.0
+    rounds = 1 if given and not uncertain else 3
     solution = None
     for k in range(rounds):
         most = max_rounds if k in (0, rounds - 1) else 15
-        solution = _solve(problem, theta, current, loss, most, tolerance)
+        solution = _solve(problem, theta, current, loss, most, tolerance, together)
         theta = solution.theta
-        if given or k == rounds - 1:
+        if k == rounds - 1 or rounds == 1:
             break
-        updated = white_noise(problem.outputs, stated, [problem.residual(t) for t in solution.trajectories])
-        settled = max(abs(np.log(a / b)) for a, b in zip(updated.white, current.white, strict=True)) < 0.02
-        current = updated
+        left = [problem.residual(t) for t in solution.trajectories]
+        settled = True
+        if not given:
+            updated = white_noise(problem.outputs, stated, left)
+            change = max(abs(np.log(a / b)) for a, b in zip(updated.white, current.white, strict=True))
+            settled, current = change < 0.02, updated
+        if uncertain:
+            before, together = (
+                together,
+                readings_as_one(
+                    [innovations(t, current, r) for t, r in zip(solution.trajectories, left, strict=True)]
+                ),
+            )
+            settled = settled and abs(np.log(together / before)) < 0.1
         if settled:
             break
     assert solution is not None
@@ -118,6 +141,9 @@ def fit_model(
         # (With estimated noise the factor is one by construction.)
         freedom = max(1, sum(int(s.grid.measured.sum()) for s in problem.systems) - len(theta))
         covariance = covariance * max(1.0, 2 * solution.cost / freedom)
+    if uncertain:  # their priors were counted `together` times: back to one
+        times = np.sqrt([together if u.is_offset else 1.0 for u in problem.unknowns])
+        covariance = covariance * np.outer(times, times)
     return Fit(
         problem,
         theta,
@@ -127,6 +153,28 @@ def fit_model(
         solution.cost,
         tuple(lost),
         clock.perf_counter() - began,
+        together,
+    )
+
+
+def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
+    """The fit with its model written in another way: same readings and numbers, nothing is fitted.
+
+    Args:
+        model: has no unknown that the fit has not.
+        campaign: of the recordings.
+    """
+    grids = {s.grid.recording: s.grid for s in fit.problem.systems}
+    problem = make_problem(model, campaign, list(grids), fit.problem.outputs, grids)
+    place = {u.key: i for i, u in enumerate(fit.problem.unknowns)}
+    index = [place[u.key] for u in problem.unknowns]
+    theta = fit.theta[index]
+    return replace(
+        fit,
+        problem=problem,
+        theta=theta,
+        covariance=fit.covariance[np.ix_(index, index)],
+        trajectories=tuple(problem.run(s, theta) for s in problem.systems),
     )
 
 
@@ -139,7 +187,13 @@ class _Solution:
 
 
 def _solve(
-    problem: Problem, theta: Array, noise: Noise, loss: Loss, max_rounds: int, tolerance: float
+    problem: Problem,
+    theta: Array,
+    noise: Noise,
+    loss: Loss,
+    max_rounds: int,
+    tolerance: float,
+    together: float = 1.0,
 ) -> _Solution:
     from scipy.optimize import least_squares
 
@@ -155,12 +209,12 @@ def _solve(
                 guesses[t.system.grid.recording] = t.x
             parts = [whiten(t, noise, problem.residual(t)[:, :, None])[:, 0] for t in trajectories]
             last.clear()
-            last[key] = (np.concatenate([*parts, problem.prior_rows(x)[0]]), trajectories)
+            last[key] = (np.concatenate([*parts, problem.prior_rows(x, together)[0]]), trajectories)
         return last[key]
 
     def jacobian(x: Array) -> Array:
         parts = [whiten(t, noise, -problem.jacobian(t)) for t in run(x)[1]]
-        return np.concatenate([*parts, problem.prior_rows(x)[1]])
+        return np.concatenate([*parts, problem.prior_rows(x, together)[1]])
 
     def residual(x: Array) -> Array:
         try:
@@ -205,7 +259,7 @@ def _covariance(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array,
     index = np.flatnonzero(seen)
     covariance[np.ix_(index, index)] = inverse / np.outer(length[seen], length[seen])
     for i, u in enumerate(problem.unknowns):
-        if u.is_start:
+        if u.is_nuisance:
             continue
         where = f" in recording '{u.recording}'" if u.recording else ""
         if not seen[i]:
@@ -234,7 +288,7 @@ def _fitted_model(fit: Fit) -> Model:
     errors = fit.standard_errors
     parameters = dict(model.parameters)
     for i, u in enumerate(fit.problem.unknowns):
-        if u.is_start:
+        if u.is_nuisance:
             continue
         p = parameters[u.name]
         value = float(fit.theta[i])

@@ -63,6 +63,27 @@ def white_noise(
     return Noise(tuple(outputs), tuple(white))
 
 
+def readings_as_one(residuals: Sequence[Array]) -> float:
+    """How many readings in a row say the same thing once: 1 where residuals (R, Y) (or what a noise model
+    leaves of them) are white, up to R where what the model lacks lasts a whole recording.
+
+    The integrated autocorrelation time, 1 + 2 sum rho(k), about zero and not about the mean, over the lags
+    before rho falls to the noise of its estimate (Sokal, Monte Carlo methods in statistical mechanics, 1997,
+    section 3).
+    """
+    longest = max(len(r) for r in residuals)
+    products = np.zeros(longest)
+    for j in range(residuals[0].shape[1]):
+        size = np.sqrt(np.nanmean(np.concatenate([r[:, j] for r in residuals]) ** 2))
+        for r in residuals:
+            z = np.nan_to_num(np.clip(r[:, j] / max(size, 1e-300), -4.0, 4.0))
+            products[: len(z)] += np.correlate(z, z, "full")[len(z) - 1 :]
+    count = sum(int(np.isfinite(r).sum()) for r in residuals)
+    rho = products / max(products[0], 1e-300)
+    end = int(np.argmax(rho < 2.0 / np.sqrt(max(count, 1)))) or longest
+    return float(min(1.0 + 2.0 * np.sum(rho[1:end]), longest))
+
+
 @njit(cache=True)
 def _filter(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, data):  # type: ignore[no-untyped-def]
     """Whitened data (R * Y rows in reading order, unmeasured rows zero) and half the log-determinant."""
@@ -195,3 +216,10 @@ def whiten(trajectory: Trajectory, noise: Noise, data: Array) -> Array:
             (np.where(measured[:, :, None], data, 0.0) / np.array(noise.white)[None, :, None])[measured]
         )
     return make_filter(trajectory).apply(noise, data)[0]
+
+
+def innovations(trajectory: Trajectory, noise: Noise, residual: Array) -> Array:
+    """What each reading (R, Y) says beyond those before it, in its standard deviations; NaN where none is."""
+    out = np.full(residual.shape, np.nan)
+    out[trajectory.system.grid.measured] = whiten(trajectory, noise, residual[:, :, None])[:, 0]
+    return out

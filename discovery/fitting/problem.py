@@ -18,7 +18,7 @@ from discovery.dynamics import (
     simulate,
     start_values,
 )
-from discovery.dynamics.system import predict
+from discovery.dynamics.system import predict, shifted, uncertain
 from discovery.models import Model, expanded
 from discovery.recordings import Campaign
 from discovery.terms import names
@@ -28,8 +28,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """One number to find: a parameter (of one recording, or common: ``recording=None``) or a start value of
-    a state.
+    """One number to find: a parameter (of one recording, or common: ``recording=None``), a start value of
+    a state, or the offset of an input known only within a spread.
+
+    Where a start is declared from an input with an offset, its number is the one at offset 0: the start moves
+    with the input, and the priors of both stay independent.
     """
 
     name: str
@@ -40,6 +43,17 @@ class Unknown:
     high: float
     prior: tuple[float, float] | None = None  # mean and standard deviation
     belief: float | None = None  # the start value is believed within a factor exp(belief), with heavy tails
+    is_offset: bool = False  # `name` is the channel
+
+    @property
+    def key(self) -> tuple[str, str | None, bool, bool]:
+        """What tells it from the others."""
+        return self.name, self.recording, self.is_start, self.is_offset
+
+    @property
+    def is_nuisance(self) -> bool:
+        """Whether this is of one recording's circumstances, not of the model."""
+        return self.is_start or self.is_offset
 
 
 @dataclass(frozen=True)
@@ -69,13 +83,20 @@ class Problem:
         """Indices of the unknowns that act in a recording."""
         return [i for i, u in enumerate(self.unknowns) if u.recording in (None, system.grid.recording)]
 
-    def prior_rows(self, theta: Array) -> tuple[Array, Array]:
-        """What priors and beliefs add to the least squares: residual (K,) and its derivative (K, U)."""
+    def prior_rows(self, theta: Array, together: float = 1.0) -> tuple[Array, Array]:
+        """What priors and beliefs add to the least squares: residual (K,) and its derivative (K, U).
+
+        Args:
+            together: readings that count as one (`readings_as_one`). A thousand of them in a row that are
+                off by what the model lacks must not outvote what is known of an input: its prior counts as
+                often.
+        """
         rows: list[float] = []
         slopes: list[tuple[int, float]] = []
         for i, u in enumerate(self.unknowns):
             if u.prior:
                 mean, sd = u.prior
+                sd /= np.sqrt(together) if u.is_offset else 1.0
                 rows.append((theta[i] - mean) / sd)
                 slopes.append((i, 1.0 / sd))
             elif u.belief:
@@ -91,17 +112,22 @@ class Problem:
         """Parameter values in a recording."""
         out = self.model.values(system.grid.recording)
         for i in self.concerns(system):
-            if not self.unknowns[i].is_start:
+            if not self.unknowns[i].is_nuisance:
                 out[self.unknowns[i].name] = float(theta[i])
         return out
 
     def run(self, system: System, theta: Array, guess: Array | None = None) -> Trajectory:
         """Free run of a recording with the unknowns at `theta`."""
         values = self.values(system, theta)
+        mine = [(self.unknowns[i], float(theta[i])) for i in self.concerns(system)]
         start = start_values(system, values)
-        for i in self.concerns(system):
-            if self.unknowns[i].is_start:
-                start[system.states.index(self.unknowns[i].name)] = theta[i]
+        declared = start.copy()
+        for u, value in mine:
+            if u.is_start:
+                start[system.states.index(u.name)] = value
+        if offset := {u.name: value for u, value in mine if u.is_offset}:
+            system = shifted(system, offset)
+            start += start_values(system, values) - declared
         return simulate(system, values, start, guess)
 
     def residual(self, trajectory: Trajectory) -> Array:
@@ -112,6 +138,7 @@ class Problem:
         """dy/d(unknowns) of a recording, (R, Y, U), zero for unknowns of other recordings."""
         system = trajectory.system
         mine = self.concerns(system)
+        # sensitivities() takes the channel of an offset like a parameter
         parameters = [self.unknowns[i].name for i in mine if not self.unknowns[i].is_start]
         starts = [self.unknowns[i].name for i in mine if self.unknowns[i].is_start]
         dy = sensitivities(trajectory, parameters, starts)
@@ -154,7 +181,7 @@ def make_problem(
         grid = grids.get(recording) if grids else None
         if grid is None or not set(inputs) <= set(grid.samples) or grid.outputs != tuple(outputs):
             grid = make_grid(campaign, recording, inputs, outputs)
-        systems.append(make_system(model, grid))
+        systems.append(make_system(model, grid.shifted({}) if grid.offset else grid))
     unknowns = []
     for name in model.free:
         p = model.parameters[name]
@@ -174,6 +201,11 @@ def make_problem(
                 unknowns.append(
                     Unknown(state.name, system.grid.recording, True, float(value), -np.inf, np.inf, prior)
                 )
+        unknowns += [
+            Unknown(n, system.grid.recording, False, 0.0, -np.inf, np.inf, (0.0, sd), is_offset=True)
+            for n in uncertain(system)
+            if (sd := system.grid.spread[n])
+        ]
     return Problem(model, tuple(systems), tuple(unknowns))
 
 

@@ -50,7 +50,7 @@ class Lens:
     @cached_property
     def priors(self) -> tuple[Array, Array]:
         """What priors add to the least squares: residual (K,) and derivative (K, U)."""
-        return self.fit.problem.prior_rows(self.fit.theta)
+        return self.fit.problem.prior_rows(self.fit.theta, self.fit.together)
 
     @cached_property
     def filters(self) -> list[Filter]:
@@ -97,6 +97,7 @@ class Lens:
         if len(residual):
             r[-len(residual) :], x[-len(residual) :] = -residual, slope
         logdet += sum(np.log(u.prior[1]) for u in self.fit.problem.unknowns if u.prior)
+        logdet -= 0.5 * np.log(self.fit.together) * sum(u.is_offset for u in self.fit.problem.unknowns)
         x = x[:, self.moving]
         scale = np.maximum(np.linalg.norm(x, axis=0), 1e-30)
         basis, triangle = np.linalg.qr(x / scale)

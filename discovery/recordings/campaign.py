@@ -25,13 +25,17 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Channel:
-    """`unit` is the canonical one, `noise` (standard deviation of a reading) is in it."""
+    """`unit` is the canonical one, `noise` (standard deviation of a reading) and `spread` are in it.
+
+    `spread`: standard deviation of the unknown constant by which an input is off in a recording; 0: known.
+    """
 
     name: str
     role: str
     unit: str
     noise: float | None
     between: Between
+    spread: float = 0.0
 
     @property
     def measured(self) -> bool:
@@ -93,9 +97,10 @@ def load_campaign(path: str | os.PathLike[str], only: Collection[str] | None = N
 
 
 def make_channel(name: str, form: ChannelForm, to: Conversion) -> Channel:
-    """A channel in its canonical unit; noise is a difference, so it takes the factor alone."""
+    """A channel in its canonical unit; noise and spread are differences, so they take the factor alone."""
     noise = None if form.noise is None else form.noise * abs(to.factor)
-    return Channel(name, form.role, to.unit, noise, form.between or ROLES[form.role].between)
+    spread = (form.spread or 0.0) * abs(to.factor)
+    return Channel(name, form.role, to.unit, noise, form.between or ROLES[form.role].between, spread)
 
 
 def wanted_columns(form: RecordingForm, channels: Mapping[str, ChannelForm]) -> dict[str, str]:

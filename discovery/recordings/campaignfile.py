@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from discovery.recordings.roles import CORRECTION, Between, Role
+from discovery.recordings.roles import CORRECTION, ROLES, Between, Role
 from discovery.schema import Strict
 
 _FUNCTIONS = ("abs", "min", "max", "exp", "log", "sqrt", "sign", "where", "tanh", "delay", "lag", "play")
@@ -36,6 +36,13 @@ class ChannelForm(Strict):
     role: Role
     unit: str = Field(description="a unit that pint knows")
     noise: float | None = Field(None, gt=0, description="standard deviation of a reading, in the unit")
+    spread: float | None = Field(
+        None,
+        gt=0,
+        allow_inf_nan=False,
+        description="of an input: in each recording its values are off by one unknown constant with this "
+        "standard deviation, in the unit (a difference); a fit finds it",
+    )
     between: Between | None = Field(None, description="what the value does between stamps")
     column: str | None = Field(None, description="the header in the files, when it is not the channel's name")
     corrects: str | None = Field(
@@ -56,6 +63,15 @@ class ChannelForm(Strict):
             raise ValueError(
                 f"{' and '.join(given)} belong to the role '{CORRECTION}' alone; "
                 f"take them away or change the role"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _inputs_alone_spread(self) -> Self:
+        if self.spread is not None and (ROLES[self.role].measured or self.role == CORRECTION):
+            raise ValueError(
+                f"spread belongs to inputs of models, not to the role '{self.role}'; "
+                "take it away (the noise of readings is noise)"
             )
         return self
 

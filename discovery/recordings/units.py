@@ -28,7 +28,7 @@ class UnitError(ValueError):
 
 @dataclass(frozen=True)
 class Conversion:
-    """canonical value = factor * value + offset; a difference (noise) takes the factor alone."""
+    """canonical value = factor * value + offset; a difference (noise, spread) takes the factor alone."""
 
     unit: str
     factor: float = 1.0

@@ -132,7 +132,7 @@ def update_belief(
         next(i for i, u in enumerate(problem.unknowns) if u.name == n and not u.is_start)
         for n in belief.parameters
     ]
-    starts = [i for i, u in enumerate(problem.unknowns) if u.is_start]
+    starts = [i for i, u in enumerate(problem.unknowns) if u.is_nuisance]
     grid = problem.systems[0].grid
     alike = stretch(belief.slow_share, grid.time[grid.read])
     weights = 1.0 / np.array([levels[n] for n in outputs]) / np.sqrt(alike)

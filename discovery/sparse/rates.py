@@ -159,12 +159,17 @@ def evidence(fit: Fit, blocks: Blocks) -> Evidence:
             rows = np.isfinite(residual) & (block == b)[:, None]
             j = jacobian[rows]
             found[b] = gram(j, residual[rows] + j @ theta)
-    priors = [problem.unknowns[i].prior for i in order[common:]]
+    rest = [problem.unknowns[i] for i in order[common:]]
     chosen = [problem.unknowns[i] for i in order[:common]]
     return Evidence(
         tuple(u.name for u in chosen),
         tuple(found),
-        np.array([0.0 if prior is None else prior[1] ** -2.0 for prior in priors]),
+        np.array(
+            [
+                0.0 if u.prior is None else u.prior[1] ** -2.0 * (fit.together if u.is_offset else 1.0)
+                for u in rest
+            ]
+        ),
         np.array([u.low for u in chosen]),
         np.array([u.high for u in chosen]),
     )

@@ -83,7 +83,10 @@ def _evaluate(
             duration = _evaluate(seconds, values, wrt, memory)
             assert memory is not None
             late, slope = memory.delayed(channel, float(np.mean(duration.value)))
-            return Dual(late, {name: slope * partial for name, partial in duration.partials.items()})
+            partials: dict[str, Value] = {n: slope * p for n, p in duration.partials.items()}
+            if channel in wrt:  # a channel that moves by a constant moved as much a while ago
+                partials[channel] = partials.get(channel, 0.0) + 1.0
+            return Dual(late, partials)
         case Apply(function="lag", arguments=(inner, tau)) if memory is not None:
             # A model's own lags are states (models.expanded); this one serves candidates, seen along a given
             # trajectory.

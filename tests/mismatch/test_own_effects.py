@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from discovery.errors import UserError
 from discovery.experiment import diagnose, diagnosis
 from discovery.experimentfile import load_experiment
-from discovery.models import write_model
+from discovery.models import read_model, write_model
 from tests.mismatch.machine import CHANNELS, Array, Inputs, model, simulated
 
 RUB = """
@@ -67,6 +68,27 @@ def test_an_effect_in_the_experiment_file_is_found(tmp_path: Path) -> None:
     assert found["improvement"]["explained"] > 0.9
     assert answer.repaired is not None
     assert [t.effect for t in answer.repaired.terms if t.effect] == ["rub"]
+
+
+def test_the_repaired_model_that_is_written_is_the_one_that_was_proved(tmp_path: Path) -> None:
+    """The numbers of diagnosis.json stand in the model file; its free run is the one of the improvement."""
+    folder = diagnose(experiment(tmp_path, RUB), tmp_path / "out")
+    said = json.loads((folder / "diagnosis.json").read_text())
+    model = read_model(folder / "models" / "repaired.toml")
+    for name, p in said["physics"][0]["parameters"].items():
+        written = model.parameters[name]
+        assert written.low is not None
+        assert written.high is not None
+        assert written.value == pytest.approx(p["value"], rel=1e-3)
+        # the diagnosis may allow for the form of its law on top of what the readings leave open
+        assert p["low"] <= written.low * 1.001
+        assert p["high"] >= written.high * 0.999
+    results = json.loads((folder / "results.json").read_text())
+    scores = results["models"]["repaired"]["recordings"]["r3"]
+    noise = results["models"]["repaired"]["noise"]
+    unit = np.mean(np.square(list(noise.values())))
+    rms = np.sqrt(np.mean([(s["rms"] / noise[y]) ** 2 for y, s in scores.items()]) * unit)
+    assert said["improvement"]["held_out"]["r3"]["rms_after"] == pytest.approx(rms, rel=1e-3)
 
 
 MISTAKES = {

@@ -119,6 +119,29 @@ def test_each_trouble_is_found_where_it_is(write: Write, data: str | bytes | lis
 
 
 @pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("-1.0", "should be greater than 0, not -1.0"),
+        ("0", "should be greater than 0, not 0"),
+        ("nan", "should be"),
+        ("inf", "should be a finite number, not inf"),
+        ('"1 K"', "should be a valid number"),
+    ],
+)
+def test_a_spread_is_a_positive_number(write: Write, given: str, said: str) -> None:
+    told = found(write(campaign=CAMPAIGN.replace('"degC"', f'"degC", spread = {given}')))
+    assert any(
+        line.startswith("error: campaign.toml, line 4: channels.T_env") and said in line for line in told
+    ), told
+
+
+def test_a_spread_belongs_to_inputs(write: Write) -> None:
+    told = found(write(campaign=CAMPAIGN.replace("noise = 0.5", "spread = 0.5")))
+    wanted = "error: campaign.toml, line 6: channels.E_Y0C: spread belongs to inputs of models, not to"
+    assert any(line.startswith(wanted) and "take it away" in line for line in told), told
+
+
+@pytest.mark.parametrize(
     ("mixed", "trouble"), [("08:00:00", "some stamps name a time zone"), ("25:00", "is no ISO")]
 )
 def test_instants_that_do_not_fit_together(write: Write, mixed: str, trouble: str) -> None:

@@ -47,6 +47,13 @@ def test_a_noise_is_a_difference_of_temperatures(write: Write) -> None:
     assert campaign.channels["T_env"].noise == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize(("unit", "spread"), [("degC", 1.8), ("K", 1.8), ("degF", 1.0)])
+def test_a_spread_is_a_difference_of_temperatures(write: Write, unit: str, spread: float) -> None:
+    campaign = load_campaign(write(campaign=CAMPAIGN.replace('"degC"', f'"{unit}", spread = 1.8')))
+    assert campaign.channels["T_env"].spread == pytest.approx(spread)
+    assert campaign.channels["speed"].spread == 0.0
+
+
 @pytest.mark.parametrize("packed", [False, True])
 def test_gzip_byte_order_mark_and_windows_line_ends(write: Write, packed: bool) -> None:
     data = b"\xef\xbb\xbf" + "\r\n".join(rows()).encode()

@@ -1,0 +1,185 @@
+"""An input known only within a spread: what a fit makes of it, what a first reading tells of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from discovery.dynamics import make_grid, make_system, sensitivities, simulate, start_values
+from discovery.dynamics.system import predict, shifted
+from discovery.fitting import fit_model, make_problem, predict_recording
+from discovery.fitting.fit import written_with
+from discovery.fitting.noise import readings_as_one
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
+
+Array = NDArray[np.float64]
+CHANNELS = {
+    "load": Channel("load", "heat load", "W", None, "held"),
+    "room": Channel("room", "ambient temperature", "degC", None, "linear", 1.0),
+    "T": Channel("T", "temperature", "degC", 0.2, "linear"),
+}
+TRUTH = {"g": 0.002, "h": 0.0015}
+START_SD, NOISE = 0.4, 0.2
+
+
+def cold(rng: np.random.Generator, name: str, off: float | None = None, count: int = 240) -> Recording:
+    """A body that starts cold in a room that is `off` from the 23 degC that everybody believes.
+
+    dT/dt = h (room - T) + g load, exactly, the load held over 30 s.
+    """
+    off = float(rng.normal(0.0, 1.0)) if off is None else off
+    time, load = (
+        np.arange(count, dtype=float) * 30.0,
+        np.repeat(rng.choice([0.0, 10.0, 25.0], count // 20), 20),
+    )
+    body: Array = np.empty(count)
+    body[0] = 23.0 + off + rng.normal(0.0, START_SD)
+    keep = np.exp(-TRUTH["h"] * 30.0)
+    for k in range(1, count):
+        rest = 23.0 + off + TRUTH["g"] / TRUTH["h"] * load[k - 1]
+        body[k] = rest + (body[k - 1] - rest) * keep
+    read: Array = body + NOISE * rng.standard_normal(count)
+    return Recording(name, time, {"load": load, "room": np.full(count, 23.0), "T": read}, f"{off:.12g}")
+
+
+def campaign(*recordings: Recording, spread: float = 1.0) -> Campaign:
+    channels = CHANNELS | {"room": replace(CHANNELS["room"], spread=spread)}
+    return Campaign("c", channels, {r.name: r for r in recordings})
+
+
+def model(start: str = "room", start_sd: float = START_SD) -> Model:
+    parameters = {"g": Parameter(0.003, "K/W/s", 0.0), "h": Parameter(0.001, "1/s", 0.0)}
+    state = State("T", "degC", None, parse(start), start_sd, 1.0)
+    terms = tuple(Term(e, "T", parse(e)) for e in ("h*(room - T)", "g*load"))
+    return Model("body", parameters, {"T": state}, terms, {})
+
+
+def test_parameters_and_rooms_lie_in_their_intervals_19_times_in_20() -> None:
+    """40 campaigns of 4 recordings, each in a room of its own: pooled coverage of 95 % intervals."""
+    inside = dict.fromkeys(("parameters", "rooms"), 0)
+    runs, each = 40, 4
+    for seed in range(runs):
+        rng = np.random.default_rng(seed)
+        rooms = [cold(rng, f"r{i}") for i in range(each)]
+        fit = fit_model(model(), campaign(*rooms), [r.name for r in rooms])
+        for name, value in TRUTH.items():
+            p = fit.model.parameters[name]
+            assert p.low is not None
+            assert p.high is not None
+            inside["parameters"] += p.low <= value <= p.high
+        for r in rooms:
+            found, error = fit.offsets["room"][r.name]
+            inside["rooms"] += abs(found - float(r.note)) <= 1.96 * error
+    assert 0.90 <= (inside["parameters"] + inside["rooms"]) / (runs * (each + 2)) <= 0.98, inside
+
+
+def test_a_room_taken_for_certain_spoils_what_a_spread_keeps() -> None:
+    rng = np.random.default_rng(1)
+    rooms = [cold(rng, f"r{i}", off) for i, off in enumerate((1.5, -1.2, 1.8))]
+    names = [r.name for r in rooms]
+    off = {
+        s: fit_model(model(), campaign(*rooms, spread=s), names).model.parameters["h"].value for s in (0, 1)
+    }
+    assert off[1] == pytest.approx(TRUTH["h"], rel=0.02)
+    assert abs(off[0] - TRUTH["h"]) > 3 * abs(off[1] - TRUTH["h"])
+
+
+def test_an_unseen_run_takes_its_room_from_the_first_reading_alone() -> None:
+    """Bayes by hand: first reading 24.5 of noise 0.2 on a start spread of 0.4 and a room spread of 1."""
+    r = cold(np.random.default_rng(2), "r", 1.5)
+    r.values["T"][0] = 24.5
+    fitted = model().with_values(TRUTH)
+    run = predict_recording(fitted, campaign(r), "r", ["T"], [NOISE])
+    gain = 1.0 / (1.0 + START_SD**2 + NOISE**2)
+    assert run.system.grid.offset["room"] == pytest.approx(1.5 * gain)
+    assert run.x[0, 0] == pytest.approx(23.0 + 1.5 * gain * (1.0 + START_SD**2))
+    later = replace(r, values={**r.values, "T": np.concatenate([r.values["T"][:1], r.values["T"][1:] + 9.0])})
+    again = predict_recording(fitted, campaign(later), "r", ["T"], [NOISE])
+    assert np.array_equal(run.x, again.x)
+
+
+def test_without_a_spread_nothing_is_estimated() -> None:
+    r = cold(np.random.default_rng(3), "r", 0.7)
+    fit = fit_model(model(), campaign(r, spread=0.0), ["r"])
+    assert fit.offsets == {}
+    assert fit.together == 1.0
+    assert not any(u.is_offset for u in fit.problem.unknowns)
+
+
+def test_the_offset_is_no_parameter_of_the_fitted_model() -> None:
+    r = cold(np.random.default_rng(4), "r", 0.7)
+    fit = fit_model(model(), campaign(r), ["r"])
+    assert set(fit.model.parameters) == {"g", "h"}
+    assert [u.name for u in fit.problem.unknowns if u.is_offset] == ["room"]
+    assert fit.trajectories[0].at_ends()["room"][0] == pytest.approx(23.0 + fit.offsets["room"]["r"][0])  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    "loss", ["h*(room - T)", "h*(delay(room, 90) - T)", "h*lag(room - T, 200)", "h*(max(room, 20) - T)"]
+)
+@pytest.mark.parametrize("start", ["room", "where(room > 20, 2*room - 23, T)", "23"])
+@pytest.mark.parametrize("start_sd", [0.0, 0.5])
+def test_sensitivities_to_the_offset_against_differences(loss: str, start: str, start_sd: float) -> None:
+    base = model(start, start_sd)
+    base = replace(base, terms=(Term("loss", "T", parse(loss)), base.terms[1])).with_values(TRUTH)
+    problem = make_problem(base, campaign(cold(np.random.default_rng(5), "r")), ["r"])
+    theta, index = problem.start, [u.is_offset for u in problem.unknowns].index(True)
+    found = problem.jacobian(problem.run(problem.systems[0], theta))[:, 0, index]
+    step = np.zeros(len(theta))
+    step[index] = 1e-3
+    up, down = (predict(problem.run(problem.systems[0], theta + s * step))[:, 0] for s in (1.0, -1.0))
+    assert found == pytest.approx((up - down) / 2e-3, abs=1e-4 * np.max(np.abs(found)) + 1e-9)
+
+
+def test_shifting_a_system_is_recording_other_values() -> None:
+    r = cold(np.random.default_rng(6), "r", 0.0)
+    warm = replace(r, values={**r.values, "room": r.values["room"] + 0.8})
+    both = []
+    for one, offset in ((r, 0.8), (warm, 0.0)):
+        system = make_system(model(), make_grid(campaign(one), "r", ["load", "room"], ["T"]))
+        system = shifted(shifted(system, {"room": 5.0}), {"room": offset})  # the last word counts
+        both.append(simulate(system, TRUTH, start_values(system, TRUTH)))
+    assert both[0].x == pytest.approx(both[1].x)
+    assert sensitivities(both[0], ["room"]) == pytest.approx(sensitivities(both[1], ["room"]))
+
+
+def test_a_lasting_misfit_does_not_outvote_what_is_known_of_a_room() -> None:
+    """The model lacks a constant 8 K: it is not put down to a room that is known within 1 K."""
+    r = cold(np.random.default_rng(7), "r", 0.0)
+    lifted = replace(r, values={**r.values, "T": r.values["T"] + 8.0 * (r.time > 600.0)})
+    unstated = campaign(lifted)
+    unstated = replace(unstated, channels={**CHANNELS, "T": replace(CHANNELS["T"], noise=None)})
+    fixed = {n: Parameter(v, fixed=True) for n, v in TRUTH.items()}
+    fit = fit_model(replace(model(), parameters=fixed), unstated, ["r"])
+    assert fit.together > 50
+    assert abs(fit.offsets["room"]["r"][0]) < 1.0
+
+
+def test_readings_that_count_as_one() -> None:
+    """White: one. A first-order process of decay a: (1 + a)/(1 - a). A constant: all of them."""
+    rng = np.random.default_rng(8)
+    white = rng.standard_normal((4000, 2))
+    assert readings_as_one([white]) == pytest.approx(1.0, abs=0.2)
+    slow = white.copy()
+    for k in range(1, len(slow)):
+        slow[k] += 0.8 * slow[k - 1]
+    assert readings_as_one([slow[:2000], slow[2000:]]) == pytest.approx(9.0, rel=0.2)
+    assert readings_as_one([np.ones((300, 1))]) > 290
+    assert readings_as_one([np.zeros((10, 1))]) == 1.0
+
+
+def test_a_fit_written_another_way_keeps_its_numbers() -> None:
+    rooms = [cold(np.random.default_rng(seed), f"r{seed}") for seed in (9, 10)]
+    seen = campaign(*rooms)
+    fit = fit_model(model(), seen, ["r9", "r10"])
+    twin = replace(fit.model, terms=(Term("both", "T", parse("g*load + h*(room - T)")),))
+    again = written_with(fit, twin, seen)
+    assert again.model.parameters == fit.model.parameters
+    assert again.offsets == fit.offsets
+    for a, b in zip(again.trajectories, fit.trajectories, strict=True):
+        assert a.x == pytest.approx(b.x)
