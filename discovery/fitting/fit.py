@@ -287,6 +287,7 @@ def _fitted_model(fit: Fit) -> Model:
     model = fit.problem.model
     errors = fit.standard_errors
     parameters = dict(model.parameters)
+    fitted = {system.grid.recording for system in fit.problem.systems}
     for i, u in enumerate(fit.problem.unknowns):
         if u.is_nuisance:
             continue
@@ -294,9 +295,11 @@ def _fitted_model(fit: Fit) -> Model:
         value = float(fit.theta[i])
         if u.recording is not None:
             values = {**p.values, u.recording: value}
-            parameters[u.name] = replace(
-                p, values=values, value=float(np.mean(list(values.values()))), low=None, high=None
-            )
+            given = model.parameters[u.name].values
+            # the common value of an event of one recording keeps it out of all others: it stays
+            mean = not given or fitted <= given.keys()
+            common = float(np.mean(list(values.values()))) if mean else p.value
+            parameters[u.name] = replace(p, values=values, value=common, low=None, high=None)
             continue
         half = Z95 * float(errors[i])
         interval = (max(value - half, p.min), min(value + half, p.max)) if np.isfinite(half) else (None, None)

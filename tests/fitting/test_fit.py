@@ -139,6 +139,16 @@ def test_a_parameter_of_each_recording() -> None:
     assert fitted.parameters["a"].value == pytest.approx(0.5, rel=0.03)
 
 
+def test_an_event_of_one_recording_stays_out_of_all_others() -> None:
+    """The load heats more in one recording; the others, unseen ones too, keep the common value."""
+    more = Parameter(0.0, per_recording=True, values={"r1": 0.001})
+    event = model().with_terms(Term("event", "y", parse("more*u")), parameters={"more": more})
+    both = campaign(recording(0, g=0.02), recording(1, g=0.03))
+    found = fit_model(event, both, ["r0", "r1"]).model.parameters["more"]
+    assert found.values["r1"] == pytest.approx(0.01, rel=0.1)
+    assert found.at("r0") == found.at("unseen") == 0.0
+
+
 def test_start_values_are_found_within_their_spread() -> None:
     r = recording(0, noise=0.05)
     shifted = replace(r, values={**r.values, "y": r.values["y"] + 1.5 * np.exp(-0.5 * r.time / 3600)})
