@@ -100,7 +100,11 @@ class ExperimentForm(Strict):
 
     name: Annotated[str, AfterValidator(_file_name)]
     campaign: str = Field(description="campaign file or its folder, relative to the experiment file")
-    outputs: list[str] | None = Field(None, min_length=1, description="default: every channel of role error")
+    outputs: list[str] | None = Field(
+        None,
+        min_length=1,
+        description="default: every channel of role error, else of role temperature",
+    )
     fit: list[str] = Field(min_length=1, description="recordings that fits may see")
     held_out: list[str] = Field([], description="recordings that nothing sees before the end")
     cross_validate: bool = Field(
@@ -181,11 +185,12 @@ def load_experiment(path: str | os.PathLike[str]) -> Experiment:
     path = Path(path)
     form = read_toml(path, ExperimentForm)
     campaign = load_campaign(path.parent / form.campaign, only=_recordings(path, form))
-    outputs = form.outputs or [c.name for c in campaign.channels.values() if c.role == "error"]
+    outputs = form.outputs or _of_role(campaign, "error") or _of_role(campaign, "temperature")
     if not outputs:
+        measured = ", ".join(c.name for c in campaign.channels.values() if c.measured)
         raise UserError(
-            f'{path}: no channel of {campaign.path} has the role "error"; say outputs = [...] '
-            f"with some of {', '.join(c.name for c in campaign.channels.values() if c.measured)}"
+            f'{path}: no channel of {campaign.path} has the role "error" or "temperature"; '
+            f"say outputs = [...] with some of {measured}"
         )
     _check(path, form, campaign, outputs)
     return Experiment(form, path, campaign, tuple(outputs))
@@ -208,6 +213,10 @@ def _recordings(path: Path, form: ExperimentForm) -> list[str]:
 def separate(entry: ModelEntry) -> Mapping[str, list[str]]:
     """Input -> recordings of its own, where a superposition names them."""
     return (isinstance(entry, SuperpositionEntry) and entry.separate) or {}
+
+
+def _of_role(campaign: Campaign, role: str) -> list[str]:
+    return [c.name for c in campaign.channels.values() if c.role == role]
 
 
 def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collection[str]) -> None:

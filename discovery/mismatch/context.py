@@ -53,11 +53,11 @@ class Context:
     def minor(self, h: Hypothesis) -> tuple[float, ...]:
         """Size of each amplitude below which an effect is the coarseness of a model with few bodies.
 
-        A tenth of the usual size; where the model is of another scale than the catalogue's machines (its
-        flows bound the spread), a fiftieth of that bound.
+        A seventh of the usual size; the smaller the model is than the catalogue's machines (its flows bound
+        the spread), the less of that bound, down to a fiftieth.
         """
         usual = h.effect.amplitude.plausible
-        return tuple(0.1 * sd if sd >= usual else 0.02 * sd for sd in self.spread(h))
+        return tuple((0.02 + 0.13 * min(1.0, 2 * sd / usual)) * sd for sd in self.spread(h))
 
     def spread(self, h: Hypothesis) -> tuple[float, ...]:
         """Prior standard deviation of each amplitude: plausible, but no more than the model's own flows."""

@@ -19,6 +19,7 @@ from discovery.mismatch.lens import Lens, View
 Array = NDArray[np.float64]
 
 COARSE = 60  # steps per recording in the first look
+LEAST = 4  # readings before and after a jump: fewer are single wrong readings
 FINE = 8  # steps on each side of an edge in the second
 
 
@@ -124,15 +125,18 @@ def _jumps(
             out[:, y, y * len(instants) : (y + 1) * len(instants)] = steps
         return whiten_one(lens, view, run, out)
 
-    found = []
-    coarse = read_time[every::every]
+    found: list[Hypothesis] = []
+    last = len(read_time) - LEAST
+    coarse = read_time[max(every, LEAST) : last : every]
+    if not len(coarse):
+        return found
     first = columns(coarse)
     for h in group:
         rows = [grid.outputs.index(name) for name in h.shown]
         sd = [spread[a] for a in h.amplitudes]
         k = _best_jump(view, first, rows, len(coarse), sd)
         centre = int(np.searchsorted(read_time, coarse[k]))
-        near = read_time[max(1, centre - every) : centre + every + 1]
+        near = read_time[max(LEAST, centre - every) : min(centre + every + 1, last)]
         k = _best_jump(view, columns(near), rows, len(near), sd)
         (name,) = h.shapes
         found.append(replace(h.at({name: float(near[k])}), cost=float(np.log(COARSE))))

@@ -32,9 +32,13 @@ def objections(best: Assessment, h: Hypothesis, gain: float) -> list[str]:
 
 
 def bent(attempt: Assessment, h: Hypothesis) -> str | None:
-    """A sentence when a shape parameter presses against the end of its physical range: another law is at
-    work.
+    """A sentence when a size or a shape parameter presses against the end of its physical range: another law
+    is at work.
     """
+    most = h.effect.amplitude.most
+    for name in h.amplitudes if most < np.inf else ():
+        if abs(attempt.fit.model.parameters[name].value) > most * (1 - PRESSED):
+            return f"{h.effect.word} would need {name} = {most:g}, the most that is physical"
     for name, shape in zip(h.shapes, h.effect.shapes, strict=True):
         p = attempt.fit.model.parameters[name]
         value = p.values.get(h.recording or "", p.value)

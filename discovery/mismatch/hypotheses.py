@@ -7,7 +7,9 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 from discovery.mismatch.catalogue.effect import ROLE_OF, Effect
+from discovery.mismatch.places import places
 from discovery.models import Model, Parameter
+from discovery.models.dimensions import differences
 from discovery.recordings import Channel
 from discovery.terms import Apply, Expression, Name, Term, names, parse, substitute
 
@@ -29,6 +31,7 @@ class Hypothesis:
     recording: str | None = None
     shapes: Mapping[str, float] = field(default_factory=dict)  # parameter name -> value
     channels: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)  # parameter name -> unit at this place
     cost: float = 0.0  # log of the number of instants that were searched for it
 
     @property
@@ -51,25 +54,26 @@ class Hypothesis:
         amplitude = self.effect.amplitude
         parameters = {}
         for name in self.amplitudes:
-            low = 0.0 if amplitude.sign > 0 else -float("inf")
-            high = 0.0 if amplitude.sign < 0 else float("inf")
+            low = 0.0 if amplitude.sign > 0 else -amplitude.most
+            high = 0.0 if amplitude.sign < 0 else amplitude.most
             value = start.get(
                 name,
                 amplitude.fixed
                 if amplitude.fixed is not None
                 else 0.1 * amplitude.plausible * (amplitude.sign or 1),
             )
-            parameters[name] = self._parameter(value, amplitude.unit, low, high, amplitude.fixed is not None)
+            parameters[name] = self._parameter(name, value, low, high, amplitude.fixed is not None)
         for (name, value), shape in zip(self.shapes.items(), self.effect.shapes, strict=True):
             parameters[name] = self._parameter(
-                start.get(name, value), shape.unit, shape.low, shape.high, shape.fixed
+                name, start.get(name, value), shape.low, shape.high, shape.fixed
             )
         outputs = {}
         for name, extra in self.shown.items():
             outputs[name] = Apply("+", (model.outputs.get(name, Name(name)), extra))
         return model.with_terms(*self.terms, parameters=parameters, outputs=outputs)
 
-    def _parameter(self, value: float, unit: str, low: float, high: float, fixed: bool) -> Parameter:
+    def _parameter(self, name: str, value: float, low: float, high: float, fixed: bool) -> Parameter:
+        unit = self.units.get(name, "1")
         if self.recording is None:
             return Parameter(value, unit, low, high, fixed)
         # An event of one recording: the common value 0 keeps it out of every other one.
@@ -121,7 +125,7 @@ def _claims(
         runs = recordings[1:]  # what is common to all recordings is the model's own parameter
     for chosen in product(*choices):
         binding: dict[str, Expression] = {v: Name(c) for v, c in zip(wanted, chosen, strict=True)}
-        for states, source_terms, shown in _places(effect, model, outputs, channels):
+        for states, source_terms, shown in places(effect, model, outputs, channels):
             for run in runs:
                 tag = [
                     *(chosen if several else ()),
@@ -214,6 +218,13 @@ def _claim(
                 effect.word,
             )
         )
+    units = {
+        name: _unit(effect.amplitude.unit, model, states, output, channels)
+        for name, output in zip(amplitudes, shown if several else shown[:1] or ("",), strict=True)
+    } | {
+        name: _unit(shape.unit, model, states, shown[0] if shown else "", channels)
+        for name, shape in zip(shapes, effect.shapes, strict=True)
+    }
     return Hypothesis(
         effect,
         states,
@@ -224,71 +235,23 @@ def _claim(
         run,
         shapes,
         chosen,
+        units,
     )
 
 
-def _places(
-    effect: Effect, model: Model, outputs: tuple[str, ...], channels: Mapping[str, Channel]
-) -> Iterator[tuple[tuple[str, ...], tuple[Term, ...], tuple[str, ...]]]:
-    """(states, terms in which a channel is replaced, outputs) of each place."""
-    bodies = [
-        name
-        for name, state in model.states.items()
-        if not name.startswith("lag_") and (state.capacity or not _has_bodies(model))
-    ]
-    role = {name: channel.role for name, channel in channels.items()}
-    linked = {frozenset((t.into, t.source)) for t in model.terms if t.source}
-
-    def fed(wanted: str) -> list[str]:
-        return [
-            b
-            for b in bodies
-            if any(
-                b in (t.into, t.source) and any(role.get(n) == wanted for n in names(t.expression))
-                for t in model.terms
-            )
-        ]
-
-    match effect.place:
-        case "body":
-            yield from (((b,), (), ()) for b in bodies)
-        case "fluid-free body":
-            wet = fed("fluid temperature")
-            yield from (((b,), (), ()) for b in bodies if b not in wet)
-        case "wet body":
-            yield from (((b,), (), ()) for b in fed("fluid temperature"))
-        case "driven body":
-            yield from (((b,), (), ()) for b in fed("heat load"))
-        case "air body":
-            yield from (((b,), (), ()) for b in fed("ambient temperature"))
-        case "pair" | "any pair" | "link":
-            for i, a in enumerate(bodies):
-                for b in bodies[i + 1 :]:
-                    is_link = frozenset((a, b)) in linked
-                    if effect.place == "any pair" or is_link == (effect.place == "link"):
-                        yield (a, b), (), ()
-        case "fluid terms" | "cooling terms":
-            wanted = "fluid temperature" if effect.place == "fluid terms" else "cooling power"
-            terms = tuple(
-                t
-                for t in model.terms
-                if not t.effect and any(role.get(n) == wanted for n in names(t.expression))
-            )
-            if terms:
-                yield tuple(dict.fromkeys(t.into for t in terms)), terms, ()
-        case "inputs of a recording":
-            terms = tuple(
-                t
-                for t in model.terms
-                if not t.effect and names(t.expression) & set(channels) - set(model.states)
-            )
-            if terms:
-                yield (), terms, ()
-        case "output" | "output of a recording":
-            yield from (((), (), (name,)) for name in outputs)
-        case "recording":
-            yield (), (), outputs
-
-
-def _has_bodies(model: Model) -> bool:
-    return any(state.capacity for state in model.states.values())
+def _unit(
+    unit: str, model: Model, states: tuple[str, ...], output: str, channels: Mapping[str, Channel]
+) -> str:
+    """Unit of a catalogue parameter at a place: um there stands for the unit of the output, W for what enters
+    the state (a rate, where it has no capacity).
+    """
+    if output and output in channels and unit.startswith("um"):
+        return differences(channels[output].unit) + unit.removeprefix("um")
+    if states and unit.startswith("W") and not model.states[states[0]].capacity:
+        of = differences(model.states[states[0]].unit)
+        return (
+            f"1/{model.time_unit}"
+            if unit == f"W/{of}"
+            else f"{of}/{model.time_unit}" + unit.removeprefix("W")
+        )
+    return unit

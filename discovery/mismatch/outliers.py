@@ -13,8 +13,10 @@ from discovery.fitting import Fit
 
 Array = NDArray[np.float64]
 
-FAR = 6.5  # reading noises from the mean of both neighbours
-LONELY = 0.4  # the neighbours agree with each other within this share of the distance
+FAR = 6.5  # reading noises from the median of the readings around
+AROUND = 3  # readings on each side that a reading is compared with
+LONELY = 0.25  # these agree with each other within this share of the distance (median deviation)
+AT_END = 0.1  # the same, where readings are on one side only
 
 
 @dataclass(frozen=True)
@@ -43,14 +45,27 @@ def find_outliers(fit: Fit, white: Array) -> list[Outlier]:
             r = residual[rows, y]
             if len(r) < 3:
                 continue
-            jump = r[1:-1] - 0.5 * (r[:-2] + r[2:])
-            alone = np.abs(r[2:] - r[:-2]) < LONELY * np.abs(jump)
-            for k in np.flatnonzero((np.abs(jump) > FAR * white[y] * np.sqrt(1.5)) & alone):
-                at = float(grid.time[grid.read[rows[k + 1]]])
-                found.append(
-                    Outlier(name, grid.recording, at, float(jump[k]), float(white[y]) * float(np.sqrt(1.5)))
-                )
+            middle, scatter = _around(r)
+            jump = r - middle
+            # whatever the model leaves out, the noise is no smaller than differences of readings show
+            steps = np.diff(r)
+            noise = max(float(white[y]), float(np.median(np.abs(steps - np.median(steps)))) / 0.954)
+            share = np.full(len(r), LONELY)
+            share[[0, -1]] = AT_END
+            alone = scatter < share * np.abs(jump)
+            for k in np.flatnonzero((np.abs(jump) > FAR * noise) & alone):
+                at = float(grid.time[grid.read[rows[k]]])
+                found.append(Outlier(name, grid.recording, at, float(jump[k]), noise))
     return found
+
+
+def _around(r: Array) -> tuple[Array, Array]:
+    """Median (N,) of the readings around each one, itself left out, and their median deviation from it."""
+    offsets = np.array([k for k in range(-AROUND, AROUND + 1) if k])
+    rows = np.arange(len(r))[:, None] + offsets
+    window = np.where((rows >= 0) & (rows < len(r)), r[np.clip(rows, 0, len(r) - 1)], np.nan)
+    middle = np.nanmedian(window, axis=1)
+    return middle, np.nanmedian(np.abs(window - middle[:, None]), axis=1)
 
 
 def without(grids: Mapping[str, Grid], outliers: list[Outlier]) -> dict[str, Grid]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discovery.errors import UserError
-from discovery.mismatch.assess import Assessment, assess
+from discovery.mismatch.assess import WIDE, Assessment, assess
 from discovery.mismatch.context import Context
 from discovery.mismatch.events import place_events
 from discovery.mismatch.evidence import Board, Score, by_claim, make_board, scores
@@ -20,7 +20,8 @@ REFITS = 6  # claims that are refitted at each step
 SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
 QUESTIONED = 3  # with more effects than this the machine is far from its model, and each one is large
 BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
-NAMED = 9.0  # log evidence that a claim has to add to be taken up
+TRACE = 0.6  # log evidence of a law's traces, times the root of the whole gain
+NAMED = 8.0  # log evidence that a claim has to add to be taken up
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ def look(context: Context, current: Assessment) -> Look:
     found = hypotheses(model, context.campaign.channels, context.outputs, context.recordings, context.effects)
     taken = {h.key for h in current.hypotheses}
     found = [h for h in found if h.key not in taken]
-    spread = {a: s for h in found for a, s in zip(h.amplitudes, context.spread(h), strict=True)}
+    spread = {a: WIDE * s for h in found for a, s in zip(h.amplitudes, context.spread(h), strict=True)}
     found = place_events(current.lens, current.best_view, found, spread)
     found = [h for h in found if not _start_of_shift(current, h)]
     board = make_board(
@@ -102,6 +103,8 @@ def search(context: Context, most: int = 6, tell: Callable[[str], None] = lambda
         tried += more
         looks.append(look(context, current).claims)
     current, more = _prune(context, baseline, current)
+    if current.hypotheses:  # sizes under the noise that stands beside the answer, not beside the one before
+        current = assess(context, current.hypotheses, current.best_view.noise, current)
     if more:
         tried += more
         looks.append(look(context, current).claims)
@@ -111,8 +114,8 @@ def search(context: Context, most: int = 6, tell: Callable[[str], None] = lambda
 def _prune(
     context: Context, baseline: Assessment, current: Assessment
 ) -> tuple[Assessment, list[Assessment]]:
-    """Drop what is not needed: effects that the others have made idle, and small ones that a gate objects
-    to.
+    """Drop what is not needed: effects that the others have made idle, small ones that a gate objects to, and
+    the traces that a law slightly off in form leaves; these grow with the effect that leaves them.
     """
     tried: list[Assessment] = []
     while len(current.hypotheses) > 1:
@@ -124,8 +127,10 @@ def _prune(
                 continue
             tried.append(without)
             lost = current.evidence - without.evidence
-            small = lost < SMALL * (current.evidence - baseline.evidence)
-            if lost < NAMED or (small and objections(current, h, current.evidence - baseline.evidence)):
+            gain = current.evidence - baseline.evidence
+            # heat that comes again and again is a sign of its own: the verdict needs to see it
+            trace = 0.0 if recurs(current.hypotheses) else TRACE * float(np.sqrt(max(gain, 0.0)))
+            if lost < NAMED + trace or (lost < SMALL * gain and objections(current, h, gain)):
                 shorter.append((lost, without))
         if not shorter:
             break

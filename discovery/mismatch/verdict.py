@@ -14,12 +14,11 @@ from discovery.mismatch.context import Context
 from discovery.mismatch.forcing import Forcing
 from discovery.mismatch.gates import objections
 from discovery.mismatch.hypotheses import Hypothesis
-from discovery.mismatch.search import Search, recurs
+from discovery.mismatch.search import NAMED, Search, recurs
 
 Array = NDArray[np.float64]
 
-QUIET = 7.0  # log evidence that nothing left over may add once the answer is in the model
-FREE = 6.0  # log evidence of free heat beyond which something acts, named or not
+FREE = 9.0  # log evidence of free heat beyond which something acts, named or not
 RIVAL = 3.0  # log evidence within which a rival stays in the answer
 TRUST = 0.6  # evidence ratios are tempered: models are never exact
 DOUBT = 0.02  # share of the answer that stays with causes outside the catalogue
@@ -87,7 +86,7 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     if recurs(best.hypotheses):
         reasons.append("unrecorded heat comes again and again: a cause, not an event")
     left = [c for c in found.looks[-1] if abs(c.size[0]) >= context.minor(c.hypothesis)[0]]
-    if left and left[0].gain > max(QUIET, 0.05 * found.gain):
+    if left and left[0].gain > max(NAMED, 0.05 * found.gain):
         other = left[0].hypothesis
         reasons.append(
             f"{other.effect.word} at {', '.join(other.places)} is still significant after the repair"

@@ -47,7 +47,7 @@ def check_dimensions(model: Model, channels: Mapping[str, Channel]) -> list[str]
         wanted, name = (
             ("W", "W, a heat flow")
             if state.capacity
-            else (f"({_differences(state.unit)})/({model.time_unit})", f"{state.unit}/{model.time_unit}")
+            else (f"({differences(state.unit)})/({model.time_unit})", f"{state.unit}/{model.time_unit}")
         )
         found = _compare(term.expression, dimensions, _dimension(wanted), name)
         if found:
@@ -75,7 +75,7 @@ def with_coefficient_units(model: Model, channels: Mapping[str, Channel]) -> Mod
         match term.expression:
             case Apply("*", (Name(coefficient), rest)) if coefficient in parameters:
                 state = model.states[term.into]
-                rate = "W" if state.capacity else f"{_differences(state.unit)}/{model.time_unit}"
+                rate = "W" if state.capacity else f"{differences(state.unit)}/{model.time_unit}"
                 if not _compare(term.expression, dimensions, _dimension(rate), rate):
                     continue
                 of = unit_of(rest, units)
@@ -95,7 +95,7 @@ def unit_of(expression: Expression, units: Mapping[str, str]) -> str:
     """
     match expression:
         case Name(id=name):
-            return _differences(units.get(name, "1"))
+            return differences(units.get(name, "1"))
         case Apply(function="*" | "/" as sign, arguments=(a, b)):
             left, right = unit_of(a, units), unit_of(b, units)
             if right == "1":
@@ -250,11 +250,11 @@ def _units() -> Callable[[str], Any]:
     registry: Any = pint.UnitRegistry()
 
     def parse(unit: str) -> Any:
-        return registry.Unit(_differences(unit))
+        return registry.Unit(differences(unit))
 
     return parse
 
 
-def _differences(unit: str) -> str:
+def differences(unit: str) -> str:
     """degC counts as K: here only dimensions matter."""
     return unit.replace("delta_degC", "K").replace("degC", "K").replace("degF", "K")

@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="drive and cooling",
     place="driven body",
     formula="R_cu*0.00393*load*(body - 22)",
-    amplitude=Amplitude("R_cu", "1", 0.3),
+    amplitude=Amplitude("R_cu", "1", 0.3, most=1.0),
     signature="drive losses grow 4 % per 10 K; almost always invisible",
     confused_with=("thermal_preload",),
     source="temperature coefficient of copper 0.00393/K on the copper share of the drive losses",

@@ -47,7 +47,7 @@ class Amplitude:
 
     `plausible` is the spread of sizes seen on machines of this class (one standard deviation), `sign` +1 or
     -1 where physics fixes it, 0 where it does not. `fixed`: the effect is on or off, its size sits in the
-    shape parameters.
+    shape parameters. `most` bounds a size that cannot be larger (a share), in magnitude.
     """
 
     name: str
@@ -55,6 +55,7 @@ class Amplitude:
     plausible: float
     sign: int = 1
     fixed: float | None = None
+    most: float = inf
 
 
 @dataclass(frozen=True)

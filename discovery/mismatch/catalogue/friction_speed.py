@@ -15,8 +15,8 @@ EFFECT = Effect(
     group="drive and cooling",
     place="driven body",
     formula="P_f*(speed/1000)**m",
-    amplitude=Amplitude("P_f", "W", 60.0),
-    shapes=(Shape("m", "1", (1.0, 1.5, 2.0, 2.5), 0.8, 3.0),),
+    amplitude=Amplitude("P_f", "W", 150.0),
+    shapes=(Shape("m", "1", (1.0, 1.5, 2.0, 2.5), 0.9, 3.0),),
     signature=(
         "heat in bearings and drive that the drive power does not account for, a smooth power of the speed"
     ),

@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="air and structure",
     place="output",
     formula="slip*(play(y, width) - y)",
-    amplitude=Amplitude("slip", "1", 0.5),
+    amplitude=Amplitude("slip", "1", 0.5, most=1.0),
     shapes=(Shape("width", "um", (1.0, 2.5), 0.2, 10.0),),
     signature="a plateau at every reversal, the same at any rate",
     confused_with=("sensor_lag",),

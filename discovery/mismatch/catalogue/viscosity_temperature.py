@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="drive and cooling",
     place="driven body",
     formula="P_v*(speed/1000)**m*exp(-k_oil*(body - 22))",
-    amplitude=Amplitude("P_v", "W", 80.0),
+    amplitude=Amplitude("P_v", "W", 150.0),
     shapes=(
         Shape("m", "1", (1.67, 2.0), 1.0, 2.5),
         Shape("k_oil", "1/K", (0.03, 0.06), 0.01, 0.12),

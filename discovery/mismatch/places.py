@@ -1,0 +1,77 @@
+"""The rules of place: at which bodies, links, terms or outputs of a model an effect can act."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from discovery.mismatch.catalogue.effect import Effect
+from discovery.models import Model
+from discovery.recordings import Channel
+from discovery.terms import Term, names
+
+
+def places(
+    effect: Effect, model: Model, outputs: tuple[str, ...], channels: Mapping[str, Channel]
+) -> Iterator[tuple[tuple[str, ...], tuple[Term, ...], tuple[str, ...]]]:
+    """(states, terms in which a channel is replaced, outputs) of each place."""
+    bodies = [
+        name
+        for name, state in model.states.items()
+        if not name.startswith("lag_") and (state.capacity or not _has_bodies(model))
+    ]
+    role = {name: channel.role for name, channel in channels.items()}
+    linked = {frozenset((t.into, t.source)) for t in model.terms if t.source}
+
+    def fed(wanted: str) -> list[str]:
+        return [
+            b
+            for b in bodies
+            if any(
+                b in (t.into, t.source) and any(role.get(n) == wanted for n in names(t.expression))
+                for t in model.terms
+            )
+        ]
+
+    match effect.place:
+        case "body":
+            yield from (((b,), (), ()) for b in bodies)
+        case "fluid-free body":
+            wet = fed("fluid temperature")
+            yield from (((b,), (), ()) for b in bodies if b not in wet)
+        case "wet body":
+            yield from (((b,), (), ()) for b in fed("fluid temperature"))
+        case "driven body":
+            yield from (((b,), (), ()) for b in fed("heat load"))
+        case "air body":
+            yield from (((b,), (), ()) for b in fed("ambient temperature"))
+        case "pair" | "any pair" | "link":
+            for i, a in enumerate(bodies):
+                for b in bodies[i + 1 :]:
+                    is_link = frozenset((a, b)) in linked
+                    if effect.place == "any pair" or is_link == (effect.place == "link"):
+                        yield (a, b), (), ()
+        case "fluid terms" | "cooling terms":
+            wanted = "fluid temperature" if effect.place == "fluid terms" else "cooling power"
+            terms = tuple(
+                t
+                for t in model.terms
+                if not t.effect and any(role.get(n) == wanted for n in names(t.expression))
+            )
+            if terms:
+                yield tuple(dict.fromkeys(t.into for t in terms)), terms, ()
+        case "inputs of a recording":
+            terms = tuple(
+                t
+                for t in model.terms
+                if not t.effect and names(t.expression) & set(channels) - set(model.states)
+            )
+            if terms:
+                yield (), terms, ()
+        case "output" | "output of a recording":
+            yield from (((), (), (name,)) for name in outputs)
+        case "recording":
+            yield (), (), outputs
+
+
+def _has_bodies(model: Model) -> bool:
+    return any(state.capacity for state in model.states.values())

@@ -1,0 +1,86 @@
+"""Single wrong readings on residuals that are written down here, and units of effects at a place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.fitting import Fit
+from discovery.mismatch.catalogue import catalogue
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.outliers import find_outliers
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Channel
+from discovery.terms import Term, parse
+
+NOISE = 0.7
+
+
+def found(residual: NDArray[np.float64]) -> list[int]:
+    """Rows that are set aside of one recording whose residual is this."""
+    rows = np.arange(len(residual))
+    grid = SimpleNamespace(outputs=("T",), time=2.0 * rows, read=rows, recording="a")
+    trajectory = SimpleNamespace(system=SimpleNamespace(grid=grid))
+    problem = SimpleNamespace(residual=lambda _: residual[:, None])
+    fit = cast(Fit, SimpleNamespace(trajectories=[trajectory], problem=problem))
+    return [round(o.time / 2.0) for o in find_outliers(fit, np.array([NOISE]))]
+
+
+def noise(count: int = 200, seed: int = 1) -> NDArray[np.float64]:
+    return np.random.default_rng(seed).normal(0.0, NOISE, count)
+
+
+def test_two_wrong_readings_with_a_right_one_between_are_both_found() -> None:
+    residual = noise()
+    residual[[120, 122]] += (7.0, 11.0)  # as a thermistor of the Temperature Control Lab reads now and then
+    assert found(residual) == [120, 122]
+
+
+def test_the_first_and_the_last_reading_can_be_wrong() -> None:
+    residual = noise()
+    residual[[0, -1]] += (-25.0, 12.0)
+    assert found(residual) == [0, len(residual) - 1]
+
+
+def test_a_jump_a_slope_and_a_slow_start_are_no_wrong_readings() -> None:
+    jump = noise()
+    jump[100:] += 12.0
+    assert found(jump) == []
+    assert found(noise() + 0.4 * np.arange(200)) == []
+    assert found(noise() + 30.0 * np.exp(-np.arange(200) / 8.0)) == []
+
+
+def test_noise_that_is_larger_than_believed_is_not_thrown_away() -> None:
+    assert found(6.0 * noise(2000)) == []
+
+
+def test_sizes_carry_the_unit_of_the_place() -> None:
+    rate = Model(
+        "an error itself",
+        {"a": Parameter(0.1, "1/h", 0.0)},
+        {"E": State("E", "um"), "T": State("T", "degC")},
+        (Term("back", "E", parse("-a*E")), Term("back too", "T", parse("-a*T"))),
+        {},
+        "h",
+    )
+    channels = {
+        "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+        "E": Channel("E", "error", "um", 0.5, "linear"),
+        "T": Channel("T", "temperature", "degC", 0.1, "linear"),
+    }
+    entries = [catalogue()[word] for word in ("air_convection", "sensor_offset")]
+    entries = [replace(e, place="body") if e.word == "air_convection" else e for e in entries]
+    claims = {(h.effect.word, h.places): h for h in hypotheses(rate, channels, ("E", "T"), ("a",), entries)}
+
+    def unit(word: str, place: str) -> str:
+        claim = claims[word, (place,)]
+        return claim.added_to(rate).parameters[claim.amplitudes[0]].unit
+
+    assert unit("air_convection", "E") == "um/h/K"
+    assert unit("air_convection", "T") == "1/h"
+    assert unit("sensor_offset", "E") == "um"
+    assert unit("sensor_offset", "T") == "K"
