@@ -9,13 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from discovery.fitting import Fit, Noise, fit_model
-from discovery.mismatch.context import Context, everyday
+from discovery.mismatch.context import Context
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.lens import Lens, View, log_mean_exp
-from discovery.mismatch.signatures import heat_rms
 from discovery.models import Model
 
-FORM = 0.05  # heat that a law slightly off in form leaves, as a share of the effect's own
 WIDE = 3.0  # sizes are refitted with so many times their usual spread: a large effect must not look smaller
 ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
 
@@ -96,19 +94,6 @@ def assess(
         tolerance=ENOUGH,
     )
     lens = Lens(fit)
-    views = tuple(lens.view(setting) for setting in _beside(context, fit, chosen))
+    views = tuple(lens.view(setting) for setting in context.settings)
     evidence = float(log_mean_exp(np.array([view.level for view in views]))) + offset
     return Assessment(tuple(chosen), fit.model, fit, lens, views, evidence)
-
-
-def _beside(context: Context, fit: Fit, chosen: Sequence[Hypothesis]) -> tuple[Noise, ...]:
-    """Everyday noise beside effects: a law a little off in form leaves heat that grows with the effect."""
-    limit = dict(context.heat_limit)
-    for h in chosen:
-        for term in h.terms:
-            squares = [heat_rms(t, term.expression) ** 2 for t in fit.trajectories]
-            size = FORM * float(np.sqrt(np.mean(squares)))
-            for state in (term.into, term.source):
-                if state in limit:
-                    limit[state] = float(np.hypot(limit[state], size))
-    return everyday(context.settings[0], limit)

@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 FAR = 6.5  # reading noises from the median of the readings around
 AROUND = 3  # readings on each side that a reading is compared with
 LONELY = 0.25  # these agree with each other within this share of the distance (median deviation)
-AT_END = 0.1  # the same, where readings are on one side only
+NEXT = (
+    4.0  # reading noises from that median within which both neighbours lie: what decays is no wrong reading
+)
 
 
 @dataclass(frozen=True)
@@ -43,16 +45,18 @@ def find_outliers(fit: Fit, white: Array) -> list[Outlier]:
         for y, name in enumerate(grid.outputs):
             rows = np.flatnonzero(np.isfinite(residual[:, y]))
             r = residual[rows, y]
-            if len(r) < 3:
+            if len(r) < 2 * AROUND:
                 continue
             middle, scatter = _around(r)
             jump = r - middle
             # whatever the model leaves out, the noise is no smaller than differences of readings show
             steps = np.diff(r)
             noise = max(float(white[y]), float(np.median(np.abs(steps - np.median(steps)))) / 0.954)
-            share = np.full(len(r), LONELY)
-            share[[0, -1]] = AT_END
-            alone = scatter < share * np.abs(jump)
+            alone = scatter < LONELY * np.abs(jump)
+            near = np.abs(r[:-2] - middle[1:-1]) < NEXT * noise
+            near &= np.abs(r[2:] - middle[1:-1]) < NEXT * noise
+            # at its ends a recording may just have begun to move
+            alone &= np.concatenate([[False, False], near[1:-1], [False, False]])
             for k in np.flatnonzero((np.abs(jump) > FAR * noise) & alone):
                 at = float(grid.time[grid.read[rows[k]]])
                 found.append(Outlier(name, grid.recording, at, float(jump[k]), noise))

@@ -14,7 +14,8 @@ from discovery.mismatch.context import Context
 from discovery.mismatch.forcing import Forcing
 from discovery.mismatch.gates import objections
 from discovery.mismatch.hypotheses import Hypothesis
-from discovery.mismatch.search import NAMED, Search, recurs
+from discovery.mismatch.question import NAMED, recurs
+from discovery.mismatch.search import Search
 
 Array = NDArray[np.float64]
 

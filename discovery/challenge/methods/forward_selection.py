@@ -18,7 +18,7 @@ from discovery.fitting.noise import white_noise
 from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.context import Context
 from discovery.mismatch.hypotheses import Hypothesis
-from discovery.mismatch.search import look
+from discovery.mismatch.look import look
 
 MOST = 3  # effects that may be added
 REFITS = 6  # claims that are refitted at each step

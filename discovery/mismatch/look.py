@@ -1,0 +1,69 @@
+"""One look and one attempt: all claims scored on what a model leaves, and a refit with one of them added."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from discovery.errors import UserError
+from discovery.mismatch.assess import WIDE, Assessment, assess
+from discovery.mismatch.context import Context
+from discovery.mismatch.events import place_events
+from discovery.mismatch.evidence import Board, Score, by_claim, make_board, scores
+from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+
+
+@dataclass(frozen=True)
+class Look:
+    """All claims scored on what an assessment leaves."""
+
+    board: Board
+    claims: tuple[Score, ...]
+
+
+def look(context: Context, current: Assessment) -> Look:
+    """Score every effect at every place on what the present model leaves."""
+    model = current.fit.problem.model
+    found = hypotheses(model, context.campaign.channels, context.outputs, context.recordings, context.effects)
+    taken = {h.key for h in current.hypotheses}
+    found = [h for h in found if h.key not in taken]
+    spread = {a: WIDE * s for h in found for a, s in zip(h.amplitudes, context.spread(h), strict=True)}
+    found = place_events(current.lens, current.best_view, found, spread)
+    found = [h for h in found if not _start_of_shift(current, h)]
+    board = make_board(
+        current.lens, current.views, found, np.array([spread[a] for h in found for a in h.amplitudes])
+    )
+    return Look(board, tuple(by_claim(scores(board))))
+
+
+def _start_of_shift(current: Assessment, h: Hypothesis) -> bool:
+    """Whether an event only fills the start of a recording whose clock is shifted: no input is known
+    there.
+    """
+    for o in current.hypotheses:
+        if o.effect.word == "clock_shift" and o.recording == h.recording and o.shapes and h.shapes:
+            (name,) = o.shapes
+            shift = abs(current.model.parameters[name].values.get(h.recording or "", 0.0))
+            return max(h.shapes.values()) <= 1.5 * shift
+    return False
+
+
+def attempt(
+    context: Context,
+    current: Assessment,
+    others: tuple[Hypothesis, ...],
+    claim: Hypothesis | None = None,
+    sizes: tuple[float, ...] = (),
+) -> Assessment | None:
+    """Refit with others and a claim beside them, from the sizes that the linear look gives; None where the
+    model runs away with them.
+    """
+    start: dict[str, float] = {}
+    if claim and claim.effect.amplitude.fixed is None:
+        start = dict(zip(claim.amplitudes, sizes, strict=True))
+    chosen = (*others, claim) if claim else others
+    try:
+        return assess(context, chosen, current.best_view.noise, current, start)
+    except UserError:  # a combination under which the model runs away is no explanation
+        return None

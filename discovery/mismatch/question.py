@@ -1,0 +1,113 @@
+"""Questioning what a search has taken up: is it needed, would something else stand better in its place?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discovery.mismatch.assess import Assessment
+from discovery.mismatch.context import Context
+from discovery.mismatch.gates import matters, objections
+from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+from discovery.mismatch.look import attempt, look
+
+NAMED = 8.0  # log evidence that a claim has to add to be taken up
+SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
+TRACE = 0.6  # log evidence of a law's traces, times the root of the whole gain
+RIVALS = 3  # claims that are tried in the place of another
+
+
+def recurs(chosen: Sequence[Hypothesis]) -> bool:
+    """Whether heat without a record was taken up twice: then it is no event, and looking for a third one is
+    idle.
+    """
+    return sum(h.effect.word == "unmeasured_heat" for h in chosen) > 1
+
+
+def trace(baseline: Assessment, current: Assessment) -> float:
+    """Log evidence that traces of the effects taken up may have."""
+    # heat that comes again and again is a sign of its own: the verdict needs to see it
+    if recurs(current.hypotheses):
+        return 0.0
+    return TRACE * float(np.sqrt(max(current.evidence - baseline.evidence, 0.0)))
+
+
+def prune(context: Context, baseline: Assessment, current: Assessment) -> tuple[Assessment, list[Assessment]]:
+    """Drop what is not needed: effects that the others have made idle, small ones that a gate objects to, and
+    the traces that a law slightly off in form leaves; these grow with the effect that leaves them.
+    """
+    tried: list[Assessment] = []
+    while len(current.hypotheses) > 1:
+        shorter = []
+        for h in current.hypotheses:
+            others = tuple(o for o in current.hypotheses if o.key != h.key)
+            without = attempt(context, current, others)
+            if without is None:
+                continue
+            tried.append(without)
+            lost = current.evidence - without.evidence
+            gain = current.evidence - baseline.evidence
+            if lost < NAMED + trace(baseline, current) or (
+                lost < SMALL * gain and objections(current, h, gain)
+            ):
+                shorter.append((lost, without))
+        if not shorter:
+            break
+        current = min(shorter, key=lambda item: item[0])[1]
+    return current, tried
+
+
+def question(context: Context, current: Assessment) -> tuple[Assessment, list[Assessment]]:
+    """Take each effect out, see what would stand in its place, also the same effect at another body, and drop
+    what is not needed.
+    """
+    tried: list[Assessment] = []
+    for h in current.hypotheses:
+        others = tuple(o for o in current.hypotheses if o.key != h.key)
+        if len(others) == len(current.hypotheses) or h.key not in {o.key for o in current.hypotheses}:
+            continue
+        without = attempt(context, current, others)
+        if without is None:
+            continue
+        tried.append(without)
+        pool = [
+            (c.hypothesis, c.size)
+            for c in look(context, without).claims[:RIVALS]
+            if c.hypothesis.key != h.key and c.gain > 2.0
+        ] + _elsewhere(context, current, h, others)
+        attempts = [a for o, size in pool if (a := attempt(context, without, others, o, size)) is not None]
+        attempts = [a for a in attempts if all(matters(context, a, o) for o in a.hypotheses)]
+        tried += attempts
+        best = max([*attempts, current], key=lambda a: a.evidence)
+        current = best if best.evidence > without.evidence + NAMED else without
+    return current, tried
+
+
+def _elsewhere(
+    context: Context, current: Assessment, h: Hypothesis, others: Sequence[Hypothesis]
+) -> list[tuple[Hypothesis, tuple[float, ...]]]:
+    """The effect at every other body with the size and shape that it has here.
+
+    A law that is offered only where a simpler one stands already follows that one to a wrong body.
+    """
+    if len(h.states) != 1 or h.recording is not None:
+        return []
+    parameters = current.model.parameters
+    size = tuple(parameters[name].value for name in h.amplitudes)
+    shapes = [parameters[name].value for name in h.shapes]
+    entry = replace(h.effect, place="body")
+    taken = {(o.effect.word, o.states) for o in (h, *others)}
+    found = {
+        o.states: replace(o.at(dict(zip(o.shapes, shapes, strict=True))), effect=h.effect)
+        for o in hypotheses(
+            context.baseline.problem.model,
+            context.campaign.channels,
+            context.outputs,
+            context.recordings,
+            [entry],
+        )
+        if o.channels == h.channels and (o.effect.word, o.states) not in taken
+    }
+    return [(o, size) for o in found.values()]
