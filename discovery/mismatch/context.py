@@ -101,7 +101,8 @@ def make_context(
             np.isfinite(campaign.recordings[r].values.get(name, np.array([np.nan]))).any() for r in recordings
         )
     ]
-    grids = thinned({r: make_grid(campaign, r, inputs, outputs) for r in recordings})
+    whole = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
+    grids = thinned(whole)
     belief = BELIEF if physical and any(state.capacity for state in model.states.values()) else None
     fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
     flows = _flows(fit)
@@ -113,9 +114,9 @@ def make_context(
     }
     duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
     white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)
-    outliers = find_outliers(fit, np.array(white.white))
+    outliers = find_outliers(fit, whole, np.array(white.white))
     if outliers:
-        grids = without(grids, outliers)
+        grids = thinned(without(whole, outliers))
         fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
         white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)
     settings = everyday(white, limit)

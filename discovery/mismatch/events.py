@@ -19,7 +19,7 @@ from discovery.mismatch.lens import Lens, View
 Array = NDArray[np.float64]
 
 COARSE = 60  # steps per recording in the first look
-LEAST = 4  # readings before and after a jump: fewer are single wrong readings
+LEAST = 4  # readings before and after a jump, after the start of heat: fewer may be single wrong readings
 FINE = 8  # steps on each side of an edge in the second
 
 
@@ -79,11 +79,15 @@ def _windows(
 ) -> list[Hypothesis]:
     trajectory = lens.fit.trajectories[_index(lens, run)]
     time = trajectory.system.grid.time
+    read_time = time[trajectory.system.grid.read]
+    if len(read_time) < 2 * LEAST:
+        return []
+    latest = float(read_time[-2 * LEAST])
     coarse = np.linspace(time[0], time[-1], COARSE + 1)
     found = []
     for h in group:
         body, sd = h.states[0], spread[h.amplitudes[0]]
-        i, j, _ = _best_window(lens, view, run, heat_steps(trajectory, body, coarse), sd)
+        i, j = _best_window(lens, view, run, heat_steps(trajectory, body, coarse), coarse <= latest, sd)
         width = coarse[1] - coarse[0]
         fine = np.unique(
             np.concatenate(
@@ -93,21 +97,25 @@ def _windows(
                 ]
             )
         )
-        i, j, _ = _best_window(lens, view, run, heat_steps(trajectory, body, fine), sd)
+        i, j = _best_window(lens, view, run, heat_steps(trajectory, body, fine), fine <= latest, sd)
         edges = dict(zip(h.shapes, (float(fine[i]), float(fine[j])), strict=True))
         found.append(replace(h.at(edges), cost=float(2 * np.log(COARSE))))  # two edges were searched
     return found
 
 
-def _best_window(lens: Lens, view: View, run: str, steps: Array, sd: float) -> tuple[int, int, float]:
+def _best_window(
+    lens: Lens, view: View, run: str, steps: Array, starts: NDArray[np.bool_], sd: float
+) -> tuple[int, int]:
+    """Indices of the edges that speak for a window most; it begins where `starts` allows."""
     z = whiten_one(lens, view, run, steps)
     dot = z.T @ view.residual
     gram = z.T @ z
     size = np.maximum(np.diag(gram)[:, None] + np.diag(gram)[None, :] - 2 * gram, 0.0) + sd**-2
     gain = 0.5 * np.subtract.outer(dot, dot) ** 2 / size - 0.5 * np.log(size * sd**2)
     gain[np.tril_indices(len(dot))] = -np.inf
+    gain[~starts] = -np.inf
     i, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    return int(i), int(j), float(gain[i, j])
+    return int(i), int(j)
 
 
 def _jumps(

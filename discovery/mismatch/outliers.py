@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid
+from discovery.dynamics import Grid, make_system
 from discovery.fitting import Fit
 
 Array = NDArray[np.float64]
@@ -32,15 +32,16 @@ class Outlier:
     noise: float
 
 
-def find_outliers(fit: Fit, white: Array) -> list[Outlier]:
-    """Readings far from both neighbours while these agree; residuals are compared, so steps of inputs pass.
+def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Outlier]:
+    """Readings far from those around while these agree; residuals are compared, so steps of inputs pass.
 
     Args:
+        grids: all readings of each recording, also where the fit saw only some.
         white: (Y,) reading noise.
     """
     found = []
-    for trajectory in fit.trajectories:
-        grid = trajectory.system.grid
+    for grid in grids.values():
+        trajectory = fit.problem.run(make_system(fit.problem.model, grid), fit.theta)
         residual = fit.problem.residual(trajectory)
         for y, name in enumerate(grid.outputs):
             rows = np.flatnonzero(np.isfinite(residual[:, y]))
@@ -56,7 +57,7 @@ def find_outliers(fit: Fit, white: Array) -> list[Outlier]:
             near = np.abs(r[:-2] - middle[1:-1]) < NEXT * noise
             near &= np.abs(r[2:] - middle[1:-1]) < NEXT * noise
             # at its ends a recording may just have begun to move
-            alone &= np.concatenate([[False, False], near[1:-1], [False, False]])
+            alone &= np.concatenate([[False], near, [False]])
             for k in np.flatnonzero((np.abs(jump) > FAR * noise) & alone):
                 at = float(grid.time[grid.read[rows[k]]])
                 found.append(Outlier(name, grid.recording, at, float(jump[k]), noise))

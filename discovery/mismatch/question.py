@@ -9,7 +9,7 @@ import numpy as np
 
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
-from discovery.mismatch.gates import matters, objections
+from discovery.mismatch.gates import bent, matters, objections
 from discovery.mismatch.hypotheses import Hypothesis, hypotheses
 from discovery.mismatch.look import attempt, look
 
@@ -26,12 +26,9 @@ def recurs(chosen: Sequence[Hypothesis]) -> bool:
     return sum(h.effect.word == "unmeasured_heat" for h in chosen) > 1
 
 
-def trace(baseline: Assessment, current: Assessment) -> float:
-    """Log evidence that traces of the effects taken up may have."""
-    # heat that comes again and again is a sign of its own: the verdict needs to see it
-    if recurs(current.hypotheses):
-        return 0.0
-    return TRACE * float(np.sqrt(max(current.evidence - baseline.evidence, 0.0)))
+def trace(gain: float) -> float:
+    """Log evidence that the traces of something may have that adds `gain`: its law is never exact in form."""
+    return TRACE * float(np.sqrt(max(gain, 0.0)))
 
 
 def prune(context: Context, baseline: Assessment, current: Assessment) -> tuple[Assessment, list[Assessment]]:
@@ -40,22 +37,23 @@ def prune(context: Context, baseline: Assessment, current: Assessment) -> tuple[
     """
     tried: list[Assessment] = []
     while len(current.hypotheses) > 1:
-        shorter = []
+        gain = current.evidence - baseline.evidence
+        lost: list[tuple[Hypothesis, float, Assessment]] = []
         for h in current.hypotheses:
             others = tuple(o for o in current.hypotheses if o.key != h.key)
-            without = attempt(context, current, others)
-            if without is None:
-                continue
-            tried.append(without)
-            lost = current.evidence - without.evidence
-            gain = current.evidence - baseline.evidence
-            if lost < NAMED + trace(baseline, current) or (
-                lost < SMALL * gain and objections(current, h, gain)
-            ):
-                shorter.append((lost, without))
+            if without := attempt(context, current, others):
+                lost.append((h, current.evidence - without.evidence, without))
+        tried += [without for _, _, without in lost]
+        shorter = []
+        for h, share, without in lost:
+            largest = max((s for o, s, _ in lost if o is not h and o.effect.is_physics), default=0.0)
+            # heat that comes again and again is a sign of its own: the verdict needs to see it
+            bar = NAMED + (0.0 if recurs(current.hypotheses) else trace(largest))
+            if share < bar or (share < SMALL * gain and objections(current, h, gain)):
+                shorter.append((bent(current, h) is None, share, without))
         if not shorter:
             break
-        current = min(shorter, key=lambda item: item[0])[1]
+        current = min(shorter, key=lambda item: item[:2])[2]  # what is bent goes first
     return current, tried
 
 

@@ -92,7 +92,9 @@ def _grow(
             break
         step = _step(context, attempts, current.evidence)
         tried += [_light(a) for a in attempts if matters(context, a, a.hypotheses[-1])]
-        bar = NAMED if freely else NAMED + trace(baseline, current)
+        bar = NAMED if freely else NAMED + trace(current.evidence - baseline.evidence)
+        if current.hypotheses and bent(step, step.hypotheses[-1]):
+            bar = max(bar, BLUNT)  # what is left has another law, and there is not much of it
         if step.evidence - current.evidence < bar or not matters(context, step, step.hypotheses[-1]):
             break
         tell(f"{step.hypotheses[-1].effect.title} at {', '.join(step.hypotheses[-1].places)}")

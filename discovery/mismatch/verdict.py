@@ -86,7 +86,11 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     reasons = []
     if recurs(best.hypotheses):
         reasons.append("unrecorded heat comes again and again: a cause, not an event")
-    left = [c for c in found.looks[-1] if abs(c.size[0]) >= context.minor(c.hypothesis)[0]]
+    left = [
+        c
+        for c in found.looks[-1]
+        if context.minor(c.hypothesis)[0] <= abs(c.size[0]) <= c.hypothesis.effect.amplitude.most
+    ]
     if left and left[0].gain > max(NAMED, 0.05 * found.gain):
         other = left[0].hypothesis
         reasons.append(

@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.fitting import Fit
+from discovery.dynamics import make_grid
+from discovery.fitting import fit_model
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.outliers import find_outliers
 from discovery.models import Model, Parameter, State
-from discovery.recordings import Channel
+from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
 
 NOISE = 0.7
 
 
 def found(residual: NDArray[np.float64]) -> list[int]:
-    """Rows that are set aside of one recording whose residual is this."""
-    rows = np.arange(len(residual))
-    grid = SimpleNamespace(outputs=("T",), time=2.0 * rows, read=rows, recording="a")
-    trajectory = SimpleNamespace(system=SimpleNamespace(grid=grid))
-    problem = SimpleNamespace(residual=lambda _: residual[:, None])
-    fit = cast(Fit, SimpleNamespace(trajectories=[trajectory], problem=problem))
-    return [round(o.time / 2.0) for o in find_outliers(fit, np.array([NOISE]))]
+    """Rows that are set aside of one recording whose readings, of a constant, leave this residual."""
+    time = np.arange(len(residual), dtype=np.float64) * 2.0
+    channels = {"T": Channel("T", "temperature", "K", NOISE, "linear")}
+    recording = Recording("a", time, {"T": residual})
+    campaign = Campaign("one", channels, {"a": recording})
+    model = Model("constant", {}, {"x": State("x", "K", start_sd=0.0)}, (), {"T": parse("x")})
+    fit = fit_model(model, campaign, ["a"], ["T"])
+    grid = make_grid(campaign, "a", [], ["T"])
+    return [round(o.time / 2.0) for o in find_outliers(fit, {"a": grid}, np.array([NOISE]))]
 
 
 def noise(count: int = 200, seed: int = 1) -> NDArray[np.float64]:
