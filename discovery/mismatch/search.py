@@ -95,7 +95,9 @@ def _grow(
         bar = NAMED if freely else NAMED + trace(current.evidence - baseline.evidence)
         if current.hypotheses and bent(step, step.hypotheses[-1]):
             bar = max(bar, BLUNT)  # what is left has another law, and there is not much of it
-        if step.evidence - current.evidence < bar or not matters(context, step, step.hypotheses[-1]):
+        if not matters(context, step, step.hypotheses[-1]):
+            bar = max(bar, BLUNT)  # small for its kind, but no coarse model shows it so clearly
+        if step.evidence - current.evidence < bar:
             break
         tell(f"{step.hypotheses[-1].effect.title} at {', '.join(step.hypotheses[-1].places)}")
         current = step
