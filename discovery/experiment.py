@@ -32,7 +32,7 @@ from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.starts import warm_start
 from discovery.models import Model
 from discovery.models.convection import validity_of_model
-from discovery.models.dimensions import check_dimensions, with_coefficient_units
+from discovery.models.dimensions import check_dimensions, differences, with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
 from discovery.progress import Progress, silent
@@ -222,7 +222,7 @@ def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
     notes = []
     for name, found in fit.offsets.items():
         low, high = (pick(found, key=lambda r: found[r][0]) for pick in (min, max))
-        unit = "K" if channels[name].unit == "degC" else channels[name].unit
+        unit = differences(channels[name].unit)
         notes.append(
             f"{name} is known within {channels[name].spread:.3g} {unit}: the fit takes it for off by "
             f"{found[low][0]:+.2g} {unit} in '{low}' to {found[high][0]:+.2g} {unit} in '{high}'; in an "

@@ -15,7 +15,7 @@ from discovery.mismatch.look import attempt, look
 
 NAMED = 8.0  # log evidence that a claim has to add to be taken up
 SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
-TRACE = 0.6  # log evidence of a law's traces, times the root of the whole gain
+TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the most beside it
 RIVALS = 3  # claims that are tried in the place of another
 
 
@@ -86,16 +86,17 @@ def question(context: Context, current: Assessment) -> tuple[Assessment, list[As
 def _elsewhere(
     context: Context, current: Assessment, h: Hypothesis, others: Sequence[Hypothesis]
 ) -> list[tuple[Hypothesis, tuple[float, ...]]]:
-    """The effect at every other body with the size and shape that it has here.
+    """The effect at every other body where it can act, with the size and shape that it has here.
 
-    A law that is offered only where a simpler one stands already follows that one to a wrong body.
+    What needs a wet body may wet a dry one: offered only where a simpler fluid term stands, it follows
+    that one to a wrong body. Everything else keeps its places: no friction without a drive.
     """
     if len(h.states) != 1 or h.recording is not None:
         return []
     parameters = current.model.parameters
     size = tuple(parameters[name].value for name in h.amplitudes)
     shapes = [parameters[name].value for name in h.shapes]
-    entry = replace(h.effect, place="body")
+    entry = replace(h.effect, place="body") if h.effect.place == "wet body" else h.effect
     taken = {(o.effect.word, o.states) for o in (h, *others)}
     found = {
         o.states: replace(o.at(dict(zip(o.shapes, shapes, strict=True))), effect=h.effect)
