@@ -23,7 +23,7 @@ from discovery.fitting import fit_model, predict_recording
 from discovery.models import Model
 from discovery.models.modelfile import read_model
 from discovery.recordings import Campaign, Recording, load_campaign
-from discovery.runtime.update import belief_of, residual_levels, update_belief
+from discovery.runtime.belief import belief_of, residual_levels, update_belief
 from discovery.virtual.machine import Machine
 from discovery.virtual.record import Order, take
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from discovery.export.document import Exported, Input
 from discovery.files import write_toml
-from discovery.runtime.opcua import _asyncua
+from discovery.runtime.opcua_link import need_asyncua
 
 NAMESPACE = "urn:discovery:offsets"
 SERVER_URI, CLIENT_URI = "urn:discovery:machine", "urn:discovery:compensator"
@@ -38,7 +38,7 @@ async def make_certificate(folder: Path, name: str, uri: str) -> None:
 @contextlib.asynccontextmanager
 async def simulated_machine(exported: Exported, folder: Path, update_s: float = 1.0) -> AsyncIterator[Path]:
     """Run the server while the context lasts; yields the connection file of a client that it trusts."""
-    asyncua = _asyncua()
+    asyncua = need_asyncua()
     logging.getLogger("asyncua").setLevel(logging.ERROR)
     ua = asyncua.ua
     from asyncua.common.utils import ServiceError

@@ -15,7 +15,8 @@ from discovery.errors import UserError
 from discovery.export.document import Exported
 from discovery.files import read_toml
 from discovery.runtime.compensator import Settings
-from discovery.runtime.opcua import ConnectionForm, Link, Punctuality, run_loop
+from discovery.runtime.opcua import Punctuality, run_loop
+from discovery.runtime.opcua_link import ConnectionForm, Link
 from discovery.runtime.opcua_machine import CLIENT_URI, make_certificate, simulated_machine
 from discovery.runtime.session import Session
 

@@ -17,7 +17,8 @@ from discovery.export.document import Exported, read_document, write_document
 from discovery.export.knowledge import stretch
 from discovery.recordings import Campaign, Recording
 from discovery.runtime import update as module
-from discovery.runtime.update import belief_of, residual_levels, update_belief, update_file
+from discovery.runtime.belief import belief_of, residual_levels, update_belief
+from discovery.runtime.update import update_file
 from discovery.virtual.effects import Request
 from discovery.virtual.machine import Machine
 from discovery.virtual.record import Order, take
