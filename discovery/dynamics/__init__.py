@@ -1,13 +1,12 @@
 """Dynamics: trajectories and the sensitivities of all parameters and candidate terms, with one kernel."""
 
 from discovery.dynamics.grid import Grid, make_grid
+from discovery.dynamics.sensitivity import Column, sensitivities
 from discovery.dynamics.system import (
-    Column,
     System,
     Trajectory,
     make_system,
     outputs,
-    sensitivities,
     simulate,
     start_values,
 )

@@ -1,10 +1,8 @@
-"""A model on a recording: its trajectory, its outputs, and the sensitivities of parameters and candidate
-terms.
-"""
+"""A model on a recording: its trajectory and its outputs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,20 +57,6 @@ class Trajectory:
         return {**self.system.grid.nodes, **self.values, **states}
 
 
-@dataclass(frozen=True)
-class Column:
-    """A piece of forcing: a heat flow (or rate) that enters `into` and leaves `source`, at the interval ends
-    (2K,).
-
-    Pieces with the same `owner` add up to one sensitivity column.
-    """
-
-    owner: int
-    into: str
-    series: Array
-    source: str | None = None
-
-
 def make_system(model: Model, grid: Grid) -> System:
     """Bind a model to a grid."""
     model = expanded(model)
@@ -96,7 +80,7 @@ def start_values(system: System, values: Mapping[str, float]) -> Array:
     """Declared start values (n,): an expression at the first instant, or the first reading of the state's
     channel.
     """
-    first = _first(system.grid)
+    first = first_values(system.grid)
     known: dict[str, float] = {**first, **values}
     out = np.zeros(len(system.states))
     for i, name in enumerate(system.states):
@@ -128,7 +112,7 @@ def uncertain(system: System) -> tuple[str, ...]:
     return tuple(name for name in system.grid.spread if name in used - own)
 
 
-def _first(grid: Grid) -> dict[str, float]:
+def first_values(grid: Grid) -> dict[str, float]:
     """Channels at the first instant, outputs at their first reading."""
     first = {name: float(series[0]) for name, series in grid.nodes.items()}
     for i, name in enumerate(grid.outputs):
@@ -244,86 +228,3 @@ def output_matrix(trajectory: Trajectory) -> Array:
         for name, partial in dual.partials.items():
             out[:, y, system.states.index(name)] = np.broadcast_to(partial, (count,))[read]
     return out
-
-
-def sensitivities(
-    trajectory: Trajectory,
-    parameters: Sequence[str],
-    starts: Sequence[str] = (),
-    candidates: Sequence[Column] = (),
-    count: int | None = None,
-) -> Array:
-    """dy/d(everything) at the reading instants, (R, Y, M).
-
-    Columns stand in this order: `parameters`, `starts` (start values of states), candidate owners 0, 1, ...
-
-    Args:
-        parameters: names of parameters, or of channels that move by a constant (start values declared from
-            them move along).
-        starts: names of states whose start value moves.
-        candidates: forcing pieces of candidate terms.
-        count: number of candidate owners; default the largest owner plus one.
-    """
-    system = trajectory.system
-    n, steps = len(system.states), len(system.grid.step)
-    owners = count if count is not None else max((c.owner for c in candidates), default=-1) + 1
-    total = len(parameters) + len(starts) + owners
-    owner: list[int] = []
-    into: list[int] = []
-    source: list[int] = []
-    series: list[Array] = []
-    wanted = frozenset(parameters)
-    if parameters:
-        env = trajectory.at_ends()
-        for term, i, j in zip(system.model.terms, system.into, system.source, strict=True):
-            if wanted.isdisjoint(names(term.expression)):
-                continue
-            dual = evaluate(term.expression, env, wanted, system.ends)
-            for name, partial in dual.partials.items():
-                owner.append(parameters.index(name))
-                into.append(i)
-                source.append(j)
-                series.append(np.broadcast_to(partial, (2 * steps,)))
-    for column in candidates:
-        owner.append(len(parameters) + len(starts) + column.owner)
-        into.append(system.states.index(column.into))
-        source.append(system.states.index(column.source) if column.source else -1)
-        series.append(np.broadcast_to(column.series, (2 * steps,)))
-    start = np.zeros((n, total))
-    for k, name in enumerate(starts):
-        start[system.states.index(name), len(parameters) + k] = 1.0
-    for i, state in enumerate(system.model.states.values()):
-        # a start that a parameter sets, unless it moves freely; around a channel it moves freely with it
-        by = wanted & system.grid.spread.keys() if state.name in starts else wanted
-        if state.start is not None and not by.isdisjoint(names(state.start)):
-            known = {**_first(system.grid), **trajectory.values}
-            for name, slope in evaluate(state.start, known, frozenset(by)).partials.items():
-                start[i, parameters.index(name)] = float(np.mean(slope))
-    stacked = np.array(series).reshape(len(series), steps, 2)
-    left = np.ascontiguousarray(stacked[:, :, 0].T)
-    right = np.ascontiguousarray(stacked[:, :, 1].T)
-    into_index = np.array(into, dtype=np.int64)
-    source_index = np.array(source, dtype=np.int64)
-    read = system.grid.read.astype(np.int64)
-    s = kernel.columns(
-        trajectory.which,
-        trajectory.e,
-        trajectory.w0,
-        trajectory.w1,
-        start,
-        np.array(owner, dtype=np.int64),
-        into_index,
-        system.scale[into_index],
-        source_index,
-        system.scale[source_index],
-        left,
-        right,
-        read,
-    )
-    dy: Array = np.einsum("ryn,rnm->rym", output_matrix(trajectory), s)
-    for y, dual in enumerate(outputs(trajectory, wanted) if parameters else []):
-        for name, partial in dual.partials.items():
-            dy[:, y, parameters.index(name)] += np.broadcast_to(partial, (len(system.grid.time),))[
-                system.grid.read
-            ]
-    return dy
