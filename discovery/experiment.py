@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from discovery.dynamics.system import predict as model_outputs
 from discovery.errors import UserError
-from discovery.evaluation import evaluate
-from discovery.evaluation.crossvalidation import cross_validate
 from discovery.experimentfile import (
     Experiment,
     FileEntry,
@@ -26,59 +20,21 @@ from discovery.experimentfile import (
     only,
     separate,
 )
-from discovery.fitting import Fit, fit_model, predict_recording
+from discovery.fitted import Fitted, judged
+from discovery.fitting import fit_model
 from discovery.fitting.fit import Loss, written_with
 from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.starts import warm_start
 from discovery.models import Model
-from discovery.models.convection import validity_of_model
-from discovery.models.dimensions import check_dimensions, differences, with_coefficient_units
+from discovery.models.dimensions import with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
 from discovery.progress import Progress, silent
-from discovery.recordings import Channel
 from discovery.results import default_folder, staged, write_run
 from discovery.sparse.options import SparseOptions
 
 if TYPE_CHECKING:
     from discovery.mismatch import Diagnosis
-
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """Free run of a model on a recording, at its readings: time (R,) in s, readings and predicted (R, Y)."""
-
-    outputs: tuple[str, ...]
-    time: Array
-    readings: Array
-    predicted: Array
-    reference: Array  # (Y,) what would be assumed without a model: no error, or the first temperature
-
-    def scores(self) -> dict[str, dict[str, Any]]:
-        """Criteria by output."""
-        columns = zip(self.outputs, self.readings.T, self.predicted.T, self.reference, strict=True)
-        return {name: evaluate(read, predicted, float(zero)) for name, read, predicted, zero in columns}
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """A model of the experiment, whatever its kind, with what became of it."""
-
-    name: str
-    kind: str
-    fit: Fit
-    predictions: Mapping[str, Prediction]  # by recording
-    cross_validation: Mapping[str, Mapping[str, float]]
-    report: Mapping[str, Any]  # what the search has to say
-    notes: tuple[str, ...]
-    seconds: float
-
-    @property
-    def model(self) -> Model:
-        """The fitted model."""
-        return self.fit.model
 
 
 def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
@@ -192,45 +148,6 @@ def repaired_of(
     return judged(experiment, name, "repaired", repaired, fit, None, 0.0, progress)
 
 
-def judged(
-    experiment: Experiment,
-    name: str,
-    kind: str,
-    model: Model,
-    fit: Fit,
-    report: Mapping[str, Any] | None = None,
-    seconds: float = 0.0,
-    progress: Progress = silent,
-) -> Fitted:
-    """A model and its fit: cross-validation on the fit recordings alone, free runs on all, notes."""
-    began = clock.perf_counter() - seconds
-    outputs = fit.problem.outputs
-    validation: Mapping[str, Mapping[str, float]] = {}
-    if experiment.form.cross_validate:
-        progress(f"cross-validating {name}")
-        validation = cross_validate(fit.model, experiment.fitting, experiment.fit, outputs, fit.noise)
-    seconds = clock.perf_counter() - began
-    predictions = {r: predict(fit, experiment, r) for r in (*experiment.fit, *experiment.held_out)}
-    notes = [*fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]
-    notes += offset_notes(fit, experiment.campaign.channels)
-    notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
-    return Fitted(name, kind, fit, predictions, validation, report or {}, tuple(notes), seconds)
-
-
-def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
-    """One sentence for each input known only within a spread: what the fit makes of it."""
-    notes = []
-    for name, found in fit.offsets.items():
-        low, high = (pick(found, key=lambda r: found[r][0]) for pick in (min, max))
-        unit = differences(channels[name].unit)
-        notes.append(
-            f"{name} is known within {channels[name].spread:.3g} {unit}: the fit takes it for off by "
-            f"{found[low][0]:+.2g} {unit} in '{low}' to {found[high][0]:+.2g} {unit} in '{high}'; in an "
-            "unseen recording the first reading alone tells"
-        )
-    return notes
-
-
 def starting_model(
     experiment: Experiment, name: str, entry: ModelEntry, progress: Progress = silent
 ) -> tuple[Model, dict[str, Any]]:
@@ -264,20 +181,6 @@ def discovered(
     folder = experiment.path.parent
     found = discover(experiment.fitting, experiment.fit, experiment.outputs, options, progress, folder)
     return with_coefficient_units(found.model, experiment.campaign.channels), dict(found.report)
-
-
-def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
-    """Free run with the fitted model, zeroed on the first reading as on a controller."""
-    outputs = fit.problem.outputs
-    trajectory = predict_recording(fit.model, experiment.campaign, recording, outputs, fit.noise.white)
-    grid = trajectory.system.grid
-    reference = np.zeros(len(outputs))
-    for y, name in enumerate(outputs):
-        taken = grid.readings[grid.measured[:, y], y]
-        if experiment.campaign.channels[name].role == "temperature" and len(taken):
-            reference[y] = taken[0]
-    predicted = model_outputs(trajectory)
-    return Prediction(outputs, grid.time[grid.read], grid.readings, predicted, reference)
 
 
 def diagnosis(experiment: Experiment, progress: Progress = silent) -> Diagnosis | None:

@@ -31,7 +31,7 @@ from discovery.models.equations import equations
 from discovery.recordings.check import check_campaign
 
 if TYPE_CHECKING:
-    from discovery.experiment import Fitted
+    from discovery.fitted import Fitted
 
 _PACKAGES = ("numpy", "scipy", "numba", "pandas", "scikit-learn", "pysindy", "pint")
 
