@@ -24,6 +24,11 @@ class Delay:
     whole: int
     part: float
 
+    @property
+    def length(self) -> int:
+        """Values of the ring that keeps the input."""
+        return self.whole + 2
+
 
 @dataclass(frozen=True)
 class Compiled:
@@ -46,6 +51,11 @@ class Compiled:
     start: Program
     rates: Program
     results: Program
+
+    @property
+    def offsets(self) -> list[int]:
+        """Where the ring of each delay begins among all rings."""
+        return [sum(delay.length for delay in self.delays[:k]) for k in range(len(self.delays))]
 
 
 @dataclass

@@ -24,12 +24,12 @@ from discovery.export.identifiers import comment
 from discovery.export.replay import (
     CFLAGS,
     LIMITS,
-    TEMPLATES,
     Proof,
     Reference,
     within,
     write_files,
 )
+from discovery.export.templated import templated
 
 _HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
@@ -56,7 +56,11 @@ def fmu_bytes(exported: Exported, version: int) -> bytes:
     """
     headers = Path(_fmpy().__file__).parent / "c-code"
     prefix = c_prefix(exported)
-    sources = c_files(exported) | {f"fmi{version}.c": _wrapper(exported, version)}
+    start = "".join(f"{value!r}, " for value in _start(exported)).rstrip(" ")
+    sources = c_files(exported) | {
+        "instance.h": templated("instance.h", prefix, GUID=_token(exported), START=start),
+        f"fmi{version}.c": templated(f"fmi{version}.c"),
+    }
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_files(folder, dict(sources))
@@ -122,20 +126,6 @@ def prove_fmu(exported: Exported, reference: Reference, version: int, data: byte
         y = np.column_stack([result[name] for name in exported.compiled.outputs])[1:]
         deviation = float(np.max(np.abs(y - reference.y))) if len(y) == steps else float("nan")
     return within(Proof(f"FMI {version}.0", deviation, LIMITS["double"], "validated and simulated with FMPy"))
-
-
-def _wrapper(exported: Exported, version: int) -> str:
-    text = (TEMPLATES / f"fmi{version}.c").read_text()
-    start = "".join(f"{value!r}, " for value in _start(exported))
-    prefix = c_prefix(exported)
-    for mark, word in (
-        ("PREFIX", prefix),
-        ("UP", prefix.upper()),
-        ("GUID", _token(exported)),
-        ("START", start.rstrip(" ")),
-    ):
-        text = text.replace(f"@{mark}@", word)
-    return text
 
 
 def _token(exported: Exported) -> str:

@@ -20,13 +20,13 @@ from discovery.export.c import c_files, c_prefix
 from discovery.export.compiled import Compiled
 from discovery.export.document import Exported
 from discovery.export.stepper import Stepper
+from discovery.export.templated import templated
 
 Array = NDArray[np.float64]
 
 LIMITS = {"double": 1e-9, "float": 1e-3}  # um
 LONGEST = 8640  # steps of a reference: a day at 10 s
 CFLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-O2")
-TEMPLATES = Path(__file__).parent / "templates"
 
 
 @dataclass(frozen=True)
@@ -116,10 +116,7 @@ def prove_c(exported: Exported, reference: Reference) -> list[Proof]:
 
 def replay_source(exported: Exported) -> dict[str, str]:
     """The C program that replays the reference."""
-    text = (TEMPLATES / "replay.c").read_text()
-    return {
-        "replay.c": text.replace("@PREFIX@", c_prefix(exported)).replace("@UP@", c_prefix(exported).upper())
-    }
+    return {"replay.c": templated("replay.c", c_prefix(exported))}
 
 
 def within(proof: Proof) -> Proof:

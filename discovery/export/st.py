@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 from discovery import __version__
 from discovery.export.compiled import Compiled
@@ -17,6 +18,7 @@ from discovery.export.document import Exported
 from discovery.export.identifiers import comment, identifier, identifiers
 from discovery.export.kernel import LARGEST_NORM, LARGEST_SUBSTEPS, ORDER
 from discovery.export.program import Instruction, Program
+from discovery.export.statements import Language, statements
 
 KINDS = {"double": "LREAL", "float": "REAL"}
 _COMPARE = {"<": "<", "<=": "<=", ">": ">", ">=": ">=", "==": "=", "!=": "<>"}
@@ -128,7 +130,7 @@ def _declarations(c: Compiled, kind: str) -> str:
         "u": len(c.inputs), "x": len(c.states), "c": len(c.states), "p": c.plays,
         "e": len(c.delays), "f": len(c.states), "a": len(c.nonzeros), "m": c.plays, "z": len(c.states),
         "xn": len(c.states), "cn": len(c.states), "y": len(c.outputs), "w": len(c.states), "term":
-        len(c.states), "ring": sum(delay.whole + 2 for delay in c.delays),
+        len(c.states), "ring": sum(delay.length for delay in c.delays),
     }  # fmt: skip
     lines = [f"    {name} : ARRAY [0..{size}] OF {kind};\n" for name, size in sizes.items()]
     lines += [f"    position : ARRAY [0..{len(c.delays)}] OF DINT;\n", "    running : BOOL;\n"]
@@ -141,26 +143,21 @@ def _declarations(c: Compiled, kind: str) -> str:
 def _program(
     program: Program, results: Sequence[str], kind: str, function: str, state: str = "x", plays: str = "p"
 ) -> list[str]:
-    words: list[str] = []
-    lines: list[str] = []
     loads = {
         "input": "u[{}]",
-        "state": state + "[{}]",
+        "state": f"{state}[{{}}]",
         "delayed": "e[{}]",
-        "played": plays + "[{}]",
+        "played": f"{plays}[{{}}]",
         "time": "t",
     }
-    for k, instruction in enumerate(program.instructions):
-        if instruction.operation == "constant":
-            words.append(literal(instruction.value, kind))
-        elif instruction.operation in loads:
-            words.append(loads[instruction.operation].format(instruction.index))
-        else:
-            words.append(f"v{k}")
-            lines.append(f"v{k} := {_expression(instruction, words, kind, function)};")
-    return lines + [
-        f"{place} := {words[node]};" for place, node in zip(results, program.results, strict=True)
-    ]
+    language = Language(
+        partial(literal, kind=kind),
+        loads,
+        partial(_expression, kind=kind, function=function),
+        "{} := {};",
+        "{} := {};",
+    )
+    return statements(program, results, language)
 
 
 def _expression(instruction: Instruction, words: Sequence[str], kind: str, function: str) -> str:
@@ -188,7 +185,6 @@ def _body(c: Compiled, kind: str, function: str) -> str:
     n, outs = range(len(c.states)), range(len(c.outputs))
     zero = f"{kind}#0.0"
     ins, names = identifiers(c.inputs), identifiers(c.outputs)
-    offsets = [sum(d.whole + 2 for d in c.delays[:k]) for k in range(len(c.delays))]
     settled = [f"p[{k}]" for k in range(c.plays)]
     moved = [f"m[{k}]" for k in range(c.plays)]
     bad = f"NOT (ABS({{}}) < {kind}#1.0e30)"
@@ -214,7 +210,7 @@ def _body(c: Compiled, kind: str, function: str) -> str:
     for k, delay in enumerate(c.delays):
         lines += [
             "k := 0;",
-            f"WHILE k < {delay.whole + 2} DO ring[{offsets[k]} + k] := u[{delay.input}]; k := k + 1; "
+            f"WHILE k < {delay.length} DO ring[{c.offsets[k]} + k] := u[{delay.input}]; k := k + 1; "
             f"END_WHILE;",
         ]
         lines += [f"position[{k}] := 0;"]
@@ -225,12 +221,12 @@ def _body(c: Compiled, kind: str, function: str) -> str:
         f"t := DINT_TO_{kind}(count) * {literal(c.step_s, kind)};",
     ]
     for k, delay in enumerate(c.delays):
-        length, part = delay.whole + 2, literal(delay.part, kind)
+        length, part = delay.length, literal(delay.part, kind)
         lines += [
             f"here := (position[{k}] + 1) MOD {length};",
-            f"ring[{offsets[k]} + here] := u[{delay.input}];",
+            f"ring[{c.offsets[k]} + here] := u[{delay.input}];",
             f"part := {kind}#1.0 - {part};",
-            f"e[{k}] := part * ring[{offsets[k]} + (here + 2) MOD {length}] + {part} * ring[{offsets[k]} "
+            f"e[{k}] := part * ring[{c.offsets[k]} + (here + 2) MOD {length}] + {part} * ring[{c.offsets[k]} "
             f"+ (here + 1) MOD {length}];",
         ]
     rates = [*(f"f[{i}]" for i in n), *(f"a[{k}]" for k in range(len(c.nonzeros))), *moved]
@@ -274,7 +270,7 @@ def _body(c: Compiled, kind: str, function: str) -> str:
     lines += [f"x[{i}] := xn[{i}]; c[{i}] := cn[{i}];" for i in n]
     lines += [f"{p} := {m};" for p, m in zip(settled, moved, strict=True)]
     lines += [f"out_{word} := y[{k}];" for k, word in enumerate(names)]
-    lines += [f"position[{k}] := (position[{k}] + 1) MOD {d.whole + 2};" for k, d in enumerate(c.delays)]
+    lines += [f"position[{k}] := (position[{k}] + 1) MOD {d.length};" for k, d in enumerate(c.delays)]
     lines += ["count := count + 1;", "END_IF;", "END_IF;"]
     return _indented(lines)
 

@@ -167,11 +167,10 @@ class _Tables:
         self.outputs = _table(compiled.results)
         self.row = np.array([i for i, _ in compiled.nonzeros], dtype=np.int64)
         self.column = np.array([j for _, j in compiled.nonzeros], dtype=np.int64)
-        lengths = [delay.whole + 2 for delay in compiled.delays]
-        offsets = np.concatenate([[0], np.cumsum(lengths)])[: len(lengths)]
-        columns = [[d.input for d in compiled.delays], offsets, lengths]
+        delays = compiled.delays
+        columns = [[d.input for d in delays], compiled.offsets, [d.length for d in delays]]
         self.delays = np.array(columns, dtype=np.int64).reshape(3, -1).T.copy()
-        self.part = np.array([delay.part for delay in compiled.delays])
+        self.part = np.array([delay.part for delay in delays])
 
 
 def _table(program: Program) -> Table:

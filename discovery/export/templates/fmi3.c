@@ -1,33 +1,13 @@
 /* FMI 3.0 co-simulation of an exported model: inputs are held over a communication step, which takes as many fixed steps
  * of the model as fit. */
-#include "@PREFIX@.h"
-
 #include "fmi3Functions.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
-#define TOKEN "@GUID@"
-#define TIME (@UP@_INPUTS + @UP@_OUTPUTS)
 
 typedef fmi3ValueReference reference;
 
-typedef struct {
-    double start_time;
-    double time;
-    double u[@UP@_INPUTS + 1];
-    double y[@UP@_OUTPUTS + 1];
-    @PREFIX@_state state;
-} instance;
+#include "instance.h"
 
-static const double start_inputs[] = {@START@ 0.0};
-
-static void set_up(instance *m)
-{
-    memset(m, 0, sizeof *m);
-    memcpy(m->u, start_inputs, sizeof(double) * @UP@_INPUTS);
-}
+#define STATUS(failed) ((failed) != 0 ? fmi3Error : fmi3OK)
+#define TIME VARIABLES /* its reference is the next one */
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
@@ -49,13 +29,9 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          const reference intermediate[], size_t n, fmi3InstanceEnvironment environment,
                                          fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update)
 {
-    instance *m;
     (void)name; (void)path; (void)visible; (void)logging; (void)events; (void)early;
     (void)intermediate; (void)n; (void)environment; (void)log; (void)update;
-    if (token == NULL || strcmp(token, TOKEN) != 0) { return NULL; }
-    m = (instance *)malloc(sizeof *m);
-    if (m != NULL) { set_up(m); }
-    return m;
+    return instantiate(token);
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String path, fmi3Boolean visible,
@@ -80,13 +56,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance i, fmi3Boolean tolerance_def
     return fmi3OK;
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance i)
-{
-    instance *m = (instance *)i;
-    if (@PREFIX@_start(&m->state, m->u) != 0) { return fmi3Error; }
-    @PREFIX@_outputs(&m->state, m->u, m->y);
-    return fmi3OK;
-}
+fmi3Status fmi3ExitInitializationMode(fmi3Instance i) { return STATUS(initialise((instance *)i)); }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance i) { (void)i; return fmi3Error; }
 fmi3Status fmi3Terminate(fmi3Instance i) { (void)i; return fmi3OK; }
@@ -98,23 +68,15 @@ fmi3Status fmi3GetFloat64(fmi3Instance i, const reference vr[], size_t n, fmi3Fl
     size_t k;
     if (values != n) { return fmi3Error; }
     for (k = 0; k < n; ++k) {
-        if (vr[k] < @UP@_INPUTS) { value[k] = m->u[vr[k]]; }
-        else if (vr[k] < TIME) { value[k] = m->y[vr[k] - @UP@_INPUTS]; }
-        else if (vr[k] == TIME) { value[k] = m->time; }
-        else { return fmi3Error; }
+        if (vr[k] == TIME) { value[k] = m->time; }
+        else if (get(m, &vr[k], 1, &value[k]) != 0) { return fmi3Error; }
     }
     return fmi3OK;
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance i, const reference vr[], size_t n, const fmi3Float64 value[], size_t values)
 {
-    size_t k;
-    if (values != n) { return fmi3Error; }
-    for (k = 0; k < n; ++k) {
-        if (vr[k] >= @UP@_INPUTS || !(fabs(value[k]) < 1e30)) { return fmi3Error; }
-        ((instance *)i)->u[vr[k]] = value[k];
-    }
-    return fmi3OK;
+    return STATUS(values != n || set((instance *)i, vr, n, value) != 0);
 }
 
 #define NONE(kind) \
@@ -149,14 +111,7 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance i, reference dependent, size
                                        size_t others[], fmi3DependencyKind kinds[], size_t n)
 { (void)i; (void)dependent; (void)elements; (void)independents; (void)others; (void)kinds; (void)n; return fmi3Error; }
 
-fmi3Status fmi3GetFMUState(fmi3Instance i, fmi3FMUState *state)
-{
-    if (*state == NULL) { *state = malloc(sizeof(instance)); }
-    if (*state == NULL) { return fmi3Error; }
-    memcpy(*state, i, sizeof(instance));
-    return fmi3OK;
-}
-
+fmi3Status fmi3GetFMUState(fmi3Instance i, fmi3FMUState *state) { return STATUS(copied(state, i)); }
 fmi3Status fmi3SetFMUState(fmi3Instance i, fmi3FMUState state) { memcpy(i, state, sizeof(instance)); return fmi3OK; }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance i, fmi3FMUState *state)
@@ -186,10 +141,7 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance i, const fmi3Byte bytes[], size_
 {
     (void)i;
     if (size != sizeof(instance)) { return fmi3Error; }
-    if (*state == NULL) { *state = malloc(sizeof(instance)); }
-    if (*state == NULL) { return fmi3Error; }
-    memcpy(*state, bytes, size);
-    return fmi3OK;
+    return STATUS(copied(state, bytes));
 }
 
 #define DERIVATIVE(name) \
@@ -243,15 +195,11 @@ fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 time, fmi3Float64 size, fmi3Bo
                       fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *last)
 {
     instance *m = (instance *)i;
-    const double due = floor((time + size - m->start_time) / @UP@_STEP_S + 1e-6);
     (void)no_set;
     *event = fmi3False;
     *terminate = fmi3False;
     *early = fmi3False;
-    while ((double)m->state.count < due) {
-        if (@PREFIX@_step(&m->state, m->u, m->y) != 0) { return fmi3Error; }
-    }
-    m->time = time + size;
+    if (steps_until(m, time + size) != 0) { return fmi3Error; }
     *last = m->time;
     return fmi3OK;
 }
