@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from discovery.dynamics.system import predict as model_outputs
-from discovery.export.document import from_document, make_document, render
+from discovery.export.document import from_document, render
+from discovery.export.makedocument import make_document
 from discovery.export.seal import open_seal
 from discovery.fitting import fit_model, predict_recording
 from discovery.models import Model

@@ -15,7 +15,8 @@ import numpy as np
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as some
 
-from discovery.export.document import Exported, from_document, make_document, render
+from discovery.export.document import Exported, from_document, render
+from discovery.export.makedocument import make_document
 from discovery.export.ranges import sampled_inputs
 from discovery.export.seal import open_seal
 from discovery.fitting import fit_model

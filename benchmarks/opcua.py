@@ -9,7 +9,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from discovery.export.document import make_document, read_document, write_document
+from discovery.export.document import read_document, write_document
+from discovery.export.makedocument import make_document
 from discovery.fitting import fit_model
 from discovery.models.modelfile import read_model
 from discovery.recordings import load_campaign

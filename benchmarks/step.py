@@ -12,7 +12,8 @@ import time
 from pathlib import Path
 
 from discovery.export.c import c_files, c_prefix
-from discovery.export.document import Exported, from_document, make_document, render
+from discovery.export.document import Exported, from_document, render
+from discovery.export.makedocument import make_document
 from discovery.export.ranges import sampled_inputs
 from discovery.export.reduce import reduce_model
 from discovery.export.replay import make_reference, reference_files, replay_source, write_files

@@ -9,7 +9,7 @@ from discovery.dynamics import Grid, make_system, simulate
 from discovery.dynamics.grid import Samples
 from discovery.dynamics.system import predict
 from discovery.export.compiled import compile_model
-from discovery.export.document import exportable
+from discovery.export.makedocument import exportable
 from discovery.export.ranges import sampled_inputs
 from discovery.export.stepper import Stepper
 from discovery.models import Model

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 from discovery.errors import UserError
 from discovery.export.agreement import agreement
 from discovery.export.c import c_files
-from discovery.export.document import Exported, from_document, make_document, render
+from discovery.export.document import Exported, from_document, render
 from discovery.export.fmu import fmu_bytes, prove_fmu
 from discovery.export.identifiers import identifier
+from discovery.export.makedocument import make_document
 from discovery.export.ranges import sampled_inputs
 from discovery.export.replay import (
     Proof,

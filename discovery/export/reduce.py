@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.export.compiled import Compiled, compile_model
-from discovery.export.document import exportable
+from discovery.export.makedocument import exportable
 from discovery.export.ranges import sampled_inputs
 from discovery.export.stepper import Stepper
 from discovery.models import Model, State

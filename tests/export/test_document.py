@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
 
 from discovery.errors import UserError
-from discovery.export.document import from_document, make_document, read_document, render, write_document
+from discovery.export.document import from_document, read_document, render, write_document
+from discovery.export.makedocument import make_document
 from discovery.export.ranges import sampled_inputs
 from discovery.export.seal import Seal, open_seal, private_key, public_key, require_trusted
 from discovery.export.stepper import Stepper
