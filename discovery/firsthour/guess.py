@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from discovery.firsthour.table import Column
 from discovery.recordings.correction import corrected_by_name
+from discovery.recordings.units import UnitError, conversion
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,7 @@ _WORDS: tuple[tuple[str, str], ...] = (
         "error",
     ),
     (r"probe|r test|growth|shift|drift", "error"),
+    (r"eff(iciency)?|status|state|mode|fault|set ?point", "other input"),
     (r"nozzle.*(height|h)|h nozzle", "nozzle height"),
     (r"nozzle.*side|side.*nozzle", "nozzle side"),
     (r"(p|power|q|heat).*cool(ing|er)?|cool(ing|er)? *(power|p)|chiller *(power|p)", "cooling power"),
@@ -43,7 +45,8 @@ _WORDS: tuple[tuple[str, str], ...] = (
         "fluid temperature",
     ),
     (
-        r"(t|temp(erature)?)? *(amb(ient)?|env(ironment)?|room|air|hall|outside|umgebung|raum)",
+        r"(t|temp(erature)?)? *"
+        r"(amb(ient)?|env(ironment)?|room|air|hall|outside|outdoor|ext(ern(al)?)?|surroundings?|umgebung|raum)",
         "ambient temperature",
     ),
     (r"pump|flow|volume stream", "fluid flow"),
@@ -100,6 +103,7 @@ _UNITS = {
     "-": "1",
     "1": "1",
 }
+_DEGREES = str.maketrans("º˚", "°°")  # what passes for the sign of degrees
 _TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
 _USUAL = {
     "rotation speed": "rpm",
@@ -133,17 +137,32 @@ def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
 
 def guess(column: Column) -> Guess:
     """Role and unit of a column."""
-    named = _UNITS.get(column.unit.lower().strip())
+    spelled = column.unit.strip().translate(_DEGREES)
+    named = _UNITS.get(spelled.lower())
     role, why = _role(column, named)
     if named:
         if role in _TEMPERATURES and named not in ("degC", "degF", "K"):
             role, why = "other input", f"the unit {column.unit} is none of a temperature"
         return Guess(role, named, f"{why}; the header says {column.unit}", role != "other input")
-    if column.unit:
-        return Guess(
-            role, column.unit, f"{why}; the header says {column.unit}, which was left as it is", sure=False
-        )
-    return _by_values(role, why, column.values)
+    if not spelled:
+        return _by_values(role, why, column.values)
+    # a unit that the role cannot have is worth more than the word that suggested the role
+    for likely in dict.fromkeys((role, "other input")):
+        if _known(spelled, likely):
+            return Guess(
+                likely, spelled, f"{why}; the header says {spelled}, which was left as it is", sure=False
+            )
+    return Guess(
+        "other input", "1", f"{why}; the header says {column.unit}, which is no known unit", sure=False
+    )
+
+
+def _known(unit: str, role: str) -> bool:
+    try:
+        conversion(unit, role)
+    except UnitError:
+        return False
+    return True
 
 
 def _role(column: Column, unit: str | None) -> tuple[str, str]:

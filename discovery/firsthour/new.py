@@ -6,6 +6,7 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,8 +34,7 @@ def new(folder: Path, sources: Sequence[Path]) -> list[str]:
     """
     if (folder / "campaign.toml").exists():
         raise UserError(f"{folder}: campaign.toml is there already; name another folder, or delete it first")
-    tables = [read_own(Path(source)) for source in sources]
-    _same_columns(tables)
+    tables = _alike([read_own(Path(source)) for source in sources])
     guesses = guess_all(tables[0].columns)
     recordings = _recordings(tables)
     room, why_room = _room(tables, guesses)
@@ -54,16 +54,41 @@ def new(folder: Path, sources: Sequence[Path]) -> list[str]:
     return [*lines, "", *_next(folder)]
 
 
-def _same_columns(tables: Sequence[OwnTable]) -> None:
+def _alike(tables: Sequence[OwnTable]) -> list[OwnTable]:
+    """The tables with the columns that all have, without inputs of unknown role that never move."""
     first = {column.name for column in tables[0].columns}
     for table in tables[1:]:
-        different = first ^ {column.name for column in table.columns}
-        if different:
+        here = {column.name for column in table.columns}
+        if not first & here:
             raise UserError(
                 f"{table.path}: its columns differ from those of {tables[0].path} "
-                f"({', '.join(sorted(different))}); "
-                "recordings of one campaign have the same columns"
+                f"({', '.join(sorted(first ^ here))}); recordings of one campaign have the same columns"
             )
+    common = first.intersection(*({column.name for column in table.columns} for table in tables))
+    still = {
+        name
+        for name, one in guess_all(tables[0].columns).items()
+        if name in common and one.role == "other input" and _never_moves(tables, name)
+    }
+    return [_kept(table, common, still) for table in tables]
+
+
+def _never_moves(tables: Sequence[OwnTable], name: str) -> bool:
+    values = np.concatenate(_columns(tables, name))
+    return bool(np.nanmin(values) == np.nanmax(values))
+
+
+def _kept(table: OwnTable, common: set[str], still: set[str]) -> OwnTable:
+    notes = list(table.notes)
+    for column in table.columns:
+        if column.name not in common:
+            notes.append(f"column '{column.header}' is not in every file: left out")
+        elif column.name in still:
+            notes.append(f"column '{column.header}' never moves: left out")
+    kept = tuple(c for c in table.columns if c.name in common - still)
+    if not kept:
+        raise UserError(f"{table.path}: no column but time holds values that move")
+    return replace(table, columns=kept, notes=tuple(notes))
 
 
 def _recordings(tables: Sequence[OwnTable]) -> dict[str, tuple[OwnTable, slice]]:
@@ -187,11 +212,13 @@ def _said(
 ) -> list[str]:
     width = max(len(column.header) for column in tables[0].columns)
     inner = max(len(f"{c.name}: {guesses[c.name].role}, {guesses[c.name].unit}") for c in tables[0].columns)
-    lines = [
-        f"{table.path.name}: {len(table.time)} rows over {_duration(float(table.time[-1]))}; "
-        f"time {table.about_time}"
-        for table in tables
-    ]
+    lines = []
+    for table in tables:
+        lines.append(
+            f"{table.path.name}: {len(table.time)} rows over {_duration(float(table.time[-1]))}; "
+            f"time {table.about_time}"
+        )
+        lines += [f"  {note}" for note in table.notes]
     lines.append("guessed (? = have a look):")
     for column in tables[0].columns:
         one = guesses[column.name]

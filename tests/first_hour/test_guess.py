@@ -27,6 +27,12 @@ CASES = [
     ("E_Z0T", "", np.linspace(0, 20, 50), "error", "um"),
     ("nozzle height", "mm", np.full(50, 50.0), "nozzle height", "mm"),
     ("gizmo", "", np.linspace(0, 1, 50), "other input", "1"),
+    ("T_ext", "", np.linspace(8, 31, 50), "ambient temperature", "degC"),
+    ("extruder temp", "", np.linspace(20, 210, 50), "temperature", "degC"),
+    ("319A Temp", "ºF", np.linspace(70, 90, 50), "temperature", "degF"),
+    ("Torque", "lbf·ft", np.linspace(0, 0.3, 50), "other input", "lbf·ft"),
+    ("heat flux", "W/quux", np.linspace(0, 9, 50), "other input", "1"),
+    ("Motor Efficiency", "%", np.linspace(0, 90, 50), "other input", "percent"),
 ]
 
 
@@ -70,6 +76,49 @@ def test_instants_of_a_logger(tmp_path: Path) -> None:
     assert table.columns[0].values[3] == 3.5
 
 
+CLOCKS = [
+    (["Date,Time,T1", *(f"2021-01-15,23:59:{58 - 10 + k:02d},{k}" for k in range(12))], 11.0),
+    (["Time,T1", *(f"1/15/2021 11:{48 + k}:00 AM,{k}" for k in range(12))], 660.0),
+    (
+        ["Time,T1", *(f"{(23 * 60 + 55 + k) // 60 % 24:02d}:{(55 + k) % 60:02d},{k}" for k in range(12))],
+        660.0,
+    ),
+    (["timestamp,T1", *(f"{1685183986928 + 2000 * k},{k}" for k in range(12))], 22.0),
+    (["Test Time (min),T1", *(f"{k / 10},{k}" for k in range(12))], 66.0),
+    (["T1,elapsed", *(f"{9 - k},{k}" for k in range(12))], 11.0),
+    (["time    T1", *(f" {k}   {k / 2}" for k in range(12))], 11.0),
+]
+
+
+@pytest.mark.parametrize(("lines", "last"), CLOCKS)
+def test_clocks_of_many_kinds(tmp_path: Path, lines: list[str], last: float) -> None:
+    table = read_own(_file(tmp_path, *lines))
+    assert table.time[-1] == pytest.approx(last)
+    assert [c.name for c in table.columns] == ["T1"]
+
+
+def test_rows_of_one_stamp_are_spread(tmp_path: Path) -> None:
+    table = read_own(_file(tmp_path, "time,T1", *(f"{k // 4},{k}" for k in range(40))))
+    np.testing.assert_allclose(np.diff(table.time), 0.25)
+    assert "30 rows bear the stamp of the row before" in table.notes[0]
+
+
+def test_what_a_logger_writes_above_and_between(tmp_path: Path) -> None:
+    lines = [
+        "# a remark, with commas, many, many",
+        "Device;TC-08",
+        "Serial;123;4",
+        ";time;T1;door;note;spare",
+    ]
+    rows = [f"{k};{k / 2};{20 + k},5;{'True' if k > 5 else 'False'};ready;" for k in range(12)]
+    table = read_own(_file(tmp_path, *lines, *rows))
+    assert [c.name for c in table.columns] == ["T1", "door"]
+    assert table.time[-1] == 5.5
+    assert table.columns[0].values[1] == 21.5
+    assert table.columns[1].values.tolist() == [0.0] * 6 + [1.0] * 6
+    assert len(table.notes) == 4  # lines above, the count of rows, words, nothing
+
+
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
@@ -77,6 +126,8 @@ def test_instants_of_a_logger(tmp_path: Path) -> None:
         (["time,T1", *(f"{k},{k}" for k in range(12)), "5,5"], r"line 14: the time does not run forward"),
         (["time,T1", *(f"{k},{k}" for k in range(12)), "12,5,6"], r"line 14: 3 cells where the header has 2"),
         (["T1,T2", *("1,2" for _ in range(12))], "no column of time was found"),
+        ([f"{k},0,{299.5 + k}" for k in range(12)], r"line 1: numbers where the names .* should stand"),
+        (["T (a)", *(f"{k},{k}" for k in range(12))], "no header above the rows of 2 cells"),
         (["time,T1", "0,1", "1,2"], "only 2 rows"),
     ],
 )

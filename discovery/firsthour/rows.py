@@ -1,0 +1,139 @@
+"""The rows of an engineer's text table: encoding, separator, what stands above the header, header, units."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import math
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from discovery.errors import UserError
+
+Row = tuple[int, list[str]]
+"""Number of the line, and its cells."""
+
+_EMPTY = {"", "nan", "inf", "-inf", "na", "n/a", "null", "none", "nil", "-", "--", "---", "?", "ol"}
+_EMPTY |= {"#n/a", "#value!", "#div/0!", "undefined", "unknown", "unavailable"}
+_SWITCH = {"true": 1.0, "on": 1.0, "yes": 1.0, "false": 0.0, "off": 0.0, "no": 0.0}
+_FEWEST = 10  # rows of a recording
+_NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """`header` and `units` (or empty words), the rows of data, and what a person should know."""
+
+    header: list[str]
+    units: list[str]
+    body: list[Row]
+    notes: tuple[str, ...]
+
+
+def read_sheet(path: Path) -> Sheet:
+    """Read a text table (plain or gzip).
+
+    Raises:
+        UserError: no such file, no text, no header, fewer than ten rows, or a ragged row.
+    """
+    rows = _cut(path, _text(path))
+    width = Counter(len(cells) for _, cells in rows[len(rows) // 2 :]).most_common(1)[0][0]
+    first = next((k for k, (_, cells) in enumerate(rows) if len(cells) == width and _is_data(cells)), None)
+    if first == 0:
+        raise UserError(
+            f"{path}, line {rows[0][0]}: numbers where the names of the columns should stand; "
+            "put a line of names above them, such as time,heater,T1"
+        )
+    above = [k for k in range(len(rows) if first is None else first) if len(rows[k][1]) == width]
+    if not above:
+        raise UserError(
+            f"{path}: no header above the rows of {width} cells; write {width} names, starting with time"
+        )
+    at = max(above, key=lambda k: (sum(map(bool, rows[k][1])), -k))
+    units = rows[at + 1][1] if first is not None and at + 1 < first else [""] * width
+    body = rows[first:] if first is not None else rows[at + 1 :]
+    if len(body) < _FEWEST:
+        raise UserError(
+            f"{path}: only {len(body)} rows of data below the header; a recording needs at least {_FEWEST}"
+        )
+    for line, cells in body:
+        if len(cells) != width:
+            raise UserError(
+                f"{path}, line {line}: {len(cells)} cells where the header has {width}; mend the row"
+            )
+    notes = (f"{at} lines above the header were passed over",) if at else ()
+    return Sheet(rows[at][1], units if len(units) == width else [""] * width, body, notes)
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number, with a decimal point or comma."""
+    return bool(_NUMBER.fullmatch(cell))
+
+
+def is_stamp(cell: str) -> bool:
+    """Whether a cell holds a date or a time of day."""
+    return bool(re.match(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?!\d)|\d{1,3}:\d{2}(:\d{2})?", cell))
+
+
+def is_word(cell: str) -> bool:
+    """Whether a cell holds neither a number nor a switch nor a word for "not measured"."""
+    return not is_number(cell) and cell.lower() not in _EMPTY and cell.lower() not in _SWITCH
+
+
+def number(cell: str, path: Path, line: int, column: str) -> float:
+    """A cell as a number: NaN where nothing was measured, 1 or 0 for on or off.
+
+    Raises:
+        UserError: the cell holds something else.
+    """
+    if is_number(cell):
+        return float(cell.replace(",", "."))
+    if cell.lower() in _EMPTY:
+        return math.nan
+    if cell.lower() in _SWITCH:
+        return _SWITCH[cell.lower()]
+    raise UserError(f"{path}, line {line}, column '{column}': '{cell}' is not a number; empty it or mend it")
+
+
+def _text(path: Path) -> str:
+    try:
+        data = path.read_bytes()
+        data = gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data
+    except (OSError, EOFError) as error:
+        why = getattr(error, "strerror", None) or "the archive is damaged"
+        raise UserError(f"{path}: cannot be read ({why}); name a CSV file") from None
+    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
+        try:
+            text = data.decode(encoding)
+            break
+        except UnicodeDecodeError:
+            continue
+    else:
+        text = "\0"
+    if "\0" in text:
+        raise UserError(f"{path}: this is no text; save the table as CSV")
+    return text
+
+
+def _cut(path: Path, text: str) -> list[Row]:
+    """Lines that hold something and are no remark, cut into cells."""
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip(" \t;,")]
+    lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
+    if len(lines) < 2:
+        raise UserError(f"{path}: a header and rows of numbers are expected")
+    tail = [line for _, line in lines[-20:]] if len(lines) > 20 else [line for _, line in lines[1:]]
+    # a semicolon stands in no number, a comma may: the first mark that all lines have
+    mark = next((m for m in ";\t,|" if sum(m in line for line in tail) > len(tail) / 2), None)
+    if mark is None:
+        return [(k, line.split()) for k, line in lines]
+    return [(k, [cell.strip() for cell in next(csv.reader([line], delimiter=mark))]) for k, line in lines]
+
+
+def _is_data(cells: Sequence[str]) -> bool:
+    """More numbers, stamps and switches than words; a header or a row of units has none."""
+    known = [cell for cell in cells if cell]
+    readable = [c for c in known if is_number(c) or is_stamp(c) or c.lower() in _SWITCH]
+    return len(readable) > len(known) / 2
