@@ -35,36 +35,42 @@ def _file_name(name: str) -> str:
     return name
 
 
+# What several kinds of models may say
+Inputs = Annotated[list[str] | None, Field(min_length=1, description="default by role, as in the paper")]
+Outputs = Annotated[list[str] | None, Field(min_length=1, description="default: those of the experiment")]
+Pull = Annotated[Loss, Field(description="how outliers pull")]
+
+
 class FileEntry(Strict):
     """A model that somebody wrote down."""
 
     kind: Literal["file"] = "file"
     file: str = Field(min_length=1, description="model file, relative to the experiment file")
-    outputs: list[str] | None = Field(None, min_length=1, description="default: those of the experiment")
-    loss: Loss = Field("linear", description="how outliers pull")
+    outputs: Outputs = None
+    loss: Pull = "linear"
 
 
 class ReducedEntry(Strict):
     """Equation (9)."""
 
     kind: Literal["reduced"]
-    inputs: list[str] | None = Field(None, min_length=1, description="default by role, as in the paper")
-    outputs: list[str] | None = Field(None, min_length=1, description="default: those of the experiment")
-    loss: Loss = Field("linear", description="how outliers pull")
+    inputs: Inputs = None
+    outputs: Outputs = None
+    loss: Pull = "linear"
 
 
 class SuperpositionEntry(Strict):
     """Equation (8), all influences together, or one after the other from recordings of their own."""
 
     kind: Literal["superposition"]
-    inputs: list[str] | None = Field(None, min_length=1, description="default by role, as in the paper")
-    outputs: list[str] | None = Field(None, min_length=1, description="default: those of the experiment")
+    inputs: Inputs = None
+    outputs: Outputs = None
     separate: dict[str, Annotated[list[str], Field(min_length=1)]] | None = Field(
         None,
         min_length=1,
         description="input -> its recordings; fitted in this order, one input after the other",
     )
-    loss: Loss = Field("linear", description="how outliers pull")
+    loss: Pull = "linear"
 
 
 def _kind(entry: Any) -> str:

@@ -14,6 +14,7 @@ from discovery.errors import UserError
 from discovery.export.compiled import Compiled, compile_model, model_inputs
 from discovery.export.ranges import InputRange, OutputRange
 from discovery.export.seal import Seal, open_seal, seal_bytes
+from discovery.extras import need
 from discovery.files import write_atomic
 from discovery.models import Model, Parameter, State
 from discovery.terms import Term, parse
@@ -167,13 +168,10 @@ def _schema() -> Any:
 
 
 def _check_schema(document: Mapping[str, Any], place: str | Path) -> None:
-    try:
-        from jsonschema import Draft202012Validator
-        from jsonschema.exceptions import best_match
-    except ImportError:
-        raise UserError(
-            "exported models need the extra 'export'; install discovery-workbench[export]"
-        ) from None
+    need("jsonschema", "export", "exported models need")
+    from jsonschema import Draft202012Validator
+    from jsonschema.exceptions import best_match
+
     mistake = best_match(Draft202012Validator(_schema()).iter_errors(document))
     if mistake is not None:
         key = ".".join(str(part) for part in mistake.absolute_path)

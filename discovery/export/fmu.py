@@ -30,6 +30,7 @@ from discovery.export.replay import (
     write_files,
 )
 from discovery.export.templated import templated
+from discovery.extras import need
 
 _HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
@@ -229,8 +230,4 @@ def _description3(exported: Exported) -> str:
 
 
 def _fmpy() -> Any:
-    try:
-        import fmpy
-    except ImportError:
-        raise UserError("FMI export needs the extra 'export'; install discovery-workbench[export]") from None
-    return fmpy
+    return need("fmpy", "export", "FMI export needs")

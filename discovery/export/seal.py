@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from discovery.errors import UserError
+from discovery.extras import need
 from discovery.files import write_atomic
 
 if TYPE_CHECKING:
@@ -173,9 +174,8 @@ def public_key(path: Path) -> Ed25519PublicKey:
 
 
 def _crypto() -> Any:
-    try:
-        from cryptography.exceptions import InvalidSignature
-        from cryptography.hazmat.primitives.asymmetric import ed25519
-    except ImportError:
-        raise UserError("signatures need the extra 'export'; install discovery-workbench[export]") from None
+    need("cryptography", "export", "signatures need")
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.hazmat.primitives.asymmetric import ed25519
+
     return ed25519, InvalidSignature

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.report.chart import Chart, Panel, Series
-from discovery.report.run import Predictions, Run
+from discovery.report.run import Run
 from discovery.report.text import number, with_unit
 
 Array = NDArray[np.float64]
+
+FEWEST = 12  # readings left over that can have a memory
 
 
 def time_axis(time: Array) -> tuple[Array, str, float]:
@@ -78,13 +80,7 @@ def _windows(run: Run, recording: str, scale: float) -> tuple[tuple[float, float
 def residual_charts(run: Run, model: str, recording: str) -> list[Chart]:
     """Autocorrelation of what a model leaves, one chart for each error."""
     charts = []
-    data = run.predictions[recording]
-    for output in data.readings:
-        if output not in data.models.get(model, {}):
-            continue
-        left = _known(data, model, output)
-        if len(left) < 12:
-            continue
+    for output, left in _left_over(run, model, recording):
         correlation = autocorrelation(left, min(40, len(left) // 3))
         lag = np.arange(1.0, len(correlation) + 1)
         edge = np.full_like(lag, 1.96 / np.sqrt(len(left)))
@@ -101,9 +97,15 @@ def residual_charts(run: Run, model: str, recording: str) -> list[Chart]:
     return charts
 
 
-def _known(data: Predictions, model: str, output: str) -> Array:
-    left = data.left_over(model, output)
-    return left[np.isfinite(left)]
+def _left_over(run: Run, model: str, recording: str) -> Iterator[tuple[str, Array]]:
+    """What a model leaves of each output that has readings enough to say something about it."""
+    data = run.predictions[recording]
+    for output in data.readings:
+        if output in data.models.get(model, {}):
+            left = data.left_over(model, output)
+            left = left[np.isfinite(left)]
+            if len(left) >= FEWEST:
+                yield output, left
 
 
 def autocorrelation(values: Array, lags: int) -> Array:
@@ -116,13 +118,7 @@ def autocorrelation(values: Array, lags: int) -> Array:
 def residual_table(run: Run, model: str, recording: str) -> list[dict[str, Any]]:
     """What is left of each error in figures: rms against noise, mean, memory, largest."""
     rows: list[dict[str, Any]] = []
-    data = run.predictions[recording]
-    for output in data.readings:
-        if output not in data.models.get(model, {}):
-            continue
-        left = _known(data, model, output)
-        if len(left) < 12:
-            continue
+    for output, left in _left_over(run, model, recording):
         spread = float(np.std(left)) or 1.0
         rms, noise = float(np.sqrt(np.mean(left**2))), run.noise(output)
         rows.append(

@@ -13,6 +13,7 @@ from pydantic import Field
 
 from discovery.errors import UserError
 from discovery.export.document import Exported
+from discovery.extras import need
 from discovery.runtime.compensator import Tick
 from discovery.runtime.guards import Reading
 from discovery.schema import Strict
@@ -203,8 +204,4 @@ def _refusal(url: str, error: Exception) -> str:
 
 def need_asyncua() -> Any:
     """The package asyncua. Raises UserError where it is not installed."""
-    try:
-        import asyncua
-    except ImportError:
-        raise UserError("OPC UA needs the extra 'opcua'; install discovery-workbench[opcua]") from None
-    return asyncua
+    return need("asyncua", "opcua", "OPC UA needs")

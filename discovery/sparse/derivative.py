@@ -5,13 +5,13 @@ Kaheman et al. (arXiv:1909.08574, 2019). Kept to compare with: the workbench tak
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.sparse.gram import Gram, factor, gram, solve, total
+from discovery.sparse.optimisers import fit_quietly
 from discovery.sparse.path import Support
 
 Array = NDArray[np.float64]
@@ -74,10 +74,6 @@ def _supports(g: Gram) -> set[Support]:
     found: set[Support] = set()
     for level in np.geomspace(0.02, 1.0, _THRESHOLDS):
         optimiser = pysindy.STLSQ(threshold=float(level * largest), alpha=_RIDGE)
-        with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore"
-            )  # "sparsity parameter is too big": an empty support, nothing to report
-            optimiser.fit(rows, target[:, None])
+        fit_quietly(optimiser, rows, target)
         found.add(tuple(np.flatnonzero(np.ravel(optimiser.coef_)).tolist()))
     return found

@@ -47,6 +47,13 @@ def stlsq(g: Gram, threshold: float, alpha: float = 0.05) -> Array:
     return theta
 
 
+def fit_quietly(optimiser: Any, rows: Array, target: Array) -> None:
+    """Fit an optimiser of PySINDy; "sparsity parameter is too big" means an empty support and is no warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        optimiser.fit(rows, target[:, None])
+
+
 def pysindy_path(g: Gram, kind: Optimiser, always: Sequence[int] = (), points: int = 25) -> list[Support]:
     """Supports that an optimiser of PySINDy finds over a range of thresholds: one of every size, smallest
     first.
@@ -65,11 +72,7 @@ def pysindy_path(g: Gram, kind: Optimiser, always: Sequence[int] = (), points: i
     top = np.max(np.abs(full))
     found: set[Support] = set()
     for optimiser in _optimisers(kind, len(scale), always, np.geomspace(1e-4 * top, top, points)):
-        with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore"
-            )  # "sparsity parameter is too big": an empty support, nothing to report
-            optimiser.fit(rows, target[:, None])
+        fit_quietly(optimiser, rows, target)
         history = optimiser.history_ if kind == "ssr" else [optimiser.coef_]
         for theta in history:
             chosen = set(np.flatnonzero(np.abs(np.ravel(theta)) > 0).tolist())

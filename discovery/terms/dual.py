@@ -18,6 +18,15 @@ from discovery.terms.expression import Apply, Expression, Name, Number
 Array = NDArray[np.float64]
 Value = float | Array
 
+_COMPARISONS = {
+    "<": np.less,
+    "<=": np.less_equal,
+    ">": np.greater,
+    ">=": np.greater_equal,
+    "==": np.equal,
+    "!=": np.not_equal,
+}
+
 
 @dataclass(slots=True)
 class Dual:
@@ -125,18 +134,8 @@ def _apply(function: str, a: list[Dual]) -> Dual:
             return _power(a[0], a[1])
         case "neg":
             return _chain(-x, [(-1.0, a[0])])
-        case "<":
-            return Dual(np.less(x, y) * 1.0)
-        case "<=":
-            return Dual(np.less_equal(x, y) * 1.0)
-        case ">":
-            return Dual(np.greater(x, y) * 1.0)
-        case ">=":
-            return Dual(np.greater_equal(x, y) * 1.0)
-        case "==":
-            return Dual(np.equal(x, y) * 1.0)
-        case "!=":
-            return Dual(np.not_equal(x, y) * 1.0)
+        case "<" | "<=" | ">" | ">=" | "==" | "!=":
+            return Dual(_COMPARISONS[function](x, y) * 1.0)
         case "abs":
             return _chain(np.abs(x), [(np.sign(x), a[0])])
         case "exp":
