@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from threadpoolctl import threadpool_limits
 
 from discovery.experiment import diagnose
 from discovery.experimentfile import load_experiment
@@ -59,6 +58,5 @@ def show(name: str) -> None:
 
 
 if __name__ == "__main__":
-    with threadpool_limits(1):  # small matrices: threads cost more than they bring, as in the command
-        for wanted in sys.argv[1:] or GROUPS:
-            show(wanted)
+    for wanted in sys.argv[1:] or GROUPS:
+        show(wanted)

@@ -1,6 +1,5 @@
 """The command line: which verbs there are (each stands in `commands`), and how a failure is said."""
 
-import os
 import sys
 from collections.abc import Callable
 from typing import Annotated, Any
@@ -11,11 +10,9 @@ from typer.core import TyperGroup
 from discovery import __version__
 from discovery.commands import machine, proof, recordings, runs, words
 from discovery.errors import UserError
+from discovery.threads import say_one_thread
 
-# One thread for the linear algebra of a process: the problems are small, and several processes share the
-# cores. It has to be said before numpy is imported; what the user has set stays.
-for _library in ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "VECLIB"):
-    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+say_one_thread()  # nothing above imports numpy
 
 
 class _Sentences(TyperGroup):

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from discovery.challenge.seal import CASES
 from discovery.files import write_atomic
+from discovery.threads import NAMES
 
 SOLVED = "solved"
 PATIENCE_S = 1800.0  # for all methods on one case
@@ -89,8 +90,7 @@ def _single_thread() -> dict[str, str]:
 
     home = str(Path(discovery.__file__).parent.parent)
     paths = [home, *(p for p in [os.environ.get("PYTHONPATH")] if p)]
-    one = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA")}
-    return {**os.environ, **one, "PYTHONPATH": os.pathsep.join(paths)}
+    return {**os.environ, **dict.fromkeys(NAMES, "1"), "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def _span(seconds: float) -> str:

@@ -18,6 +18,7 @@ from discovery.fitting.noise import Noise, innovations, readings_as_one, white_n
 from discovery.fitting.problem import Problem, make_problem
 from discovery.models import Model
 from discovery.recordings import Campaign
+from discovery.threads import one_thread
 
 Array = NDArray[np.float64]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
@@ -66,6 +67,7 @@ class Fit:
         return found
 
 
+@one_thread
 def fit_model(
     model: Model,
     campaign: Campaign,

@@ -48,9 +48,9 @@ def stlsq(g: Gram, threshold: float, alpha: float = 0.05) -> Array:
 
 
 def fit_quietly(optimiser: Any, rows: Array, target: Array) -> None:
-    """Fit an optimiser of PySINDy; "sparsity parameter is too big" means an empty support and is no warning."""
+    """Fit an optimiser of PySINDy without its warnings."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+        warnings.simplefilter("ignore")  # "sparsity parameter is too big": an empty support is no fault
         optimiser.fit(rows, target[:, None])
 
 
