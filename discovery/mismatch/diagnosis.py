@@ -27,6 +27,7 @@ from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.terms import Apply, Expression, Name, Term, names
 from discovery.terms.expression import rewrite
+from discovery.threads import one_thread
 
 INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
 
@@ -66,6 +67,7 @@ class Diagnosis:
         return document(self)
 
 
+@one_thread
 def diagnose(
     model: Model,
     campaign: Campaign,
