@@ -70,6 +70,16 @@ def test_an_effect_in_the_experiment_file_is_found(tmp_path: Path) -> None:
     assert [t.effect for t in answer.repaired.terms if t.effect] == ["rub"]
 
 
+@pytest.mark.parametrize(("most", "named"), [(1.0, True), (0.1, False)])
+def test_an_effect_that_would_have_to_be_larger_than_it_can_be_is_not_named(
+    most: float, named: bool, tmp_path: Path
+) -> None:
+    """The seal that is concealed takes 0.15 W/rpm."""
+    answer = diagnosis(load_experiment(experiment(tmp_path, f"{RUB}most = {most}\n")))
+    assert answer is not None
+    assert ("rub" in [one["effect"] for one in answer.document()["physics"]]) == named
+
+
 def test_the_repaired_model_that_is_written_is_the_one_that_was_proved(tmp_path: Path) -> None:
     """The numbers of diagnosis.json stand in the model file; its free run is the one of the improvement."""
     folder = diagnose(experiment(tmp_path, RUB), tmp_path / "out")
@@ -107,11 +117,18 @@ def test_a_mistake_in_a_formula_is_a_sentence(formula: str, tmp_path: Path) -> N
     assert not (tmp_path / "out").exists()
 
 
+def test_a_usual_size_above_the_most_is_a_mistake(tmp_path: Path) -> None:
+    path = experiment(tmp_path, f"{RUB}most = 0.05\n")
+    with pytest.raises(UserError, match=r"effect 'rub': its usual size 0\.1 is more than 0\.05"):
+        diagnose(path, tmp_path / "out")
+
+
 @pytest.mark.parametrize(
     ("line", "wrong", "said"),
     [
         ('place = "driven body"', 'place = "somewhere"', "place"),
         ("plausible = 0.1", "plausible = 0", "plausible"),
+        ("plausible = 0.1", "plausible = 0.1\nmost = 0", "most"),
         ('word = "rub"', 'word = "Rub it"', "word"),
         ('unit = "W/rpm"', 'colour = "red"', "colour"),
         ("grid = [10000, 30000], ", "grid = [], ", "grid"),

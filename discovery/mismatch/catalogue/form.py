@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Literal
 
 from pydantic import Field
@@ -36,6 +37,9 @@ class EffectForm(Strict):
     amplitude: str = Field(description="the name in the formula that switches it on")
     unit: str = Field("W", description="unit of the amplitude")
     plausible: float = Field(gt=0, description="usual size of the amplitude")
+    most: float = Field(
+        inf, gt=0, description="largest size that is physical, 1 for a share; default no limit"
+    )
     sign: Literal[-1, 0, 1] = Field(1, description="sign of the amplitude, 0 where physics leaves it open")
     shapes: dict[str, ShapeForm] = {}
     source: str = "given in the experiment file"
@@ -54,13 +58,18 @@ class EffectForm(Strict):
             )
         if self.amplitude not in names(parse(self.formula, where)):
             raise UserError(f"{where}: the amplitude '{self.amplitude}' does not stand in the formula")
+        if self.plausible > self.most:
+            raise UserError(
+                f"{where}: its usual size {self.plausible:g} is more than {self.most:g}, its most; "
+                "give a smaller one"
+            )
         return Effect(
             word=self.word,
             title=self.title or self.word.replace("_", " "),
             group="user",
             place=self.place,
             formula=self.formula,
-            amplitude=Amplitude(self.amplitude, self.unit, self.plausible, self.sign),
+            amplitude=Amplitude(self.amplitude, self.unit, self.plausible, self.sign, most=self.most),
             shapes=tuple(
                 Shape(name, s.unit, tuple(s.grid), s.low, s.high) for name, s in self.shapes.items()
             ),
