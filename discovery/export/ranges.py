@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.export.compiled import Compiled
-from discovery.export.stepper import Stepper
+from discovery.export.stepper import free_run
 from discovery.recordings import Campaign, sample_input
 from discovery.recordings.roles import ROLES
 
@@ -116,9 +116,7 @@ def output_ranges(
     rate = np.zeros(len(compiled.outputs))
     for recording in recordings:
         inputs = sampled_inputs(campaign, recording, compiled.inputs, compiled.step_s)
-        stepper = Stepper(compiled)
-        stepper.start(inputs[0])
-        y = stepper.run(inputs)
+        y = free_run(compiled, inputs)
         if len(y) < len(inputs):
             raise UserError(
                 f"model '{compiled.name}' runs away after {len(y) * compiled.step_s / 3600:.1f} h of "

@@ -19,7 +19,7 @@ from discovery.errors import UserError
 from discovery.export.c import c_files, c_prefix
 from discovery.export.compiled import Compiled
 from discovery.export.document import Exported
-from discovery.export.stepper import Stepper
+from discovery.export.stepper import free_run
 from discovery.export.templated import templated
 
 Array = NDArray[np.float64]
@@ -62,9 +62,7 @@ def make_reference(compiled: Compiled, inputs: Array) -> Reference:
         UserError: a step that is not finite.
     """
     inputs = np.ascontiguousarray(inputs[:LONGEST])
-    stepper = Stepper(compiled)
-    stepper.start(inputs[0])
-    y = stepper.run(inputs)
+    y = free_run(compiled, inputs)
     if len(y) < len(inputs):
         raise UserError(
             f"model '{compiled.name}' is not finite after {len(y)} steps of its reference inputs; check "

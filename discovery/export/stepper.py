@@ -158,6 +158,13 @@ class Stepper:
         self.count = snapshot.count
 
 
+def free_run(compiled: Compiled, inputs: Array) -> Array:
+    """Outputs (K, Y) under inputs (K, U) from the start; fewer where a step is not finite."""
+    stepper = Stepper(compiled)
+    stepper.start(inputs[0])
+    return stepper.run(inputs)
+
+
 class _Tables:
     """The programs of a model as arrays for the kernel."""
 
