@@ -23,7 +23,8 @@ GROUPS = {
     "tclab_mismatch": {
         "random both": ["random"],
         "steps up": ["step"],
-        "0 to 100 %": ["step_h1_up_100", "step_h2_up_100"],
+        "heater 1, 0 to 100 %": ["step_h1_up_100"],
+        "heater 2, 0 to 100 %": ["step_h2_up_100"],
     },
 }
 
@@ -54,7 +55,7 @@ def show(name: str) -> None:
         for model in models:
             parts = [t[y] - t[f"{y}|{model}"] for t in chosen for y in experiment.outputs]
             rms = float(np.sqrt(np.mean([np.nanmean(part**2) for part in parts])))
-            print(f"  {group:12s} {model:10s} {rms:7.2f}")
+            print(f"  {group:20s} {model:10s} {rms:7.2f}")
 
 
 if __name__ == "__main__":

@@ -144,7 +144,7 @@ def repaired_of(
     experiment: Experiment, name: str, found: Diagnosis, repaired: Model, progress: Progress = silent
 ) -> Fitted:
     """The repaired model of a diagnosis with the very numbers that the diagnosis found and proved."""
-    fit = written_with(found.search.best.fit, repaired, experiment.fitting)
+    fit = written_with(found.after.fit, repaired, experiment.fitting)
     return judged(experiment, name, "repaired", repaired, fit, None, 0.0, progress)
 
 

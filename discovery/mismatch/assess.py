@@ -43,6 +43,54 @@ class Assessment:
         return float(np.sqrt(np.nanmean(z**2)))
 
 
+def refit(
+    context: Context,
+    chosen: Sequence[Hypothesis],
+    noise: Noise,
+    start: Assessment | None = None,
+    sizes: Mapping[str, float] | None = None,
+) -> Fit:
+    """The model with effects added, everything fitted to the recordings of the context.
+
+    Args:
+        chosen: effects to add, amplitudes and shapes at their start.
+        noise: noise setting to fit under.
+        start: a fit to take start values from.
+        sizes: amplitudes to start from.
+    """
+    model, priors = context.model, {}
+    begin = start.fit.model if start is not None else context.baseline.model
+    for h in chosen:
+        model = h.added_to(model)
+        for name, sd in zip(h.amplitudes, context.spread(h), strict=True):
+            if h.effect.amplitude.fixed is None:
+                priors[name] = (0.0, WIDE * sd)
+        for name, shape in zip(h.shapes, h.effect.shapes, strict=True):
+            if not shape.fixed:
+                low, high = min(shape.grid), max(shape.grid)
+                centre, width = 0.5 * (low + high), max(high - low, 0.3 * abs(high))
+                priors[name] = (centre, width)
+    guess = {
+        name: p.value
+        for name, p in begin.parameters.items()
+        if name in model.parameters and not p.per_recording
+    }
+    guess |= sizes or {}
+    return fit_model(
+        model,
+        context.campaign,
+        context.recordings,
+        context.outputs,
+        noise=noise,
+        grids=context.grids,
+        priors=priors,
+        belief=context.belief,
+        guess=guess,
+        max_rounds=25,
+        tolerance=ENOUGH,
+    )
+
+
 def assess(
     context: Context,
     chosen: Sequence[Hypothesis],
@@ -53,47 +101,14 @@ def assess(
     """Refit the model with effects added; evidence with all unknowns and noise levels integrated out
     (Laplace).
 
-    Args:
-        chosen: effects to add, amplitudes and shapes at their start.
-        noise: noise setting to fit under; default the first.
-        start: a fit to take start values from.
-        sizes: amplitudes to start from.
+    Arguments as for `refit`; `noise` is the first setting by default.
     """
-    model, priors, offset = context.model, {}, 0.0
-    begin = start.fit.model if start is not None else context.baseline.model
-    for h in chosen:
-        model = h.added_to(model)
-        amplitude = h.effect.amplitude
-        for name, sd in zip(h.amplitudes, context.spread(h), strict=True):
-            if amplitude.fixed is None:
-                priors[name] = (0.0, WIDE * sd)
-                offset += np.log(2.0) if amplitude.sign else 0.0
-        for name, shape in zip(h.shapes, h.effect.shapes, strict=True):
-            if not shape.fixed:
-                low, high = min(shape.grid), max(shape.grid)
-                centre, width = 0.5 * (low + high), max(high - low, 0.3 * abs(high))
-                priors[name] = (centre, width)
-        offset += float(np.log(h.effect.prior)) - h.cost
-    guess = {
-        name: p.value
-        for name, p in begin.parameters.items()
-        if name in model.parameters and not p.per_recording
-    }
-    guess |= sizes or {}
-    fit = fit_model(
-        model,
-        context.campaign,
-        context.recordings,
-        context.outputs,
-        noise=noise or context.settings[0],
-        grids=context.grids,
-        priors=priors,
-        belief=context.belief,
-        guess=guess,
-        max_rounds=25,
-        tolerance=ENOUGH,
-    )
+    fit = refit(context, chosen, noise or context.settings[0], start, sizes)
     lens = Lens(fit)
     views = tuple(lens.view(setting) for setting in context.settings)
-    evidence = float(log_mean_exp(np.array([view.level for view in views]))) + offset
+    evidence = float(log_mean_exp(np.array([view.level for view in views])))
+    for h in chosen:
+        evidence += float(np.log(h.effect.prior)) - h.cost
+        if h.effect.amplitude.sign and h.effect.amplitude.fixed is None:
+            evidence += len(h.amplitudes) * float(np.log(2.0))  # a known sign halves what it could have been
     return Assessment(tuple(chosen), fit.model, fit, lens, views, evidence)

@@ -14,6 +14,7 @@ from discovery.mismatch.ask import next_experiment
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.catalogue import Effect, catalogue
 from discovery.mismatch.context import Context, make_context, seen_beside
+from discovery.mismatch.deliver import delivered
 from discovery.mismatch.describe import Curve, Description, curves, describe
 from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
@@ -40,6 +41,8 @@ class Diagnosis:
 
     context: Context
     search: Search
+    before: Assessment  # the baseline as it runs freely best
+    after: Assessment  # with what was found, as it runs freely best; the baseline where nothing is named
     verdict: Verdict
     location: Location
     forcings: tuple[Forcing, ...]  # on what the baseline leaves
@@ -115,12 +118,13 @@ def diagnose(
     verdict = decide(context, found, before, after)
     shown = verdict.named or verdict.candidates
     location = locate(context, found.baseline, found.best, verdict.named, before)
-    repaired = _repaired(found.best) if verdict.named else None
+    tell("fitting what was found for free runs")
+    old = delivered(context, found.baseline)
+    new = delivered(context, found.best) if verdict.named else old
+    repaired = _repaired(new) if verdict.named else None
     tell("proving on held-out recordings")
     noise = found.best.best_view.noise
-    old, new = found.baseline.fit.model, (found.best if verdict.named else found.baseline).fit.model
-    proof = improvements(campaign, held_out, outputs, old, new, noise)
-    on_fit = _on_fit(found.baseline, found.best if verdict.named else found.baseline)
+    proof = improvements(campaign, held_out, outputs, old.fit.model, new.fit.model, noise)
     unexplained = verdict.word == UNEXPLAINED and bool(before)
     tell("asking for the next experiment")
     white = np.array(noise.white)
@@ -139,10 +143,12 @@ def diagnose(
     return Diagnosis(
         context,
         found,
+        old,
+        new,
         verdict,
         location,
         tuple(before),
-        on_fit,
+        _on_fit(old, new),
         proof,
         false_alarm(found.board, int(np.argmax(levels)), top),
         repaired,

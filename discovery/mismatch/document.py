@@ -158,20 +158,22 @@ def _alternatives(named: tuple[Named, ...]) -> list[dict[str, Any]]:
 
 
 def _physics(d: Diagnosis, n: Named, checked: float | None) -> dict[str, Any]:
-    h, model = n.hypothesis, d.search.best.fit.model
+    h = n.hypothesis
     parameters = {}
     for name in (*h.amplitudes, *h.shapes):
-        p = model.parameters[name]
-        value = p.values.get(h.recording, p.value) if h.recording else p.value
+        p, q = (a.fit.model.parameters[name] for a in (d.search.best, d.after))
+        believed, value = (x.values.get(h.recording, x.value) if h.recording else x.value for x in (p, q))
         low, high = (p.low, p.high) if not h.recording else _interval(d, name)
-        fixed = p.fixed
-        if h.effect.is_physics and low is not None and high is not None:
-            low = max(value - float(np.hypot(value - low, FORM * value)), p.min)
-            high = min(value + float(np.hypot(high - value, FORM * value)), p.max)
+        if low is not None and high is not None:
+            if h.effect.is_physics:
+                low = max(believed - float(np.hypot(believed - low, FORM * believed)), p.min)
+                high = min(believed + float(np.hypot(high - believed, FORM * believed)), p.max)
+            # two ways to fit that do not agree leave that much open
+            low, high = min(low, value), max(high, value)
         parameters[name] = {
             "value": _number(value),
-            "low": _number(value if fixed else low),
-            "high": _number(value if fixed else high),
+            "low": _number(value if p.fixed else low),
+            "high": _number(value if p.fixed else high),
             "unit": p.unit,
         }
     expressions = [text(t.expression) for t in h.terms] or [text(e) for e in h.shown.values()]
