@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 
 _READINGS = 250  # of one output in one recording: more say nothing new about hours or minutes
 _ROUNDS = 3  # of a fit in a fold: it starts where the normal equations of the fold have their minimum
+_FAR = 3.0  # times the rms: start values that are no use
 _SIZES = 5  # that are refitted and run freely, down from the one that the criterion names
 
 
@@ -75,6 +76,8 @@ def discover_rates(
     always: Sequence[str],
     options: SparseOptions,
     growth: Growth | None = None,
+    plain: Sequence[str] = (),
+    easy: Sequence[str] = (),
 ) -> Discovery:
     """Choose which coefficients of a model stay, and fit the rest.
 
@@ -84,6 +87,10 @@ def discover_rates(
         always: parameters that cannot leave (shapes, baseline terms that are kept).
         growth: terms first enter one by one by their score, then those that entered may leave; else all are
             fitted at once and leave one by one.
+        plain: coefficients of a model that competes at any rate: where little is recorded the way down from
+            all candidates may miss it.
+        easy: coefficients of terms of the first order: where the readings hardly tell, one of them stands for
+            a term of a higher order.
     """
     if growth is not None:
         model, labels = _grown(data, model, labels, growth)
@@ -99,23 +106,26 @@ def discover_rates(
     dispersion = max(min(costs) / max(g.count - len(path[-1]), 1), 1.0)
     criterion = extended_bic(g, [len(s) for s in path], [c / dispersion for c in costs], max(len(labels), 1))
     last = int(np.argmin(criterion))
-    window = range(max(0, last - _SIZES + 1), last + 1)
+    simple = tuple(sorted({*kept, *(i for i, name in enumerate(seen.names) if name in plain)}))
+    window = {*path[max(0, last - _SIZES + 1) : last + 1], *([simple] if plain else [])}
+    supports = sorted(window, key=len)
 
-    errors = np.array([_left_out(data, model, seen, path[k], noise) for k in window])
+    errors = np.array([_left_out(data, model, seen, one, noise) for one in supports])
     usual = NAME if growth is None else CLAIM
     row = choose(errors, usual if options.tolerance is None else options.tolerance)
-    chosen = path[window[row]]
+    worth = dispersion * (np.log(max(g.count, 2)) + 2 * np.log(max(len(labels), 1)))  # of one more term
+    supports[row] = chosen = _plainer(g, seen, supports[row], kept, easy, labels, float(worth))
     fit = _refit(data, model, seen, g, chosen, data.grids, None, 25)
     points = tuple(
         PathPoint(
             data.outputs,
-            len(path[k]),
+            len(one),
             float(np.sqrt(errors[i].mean())),
-            float(np.sqrt(max(costs[k], 0.0) / g.count)),
+            float(np.sqrt(max(g.cost(solve(g, one, seen.low, seen.high)), 0.0) / g.count)),
             i == row,
-            tuple(labels.get(seen.names[j], seen.names[j]) for j in path[k]),
+            tuple(labels.get(seen.names[j], seen.names[j]) for j in one),
         )
-        for i, k in enumerate(window)
+        for i, one in enumerate(supports)
     )
     stability = _stability(seen, kept, chosen, options)
     report = {
@@ -215,6 +225,33 @@ def _path(g: Gram, seen: Evidence, kept: Sequence[int], options: SparseOptions, 
     return best_of_each_size(g, most, kept, seen.low, seen.high)
 
 
+def _plainer(
+    g: Gram,
+    seen: Evidence,
+    support: Support,
+    kept: Sequence[int],
+    easy: Sequence[str],
+    labels: Mapping[str, str],
+    worth: float,
+) -> Support:
+    """The support with terms of the first order in place of others into the same state, where the cost rises
+    by less than a further term would have to bring.
+    """
+    first = [i for i, name in enumerate(seen.names) if name in easy]
+    bound = g.cost(solve(g, support, seen.low, seen.high)) + worth
+    for term in [i for i in support if i not in kept and i not in first]:
+        into = labels[seen.names[term]].split(": ")[0]
+        swaps = [
+            tuple(sorted({*support, i} - {term}))
+            for i in first
+            if i not in support and labels[seen.names[i]].split(": ")[0] == into
+        ]
+        costs = [g.cost(solve(g, one, seen.low, seen.high)) for one in swaps]
+        if costs and min(costs) < bound:
+            support = swaps[int(np.argmin(costs))]
+    return support
+
+
 def _refit(
     data: RateData,
     model: Model,
@@ -253,10 +290,40 @@ def _left_out(data: RateData, model: Model, seen: Evidence, support: Support, no
                 )
                 left = data.grids[r].readings - predict(trajectory)
                 for b in mine:
-                    errors[b] = np.nanmean(left[blocks.of[i] == b] ** 2)
+                    here = left[blocks.of[i] == b] ** 2
+                    errors[b] = np.nanmean(here) if np.isfinite(here).any() else np.nan
         except UserError:  # a sparse model that runs away is a bad model, not a mistake of the user
             errors[fold] = np.inf
-    return np.where(np.isfinite(errors), errors, 1e12)
+    # a block without a reading says nothing: it must not tell the sizes apart
+    silent = np.array([not _has_reading(data, b) for b in range(blocks.count)])
+    return np.where(np.isfinite(errors), errors, np.where(silent, 1.0, 1e12))
+
+
+def _has_reading(data: RateData, block: int) -> bool:
+    of, readings = zip(data.blocks.of, data.recordings, strict=True), data.grids
+    return any(np.isfinite(readings[r].readings[b == block]).any() for b, r in of)
+
+
+def nearer(data: RateData, first: Model, second: Model) -> Model:
+    """The first model unless the second one, as they stand, runs far nearer to the readings.
+
+    Start values from the weak form may belong to a model that runs away: no fit comes back from there.
+    """
+    return second if _missed(data, first) > _FAR**2 * _missed(data, second) else first
+
+
+def _missed(data: RateData, model: Model) -> float:
+    """Mean squared error of free runs over the rough noise; infinite where one runs away."""
+    noise = _rough_noise(data).white
+    squares = []
+    for r in data.recordings:
+        try:
+            run = predict_recording(model, data.campaign, r, data.outputs, noise, data.grids[r])
+        except UserError:
+            return float("inf")
+        squares.append((((data.grids[r].readings - predict(run)) / noise) ** 2).ravel())
+    missed = float(np.nanmean(np.concatenate(squares)))
+    return missed if np.isfinite(missed) else float("inf")
 
 
 def _stability(

@@ -16,7 +16,7 @@ from discovery.models import Model, Parameter, State
 from discovery.models.modelfile import check_names, read_model
 from discovery.recordings import Campaign
 from discovery.sparse.bymasses import MassData, discover_error
-from discovery.sparse.byrates import Growth, RateData, discover_rates, make_rate_data
+from discovery.sparse.byrates import Growth, RateData, discover_rates, make_rate_data, nearer
 from discovery.sparse.discovery import Discovery, joined
 from discovery.sparse.drives import AMBIENT, Inputs, make_inputs
 from discovery.sparse.families import candidates
@@ -26,14 +26,16 @@ from discovery.sparse.masses import make_mass_library, respond
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.rates import Candidate, with_candidates
 from discovery.sparse.weak import weak_gram, weak_rows
-from discovery.terms import Name, Term, names, parse
+from discovery.terms import Name, Term, names, parse, text
 from discovery.threads import one_thread
 
 Progress = Callable[[str], None]
 
 FILE_FAMILIES = ("wet", "rotation", "coupling")
 LABORATORY = ("linear", "coupling", "radiation", "load", "second mass")
-SECOND_MASS = (300.0, 1200.0)  # s, time constants of a mass behind each body
+# s, time constants of the masses behind each body: two of a series in steps of four, in proportion to the
+# recordings, of which the slower one shall see the sixth part
+SECOND_MASS, _STEP, _SEEN = (300.0, 1200.0), 4.0, 6.0
 SENSOR_LAG = (1.0, 20.0, 300.0)  # s: least, start, most
 START_SD = 5.0  # K: a first reading may be an artefact of switching on
 
@@ -165,7 +167,9 @@ def _temperatures(
 ) -> Discovery:
     """Measured temperatures: a body behind each sensor, all bodies together."""
     room, states = _room(outputs, inputs)
-    least, lag, most = SENSOR_LAG
+    longest = max(float(campaign.recordings[r].time[-1]) for r in recordings)
+    masses = second_masses(longest) if "second mass" in (options.library or LABORATORY) else ()
+    least, lag, most = (min(t, longest / 4) for t in SENSOR_LAG)
     parameters, terms = {}, []
     bodies = [f"{name}_body" for name in outputs]
     for name, body in zip(outputs, bodies, strict=True):
@@ -173,9 +177,7 @@ def _temperatures(
         states[name] = State(name, "degC", None, None, START_SD, 1.0)
         terms.append(Term(f"sensor {name} follows", name, parse(f"({body} - {name})/{name}_lag")))
         states[body] = State(body, "degC", None, Name(name), START_SD, 1 / 3600)
-        for k, tau in enumerate(
-            SECOND_MASS if "second mass" in (options.library or LABORATORY) else (), start=1
-        ):
+        for k, tau in enumerate(masses, start=1):
             mass = f"{body}_mass{k}"
             states[mass] = State(mass, "degC", None, Name(name), 0.0, 1.0)
             terms.append(Term(f"{mass} follows", mass, parse(f"({body} - {mass})/{tau:g}")))
@@ -185,11 +187,29 @@ def _temperatures(
     given = candidates(bodies, empty, campaign, inputs, words, options, room)
     found = [*own, *(c for c in given if (c.into, c.label) not in {(o.into, o.label) for o in own})]
     data = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
-    model, labels = with_candidates(
-        empty, _started(found, data, dict(zip(bodies, outputs, strict=True)), {room: inputs.reference})
-    )
+    channel, known = dict(zip(bodies, outputs, strict=True)), {room: inputs.reference}
+    simple = {text(o.expression) for o in own} | set(inputs.of("heat load", "cooling power"))
+    basis = [c for c in found if c.label in simple]
+    cautious = {(c.into, c.label): c for c in _started(basis, data, channel, known)}
+    begun = _started(found, data, channel, known)
+    model, labels = with_candidates(empty, begun)
+    slow, _ = with_candidates(empty, [cautious.get((c.into, c.label), replace(c, start=0.0)) for c in found])
     decay = [n for n, label in labels.items() if label.endswith(f": {room} - {label.split(': ')[0]}")]
-    return discover_rates(data, model, labels, decay, options)
+    plain = [n for n, label in labels.items() if label.split(": ", 1)[1] in simple]
+    first = {"1", *simple, *(text(parse(f"{a} - {b}")) for a in bodies for b in bodies if a != b)}
+    easy = [n for n, label in labels.items() if label.split(": ", 1)[1] in first]
+    return discover_rates(data, nearer(data, model, slow), labels, decay, options, plain=plain, easy=easy)
+
+
+def second_masses(longest: float) -> tuple[float, ...]:
+    """Time constants [s] of the masses behind a body that recordings of this length [s] can show.
+
+    >>> second_masses(7200.0), second_masses(86400.0)
+    ((300.0, 1200.0), (4800.0, 19200.0))
+    """
+    slower = max(longest, 1.0) / _SEEN / SECOND_MASS[-1]
+    scale = _STEP ** round(float(np.log(slower) / np.log(_STEP)))
+    return tuple(tau * scale for tau in SECOND_MASS)
 
 
 def _on_file(

@@ -1,0 +1,118 @@
+"""Little is recorded, or slowly: minutes of a heater board, days of a heated room."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics.system import predict
+from discovery.fitting import predict_recording
+from discovery.models import Model
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.sparse import Discovery, SparseOptions, discover
+from discovery.sparse.byrates import _plainer
+from discovery.sparse.discover import second_masses
+from discovery.sparse.gram import gram
+from discovery.sparse.rates import Evidence
+
+Array = NDArray[np.float64]
+
+
+def campaign(time: Array, room: Array, heat: dict[str, Array], measured: dict[str, Array]) -> Campaign:
+    channels = {name: Channel(name, "heat load", "W", None, "held") for name in heat}
+    channels |= {name: Channel(name, "temperature", "degC", None, "linear") for name in measured}
+    channels["T_room"] = Channel("T_room", "ambient temperature", "degC", None, "linear")
+    values = {**heat, **measured, "T_room": room}
+    cut = round(0.67 * len(time))
+    made = {
+        "first": Recording("first", time[:cut], {n: v[:cut] for n, v in values.items()}),
+        "last": Recording("last", time[cut:] - time[cut], {n: v[cut:] for n, v in values.items()}),
+    }
+    return Campaign("scarce", channels, made, Path("scarce"))
+
+
+def missed(model: Model, where: Campaign, recording: str, outputs: list[str]) -> Array:
+    run = predict_recording(model, where, recording, outputs)
+    return np.asarray(np.sqrt(np.nanmean((run.system.grid.readings - predict(run)) ** 2, axis=0)))
+
+
+def board() -> Campaign:
+    """Five minutes, three pulses of the first of two heaters; sensors of 0.3 K steps that lag by 20 s."""
+    time = np.arange(0.0, 333.0, 3.0)
+    q = 43.0 * ((time >= 23) & (time < 46)) + 56.0 * ((time >= 113) & (time < 132))
+    q += 32.0 * ((time >= 211) & (time < 259))
+    body, sensor = np.array([24.2, 23.8]), np.array([24.2, 23.8])
+    seen = []
+    for k in range(len(time)):
+        seen.append(np.round(sensor / 0.32) * 0.32)
+        for _ in range(30):
+            flow = 0.0025 * (body[::-1] - body) + 0.006 * (23.8 - body) + np.array([0.0055, 0.0]) * q[k]
+            body, sensor = body + 0.1 * flow, sensor + 0.1 * (body - sensor) / 20
+    measured = dict(zip(("T1", "T2"), np.array(seen).T, strict=True))
+    return campaign(time, 0 * time + 23.8, {"Q1": q, "Q2": 0 * q}, measured)
+
+
+def discovered(where: Campaign, outputs: list[str]) -> Discovery:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return discover(where, ["first"], outputs, SparseOptions(bootstraps=0))
+
+
+def test_three_minutes_of_a_heater_are_explained_by_the_heater() -> None:
+    """The weak form starts from terms that run away here; the search ended with nothing but the room."""
+    where = board()
+    found = discovered(where, ["T1", "T2"])
+    assert "T1_body: Q1" in found.report["groups"][0]["kept"]
+    assert max(missed(found.model, where, "first", ["T1", "T2"])) < 0.35
+
+
+def test_a_room_of_air_and_walls_gets_its_walls() -> None:
+    """Readings every half hour: masses of minutes behind a body, right for a board, are of no use there."""
+    time = np.arange(0.0, 5 * 86400.0, 1800.0)
+    out = 15 + 6 * np.sin(2 * np.pi * time / 86400)
+    heat = 2000.0 * ((time % 172800) > 86400)
+    air, wall, seen = 20.0, 20.0, []
+    rng = np.random.default_rng(2)
+    for k in range(len(time)):
+        seen.append(air + 0.05 * rng.standard_normal())
+        for _ in range(30):
+            flow = 150 * (wall - air)
+            air += 60 * (heat[k] + flow + 30 * (out[k] - air)) / 2e6
+            wall += 60 * (-flow + 20 * (out[k] - wall)) / 1.2e7
+    where = campaign(time, out, {"P": heat}, {"T_in": np.array(seen)})
+    found = discovered(where, ["T_in"])
+    assert any("mass" in label for label in found.report["groups"][0]["kept"])
+    assert missed(found.model, where, "first", ["T_in"])[0] < 0.5
+
+
+def test_masses_go_with_the_length_of_the_recordings() -> None:
+    assert second_masses(2.1 * 3600) == (300.0, 1200.0)
+    assert second_masses(420.0)[1] < 420.0 / 3
+    assert second_masses(5 * 86400.0)[1] > 6 * 3600
+
+
+def test_a_block_without_readings_is_no_warning() -> None:
+    where = board()
+    first = where.recordings["first"]
+    holes = {n: np.where((first.time > 90) & (first.time < 110), np.nan, v) for n, v in first.values.items()}
+    holes |= {n: v for n, v in first.values.items() if n not in ("T1", "T2")}
+    gone = Recording("first", first.time, holes)
+    found = discovered(
+        Campaign("holes", where.channels, {"first": gone, "last": where.recordings["last"]}, Path("holes")),
+        ["T1", "T2"],
+    )
+    assert found.path
+
+
+def test_the_plainer_of_two_twins_is_named_and_no_other() -> None:
+    rng = np.random.default_rng(4)
+    plain = rng.uniform(0, 10, 300)
+    x = np.column_stack([plain, plain + 1e-3 * plain**2, rng.standard_normal(300)])
+    g = gram(x, 2 * x[:, 1] + x[:, 2] + 0.1 * rng.standard_normal(300))
+    free = np.full(3, np.inf)
+    seen = Evidence(("a", "b", "c"), (g,), np.array([]), -free, free)
+    labels = {"a": "T: P", "b": "T: odd", "c": "T: other"}
+    assert _plainer(g, seen, (1, 2), [], ["a"], labels, worth=20.0) == (0, 2)
+    assert _plainer(g, seen, (1, 2), [], ["a"], labels, worth=1e-9) == (1, 2)
+    assert _plainer(g, seen, (1, 2), [1], ["a"], labels, worth=20.0) == (1, 2)
