@@ -39,7 +39,7 @@ def new(folder: Path, sources: Sequence[Path]) -> list[str]:
     recordings = _recordings(tables)
     room, why_room = _room(tables, guesses)
     write = {f"{name}.csv": _csv(table, rows) for name, (table, rows) in recordings.items()}
-    outputs = _outputs(guesses)
+    outputs = [name for name in _outputs(guesses) if not _never_moves(tables, name)] or _outputs(guesses)
     lines = _said(tables, guesses, recordings, why_room, room)
     if not outputs:
         raise UserError(
@@ -75,7 +75,7 @@ def _alike(tables: Sequence[OwnTable]) -> list[OwnTable]:
 
 def _never_moves(tables: Sequence[OwnTable], name: str) -> bool:
     values = np.concatenate(_columns(tables, name))
-    return bool(np.nanmin(values) == np.nanmax(values))
+    return not bool(np.nanmin(values) < np.nanmax(values))
 
 
 def _kept(table: OwnTable, common: set[str], still: set[str]) -> OwnTable:

@@ -151,6 +151,10 @@ def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
     sentence = f"{lead} in “{model}”"
     if found:
         sentence += f": {listed([_effect(one) for one in found])}"
+    worse = contradicted(diagnosis)
+    if worse:
+        contradict = "contradicts" if len(worse) == 1 else "contradict"
+        sentence += f"; but the unseen {listed([f'“{name}”' for name in worse])} {contradict} the repair"
     points = [f"Size of {words(one['effect'])}: {listed(sizes(one))}." for one in found if sizes(one)]
     p_value = diagnosis.get("detection", {}).get("p_value")
     if p_value is not None:
@@ -169,8 +173,9 @@ def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
 
 def _effect(one: Mapping[str, Any]) -> str:
     states = listed([str(state) for state in one.get("states", [])])
+    where = f" at {states}" if states else f" in {one['recording']}" if one.get("recording") else ""
     sure = one.get("probability")
-    text = f"{words(str(one.get('effect', 'unknown')))}{f' at {states}' if states else ''}"
+    text = f"{words(str(one.get('effect', 'unknown')))}{where}"
     return text + (f" ({percent(sure)} sure)" if sure is not None else "")
 
 
@@ -188,8 +193,20 @@ def _proof(diagnosis: Mapping[str, Any]) -> list[str]:
             "Repaired and run freely on unseen recordings it leaves (rms, errors weighed by their noise): "
             f"{listed(each)}."
         )
-    if improvement.get("explained") is not None:
+    explained = improvement.get("explained")
+    if contradicted(diagnosis):
         points.append(
-            f"The repair closes {percent(improvement['explained'])} of the gap that can be closed there."
+            "There it is worse than without: what is named fits the recordings at hand and may be no more "
+            "than that. Do not use the repaired model; fit more recordings, each input moving on its own."
         )
+    elif explained is not None:
+        share = percent(explained) if explained >= 0.005 else "nothing"
+        points.append(f"The repair closes {share} of the gap that can be closed there.")
     return points
+
+
+def contradicted(diagnosis: Mapping[str, Any]) -> list[str]:
+    """Unseen recordings that the repair predicts worse than the model did before it, beyond chance."""
+    held = (diagnosis.get("improvement") or {}).get("held_out") or {}
+    worse = {name: one.get("gain_high") for name, one in held.items() if diagnosis.get("physics")}
+    return [name for name, gain in worse.items() if gain is not None and gain < 0]

@@ -139,11 +139,11 @@ def other_values(model: Model) -> list[Value]:
 def value(name: str, parameter: Parameter) -> Value:
     """A parameter as it is printed: value, 95 % interval (or "given"), unit."""
     symbol, unit = mathml.math(mathml.symbol(name)), pretty_unit(parameter.unit)
-    if parameter.fixed:
-        return Value(name, symbol, number(parameter.value), "given", unit)
     if parameter.values:
         each = ", ".join(f"{recording}: {number(one)}" for recording, one in parameter.values.items())
         return Value(name, symbol, each, "by recording", unit)
+    if parameter.fixed:
+        return Value(name, symbol, number(parameter.value), "given", unit)
     low, high = parameter.low, parameter.high
     if low is None or high is None:
         return Value(name, symbol, number(parameter.value), "–", unit)

@@ -56,13 +56,18 @@ def sizes(one: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def _place(one: Mapping[str, Any]) -> str:
+    """Bodies and recording of an effect; a shifted clock has a recording alone."""
+    parts = [listed(one.get("states") or []), f"in {one['recording']}" if one.get("recording") else ""]
+    return " ".join(part for part in parts if part) or "all inputs"
+
+
 def _physics(d: Mapping[str, Any]) -> Printed:
     rows = []
     for one in d.get("physics") or []:
-        place = listed(one.get("states", [])) + (f" in {one['recording']}" if one.get("recording") else "")
         cells = (
             words(one["effect"]),
-            place,
+            _place(one),
             percent(one.get("probability")),
             one.get("expression") or "",
             "; ".join(sizes(one)),
@@ -171,7 +176,7 @@ def _rivals(d: Mapping[str, Any]) -> Printed:
             if below < 10
             else "ruled out"
         )
-        rows.append(Line((words(one["effect"]), listed(one.get("states", [])), number(below), judged)))
+        rows.append(Line((words(one["effect"]), _place(one), number(below), judged)))
     return Printed(
         "Rivals",
         ("Effect", "Where", "Log evidence below best", "With these recordings"),
@@ -188,7 +193,7 @@ def _considered(d: Mapping[str, Any]) -> Printed:
         Line(
             (
                 words(c["effect"]),
-                listed(c.get("states", [])),
+                _place(c),
                 number(c.get("log_evidence")),
                 "yes" if c.get("decidable") else "no",
             )

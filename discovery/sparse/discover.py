@@ -24,7 +24,7 @@ from discovery.sparse.folds import make_blocks
 from discovery.sparse.gram import solve, total
 from discovery.sparse.masses import make_mass_library, respond
 from discovery.sparse.options import SparseOptions
-from discovery.sparse.rates import Candidate, with_candidates
+from discovery.sparse.rates import Candidate, with_candidates, without_idle
 from discovery.sparse.weak import weak_gram, weak_rows
 from discovery.terms import Name, Term, names, parse, text
 from discovery.threads import one_thread
@@ -185,20 +185,23 @@ def _temperatures(
     words = options.library or LABORATORY
     own = [Candidate(body, parse(f"{room} - {body}"), 0.0) for body in bodies]
     given = candidates(bodies, empty, campaign, inputs, words, options, room)
-    found = [*own, *(c for c in given if (c.into, c.label) not in {(o.into, o.label) for o in own})]
+    offered = [*own, *(c for c in given if (c.into, c.label) not in {(o.into, o.label) for o in own})]
     data = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
     channel, known = dict(zip(bodies, outputs, strict=True)), {room: inputs.reference}
     simple = {text(o.expression) for o in own} | set(inputs.of("heat load", "cooling power"))
-    basis = [c for c in found if c.label in simple]
+    basis = [c for c in offered if c.label in simple]
     cautious = {(c.into, c.label): c for c in _started(basis, data, channel, known)}
-    begun = _started(found, data, channel, known)
+    begun = _started(offered, data, channel, known)
     model, labels = with_candidates(empty, begun)
-    slow, _ = with_candidates(empty, [cautious.get((c.into, c.label), replace(c, start=0.0)) for c in found])
+    slow, _ = with_candidates(
+        empty, [cautious.get((c.into, c.label), replace(c, start=0.0)) for c in offered]
+    )
     decay = [n for n, label in labels.items() if label.endswith(f": {room} - {label.split(': ')[0]}")]
     plain = [n for n, label in labels.items() if label.split(": ", 1)[1] in simple]
     first = {"1", *simple, *(text(parse(f"{a} - {b}")) for a in bodies for b in bodies if a != b)}
     easy = [n for n, label in labels.items() if label.split(": ", 1)[1] in first]
-    return discover_rates(data, nearer(data, model, slow), labels, decay, options, plain=plain, easy=easy)
+    found = discover_rates(data, nearer(data, model, slow), labels, decay, options, plain=plain, easy=easy)
+    return replace(found, model=without_idle(found.model, outputs))
 
 
 def second_masses(longest: float) -> tuple[float, ...]:

@@ -100,6 +100,24 @@ def without(model: Model, gone: Sequence[str]) -> Model:
     return replace(model, terms=tuple(terms), parameters=parameters)
 
 
+def without_idle(model: Model, outputs: Sequence[str]) -> Model:
+    """The model without states that move no output, their terms and what these alone used."""
+    read = [model.outputs[name] for name in outputs if name in model.outputs]
+    needed = {*outputs}.union(*(names(e) for e in read)) & set(model.states)
+    while True:
+        mine = [t for t in model.terms if needed & {t.into, t.source}]
+        more = needed.union(*(names(t.expression) for t in mine)) & set(model.states)
+        if more == needed:
+            break
+        needed = more
+    states = {name: state for name, state in model.states.items() if name in needed}
+    used = frozenset().union(*(names(t.expression) for t in mine), *(names(e) for e in read))
+    used |= frozenset().union(*(names(s.start) for s in states.values() if s.start is not None))
+    idle = frozenset().union(*(names(t.expression) for t in model.terms if t not in mine)) - used
+    parameters = {name: p for name, p in model.parameters.items() if name not in idle}
+    return replace(model, states=states, terms=tuple(mine), parameters=parameters)
+
+
 def _vanishes(expression: Expression, zero: set[str] | frozenset[str]) -> bool:
     """Whether an expression is identically zero once these names are."""
     from discovery.terms import Apply, Name, Number

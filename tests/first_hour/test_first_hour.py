@@ -126,12 +126,14 @@ def test_a_table_of_errors_makes_files_that_load(tmp_path: Path) -> None:
 
 def test_columns_that_say_nothing_stay_out(tmp_path: Path) -> None:
     for name, column in (("one", "extra"), ("two", "other")):
-        rows = [f"{k},{k % 3},{20 + k / 9},7,{k % 5}" for k in range(30)]
-        (tmp_path / f"{name}.csv").write_text("\n".join([f"time,P,T1,fault,{column}", *rows]), "utf-8")
+        rows = [f"{k},{k % 3},{20 + k / 9},24.3,7,{k % 5}" for k in range(30)]
+        (tmp_path / f"{name}.csv").write_text("\n".join([f"time,P,T1,T2,fault,{column}", *rows]), "utf-8")
     files = ["--from", str(tmp_path / "one.csv"), "--from", str(tmp_path / "two.csv")]
     result = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), *files])
     assert result.exit_code == 0, result.output
     assert "column 'extra' is not in every file: left out" in result.output
     assert "column 'fault' never moves: left out" in result.output
     channels = tomllib.loads((tmp_path / "rig" / "campaign.toml").read_text())["channels"]
-    assert set(channels) == {"P", "T1", "T_env"}
+    assert set(channels) == {"P", "T1", "T2", "T_env"}
+    experiment = tomllib.loads((tmp_path / "rig" / "experiment.toml").read_text())
+    assert experiment["outputs"] == ["T1"]  # a sensor that never moves is no output

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from discovery.errors import UserError
-from discovery.report import write_comparison, write_figures, write_report
+from discovery.models import Parameter
+from discovery.report import equations, write_comparison, write_figures, write_report
 from discovery.report.chart import thinned
 from discovery.report.ranking import ratio
 from discovery.report.run import load_run
@@ -134,6 +135,39 @@ def test_the_missing_physics_is_told_with_size_and_certainty(page: str) -> None:
     assert "pump &gt; 0.5 and speed &gt; 750" in page
     shades = [chart["shades"] for chart in _data(page)["charts"] if chart["key"] == "fit-E_Y0C"]
     assert shades == [[[4, 10, "mismatch at b_corpus, 81 W"]]]
+
+
+def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path) -> None:
+    folder = sample.write_sample(tmp_path / "run")
+    path = folder / "diagnosis.json"
+    diagnosis = json.loads(path.read_text())
+    diagnosis["physics"].append(
+        {**diagnosis["physics"][0], "effect": "clock_shift", "states": [], "recording": "fit"}
+    )
+    held = {"rms_before": 1.6, "rms_after": 25.0, "noise_floor": 0.4, "gain_low": -27.0, "gain_high": -19.0}
+    diagnosis["improvement"] = {"fit": {}, "held_out": {"left": held}, "explained": -1.0}
+    path.write_text(json.dumps(diagnosis))
+    page = write_report(folder).read_text("utf-8")
+    assert "clock shift in fit (98 % sure); but the unseen “left” contradicts the repair." in page
+    assert "Do not use the repaired model" in page
+    assert "The repair closes" not in page
+    held |= {"rms_after": 1.59, "gain_low": -0.1, "gain_high": 0.2}
+    diagnosis["improvement"] = {"fit": {}, "held_out": {"left": held}, "explained": -0.002}
+    path.write_text(json.dumps(diagnosis))
+    page = write_report(folder).read_text("utf-8")
+    assert "contradict" not in page
+    assert "The repair closes nothing of the gap" in page
+
+
+def test_a_given_number_of_each_recording_is_printed_for_each() -> None:
+    window = Parameter(0.0, "s", fixed=True, per_recording=True, values={"monday": 8.7})
+    assert (
+        equations.value("t_on", window).value,
+        equations.value("k", Parameter(2.0, fixed=True)).value,
+    ) == (
+        "monday: 8.7",
+        "2",
+    )
 
 
 def test_names_of_a_user_stay_text(page: str) -> None:

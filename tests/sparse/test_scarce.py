@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from discovery.dynamics.system import predict
 from discovery.fitting import predict_recording
-from discovery.models import Model
+from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.sparse import Discovery, SparseOptions, discover
 from discovery.sparse.byrates import _plainer
 from discovery.sparse.discover import second_masses
 from discovery.sparse.gram import gram
-from discovery.sparse.rates import Evidence
+from discovery.sparse.rates import Evidence, without_idle
+from discovery.terms import Term, parse
 
 Array = NDArray[np.float64]
 
@@ -64,15 +65,16 @@ def test_three_minutes_of_a_heater_are_explained_by_the_heater() -> None:
     where = board()
     found = discovered(where, ["T1", "T2"])
     assert "T1_body: Q1" in found.report["groups"][0]["kept"]
+    assert not any("mass" in name for name in found.model.states)  # nothing asks for them
     assert max(missed(found.model, where, "first", ["T1", "T2"])) < 0.35
 
 
 def test_a_room_of_air_and_walls_gets_its_walls() -> None:
     """Readings every half hour: masses of minutes behind a body, right for a board, are of no use there."""
     time = np.arange(0.0, 5 * 86400.0, 1800.0)
-    out = 15 + 6 * np.sin(2 * np.pi * time / 86400)
-    heat = 2000.0 * ((time % 172800) > 86400)
-    air, wall, seen = 20.0, 20.0, []
+    out = np.asarray(15 + 6 * np.sin(2 * np.pi * time / 86400), dtype=np.float64)
+    heat = np.where(time % 172800 > 86400, 2000.0, 0.0)
+    air, wall, seen = 20.0, 20.0, list[float]()
     rng = np.random.default_rng(2)
     for k in range(len(time)):
         seen.append(air + 0.05 * rng.standard_normal())
@@ -116,3 +118,19 @@ def test_the_plainer_of_two_twins_is_named_and_no_other() -> None:
     assert _plainer(g, seen, (1, 2), [], ["a"], labels, worth=20.0) == (0, 2)
     assert _plainer(g, seen, (1, 2), [], ["a"], labels, worth=1e-9) == (1, 2)
     assert _plainer(g, seen, (1, 2), [1], ["a"], labels, worth=20.0) == (1, 2)
+
+
+def test_what_moves_no_output_leaves_with_its_numbers() -> None:
+    p = {name: Parameter(1.0) for name in ("a", "b", "shared")}
+    states = {name: State(name) for name in ("T", "room", "ghost", "echo")}
+    terms = (
+        Term("loss", "T", parse("a*(room - T)*shared")),
+        Term("ghost follows", "ghost", parse("b*shared*(T - ghost)")),
+        Term("echo follows", "echo", parse("ghost - echo")),
+    )
+    small = without_idle(Model("m", p, states, terms, {}), ["T"])
+    assert set(small.states) == {"T", "room"}
+    assert [t.name for t in small.terms] == ["loss"]
+    assert set(small.parameters) == {"a", "shared"}
+    shown = without_idle(Model("m", p, states, terms, {"T": parse("T + echo")}), ["T"])
+    assert len(shown.terms) == 3
