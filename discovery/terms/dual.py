@@ -128,7 +128,7 @@ def _apply(function: str, a: list[Dual]) -> Dual:
         case "*":
             return _chain(x * y, [(y, a[0]), (x, a[1])])
         case "/":
-            below = np.float64(y) if np.ndim(y) == 0 else y  # numpy divides by zero without an exception
+            below = _divisor(y)
             return _chain(x / below, [(1.0 / below, a[0]), (-x / (below * below), a[1])])
         case "**":
             return _power(a[0], a[1])
@@ -142,7 +142,7 @@ def _apply(function: str, a: list[Dual]) -> Dual:
             e = np.exp(np.minimum(x, 500.0))  # beyond this a fit has left all physics; keep it finite
             return _chain(e, [(e, a[0])])
         case "log":
-            return _chain(np.log(x), [(1.0 / x, a[0])])
+            return _chain(np.log(x), [(1.0 / _divisor(x), a[0])])
         case "sqrt":
             root = np.sqrt(x)
             return _chain(root, [(0.5 / np.maximum(root, 1e-12), a[0])])
@@ -168,6 +168,11 @@ def _apply(function: str, a: list[Dual]) -> Dual:
                 result = _chain(value, [(first, result), (1.0 - first, other)])
             return result
     raise ValueError(f"unknown function {function}")
+
+
+def _divisor(value: Value) -> Value:
+    """The same as a number of numpy, which divides by zero without an exception."""
+    return np.float64(value) if np.ndim(value) == 0 else value
 
 
 def _power(base: Dual, exponent: Dual) -> Dual:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from discovery.errors import UserError
@@ -39,6 +39,7 @@ expressions = st.recursive(leaves, applied, max_leaves=12)
 
 
 @settings(max_examples=400, deadline=None)
+@example(Apply("log", (Apply("**", (Number(0.0), Number(1.0))),)))
 @given(expressions)
 def test_what_is_printed_reads_back_to_the_same_values(expression: Expression) -> None:
     again = parse(text(expression))
