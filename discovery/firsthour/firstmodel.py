@@ -41,6 +41,13 @@ def first_model(guesses: Mapping[str, Guess], outputs: Sequence[str], *, has_roo
     )
 
 
+def drives(guesses: Mapping[str, Guess]) -> list[str]:
+    """What warms a machine: its heat loads; where none is recorded, its currents and speeds."""
+    loads = [name for name, one in guesses.items() if one.role == "heat load"]
+    likely = [n for n, one in guesses.items() if one.role == "rotation speed" or one.unit == "A"]
+    return loads or likely
+
+
 def _state_unit(one: Guess) -> str:
     if one.role == "temperature":
         return "degC"
@@ -54,12 +61,14 @@ def _temperature(
     if room:
         parameters.append(f'loss_{output} = {{ start = 1e-3, unit = "1/s", min = 0.0 }}')
         terms.append(_term(f"{output} loses heat to the room", output, f"loss_{output}*({room} - {output})"))
-    for load in _belonging(output, [n for n, one in guesses.items() if one.role == "heat load"], outputs):
+    for load in _belonging(output, drives(guesses), outputs):
         unit = _canonical(guesses[load])
+        # copper warms with the square of its current
+        heat, per = (f"{load}**2", "A**2") if unit == "A" else (load, unit)
         parameters.append(
-            f'gain_{output}_{load} = {{ start = {_start(unit)}, unit = "K/{unit}/s", min = 0.0 }}'
+            f'gain_{output}_{load} = {{ start = {_start(per)}, unit = "K/{per}/s", min = 0.0 }}'
         )
-        terms.append(_term(f"{load} warms {output}", output, f"gain_{output}_{load}*{load}"))
+        terms.append(_term(f"{load} warms {output}", output, f"gain_{output}_{load}*{heat}"))
     fluid, pump = _first(guesses, "fluid temperature"), _first(guesses, "fluid flow")
     if fluid:
         parameters.append(f'fluid_{output} = {{ start = 1e-4, unit = "1/s", min = 0.0 }}')

@@ -118,6 +118,11 @@ _ROOM_F = (55.0, 100.0)  # a machine starts near room temperature: 13 to 38 degC
 def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
     """Role and unit of each column by name, and which error a correction belongs to."""
     guesses, stated = {column.name: guess(column) for column in columns}, {c.name: c.unit for c in columns}
+    told = [g.unit for c, g in zip(columns, guesses.values(), strict=True) if _is_load(g) and c.values.any()]
+    for column in columns:  # a load that is never on has the unit of its neighbour
+        one = guesses[column.name]
+        if told and _is_load(one) and not column.unit and not column.values.any():
+            guesses[column.name] = replace(one, unit=told[0], why=f"{one.why}, in {told[0]} as the others")
     errors = [name for name, one in guesses.items() if one.role == "error"]
     corrections = [name for name, one in guesses.items() if one.role == "applied correction"]
     for name in corrections:
@@ -155,6 +160,10 @@ def guess(column: Column) -> Guess:
     return Guess(
         "other input", "1", f"{why}; the header says {column.unit}, which is no known unit", sure=False
     )
+
+
+def _is_load(one: Guess) -> bool:
+    return one.role in ("heat load", "cooling power")
 
 
 def _known(unit: str, role: str) -> bool:

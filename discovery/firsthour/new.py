@@ -13,7 +13,7 @@ import numpy as np
 
 from discovery.errors import UserError
 from discovery.files import format_toml, write_atomic
-from discovery.firsthour.firstmodel import first_model
+from discovery.firsthour.firstmodel import drives, first_model
 from discovery.firsthour.guess import Guess, guess_all
 from discovery.firsthour.table import Array, OwnTable, read_own
 
@@ -226,6 +226,11 @@ def _said(
         lines.append(f"  {column.header:{width}} -> {what:{inner}} {' ' if one.sure else '?'} {one.why}")
     if room is not None:
         lines.append(f"  {'':{width}} -> T_env: {why_room} ({room:g} degC)")
+    if not drives(guesses):
+        lines.append(
+            "no column says what heats the machine: a model can only follow its surroundings; "
+            "record a power, current, speed or switch as well"
+        )
     names = list(recordings)
     lines.append(f"recordings: fit {', '.join(names[:-1])}; unseen {names[-1]}")
     return lines

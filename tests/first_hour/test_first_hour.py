@@ -137,3 +137,28 @@ def test_columns_that_say_nothing_stay_out(tmp_path: Path) -> None:
     assert set(channels) == {"P", "T1", "T2", "T_env"}
     experiment = tomllib.loads((tmp_path / "rig" / "experiment.toml").read_text())
     assert experiment["outputs"] == ["T1"]  # a sensor that never moves is no output
+
+
+@pytest.mark.parametrize(
+    ("header", "term", "hint"),
+    [
+        ("time,current [A],temperature", "gain_temperature_current*current**2", False),
+        ("time,speed [rpm],temperature", "gain_temperature_speed*speed", False),
+        ("time,door,temperature", None, True),
+    ],
+)
+def test_where_no_power_is_recorded(tmp_path: Path, header: str, term: str | None, hint: bool) -> None:
+    from discovery.experimentfile import load_experiment
+
+    rows = [f"{k},{k // 10 % 2},{20 + k / 9}" for k in range(60)]
+    (tmp_path / "run.csv").write_text("\n".join([header, *rows]), "utf-8")
+    result = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), "--from", str(tmp_path / "run.csv")])
+    assert result.exit_code == 0, result.output
+    assert ("what heats the machine" in result.output) is hint
+    load_experiment(tmp_path / "rig" / "experiment.toml")
+    model = tomllib.loads((tmp_path / "rig" / "model.toml").read_text())
+    assert (term in [one["expression"] for one in model["terms"]]) is (term is not None)
+    check = CliRunner().invoke(
+        app, ["check", str(tmp_path / "rig"), "--model", str(tmp_path / "rig/model.toml")]
+    )
+    assert check.exit_code == 0, check.output

@@ -54,6 +54,11 @@ def test_a_correction_is_given_to_the_error_of_its_name() -> None:
     assert found("T_bed", "offset")[1] == ("other input", "um", None)
 
 
+def test_a_load_that_is_never_on_has_the_unit_of_the_other() -> None:
+    columns = [Column("Q1", "Q1", "", np.linspace(0, 80, 9)), Column("Q2", "Q2", "", np.zeros(9))]
+    assert [one.unit for one in guess_all(columns).values()] == ["percent", "percent"]
+
+
 def _file(folder: Path, *lines: str) -> Path:
     path = folder / "own.csv"
     path.write_text("\n".join(lines), "utf-8")
