@@ -122,17 +122,18 @@ def _error_rates(
     return discover_rates(data, model, labels, always, options)
 
 
-def _room(outputs: Sequence[str], inputs: Inputs) -> tuple[str, dict[str, State]]:
-    """The temperature of the room: its channel where it moves, else a constant of each recording.
+def _room(outputs: Sequence[str], inputs: Inputs, count: int) -> tuple[str, dict[str, State]]:
+    """The temperature of the room: its channel where it moves, else a constant of each of `count` recordings.
 
     Where the sensors start near what is known of the room they stand in it at rest, and their mean tells the
-    room's temperature of that day.
+    room's temperature of that day. A single recording does not tell it from steady heat: its readings would
+    pull it away from where free runs, which see the first reading alone, begin.
     """
     if air := inputs.of(AMBIENT):
         return air[0], {}
     mean = f"({' + '.join(outputs)})/{len(outputs)}"
     start = parse(f"where({mean} < {inputs.reference + 2:g}, {mean}, {inputs.reference:g})")
-    return "room", {"room": State("room", "degC", None, start, 0.5, 1 / 3600)}
+    return "room", {"room": State("room", "degC", None, start, 0.5 if count > 1 else 0.1, 1 / 3600)}
 
 
 def _started(
@@ -166,7 +167,7 @@ def _temperatures(
     options: SparseOptions,
 ) -> Discovery:
     """Measured temperatures: a body behind each sensor, all bodies together."""
-    room, states = _room(outputs, inputs)
+    room, states = _room(outputs, inputs, len(recordings))
     longest = max(float(campaign.recordings[r].time[-1]) for r in recordings)
     masses = second_masses(longest) if "second mass" in (options.library or LABORATORY) else ()
     least, lag, most = (min(t, longest / 4) for t in SENSOR_LAG)
