@@ -189,7 +189,8 @@ def _temperatures(
     offered = [*own, *(c for c in given if (c.into, c.label) not in {(o.into, o.label) for o in own})]
     data = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
     channel, known = dict(zip(bodies, outputs, strict=True)), {room: inputs.reference}
-    simple = {text(o.expression) for o in own} | set(inputs.of("heat load", "cooling power"))
+    loads = inputs.of("heat load", "cooling power") or inputs.of("rotation speed", "other input")
+    simple = {text(o.expression) for o in own} | set(loads)
     basis = [c for c in offered if c.label in simple]
     cautious = {(c.into, c.label): c for c in _started(basis, data, channel, known)}
     begun = _started(offered, data, channel, known)

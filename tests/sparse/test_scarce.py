@@ -69,19 +69,35 @@ def test_three_minutes_of_a_heater_are_explained_by_the_heater() -> None:
     assert max(missed(found.model, where, "first", ["T1", "T2"])) < 0.35
 
 
-def test_the_room_of_a_single_recording_is_no_place_for_steady_heat() -> None:
-    """A motor with its electronics on; free runs began 2 K below what the fit had made of the room."""
+def motor() -> Campaign:
+    """Nine minutes on and off, with electronics that stay on."""
     time = np.arange(0.0, 540.0, 3.0)
-    on = ((time - 4) % 180 < 90).astype(float)
-    body, seen = 21.3, []
+    on = np.where((time - 4) % 180 < 90, 1.0, 0.0)
+    body, seen = 21.3, list[float]()
     rng = np.random.default_rng(8)
     for k in range(len(time)):
         seen.append(round(body + 0.05 * rng.standard_normal(), 1))
         for _ in range(30):
             body += 0.1 * (0.03 * (21.3 - body) + 0.13 * on[k] + 0.12 * (time[k] > 3))
-    where = campaign(time, 0 * time + 21.3, {"P": on}, {"T": np.array(seen)})
+    return campaign(time, 0 * time + 21.3, {"P": on}, {"T": np.array(seen)})
+
+
+def test_the_room_of_a_single_recording_is_no_place_for_steady_heat() -> None:
+    """Free runs began 2 K below what the fit had made of the room."""
+    where = motor()
     found = discovered(where, ["T"])
     assert missed(found.model, where, "first", ["T"])[0] < 1.5  # 3.7 with a room that may move
+
+
+def test_without_a_heat_load_the_plain_rival_has_the_other_inputs() -> None:
+    """The sizes that the search keeps hold no more than the room here; the rival is weighed all the same."""
+    time = np.arange(0.0, 540.0, 3.0)
+    seen = 21.3 + 9 * np.exp(-time / 60) + 0.05 * np.random.default_rng(3).standard_normal(len(time))
+    where = campaign(time, 0 * time + 21.3, {"P": np.where(time % 90 < 40, 1.0, 0.0)}, {"T": seen})
+    channels = {**where.channels, "P": Channel("P", "other input", "A", None, "held")}
+    found = discovered(Campaign("idle", channels, where.recordings, Path("idle")), ["T"])
+    plain = {"T_lag", "T_body: room - T_body", "T_body: P"}
+    assert plain in [set(point.names) for point in found.path]
 
 
 def test_a_room_of_air_and_walls_gets_its_walls() -> None:
