@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from discovery.errors import UserError
 from discovery.schema import suggest
+
+if TYPE_CHECKING:
+    from discovery.mismatch.catalogue import Effect
 
 MODELS = {
     "file": 'a model of your own: { file = "model.toml" }, a sparse sum of terms with named parameters',
@@ -72,7 +76,12 @@ def explain(word: str) -> Iterator[str]:
     known = catalogue()
     if word not in known:
         raise UserError(f"there is no effect '{word}'; {suggest(word, sorted(known))}")
-    effect = known[word]
+    for k, effect in enumerate(e for e in known.values() if e.word == known[word].word):
+        yield from [""] * bool(k)
+        yield from _entry(effect)
+
+
+def _entry(effect: Effect) -> Iterator[str]:
     size = effect.amplitude
     sign = {1: ", positive", -1: ", negative"}.get(size.sign, ", either sign")
     yield f"{effect.title} ({effect.word}; {effect.group})"

@@ -14,7 +14,7 @@ from discovery.mismatch.ask import next_experiment
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.catalogue import Effect, catalogue
 from discovery.mismatch.context import Context, make_context, seen_beside
-from discovery.mismatch.deliver import delivered
+from discovery.mismatch.deliver import delivered, written
 from discovery.mismatch.describe import Curve, Description, curves, describe
 from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
@@ -26,8 +26,6 @@ from discovery.mismatch.selfcheck import false_alarm, named_again
 from discovery.mismatch.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.terms import Apply, Expression, Name, Term, names
-from discovery.terms.expression import rewrite
 from discovery.threads import one_thread
 
 INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
@@ -101,10 +99,11 @@ def diagnose(
     outputs = tuple(n for n in outputs if n in model.outputs or n in model.states)
     if not outputs:
         raise UserError(f"model '{model.name}' predicts no measured channel; name one under [outputs]")
-    entries = {**catalogue(), **{e.word: e for e in effects}}
+    own = {e.word for e in effects}
+    entries = [*(e for e in catalogue().values() if e.word not in own), *effects]
     seen = replace(campaign, recordings={r: campaign.recordings[r] for r in fit})  # nothing else can leak in
     tell("fitting the baseline and its noise")
-    context = make_context(seen, model, fit, outputs, list(entries.values()), physical)
+    context = make_context(seen, model, fit, outputs, entries, physical)
     tell("scoring the catalogue")
     found = search(context, tell=lambda what: tell(f"found so far: {what}"))
     beside = seen_beside(context, found.best.fit)
@@ -121,7 +120,7 @@ def diagnose(
     tell("fitting what was found for free runs")
     old = delivered(context, found.baseline)
     new = delivered(context, found.best) if verdict.named else old
-    repaired = _repaired(new) if verdict.named else None
+    repaired = written(new) if verdict.named else None
     tell("proving on held-out recordings")
     noise = found.best.best_view.noise
     proof = improvements(campaign, held_out, outputs, old.fit.model, new.fit.model, noise)
@@ -211,47 +210,3 @@ def _smallest(found: Search) -> str:
         if texts
         else "nothing is missing that these recordings could show"
     )
-
-
-def _repaired(best: Assessment) -> Model:
-    """The fitted model with what was found as an engineer would write it (no switch that is always on)."""
-    model = best.fit.model
-    switches = {
-        h.amplitudes[0]: h
-        for h in best.hypotheses
-        if h.effect.amplitude.fixed is not None and not h.recording
-    }
-
-    def simplify(apply: Apply) -> Expression | None:
-        match apply:
-            case Apply(
-                function="*", arguments=(Name(id=name), Apply(function="-", arguments=(changed, _)))
-            ) if name in switches:
-                return changed
-        return None
-
-    terms: list[Term] = []
-    for term in model.terms:
-        plain = rewrite(term.expression, simplify)
-        if plain != term.expression:
-            # the replacement carries the whole term: the original goes
-            terms = [
-                t
-                for t in terms
-                if not (t.into == term.into and t.source == term.source and _is_original(term, t))
-            ]
-        terms.append(replace(term, expression=plain))
-    parameters = {n: p for n, p in model.parameters.items() if n not in switches or _used(n, terms, model)}
-    return replace(model, name=f"{model.name}, repaired", terms=tuple(terms), parameters=parameters)
-
-
-def _is_original(replaced: Term, term: Term) -> bool:
-    match replaced.expression:
-        case Apply(function="*", arguments=(_, Apply(function="-", arguments=(_, original)))):
-            return bool(term.expression == original)
-    return False
-
-
-def _used(name: str, terms: Sequence[Term], model: Model) -> bool:
-    expressions = [*(t.expression for t in terms), *model.outputs.values()]
-    return any(name in names(e) for e in expressions)

@@ -184,10 +184,8 @@ def _claim(
     amplitude = Name(amplitudes[0])
     terms: list[Term] = []
     extra: dict[str, Expression] = {}
-    if (
-        replaced
-    ):  # a channel is replaced in terms of the model: amplitude * (term with the new channel - term)
-        fresh = substitute(formula, base)
+    if replaced:  # a channel is replaced in terms of the model: the term with the new channel less the term
+        fresh = substitute(formula, {**base, effect.amplitude.name: amplitude})
         for term in replaced:
             if effect.place == "inputs of a recording":
                 swaps = {
@@ -195,9 +193,12 @@ def _claim(
                     for c in names(term.expression) & set(channels) - set(model.states)
                 }
             else:
-                swaps = dict.fromkeys(names(term.expression) & names(fresh) & set(channels), fresh)
+                replaced_one = binding["fluid" if effect.place == "fluid terms" else "cooling"]
+                swaps = {n: fresh for n in names(term.expression) if Name(n) == replaced_one}
             changed = substitute(term.expression, swaps)
-            difference = Apply("*", (amplitude, Apply("-", (changed, term.expression))))
+            difference = Apply("-", (changed, term.expression))
+            if effect.amplitude.name not in names(formula):  # then it switches the replacement on
+                difference = Apply("*", (amplitude, difference))
             terms.append(
                 Term(f"{effect.title}: {term.name}", term.into, difference, term.source, effect.word)
             )

@@ -16,14 +16,16 @@ from discovery.mismatch.look import attempt, look
 NAMED = 8.0  # log evidence that a claim has to add to be taken up
 SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
 TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the most beside it
+EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
 RIVALS = 3  # claims that are tried in the place of another
 
 
-def recurs(chosen: Sequence[Hypothesis]) -> bool:
-    """Whether heat without a record was taken up twice: then it is no event, and looking for a third one is
-    idle.
+def recurs(context: Context, chosen: Sequence[Hypothesis]) -> bool:
+    """Whether what was taken up for events is none, and looking for a further one is idle: heat without a
+    record came twice, or there are more events (two at least) than recordings.
     """
-    return sum(h.effect.word == "unmeasured_heat" for h in chosen) > 1
+    words = [h.effect.word for h in chosen if h.effect.word in EVENTS]
+    return words.count("unmeasured_heat") > 1 or len(words) > max(2, len(context.recordings))
 
 
 def trace(gain: float) -> float:
@@ -48,7 +50,7 @@ def prune(context: Context, baseline: Assessment, current: Assessment) -> tuple[
         for h, share, without in lost:
             largest = max((s for o, s, _ in lost if o is not h and o.effect.is_physics), default=0.0)
             # heat that comes again and again is a sign of its own: the verdict needs to see it
-            bar = NAMED + (0.0 if recurs(current.hypotheses) else trace(largest))
+            bar = NAMED + (0.0 if recurs(context, current.hypotheses) else trace(largest))
             if share < bar or (share < SMALL * gain and objections(current, h, gain)):
                 shorter.append((bent(current, h) is None, share, without))
         if not shorter:

@@ -52,7 +52,7 @@ def search(context: Context, most: int = 6, tell: Callable[[str], None] = lambda
             break
         current, more = prune(context, baseline, current)
         tried += more
-        if 1 < len(current.hypotheses) <= QUESTIONED and not recurs(current.hypotheses):
+        if 1 < len(current.hypotheses) <= QUESTIONED and not recurs(context, current.hypotheses):
             current, more = question(context, current)
             tried += more
         # sizes under the noise that stands beside the answer, not beside the one before
@@ -80,7 +80,7 @@ def _grow(
     """
     tried: list[Assessment] = []
     looks: list[tuple[Score, ...]] = []
-    while len(current.hypotheses) < most and not recurs(current.hypotheses):
+    while len(current.hypotheses) < most and not recurs(context, current.hypotheses):
         first = claims[0].gain if claims else 0.0
         pool = [c for c in claims[:REFITS] if c.gain > max(2.0, 0.2 * first)]
         attempts = [

@@ -84,8 +84,8 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     named = tuple(_named(found, h) for h in best.hypotheses)
     named = tuple(sorted(named, key=lambda n: -_weight(found, n.hypothesis)))
     reasons = []
-    if recurs(best.hypotheses):
-        reasons.append("unrecorded heat comes again and again: a cause, not an event")
+    if recurs(context, best.hypotheses):
+        reasons.append("unrecorded events come again and again: a cause, not an event")
     left = [
         c
         for c in found.looks[-1]

@@ -13,10 +13,13 @@ __all__ = ["Amplitude", "Effect", "Example", "Shape", "catalogue"]
 
 @cache
 def catalogue() -> dict[str, Effect]:
-    """Every effect of the catalogue by its word."""
-    found = {}
-    for module in sorted(iter_modules(__path__), key=lambda m: m.name):
-        if module.name not in ("effect", "form", "worked"):
-            entry: Effect = import_module(f"{__name__}.{module.name}").EFFECT
-            found[entry.word] = entry
-    return found
+    """Every entry of the catalogue by the name of its file: the word of its effect.
+
+    An effect that acts by two laws has a second file, whose name says more than the word.
+    """
+    modules = sorted(m.name for m in iter_modules(__path__))
+    return {
+        name: import_module(f"{__name__}.{name}").EFFECT
+        for name in modules
+        if name not in ("effect", "form", "worked")
+    }
