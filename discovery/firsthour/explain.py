@@ -52,7 +52,11 @@ def _roles() -> Iterator[str]:
 
     for role, facts in ROLES.items():
         unit = " or ".join(facts.units) if facts.units else "any unit"
-        kind = "read now and then" if facts.measured else f"input, {facts.between} between its stamps"
+        kind = (
+            "read now and then, compared with models"
+            if facts.measured
+            else f"input, {facts.between} between its stamps"
+        )
         if role == CORRECTION:
             kind = 'added to the readings of its error: corrects = "E_Y0C"'
         yield f"{role:20} {unit:12} {kind}"

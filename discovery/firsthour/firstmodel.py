@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from discovery.firsthour.guess import Guess
+from discovery.firsthour.guess import Guess, drives
 
 
 def first_model(guesses: Mapping[str, Guess], outputs: Sequence[str], *, has_room: bool) -> str:
@@ -39,13 +39,6 @@ def first_model(guesses: Mapping[str, Guess], outputs: Sequence[str], *, has_roo
     return "\n".join(
         [*lines, *parameters, "", "[states]   # each starts at its first reading", *states, "", *terms]
     )
-
-
-def drives(guesses: Mapping[str, Guess]) -> list[str]:
-    """What warms a machine: its heat loads; where none is recorded, its currents and speeds."""
-    loads = [name for name, one in guesses.items() if one.role == "heat load"]
-    likely = [n for n, one in guesses.items() if one.role == "rotation speed" or one.unit == "A"]
-    return loads or likely
 
 
 def _state_unit(one: Guess) -> str:
@@ -96,7 +89,10 @@ def _error(
         _term(f"zero balance of {output}", output, f"zero_{output}"),
     ]
     temperatures = [
-        name for name, one in guesses.items() if one.role in ("fluid temperature", "coolant temperature")
+        name
+        for name, one in guesses.items()
+        if one.role in ("fluid temperature", "coolant temperature")
+        or (one.role == "other input" and one.unit in ("degC", "K"))
     ]
     loads = [name for name, one in guesses.items() if one.role == "heat load"]
     speeds = [] if loads else [name for name, one in guesses.items() if one.role == "rotation speed"]

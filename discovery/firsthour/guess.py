@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -137,7 +137,19 @@ def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
             why = f"{one.why}; it is added to {error} (what was added to the position needs sign = -1)"
             unit = one.unit if stated[name] else guesses[error].unit
             guesses[name] = replace(one, unit=unit, why=why, sure=False, corrects=error)
+    if errors and not drives(guesses):
+        for name, one in guesses.items():
+            if one.role == "temperature" and one.unit in ("degC", "K"):
+                why = f"{one.why}; an input of the errors, since nothing else says what heats the machine"
+                guesses[name] = replace(one, role="other input", why=why, sure=False)
     return guesses
+
+
+def drives(guesses: Mapping[str, Guess]) -> list[str]:
+    """What warms a machine: its heat loads; where none is recorded, its currents and speeds."""
+    loads = [name for name, one in guesses.items() if one.role == "heat load"]
+    likely = [n for n, one in guesses.items() if one.role == "rotation speed" or one.unit == "A"]
+    return loads or likely
 
 
 def guess(column: Column) -> Guess:

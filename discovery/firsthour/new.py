@@ -13,8 +13,8 @@ import numpy as np
 
 from discovery.errors import UserError
 from discovery.files import format_toml, write_atomic
-from discovery.firsthour.firstmodel import drives, first_model
-from discovery.firsthour.guess import Guess, guess_all
+from discovery.firsthour.firstmodel import first_model
+from discovery.firsthour.guess import Guess, drives, guess_all
 from discovery.firsthour.table import Array, OwnTable, read_own
 
 _LAST_THIRD = 2 / 3
@@ -165,6 +165,8 @@ def _campaign(
     for name, guessed in guesses.items():
         if guessed.corrects:
             channels[name]["corrects"] = guessed.corrects
+        if guessed.role == "other input" and guessed.unit in ("degC", "K"):
+            channels[name]["between"] = "linear"
     if room is not None:
         channels["T_env"] = {"role": "ambient temperature", "unit": "degC"}
     given = {"set": {"T_env": room}} if room is not None else {}
@@ -226,7 +228,8 @@ def _said(
         lines.append(f"  {column.header:{width}} -> {what:{inner}} {' ' if one.sure else '?'} {one.why}")
     if room is not None:
         lines.append(f"  {'':{width}} -> T_env: {why_room} ({room:g} degC)")
-    if not drives(guesses):
+    warmed = [n for n, one in guesses.items() if one.role == "other input" and one.unit in ("degC", "K")]
+    if not drives(guesses) and not warmed:
         lines.append(
             "no column says what heats the machine: a model can only follow its surroundings; "
             "record a power, current, speed or switch as well"

@@ -36,6 +36,7 @@ LABORATORY = ("linear", "coupling", "radiation", "load", "second mass")
 # s, time constants of the masses behind each body: two of a series in steps of four, in proportion to the
 # recordings, of which the slower one shall see the sixth part
 SECOND_MASS, _STEP, _SEEN = (300.0, 1200.0), 4.0, 6.0
+QUICK = (60.0, 240.0)  # s
 SENSOR_LAG = (1.0, 20.0, 300.0)  # s: least, start, most
 START_SD = 5.0  # K: a first reading may be an artefact of switching on
 
@@ -96,7 +97,9 @@ def _mass_data(
     inputs: Inputs,
     options: SparseOptions,
 ) -> MassData:
-    library = make_mass_library(inputs, options.time_constants, options.pump_ratios, options.library or ())
+    quick = QUICK if inputs.bodies else ()  # an error follows the temperature of its own body at once
+    constants = sorted({*quick, *options.time_constants})
+    library = make_mass_library(inputs, constants, options.pump_ratios, options.library or ())
     grids = {r: make_grid(campaign, r, inputs.names, outputs) for r in recordings}
     blocks = make_blocks([grids[r].time[grids[r].read] for r in recordings], options.blocks)
     return MassData(library, grids, tuple(respond(library, grids[r]) for r in recordings), blocks)

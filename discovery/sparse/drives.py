@@ -24,6 +24,7 @@ class Inputs:
     by_role: dict[str, tuple[str, ...]]
     reference: float  # degC
     gate: str | None  # expression, 0 to 1, of a flow that goes on and off in these recordings
+    bodies: tuple[str, ...] = ()  # inputs of no special role that are temperatures
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -69,7 +70,9 @@ def make_inputs(campaign: Campaign, recordings: Sequence[str], asked: Sequence[s
     flow = by_role.get(FLOW, ())
     most = float(np.max(values[flow[0]])) if flow else 1.0
     gate = (flow[0] if most <= 1.0 else f"{flow[0]}/{most:g}") if flow else None
-    return Inputs(by_role, float(np.round(np.mean(air[0]), 1)) if air else 20.0, gate)
+    others = by_role.get("other input", ())
+    bodies = tuple(name for name in others if campaign.channels[name].unit in ("degC", "K"))
+    return Inputs(by_role, float(np.round(np.mean(air[0]), 1)) if air else 20.0, gate, bodies)
 
 
 def _known(campaign: Campaign, recording: str, name: str) -> NDArray[np.float64]:
@@ -80,9 +83,13 @@ def _known(campaign: Campaign, recording: str, name: str) -> NDArray[np.float64]
 def mass_drives(inputs: Inputs) -> list[str]:
     """Expressions that may drive a hidden mass: zero at the reference, heat also gated by the pump."""
     reference = f"{inputs.reference:g}"
-    found = [f"{name} - {reference}" for name in inputs.of(*TEMPERATURES)]
+    found = [f"{name} - {reference}" for name in (*inputs.of(*TEMPERATURES), *inputs.bodies)]
     others = [
-        name for role, names in inputs.by_role.items() if role not in (*TEMPERATURES, FLOW) for name in names
+        name
+        for role, names in inputs.by_role.items()
+        if role not in (*TEMPERATURES, FLOW)
+        for name in names
+        if name not in inputs.bodies
     ]
     found += others
     if inputs.gate:

@@ -49,7 +49,7 @@ class MassLibrary:
     masses: tuple[Mass, ...]
     drives: tuple[Expression, ...]
     gate: Expression
-    soaked: tuple[bool, ...]  # drives whose mass begins in balance with them: ambient temperatures
+    soaked: tuple[bool, ...]  # drives whose mass begins in balance with them: air, measured bodies
 
     @property
     def drive(self) -> NDArray[np.intp]:
@@ -83,7 +83,7 @@ def make_mass_library(
         if ratio == 1.0 or tau / ratio >= _QUICKEST
     ]
     drives = tuple(parse(drive) for drive in [*mass_drives(inputs), *extra])
-    air = frozenset(inputs.of(AMBIENT))
+    air = frozenset((*inputs.of(AMBIENT), *inputs.bodies))
     gate_names = names(parse(inputs.gate)) if inputs.gate else frozenset()
     soaked = tuple(bool(names(drive) & air) and not names(drive) & gate_names for drive in drives)
     return MassLibrary(tuple(masses), drives, parse(inputs.gate or 0.0), soaked)

@@ -162,3 +162,18 @@ def test_where_no_power_is_recorded(tmp_path: Path, header: str, term: str | Non
         app, ["check", str(tmp_path / "rig"), "--model", str(tmp_path / "rig/model.toml")]
     )
     assert check.exit_code == 0, check.output
+
+
+def test_body_temperatures_alone_drive_the_errors(tmp_path: Path) -> None:
+    """The usual table of a spindle test: some temperatures, a displacement, nothing that says why."""
+    from discovery.experimentfile import load_experiment
+
+    rows = [f"{k},{20 + k / 9},{20 + k / 20},21,{k / 7}" for k in range(60)]
+    (tmp_path / "run.csv").write_text("\n".join(["time_min,T1,T2,T_room,dZ_um", *rows]), "utf-8")
+    result = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), "--from", str(tmp_path / "run.csv")])
+    assert result.exit_code == 0, result.output
+    assert "what heats the machine:" not in result.output
+    experiment = load_experiment(tmp_path / "rig" / "experiment.toml")
+    assert experiment.campaign.channels["T1"].role == "other input"
+    assert experiment.campaign.channels["T1"].between == "linear"
+    assert {"T1", "T2"} <= set(experiment.model_file("first_order").inputs)
