@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
+import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
 from discovery.errors import UserError
@@ -19,6 +20,7 @@ from discovery.mismatch.catalogue.form import EffectForm
 from discovery.models import Model, check_names, read_model
 from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, campaign_path
+from discovery.recordings.roles import CORRECTION
 from discovery.schema import Strict, suggest
 from discovery.sparse.options import SparseOptions
 
@@ -27,6 +29,7 @@ _INPUT_ROLES = (
     "heat load",
     "fluid temperature",
 )  # of eqs. (8) and (9), in the paper's order
+_ELSE = ("rotation speed", "other input")
 
 
 def _file_name(name: str) -> str:
@@ -155,13 +158,26 @@ class Experiment:
         return only(self.campaign, self.fit)
 
     def inputs(self, entry: ModelEntry) -> list[str]:
-        """Inputs of a built model: those stated, else the first channel of each role that the paper uses."""
+        """Inputs of a built model: those stated, else the channels of the roles that the paper uses.
+
+        Where no heat load is recorded, speeds and other inputs say what heats the machine.
+        """
         stated = getattr(entry, "inputs", None)
         if stated:
             return list(stated)
-        channels = self.campaign.channels.values()
-        first = [next((c.name for c in channels if c.role == role), None) for role in _INPUT_ROLES]
-        return [name for name in first if name] or [c.name for c in channels if not c.measured]
+        channels = [c for c in self.campaign.channels.values() if not c.measured and c.role != CORRECTION]
+        roles = _INPUT_ROLES if any(c.role == "heat load" for c in channels) else (*_INPUT_ROLES, *_ELSE)
+        usual = [c.name for role in roles for c in channels if c.role == role]
+        moving = [name for name in usual if self._moves(name)]
+        return moving or usual or [c.name for c in channels]
+
+    def _moves(self, name: str) -> bool:
+        """Whether a channel says something in the recordings to fit; the ambient temperature always does."""
+        if self.campaign.channels[name].role == _INPUT_ROLES[0]:
+            return True
+        pieces = [self.campaign.recordings[r].values.get(name, np.empty(0)) for r in self.fit]
+        known = np.concatenate([piece[np.isfinite(piece)] for piece in pieces])
+        return bool(len(known) and known.min() < known.max())
 
     def outputs_of(self, entry: ModelEntry) -> list[str]:
         """Outputs that a model is built for, or compared on."""

@@ -102,6 +102,26 @@ def results_of(out: Path) -> dict[str, Any]:
     return content
 
 
+def test_the_inputs_of_equation_9_are_all_that_heats(folder: Path) -> None:
+    """Two heaters: both. A spindle without a recorded power: its speed. The first of a role is not enough."""
+
+    def inputs(*lines: str) -> list[str]:
+        head = 'name = "x"\n[channels]\nT_env = { role = "ambient temperature", unit = "degC" }\n'
+        tail = 'E_Y0C = { role = "error", unit = "um" }\n[recordings]\na = { file = "d.csv" }\n'
+        (folder / "campaign.toml").write_text(head + "\n".join(lines) + "\n" + tail)
+        rows = [f"{60 * k},21,{k % 2},{k % 3},0,{k / 9}" for k in range(30)]
+        (folder / "d.csv").write_text("\n".join(["time,T_env,one,two,off,E_Y0C", *rows]))
+        text = 'name = "x"\ncampaign = "campaign.toml"\nfit = ["a"]\n[models]\nr = { kind = "reduced" }\n'
+        (folder / "experiment.toml").write_text(text)
+        experiment = load_experiment(folder / "experiment.toml")
+        return experiment.inputs(experiment.form.models["r"])
+
+    load, speed = '{ role = "heat load", unit = "W" }', '{ role = "rotation speed", unit = "rpm" }'
+    assert inputs(f"one = {load}", f"two = {load}", f"off = {load}") == ["T_env", "one", "two"]
+    assert inputs(f"one = {speed}") == ["T_env", "one"]
+    assert inputs(f"one = {speed}", f"two = {load}") == ["T_env", "two"]
+
+
 def test_a_run_writes_what_the_contract_says(folder: Path) -> None:
     out = run(folder / "experiment.toml", folder / "out")
     names = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
