@@ -16,6 +16,7 @@ from discovery.terms import Dual, degree, evaluate, names
 
 Array = NDArray[np.float64]
 
+_FAR = 1e12  # K or um: beyond it a model has run away, before its squares overflow
 _ROUNDS = 30  # of Newton on the trajectory
 _TOLERANCE = 1e-8  # largest change of a state in its unit, relative to 1 + its size
 
@@ -182,7 +183,7 @@ def simulate(
             a, g0, g1 = _linearise(system, values, x)
         which, e, w0, w1 = kernel.transitions(a, system.grid.step)
         new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
-        if not np.isfinite(new).all():
+        if not np.all(np.abs(new) < _FAR):
             raise UserError(
                 f"model '{system.model.name}' runs away on recording '{system.grid.recording}'; "
                 "check signs, bounds and start values of its parameters"

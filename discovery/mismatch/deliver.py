@@ -10,13 +10,9 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from discovery.dynamics.system import predict
-from discovery.evaluation.crossvalidation import folds
-from discovery.fitting import Noise, predict_recording
-from discovery.mismatch.assess import Assessment, assess, refit
+from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.context import Context
+from discovery.mismatch.leftout import left_out
 from discovery.models import Model
 from discovery.terms import Apply, Expression, Name, Term, names
 from discovery.terms.expression import rewrite
@@ -35,29 +31,10 @@ def delivered(context: Context, best: Assessment) -> Assessment:
     if not any((noise.heat or {}).values()):
         return best
     strict = replace(noise, heat=dict.fromkeys(noise.heat or {}, 0.0))
-    forgiving, unforgiving = (_left_out(context, best, n) for n in (noise, strict))
+    forgiving, unforgiving = (left_out(context, best, n) for n in (noise, strict))
     if unforgiving < BETTER * forgiving:
         return assess(context, best.hypotheses, strict, best)
     return best
-
-
-def _left_out(context: Context, best: Assessment, noise: Noise) -> float:
-    """rms of free runs, in units of the reading noise, on recordings left out of the fit; nan with one."""
-    events = {h.recording for h in best.hypotheses if h.recording}
-    white = np.array(noise.white)
-    squares, count = 0.0, 0
-    for fold in folds(context.campaign, context.recordings, blocks=0):
-        kept = tuple(r for r in context.recordings if r not in fold.recordings)
-        seen = replace(context, recordings=kept, grids={r: context.grids[r] for r in kept})
-        chosen = [h for h in best.hypotheses if h.recording is None or h.recording in kept]
-        model = refit(seen, chosen, noise, best).model
-        for name in set(fold.recordings) - events:  # an event of its own cannot be predicted
-            run = predict_recording(
-                model, context.campaign, name, context.outputs, noise.white, context.grids[name]
-            )
-            z = (run.system.grid.readings - predict(run)) / white
-            squares, count = squares + float(np.nansum(z**2)), count + int(np.isfinite(z).sum())
-    return float(np.sqrt(squares / count)) if count else float("nan")
 
 
 def written(best: Assessment) -> Model:

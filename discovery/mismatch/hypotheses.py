@@ -193,8 +193,8 @@ def _claim(
                     for c in names(term.expression) & set(channels) - set(model.states)
                 }
             else:
-                replaced_one = binding["fluid" if effect.place == "fluid terms" else "cooling"]
-                swaps = {n: fresh for n in names(term.expression) if Name(n) == replaced_one}
+                variable = next(v for v in ("fluid", "cooling", "flow") if v in binding)
+                swaps = {n: fresh for n in names(term.expression) if Name(n) == binding[variable]}
             changed = substitute(term.expression, swaps)
             difference = Apply("-", (changed, term.expression))
             if effect.amplitude.name not in names(formula):  # then it switches the replacement on
@@ -209,13 +209,13 @@ def _claim(
     else:
         bodies = {"body": Name(states[0]), **({"other": Name(states[1])} if len(states) > 1 else {})}
         expression = substitute(formula, {**base, **bodies, effect.amplitude.name: amplitude})
-        place = " and ".join(states)
+        exchange = len(states) > 1 and effect.place != "neighbour"
         terms.append(
             Term(
-                f"{effect.title}, {place}",
+                f"{effect.title}, {' and '.join(states)}",
                 states[0],
                 expression,
-                states[1] if len(states) > 1 else None,
+                states[1] if exchange else None,
                 effect.word,
             )
         )

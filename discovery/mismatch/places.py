@@ -50,6 +50,13 @@ def places(
                     is_link = frozenset((a, b)) in linked
                     if effect.place == "any pair" or is_link == (effect.place == "link"):
                         yield (a, b), (), ()
+        case "neighbour":
+            yield from (
+                ((a, b), (), ())
+                for a in fed("heat load")
+                for b in bodies
+                if a != b and frozenset((a, b)) in linked
+            )
         case "fluid terms" | "cooling terms":
             wanted = "fluid temperature" if effect.place == "fluid terms" else "cooling power"
             terms = tuple(

@@ -11,6 +11,7 @@ from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.gates import bent, matters, objections
 from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+from discovery.mismatch.leftout import left_out
 from discovery.mismatch.look import attempt, look
 
 NAMED = 8.0  # log evidence that a claim has to add to be taken up
@@ -82,6 +83,29 @@ def question(context: Context, current: Assessment) -> tuple[Assessment, list[As
         tried += attempts
         best = max([*attempts, current], key=lambda a: a.evidence)
         current = best if best.evidence > without.evidence + NAMED else without
+    return current, tried
+
+
+def supported(context: Context, current: Assessment) -> tuple[Assessment, list[Assessment]]:
+    """Drop each effect without which recordings left out of the fit are run no worse: what is there helps to
+    predict. Events of one recording say nothing on others and stay; so does all with a single recording.
+    """
+    tried: list[Assessment] = []
+    noise = current.best_view.noise
+    while lasting := [h for h in current.hypotheses if h.recording is None]:
+        whole = left_out(context, current, noise)
+        lost = []
+        for h in lasting:
+            rest = replace(current, hypotheses=tuple(o for o in current.hypotheses if o is not h))
+            lost.append((left_out(context, rest, noise) / whole, h))
+        gain, idle = min(lost, key=lambda item: item[0])
+        if not gain <= 1.0:
+            break
+        without = attempt(context, current, tuple(o for o in current.hypotheses if o is not idle))
+        if without is None:
+            break
+        current = without
+        tried.append(current)
     return current, tried
 
 

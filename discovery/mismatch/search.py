@@ -11,7 +11,7 @@ from discovery.mismatch.evidence import Board, Score
 from discovery.mismatch.gates import bent, matters
 from discovery.mismatch.lens import Lens
 from discovery.mismatch.look import attempt, look
-from discovery.mismatch.question import NAMED, prune, question, recurs, trace
+from discovery.mismatch.question import NAMED, prune, question, recurs, supported, trace
 
 REFITS = 6  # claims that are refitted at each step
 QUESTIONED = 3  # with more effects than this the machine is far from its model, and each one is large
@@ -55,6 +55,8 @@ def search(context: Context, most: int = 6, tell: Callable[[str], None] = lambda
         if 1 < len(current.hypotheses) <= QUESTIONED and not recurs(context, current.hypotheses):
             current, more = question(context, current)
             tried += more
+        current, more = supported(context, current)
+        tried += more
         # sizes under the noise that stands beside the answer, not beside the one before
         current = assess(context, current.hypotheses, current.best_view.noise, current)
         looks.append(look(context, current).claims)

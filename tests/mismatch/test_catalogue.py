@@ -40,6 +40,7 @@ GROUP_OF = {word: group for group, words in WORDS.items() for word in words.spli
 PLACE_NEEDS = {
     "wet body": "fluid temperature",
     "driven body": "heat load",
+    "neighbour": "heat load",
     "air body": "ambient temperature",
     "fluid terms": "fluid temperature",
     "cooling terms": "cooling power",

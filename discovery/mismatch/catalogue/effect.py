@@ -19,6 +19,7 @@ Place = Literal[
     "pair",  # two bodies without a path between them in the model
     "any pair",  # two bodies, linked or not
     "link",  # two bodies that the model links
+    "neighbour",  # a driven body and one that the model links to it; heat enters the driven one alone
     "fluid terms",  # every term in which the fluid temperature stands
     "cooling terms",  # every term in which the cooling power stands
     "output",  # one error, all recordings
@@ -89,8 +90,9 @@ class Effect:
     """One entry of the catalogue.
 
     `formula` is a heat flow [W] into `body` (and out of `other` where it names one), or what an output shows
-    more. For "fluid terms" and "cooling terms" it is what the replaced channel becomes; for outputs `y` is
-    the error without the effect. Where states have no capacity (phenomenological models) it is a rate.
+    more. For "fluid terms" and "cooling terms" it is what their fluid, cooling or flow channel becomes (the
+    first of these that it names); for outputs `y` is the error without the effect. Where states have no
+    capacity (phenomenological models) it is a rate.
     """
 
     word: str

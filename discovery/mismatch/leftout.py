@@ -1,0 +1,42 @@
+"""Free runs on recordings left out of the fit: what evidence on the recordings themselves cannot say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from discovery.dynamics.system import predict
+from discovery.errors import UserError
+from discovery.evaluation.crossvalidation import folds
+from discovery.fitting import Noise, predict_recording
+from discovery.mismatch.assess import Assessment, refit
+from discovery.mismatch.context import Context
+
+
+def left_out(context: Context, answer: Assessment, noise: Noise) -> float:
+    """rms of free runs, in units of the reading noise, with the effects of an answer.
+
+    Each recording of the diagnosis in turn (or a quarter of them) is left out, the model fitted anew to the
+    others under a noise setting, and run freely on what was left out. A recording with an event of its own
+    cannot be predicted and is not run. nan where nothing can be left out, inf where a fit runs away.
+    """
+    events = {h.recording for h in answer.hypotheses if h.recording}
+    white = np.array(noise.white)
+    squares, count = 0.0, 0
+    for fold in folds(context.campaign, context.recordings, blocks=0):
+        kept = tuple(r for r in context.recordings if r not in fold.recordings)
+        seen = replace(context, recordings=kept, grids={r: context.grids[r] for r in kept})
+        chosen = [h for h in answer.hypotheses if h.recording is None or h.recording in kept]
+        try:
+            model = refit(seen, chosen, noise, answer).model
+        except UserError:  # the others alone do not hold it: it runs away
+            return inf
+        for name in (r for r in fold.recordings if r not in events):
+            run = predict_recording(
+                model, context.campaign, name, context.outputs, noise.white, context.grids[name]
+            )
+            z = (run.system.grid.readings - predict(run)) / white
+            squares, count = squares + float(np.nansum(z**2)), count + int(np.isfinite(z).sum())
+    return float(np.sqrt(squares / count)) if count else float("nan")

@@ -1,0 +1,47 @@
+"""What an answer holds has to help to predict recordings that were left out of the fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from discovery.mismatch.assess import Assessment, assess
+from discovery.mismatch.catalogue import catalogue
+from discovery.mismatch.context import Context, make_context
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.leftout import left_out
+from discovery.mismatch.question import supported
+from discovery.models import Model
+from tests.mismatch.machine import SEEN, campaign, model, simulated
+
+
+def claimed(baseline: Model, word: str, state: str, runs: tuple[str, ...]) -> tuple[Context, Assessment]:
+    """The fit with one effect at one body, whether it is there or not."""
+    seen = campaign(*(simulated(int(r[1:]), slow=0.5) for r in runs))
+    effect = catalogue()[word]
+    context = make_context(seen, baseline, runs, tuple(SEEN), [effect])
+    found = hypotheses(context.baseline.problem.model, seen.channels, tuple(SEEN), runs, [effect])
+    claim = next(h for h in found if h.states == (state,))
+    return context, assess(context, (claim,))
+
+
+def test_what_acts_stays() -> None:
+    context, answer = claimed(model(wet=False), "fluid_convection", "table", ("r1", "r2"))
+    assert supported(context, answer) == (answer, [])
+
+
+@pytest.mark.parametrize("state", ["motor", "bed"])
+def test_what_predicts_nothing_goes(state: str) -> None:
+    """Memory of the bed where there is none follows slow noise, which no other recording repeats."""
+    context, answer = claimed(model(), "bed_memory", state, ("r1", "r2"))
+    noise = answer.best_view.noise
+    assert left_out(context, answer, noise) > left_out(context, assess(context, ()), noise)
+    kept, tried = supported(context, answer)
+    assert kept.hypotheses == ()
+    assert tried == [kept]
+
+
+def test_one_recording_cannot_object() -> None:
+    context, answer = claimed(model(), "bed_memory", "motor", ("r1",))
+    assert np.isnan(left_out(context, answer, answer.best_view.noise))
+    assert supported(context, answer) == (answer, [])
