@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -16,7 +17,10 @@ from discovery.cli import app
 from discovery.errors import UserError
 from discovery.experiment import run
 from discovery.experimentfile import load_experiment
+from discovery.fitted import offset_notes
+from discovery.fitting import Fit
 from discovery.models import read_model
+from discovery.recordings import Channel
 from discovery.summary import comparison
 
 CAMPAIGN = """
@@ -120,6 +124,14 @@ def test_the_inputs_of_equation_9_are_all_that_heats(folder: Path) -> None:
     assert inputs(f"one = {load}", f"two = {load}", f"off = {load}") == ["T_env", "one", "two"]
     assert inputs(f"one = {speed}") == ["T_env", "one"]
     assert inputs(f"one = {speed}", f"two = {load}") == ["T_env", "two"]
+
+
+def test_the_note_on_an_uncertain_room_names_each_recording_once() -> None:
+    room = Channel("T_env", "ambient temperature", "degC", None, "linear", spread=1.0)
+    one = cast("Fit", SimpleNamespace(offsets={"T_env": {"a": (0.5, 0.1)}}))
+    two = cast("Fit", SimpleNamespace(offsets={"T_env": {"a": (0.5, 0.1), "b": (-0.2, 0.1)}}))
+    assert offset_notes(one, {"T_env": room})[0].count("'a'") == 1
+    assert "-0.2 K in 'b' to +0.5 K in 'a'" in offset_notes(two, {"T_env": room})[0]
 
 
 def test_a_run_writes_what_the_contract_says(folder: Path) -> None:

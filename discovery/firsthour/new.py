@@ -168,7 +168,8 @@ def _campaign(
         if guessed.role == "other input" and guessed.unit in ("degC", "K"):
             channels[name]["between"] = "linear"
     if room is not None:
-        channels["T_env"] = {"role": "ambient temperature", "unit": "degC"}
+        # a room that nobody measured is known within a kelvin; taken as exact, it passes for physics
+        channels["T_env"] = {"role": "ambient temperature", "unit": "degC", "spread": 1.0}
     given = {"set": {"T_env": room}} if room is not None else {}
     entries = {
         name: {"file": f"{name}.csv", **given, "note": f"from {table.path.name}"}
@@ -227,7 +228,7 @@ def _said(
         what = f"{column.name}: {one.role}, {one.unit}"
         lines.append(f"  {column.header:{width}} -> {what:{inner}} {' ' if one.sure else '?'} {one.why}")
     if room is not None:
-        lines.append(f"  {'':{width}} -> T_env: {why_room} ({room:g} degC)")
+        lines.append(f"  {'':{width}} -> T_env: {why_room} ({room:g} degC, known within 1 K)")
     warmed = [n for n, one in guesses.items() if one.role == "other input" and one.unit in ("degC", "K")]
     if not drives(guesses) and not warmed:
         lines.append(
