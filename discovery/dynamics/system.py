@@ -16,7 +16,7 @@ from discovery.terms import Dual, degree, evaluate, names
 
 Array = NDArray[np.float64]
 
-_FAR = 1e12  # K or um: beyond it a model has run away, before its squares overflow
+_FAR = 1e50  # in any unit: beyond it a model has run away, before its squares overflow
 _ROUNDS = 30  # of Newton on the trajectory
 _TOLERANCE = 1e-8  # largest change of a state in its unit, relative to 1 + its size
 

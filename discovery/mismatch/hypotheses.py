@@ -177,7 +177,7 @@ def _claim(
     rename: dict[str, Expression] = {short: Name(full) for short, full in shape_names.items()}
     shapes = {full: effect.shapes[i].grid[0] for i, full in enumerate(shape_names.values())}
     base = {**binding, **rename}
-    several = len(shown) > 1
+    several = len(shown) > 1 and not states  # a body has one size for all errors
     amplitudes = (
         [own(effect.amplitude.name, output) for output in shown] if several else [own(effect.amplitude.name)]
     )
@@ -205,7 +205,12 @@ def _claim(
     elif shown:
         for name, size in zip(shown, amplitudes if several else amplitudes * len(shown), strict=True):
             y = model.outputs.get(name, Name(name))
-            extra[name] = substitute(formula, {**base, "y": y, effect.amplitude.name: Name(size)})
+            bodies = {"body": Name(states[0])} if states else {"y": y}
+            change = substitute(formula, {**base, **bodies, effect.amplitude.name: Name(size)})
+            if states:
+                seen = substitute(y, {states[0]: Apply("+", (Name(states[0]), change))})
+                change = Apply("-", (seen, y))
+            extra[name] = change
     else:
         bodies = {"body": Name(states[0]), **({"other": Name(states[1])} if len(states) > 1 else {})}
         expression = substitute(formula, {**base, **bodies, effect.amplitude.name: amplitude})

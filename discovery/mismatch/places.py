@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from discovery.mismatch.catalogue.effect import Effect
 from discovery.models import Model
 from discovery.recordings import Channel
-from discovery.terms import Term, names
+from discovery.terms import Name, Term, names
 
 
 def places(
@@ -76,6 +76,11 @@ def places(
                 yield (), terms, ()
         case "output" | "output of a recording":
             yield from (((), (), (name,)) for name in outputs)
+        case "seat":
+            for b in bodies:
+                moved = tuple(y for y in outputs if b in names(model.outputs.get(y, Name(y))))
+                if moved:
+                    yield (b,), (), moved
         case "recording":
             yield (), (), outputs
 

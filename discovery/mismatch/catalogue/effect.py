@@ -22,6 +22,7 @@ Place = Literal[
     "neighbour",  # a driven body and one that the model links to it; heat enters the driven one alone
     "fluid terms",  # every term in which the fluid temperature stands
     "cooling terms",  # every term in which the cooling power stands
+    "seat",  # a body as all errors see it; the formula is added to its temperature there
     "output",  # one error, all recordings
     "output of a recording",  # one error in one recording
     "inputs of a recording",  # every input in one recording
