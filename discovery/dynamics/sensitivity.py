@@ -111,10 +111,9 @@ def _start_slopes(
     for k, name in enumerate(starts):
         start[system.states.index(name), len(parameters) + k] = 1.0
     for i, state in enumerate(system.model.states.values()):
-        # a start that a parameter sets, unless it moves freely; around a channel it moves freely with it
-        by = wanted & system.grid.spread.keys() if state.name in starts else wanted
-        if state.start is not None and not by.isdisjoint(names(state.start)):
+        # one that also moves freely does so around what its formula says
+        if state.start is not None and not wanted.isdisjoint(names(state.start)):
             known = {**first_values(system.grid), **trajectory.values}
-            for name, slope in evaluate(state.start, known, frozenset(by)).partials.items():
+            for name, slope in evaluate(state.start, known, wanted).partials.items():
                 start[i, parameters.index(name)] = float(np.mean(slope))
     return start

@@ -28,11 +28,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """One number to find: a parameter (of one recording, or common: ``recording=None``), a start value of
-    a state, or the offset of an input known only within a spread.
+    """One number to find: a parameter (of one recording, or common: ``recording=None``), how far a state
+    begins from its declared start, or the offset of an input known only within a spread.
 
-    Where a start is declared from an input with an offset, its number is the one at offset 0: the start moves
-    with the input, and the priors of both stay independent.
+    A start that is declared by a formula moves with the parameters and inputs in it; the priors of all stay
+    independent.
     """
 
     name: str
@@ -120,14 +120,12 @@ class Problem:
         """Free run of a recording with the unknowns at `theta`."""
         values = self.values(system, theta)
         mine = [(self.unknowns[i], float(theta[i])) for i in self.concerns(system)]
-        start = start_values(system, values)
-        declared = start.copy()
-        for u, value in mine:
-            if u.is_start:
-                start[system.states.index(u.name)] = value
         if offset := {u.name: value for u, value in mine if u.is_offset}:
             system = shifted(system, offset)
-            start += start_values(system, values) - declared
+        start = start_values(system, values)
+        for u, value in mine:
+            if u.is_start:
+                start[system.states.index(u.name)] += value
         return simulate(system, values, start, guess)
 
     def residual(self, trajectory: Trajectory) -> Array:
@@ -194,13 +192,11 @@ def make_problem(
             believed = belief if name not in priors and p.value > 0 and p.min >= 0 else None
             unknowns.append(Unknown(name, None, False, p.value, p.min, p.max, priors.get(name), believed))
     for system in systems:
-        declared = start_values(system, model.values(system.grid.recording))
-        for state, value in zip(system.model.states.values(), declared, strict=True):
-            if state.start_sd > 0:
-                prior = (float(value), state.start_sd)
-                unknowns.append(
-                    Unknown(state.name, system.grid.recording, True, float(value), -np.inf, np.inf, prior)
-                )
+        unknowns += [
+            Unknown(state.name, system.grid.recording, True, 0.0, -np.inf, np.inf, (0.0, state.start_sd))
+            for state in system.model.states.values()
+            if state.start_sd > 0
+        ]
         unknowns += [
             Unknown(n, system.grid.recording, False, 0.0, -np.inf, np.inf, (0.0, sd), is_offset=True)
             for n in uncertain(system)

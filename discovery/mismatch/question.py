@@ -18,6 +18,7 @@ NAMED = 8.0  # log evidence that a claim has to add to be taken up
 SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
 TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the most beside it
 EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
+WORSE = 1.02  # rms on recordings left out, as a share of that without an effect, from which it has to go
 RIVALS = 3  # claims that are tried in the place of another
 
 
@@ -99,7 +100,7 @@ def supported(context: Context, current: Assessment) -> tuple[Assessment, list[A
             rest = replace(current, hypotheses=tuple(o for o in current.hypotheses if o is not h))
             lost.append((left_out(context, rest, noise) / whole, h))
         gain, idle = min(lost, key=lambda item: item[0])
-        if not gain <= 1.0:
+        if not gain < 1 / WORSE:
             break
         without = attempt(context, current, tuple(o for o in current.hypotheses if o is not idle))
         if without is None:

@@ -215,11 +215,8 @@ def mass_model(
             driven = text(library.drives[drive])
             terms.append(Term(f"{driven} drives {state}", state, parse(f"{name}*({driven})")))
             if library.soaked[drive]:
-                # in numbers: a fit holds start values to where they were when it began, and free runs begin
-                # where the formula says; a formula of the fitted parameters would part the two
-                start.append(f"{float(theta[k])!r}*({driven})")
-        begun = f"({a!r} + {b!r}*({gated}))" if b else f"{a!r}"
-        begin = parse(f"({' + '.join(start)})/{begun}") if start else Number(0.0)
+                start.append(f"{name}*({driven})")
+        begin = parse(f"({' + '.join(start)})/{rate}") if start else Number(0.0)
         states[state] = State(state, unit, None, begin, start_sd, 1 / HOUR)
     expression = parse(" + ".join([*states, offset]))
     return Model(output, parameters, states, tuple(terms), {output: expression}, "h")

@@ -170,3 +170,25 @@ def test_a_prediction_uses_the_first_reading_and_no_later_one() -> None:
     assert np.array_equal(a.x, b.x)
     moved = replace(r, values={**r.values, "y": np.concatenate([r.values["y"][:1] + 1.0, r.values["y"][1:]])})
     assert predict_recording(fitted, campaign(moved), "r0", ["y"], [0.5]).x[0, 0] > a.x[0, 0] + 0.5
+
+
+def test_a_start_that_a_formula_sets_moves_with_its_parameters() -> None:
+    """A body begins settled at P/hA above the room. However far the first guess of hA was off, fit and free
+    run begin at the same place, and the spread of the start is around that place, not around the guess.
+    """
+    time, power, hA, C = np.arange(0.0, 4 * 3600.0 + 1, 60.0), 100.0, 4.0, 30e3
+    after = np.where(time < 7200, power, 0.0)
+    y = power / hA * np.where(time < 7200, 1.0, np.exp(-hA / C * (time - 7200)))
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "T": Channel("T", "temperature", "degC", 0.01, "linear"),
+    }
+    campaign = Campaign("c", channels, {"r": Recording("r", time, {"P": after, "T": 20.0 + y})})
+    terms = (Term("heat", "T", parse("P")), Term("air", "T", parse("hA*(20 - T)")))
+    states = {"T": State("T", "degC", C, parse("20 + P/hA"), 0.05, 1 / C)}
+    fit = fit_model(Model("m", {"hA": Parameter(9.0, "W/K", 0.0)}, states, terms, {}), campaign, ["r"])
+    assert fit.model.parameters["hA"].value == pytest.approx(hA, rel=1e-3)
+    assert np.abs(fit.theta[[u.is_start for u in fit.problem.unknowns]]).max() < 0.01
+    free = predict_recording(fit.model, campaign, "r", ("T",), (0.01,))
+    np.testing.assert_allclose(free.x[:, 0], fit.trajectories[0].x[:, 0], atol=0.01)
+    np.testing.assert_allclose(free.x[:, 0], 20 + y, atol=0.02)
