@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
 from discovery.errors import UserError
-from discovery.fitting.noise import Noise, innovations, readings_as_one, white_noise, whiten
+from discovery.fitting.noise import (
+    Noise,
+    innovations,
+    readings_as_one,
+    resolution,
+    white_noise,
+    whiten,
+)
 from discovery.fitting.problem import Problem, make_problem
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -108,7 +115,9 @@ def fit_model(
     known = guess or {}
     theta = np.array([u.start if u.is_nuisance else known.get(u.name, u.start) for u in problem.unknowns])
     given = noise is not None
-    current = noise or white_noise(problem.outputs, stated, [s.grid.readings for s in problem.systems])
+    readings = [s.grid.readings for s in problem.systems]
+    least = resolution(readings)
+    current = noise or white_noise(problem.outputs, stated, readings, least)
     uncertain = any(u.is_offset for u in problem.unknowns)
     together = 1.0
     rounds = 1 if given and not uncertain else 3
@@ -122,7 +131,7 @@ def fit_model(
         left = [problem.residual(t) for t in solution.trajectories]
         settled = True
         if not given:
-            updated = white_noise(problem.outputs, stated, left)
+            updated = white_noise(problem.outputs, stated, left, least)
             change = max(abs(np.log(a / b)) for a, b in zip(updated.white, current.white, strict=True))
             settled, current = change < 0.02, updated
         if uncertain:

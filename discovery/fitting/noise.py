@@ -50,17 +50,35 @@ class Noise:
 
 
 def white_noise(
-    outputs: Sequence[str], stated: Mapping[str, float | None], residuals: Sequence[Array]
+    outputs: Sequence[str],
+    stated: Mapping[str, float | None],
+    residuals: Sequence[Array],
+    least: Sequence[float] = (),
 ) -> Noise:
     """White noise with the stated standard deviations; where none is stated, that of the residuals (or
-    readings).
+    readings), though no less than `least`.
     """
     white = []
-    for j, name in enumerate(outputs):
+    for j, (name, floor) in enumerate(zip(outputs, least or [1e-9] * len(outputs), strict=True)):
         series = np.concatenate([r[:, j][np.isfinite(r[:, j])] for r in residuals])
         found = float(np.sqrt(np.mean(series**2))) if len(series) else 1.0
-        white.append(float(stated.get(name) or max(found, 1e-9)))
+        white.append(float(stated.get(name) or max(found, floor)))
     return Noise(tuple(outputs), tuple(white))
+
+
+def resolution(readings: Sequence[Array]) -> tuple[float, ...]:
+    """Noise that the steps of each channel's numbers alone make, by (R, Y) readings: step/sqrt(12).
+
+    A sensor that stands still or shows whole degrees says no more than that, however well a model meets it.
+    """
+    out = []
+    for j in range(readings[0].shape[1]):
+        shown = np.unique(np.concatenate([r[:, j][np.isfinite(r[:, j])] for r in readings]))
+        size = float(np.abs(shown).max(initial=0.0))
+        steps = np.diff(shown)
+        steps = steps[steps > 1e-9 * size]  # not the last digits of a conversion
+        out.append(float(steps.min(initial=np.inf)) if len(steps) else 1e-3 * size or 1e-9)
+    return tuple(step / float(np.sqrt(12)) for step in out)
 
 
 def readings_as_one(residuals: Sequence[Array]) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, make_grid
 from discovery.fitting import Fit, Noise, fit_model
+from discovery.fitting.noise import resolution
 from discovery.mismatch.catalogue.effect import Effect
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.lens import Lens
@@ -199,11 +200,11 @@ def reading_noise(
     slow_time, heat_time = min(7200.0, duration / 12), min(10800.0, duration / 8)
     best, lowest = np.array(fit.noise.white), np.inf
     if not known.all():
-        lens = Lens(fit)
+        lens, least = Lens(fit), np.array(resolution([s.grid.readings for s in fit.problem.systems]))
         for share in (0.0, 0.5 * SLOW_LIMIT, SLOW_LIMIT):
             for level in (0.0, 0.3, 1.0, 3.0, 10.0, 30.0):
                 heat = {name: level * value for name, value in limit.items()}
-                white, cost = _white_beside(lens, known, share, heat, slow_time, heat_time)
+                white, cost = _white_beside(lens, known, least, share, heat, slow_time, heat_time)
                 if cost < lowest:
                     best, lowest = white, cost
     return Noise(outputs, tuple(float(w) for w in best), (), None, slow_time, heat_time)
@@ -212,6 +213,7 @@ def reading_noise(
 def _white_beside(
     lens: Lens,
     known: NDArray[np.bool_],
+    least: Array,
     share: float,
     heat: Mapping[str, float],
     slow_time: float,
@@ -233,7 +235,7 @@ def _white_beside(
             counts += part.measured.sum(axis=0)
             cost += logdet + 0.5 * float(np.nansum(innovation**2))
         factor = np.where(known, 1.0, np.sqrt(squares / np.maximum(counts, 1)))
-        white = white * np.maximum(factor, 0.2)
+        white = np.where(known, white, np.maximum(white * np.maximum(factor, 0.2), least))
         if np.all(np.abs(factor - 1) < 0.01):
             break
     return white, cost

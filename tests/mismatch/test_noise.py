@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
 from discovery.fitting import Noise
-from discovery.fitting.noise import make_filter
+from discovery.fitting.noise import make_filter, resolution, white_noise
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -79,3 +79,26 @@ def test_innovations_are_the_rows_of_a_cholesky_factor(name: str, trajectory: Tr
     triangle = np.linalg.cholesky(dense(trajectory, noise))
     assert np.allclose(found, np.linalg.solve(triangle, data[measured]), atol=1e-7)
     assert logdet == pytest.approx(np.log(np.diag(triangle)).sum(), abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("shown", "step"),
+    [
+        (np.round(np.linspace(20, 24, 50)), 1.0),  # whole degrees
+        (np.round(np.linspace(20, 24, 50) / 0.0625) * 0.0625, 0.0625),  # a 12 bit sensor
+        (
+            np.array([20.1, 20.1, np.nan, 20.100000000001]),
+            0.0201,
+        ),  # stands still: a thousandth of what it shows
+    ],
+)
+def test_a_sensor_says_no_more_than_its_steps(shown: Array, step: float) -> None:
+    """An equal distribution over a step has the standard deviation step/sqrt(12)."""
+    assert resolution([shown[:, None]]) == pytest.approx((step / np.sqrt(12),), rel=1e-6)
+
+
+def test_a_model_that_meets_a_coarse_sensor_exactly_is_not_believed_more_than_its_steps() -> None:
+    readings = np.round(np.linspace(20, 24, 50))[:, None]
+    least = resolution([readings])
+    assert white_noise(("y",), {}, [0.0 * readings], least).white == least
+    assert white_noise(("y",), {"y": 0.1}, [0.0 * readings], least).white == (0.1,)  # what is stated holds
