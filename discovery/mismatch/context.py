@@ -15,6 +15,7 @@ from discovery.mismatch.catalogue.effect import Effect
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.lens import Lens
 from discovery.mismatch.outliers import Outlier, find_outliers, without
+from discovery.mismatch.scales import scaled
 from discovery.mismatch.signatures import heat_rms
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -109,7 +110,9 @@ def make_context(
     flows = _flows(fit)
     largest = max(flows.values(), default=1.0)
     limit = {
-        name: EVERYDAY_HEAT * min(1.0, largest / BUSY_FLOW) if state.capacity else 0.04 * flows.get(name, 0.0)
+        name: EVERYDAY_HEAT * min(1.0, largest / BUSY_FLOW)
+        if state.capacity
+        else 0.04 * max(flows.get(name, 0.0), 0.1 * largest)  # also where nothing drives it
         for name, state in fit.problem.model.states.items()
         if not name.startswith("lag_")
     }
@@ -127,7 +130,7 @@ def make_context(
         tuple(recordings),
         tuple(outputs),
         grids,
-        tuple(effects),
+        tuple(scaled(e, duration) for e in effects),
         fit,
         settings,
         limit,

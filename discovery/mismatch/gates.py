@@ -44,9 +44,9 @@ def bent(attempt: Assessment, h: Hypothesis) -> str | None:
         value = p.values.get(h.recording or "", p.value)
         # an end at zero is a natural one: there the law turns into a simpler one
         inside = shape.low * (1 + PRESSED) < value if shape.low > 0 else True
-        if not (shape.fixed or p.fixed or h.recording) and not (
-            inside and value < shape.high * (1 - PRESSED)
-        ):
+        if shape.low < 0:
+            inside = value > shape.low * (1 - PRESSED)
+        if not (shape.fixed or p.fixed) and not (inside and value < shape.high * (1 - PRESSED)):
             size = f"{shape.name} = {value:.3g} {shape.unit}"
             return f"{h.effect.word} would need {size}, at the end of what is physical"
     return None

@@ -9,7 +9,7 @@ from itertools import product
 from discovery.mismatch.catalogue.effect import ROLE_OF, Effect
 from discovery.mismatch.places import places
 from discovery.models import Model, Parameter
-from discovery.models.dimensions import differences
+from discovery.models.dimensions import differences, same_dimension
 from discovery.recordings import Channel
 from discovery.terms import Apply, Expression, Name, Term, names, parse, substitute
 
@@ -43,6 +43,11 @@ class Hypothesis:
     def places(self) -> tuple[str, ...]:
         """States, or outputs for what happens in the measuring chain."""
         return self.states or ((self.output,) if self.output else tuple(self.shown))
+
+    @property
+    def where(self) -> str:
+        """The places, or the recording of what concerns all of it."""
+        return ", ".join(self.places) or self.recording or "all recordings"
 
     def at(self, shapes: Mapping[str, float]) -> Hypothesis:
         """The same claim with other shape values."""
@@ -116,7 +121,11 @@ def _claims(
     used = names(formula)
     wanted = [variable for variable in ROLE_OF if variable in used]
     choices = [
-        [name for name, c in channels.items() if c.role == ROLE_OF[variable] and _drives(name, model)]
+        [
+            name
+            for name, c in channels.items()
+            if c.role == ROLE_OF[variable] and _drives(name, model) and _is_heat(variable, c, effect)
+        ]
         for variable in wanted
     ]
     several = any(len(choice) > 1 for choice in choices)
@@ -150,6 +159,13 @@ def _claims(
 def _drives(name: str, model: Model) -> bool:
     """A channel may stand in a hypothesis unless the model predicts it."""
     return name not in model.states and name not in model.outputs
+
+
+def _is_heat(variable: str, channel: Channel, effect: Effect) -> bool:
+    """Whether a channel of no known role can stand where a share of it is heat: it has to be a power."""
+    if variable != "other_input" or effect.amplitude.unit != "1":
+        return True
+    return same_dimension(channel.unit, "W")
 
 
 def _claim(

@@ -101,7 +101,7 @@ def _grow(
             bar = max(bar, BLUNT)  # small for its kind, but no coarse model shows it so clearly
         if step.evidence - current.evidence < bar:
             break
-        tell(f"{step.hypotheses[-1].effect.title} at {', '.join(step.hypotheses[-1].places)}")
+        tell(f"{step.hypotheses[-1].effect.title} at {step.hypotheses[-1].where}")
         current = step
         claims = look(context, current).claims
         looks.append(claims)

@@ -13,10 +13,10 @@ def summary(path: Path) -> list[str]:
     lines = [f"{d['verdict']}: what '{d['model']}' leaves out"]
     for p in d["physics"]:
         sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q))
-        said = f"  {p['effect']} at {', '.join(p['states'])}, probability {p['probability']:.2f}"
+        said = f"  {p['effect']} {_place(p)}, probability {p['probability']:.2f}"
         lines.append(f"{said}: {sizes}" if sizes else said)
     near = [a for a in d["alternatives"] if a["log_evidence_below_best"] <= 3]
-    lines += [f"  could also be {a['effect']} at {', '.join(a['states'])}" for a in near]
+    lines += [f"  could also be {a['effect']} {_place(a)}" for a in near]
     lines += [f"  {reason}" for reason in d["reasons"]]
     if about := d["description"]:
         what = f"the missing heat at {about['state']} follows {about['formula']}"
@@ -26,6 +26,12 @@ def summary(path: Path) -> list[str]:
         lines.append(f"  unseen recording {run}: {rms}")
     lines.append(f"  next: {d['next_experiment']}")
     return lines
+
+
+def _place(claim: dict[str, Any]) -> str:
+    """Where an effect acts, in which recording."""
+    places = [f"at {', '.join(claim['states'])}"] if claim["states"] else []
+    return " ".join([*places, *([f"in {claim['recording']}"] if claim.get("recording") else [])])
 
 
 def _is_told(q: dict[str, Any]) -> bool:

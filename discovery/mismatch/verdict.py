@@ -93,9 +93,7 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     ]
     if left and left[0].gain > max(NAMED, 0.05 * found.gain):
         other = left[0].hypothesis
-        reasons.append(
-            f"{other.effect.word} at {', '.join(other.places)} is still significant after the repair"
-        )
+        reasons.append(f"{other.effect.word} at {other.where} is still significant after the repair")
     if free_after > max(FREE, 0.1 * found.gain):
         reasons.append(f"free heat at {after[0].state} still explains much after the repair")
     if found.gain < 0.5 * free_before:

@@ -29,6 +29,11 @@ class _Mismatch(Exception):  # noqa: N818  (control flow, caught here)
     """Two units that cannot meet."""
 
 
+def same_dimension(one: str, other: str) -> bool:
+    """Whether two units measure the same quantity; False for a unit that is not known."""
+    return _known(one) and _known(other) and _dimension(one) == _dimension(other)
+
+
 def check_dimensions(model: Model, channels: Mapping[str, Channel]) -> list[str]:
     """A sentence for each term and output whose units do not fit; empty when all do.
 

@@ -1,0 +1,30 @@
+"""Time constants of the catalogue, which are those of machine tools, fitted to how long recordings last."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from discovery.mismatch.catalogue.effect import Effect, Shape
+
+SHORTEST = 1 / 60  # of the longest recording: a body that small may be what was recorded
+FURTHEST = 1 / 10  # of the longest recording, for a clock
+
+
+def scaled(effect: Effect, duration: float) -> Effect:
+    """The effect with time constants that recordings of `duration` [s] can show.
+
+    In three days on a machine nothing changes. Ten minutes of a small motor may hold a mass of seconds, and
+    no clock that is two hours late.
+    """
+    return replace(effect, shapes=tuple(_scaled(shape, duration) for shape in effect.shapes))
+
+
+def _scaled(shape: Shape, duration: float) -> Shape:
+    if shape.unit != "s" or shape.fixed:
+        return shape
+    if shape.low < 0:
+        low, high = max(shape.low, -FURTHEST * duration), min(shape.high, FURTHEST * duration)
+        grid = tuple(value for value in shape.grid if low <= value <= high) or (low / 2, high / 2)
+        return replace(shape, low=low, high=high, grid=grid)
+    low = min(shape.low, SHORTEST * duration)
+    return replace(shape, low=low, grid=shape.grid if low == shape.low else (3 * low, *shape.grid))
