@@ -178,6 +178,7 @@ def simulate(
     """
     first = start_values(system, values) if start is None else start
     x = np.tile(first, (len(system.grid.time), 1)) if guess is None else guess
+    before = 1.0
     for _ in range(1 if system.affine else _ROUNDS):
         with np.errstate(all="ignore"):
             a, g0, g1 = _linearise(system, values, x)
@@ -190,8 +191,10 @@ def simulate(
             )
         change = np.max(np.abs(new - x) / (1.0 + np.abs(new)))
         x = new
-        if change < _TOLERANCE:
+        # Newton's steps shrink at least as fast as this one did, a first one to less than its square
+        if change * min(1.0, change / before) < _TOLERANCE:
             break
+        before = change
     return Trajectory(system, dict(values), x, which, e, w0, w1)
 
 

@@ -87,6 +87,7 @@ def fit_model(
     priors: Mapping[str, tuple[float, float]] | None = None,
     belief: float | None = None,
     guess: Mapping[str, float] | None = None,
+    begin: Fit | None = None,
     max_rounds: int = 60,
     tolerance: float = 1e-9,
 ) -> Fit:
@@ -106,14 +107,14 @@ def fit_model(
         grids: grids to share between fits.
         priors, belief: as in `make_problem`.
         guess: parameter values to begin from, where they differ from the model's start values.
+        begin: a fit to begin from, of a model that has most of the unknowns; `guess` goes before it.
         max_rounds: of Levenberg-Marquardt.
         tolerance: relative change of the cost that ends them.
     """
     began = clock.perf_counter()
     problem = make_problem(model, campaign, recordings, outputs, grids, priors, belief)
     stated = {name: campaign.channels[name].noise for name in problem.outputs}
-    known = guess or {}
-    theta = np.array([u.start if u.is_nuisance else known.get(u.name, u.start) for u in problem.unknowns])
+    theta = _beginning(problem, guess or {}, begin)
     given = noise is not None
     readings = [s.grid.readings for s in problem.systems]
     least = resolution(readings)
@@ -195,6 +196,19 @@ class _Solution:
     trajectories: tuple[Trajectory, ...]
     jacobian: Array
     cost: float
+
+
+def _beginning(problem: Problem, guess: Mapping[str, float], begin: Fit | None) -> Array:
+    """Where a fit begins, by unknown."""
+    found = (
+        {u.key: float(v) for u, v in zip(begin.problem.unknowns, begin.theta, strict=True)} if begin else {}
+    )
+    return np.array(
+        [
+            guess[u.name] if u.name in guess and not u.is_nuisance else found.get(u.key, u.start)
+            for u in problem.unknowns
+        ]
+    )
 
 
 def _solve(

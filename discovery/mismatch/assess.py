@@ -59,7 +59,6 @@ def refit(
         sizes: amplitudes to start from.
     """
     model, priors = context.model, {}
-    begin = start.fit.model if start is not None else context.baseline.model
     for h in chosen:
         model = h.added_to(model)
         for name, sd in zip(h.amplitudes, context.spread(h), strict=True):
@@ -70,12 +69,6 @@ def refit(
                 low, high = min(shape.grid), max(shape.grid)
                 centre, width = 0.5 * (low + high), max(high - low, 0.3 * abs(high))
                 priors[name] = (centre, width)
-    guess = {
-        name: p.value
-        for name, p in begin.parameters.items()
-        if name in model.parameters and not p.per_recording
-    }
-    guess |= sizes or {}
     return fit_model(
         model,
         context.campaign,
@@ -85,7 +78,8 @@ def refit(
         grids=context.grids,
         priors=priors,
         belief=context.belief,
-        guess=guess,
+        guess=sizes,
+        begin=start.fit if start is not None else context.baseline,
         max_rounds=25,
         tolerance=ENOUGH,
     )

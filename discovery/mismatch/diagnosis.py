@@ -110,7 +110,7 @@ def diagnose(
     change = np.log(np.array(beside.settings[0].white) / np.array(context.settings[0].white))
     if found.best.hypotheses and np.max(np.abs(change)) > ANOTHER_NOISE:
         tell("once more, with the reading noise as it stands beside the answer")
-        context, found = beside, search(beside, tell=lambda what: tell(f"found so far: {what}"))
+        context, found = beside, search(beside, tell=lambda what: tell(f"found so far: {what}"), begun=found)
     tell("locating")
     before = free_forcing(context, found.baseline)
     after = free_forcing(context, found.best) if found.best is not found.baseline else before

@@ -19,6 +19,7 @@ SMALL = 0.1  # share of the whole gain below which an objectionable effect is dr
 TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the most beside it
 EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
 WORSE = 1.02  # rms on recordings left out, as a share of that without an effect, from which it has to go
+HOPELESS = 0.3  # of the best claim's gain: places where nothing sees more are not tried
 RIVALS = 3  # claims that are tried in the place of another
 
 
@@ -74,11 +75,11 @@ def question(context: Context, current: Assessment) -> tuple[Assessment, list[As
         if without is None:
             continue
         tried.append(without)
-        pool = [
-            (c.hypothesis, c.size)
-            for c in look(context, without).claims[:RIVALS]
-            if c.hypothesis.key != h.key and c.gain > 2.0
-        ] + _elsewhere(context, current, h, others)
+        claims = [c for c in look(context, without).claims if c.hypothesis.key != h.key]
+        # a claim that sees so little at first sight does not turn out the best
+        seen = {c.hypothesis.places for c in claims if c.gain > HOPELESS * claims[0].gain}
+        pool = [(c.hypothesis, c.size) for c in claims[:RIVALS] if c.gain > 2.0]
+        pool += [(o, size) for o, size in _elsewhere(context, current, h, others) if o.places in seen]
         attempts = [a for o, size in pool if (a := attempt(context, without, others, o, size)) is not None]
         attempts = [a for a in attempts if all(matters(context, a, o) for o in a.hypotheses)]
         tried += attempts

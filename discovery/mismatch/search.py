@@ -15,6 +15,7 @@ from discovery.mismatch.question import NAMED, prune, question, recurs, supporte
 
 REFITS = 6  # claims that are refitted at each step
 QUESTIONED = 3  # with more effects than this the machine is far from its model, and each one is large
+FAR_BELOW = 12.0  # log evidence below the best from which an attempt is no rival under another noise either
 BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
 
 
@@ -34,25 +35,41 @@ class Search:
         return self.best.evidence - self.baseline.evidence
 
 
-def search(context: Context, most: int = 6, tell: Callable[[str], None] = lambda _: None) -> Search:
+def search(
+    context: Context,
+    most: int = 6,
+    tell: Callable[[str], None] = lambda _: None,
+    begun: Search | None = None,
+) -> Search:
     """Add effects one by one while each adds evidence, drop what the others have made idle, question each one
     that is left; where that changed something, see whether more can be added now.
+
+    Args:
+        most: effects at once.
+        tell: told what is taken up.
+        begun: a search under another noise to go on from: what it found is judged anew.
     """
     current = assess(context, (), context.settings[0])
     current = assess(context, (), current.best_view.noise, current)
     whole = look(context, current)
     baseline, looks = current, [whole.claims]
     tried: list[Assessment] = []
+    if begun:
+        noise, near = current.best_view.noise, begun.best.evidence - FAR_BELOW
+        current = assess(context, begun.best.hypotheses, noise, begun.best)
+        tried = [_light(assess(context, a.hypotheses, noise, a)) for a in begun.tried if a.evidence > near]
+        looks.append(look(context, current).claims)
     for freely in (True, False):
-        before = {h.key for h in current.hypotheses}
+        before = _keys(current)
         current, more, claims = _grow(context, baseline, current, looks[-1], most, freely, tell)
         tried, looks = tried + more, looks + claims
-        grown = {h.key for h in current.hypotheses}
-        if grown == before:
+        grown = _keys(current)
+        if grown == before and not (begun and freely):
             break
         current, more = prune(context, baseline, current)
         tried += more
-        if 1 < len(current.hypotheses) <= QUESTIONED and not recurs(context, current.hypotheses):
+        questioned = grown != before and 1 < len(current.hypotheses) <= QUESTIONED
+        if questioned and not recurs(context, current.hypotheses):
             current, more = question(context, current)
             tried += more
         current, more = supported(context, current)
@@ -60,9 +77,13 @@ def search(context: Context, most: int = 6, tell: Callable[[str], None] = lambda
         # sizes under the noise that stands beside the answer, not beside the one before
         current = assess(context, current.hypotheses, current.best_view.noise, current)
         looks.append(look(context, current).claims)
-        if {h.key for h in current.hypotheses} == grown:
+        if _keys(current) == grown:
             break
     return Search(baseline, current, tuple(_light(a) for a in tried), whole.board, tuple(looks))
+
+
+def _keys(answer: Assessment) -> set[object]:
+    return {h.key for h in answer.hypotheses}
 
 
 def _grow(
