@@ -23,9 +23,8 @@ BETTER = 0.995  # rms of free runs, as a share of the other's, from which the un
 def delivered(context: Context, best: Assessment) -> Assessment:
     """The same effects, fitted as they predict recordings best that the fit has not seen.
 
-    Only the recordings of the diagnosis take part: each in turn (or a quarter of them) is left out, the model
-    fitted anew to the others, with everyday heat and without, and run freely on what was left out. With one
-    recording, or where the two run alike, the diagnosis' own fit stays.
+    Only the recordings of the diagnosis take part: of each, left out in turn, free runs with everyday heat
+    and without are compared. Where they run alike, the diagnosis' own fit stays.
     """
     noise = best.best_view.noise
     if not any((noise.heat or {}).values()):

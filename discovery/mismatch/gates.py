@@ -12,6 +12,7 @@ from discovery.mismatch.signatures import block_signatures
 BLOCKS = 12  # per recording, in which an effect is asked for its size
 STEADY = 6.0  # log evidence for a size that changes with time beyond which the form is wrong
 FORM = 0.03  # share of the gain that a law slightly off in form may leave unsteady
+ALIKE = 0.8  # squared correlation of a window with an input from which the two cannot be told apart
 PRESSED = 0.03  # relative distance from the end of a physical range
 
 
@@ -25,6 +26,7 @@ def objections(best: Assessment, h: Hypothesis, gain: float) -> list[str]:
     limit = STEADY + FORM * max(gain, 0.0)
     found = (
         bent(best, h),
+        _is_an_input(best, h),
         _unsteady(best, h, 1, limit, "from recording to recording"),
         _unsteady(best, h, BLOCKS, limit, "with time"),
     )
@@ -49,6 +51,21 @@ def bent(attempt: Assessment, h: Hypothesis) -> str | None:
         if not (shape.fixed or p.fixed) and not (inside and value < shape.high * (1 - PRESSED)):
             size = f"{shape.name} = {value:.3g} {shape.unit}"
             return f"{h.effect.word} would need {size}, at the end of what is physical"
+    return None
+
+
+def _is_an_input(best: Assessment, h: Hypothesis) -> str | None:
+    """A sentence when the window of an unrecorded heat is that of an input: the input acts by another law."""
+    if h.effect.word != "unmeasured_heat" or h.recording is None:
+        return None
+    t = next(t for t in best.fit.trajectories if t.system.grid.recording == h.recording)
+    on, off = (best.fit.model.parameters[n].values[h.recording] for n in h.shapes)
+    time = np.linspace(t.system.grid.time[0], t.system.grid.time[-1], 2000)
+    window = ((time >= on) & (time < off)).astype(float)
+    for name, samples in t.system.grid.samples.items():
+        series = samples.at(time)
+        if np.ptp(series) > 0 and np.ptp(window) > 0 and np.corrcoef(series, window)[0, 1] ** 2 > ALIKE:
+            return f"{h.effect.word} acts just while {name} does: no event"
     return None
 
 

@@ -90,7 +90,7 @@ def question(context: Context, current: Assessment) -> tuple[Assessment, list[As
 
 def supported(context: Context, current: Assessment) -> tuple[Assessment, list[Assessment]]:
     """Drop each effect without which recordings left out of the fit are run no worse: what is there helps to
-    predict. Events of one recording say nothing on others and stay; so does all with a single recording.
+    predict. Events of one recording say nothing on others and stay.
     """
     tried: list[Assessment] = []
     noise = current.best_view.noise

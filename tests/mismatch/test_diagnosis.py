@@ -14,6 +14,11 @@ import pytest
 from discovery.dynamics.system import predict
 from discovery.fitting import predict_recording
 from discovery.mismatch import Diagnosis, diagnose
+from discovery.mismatch.assess import assess
+from discovery.mismatch.catalogue import catalogue
+from discovery.mismatch.context import make_context
+from discovery.mismatch.gates import objections
+from discovery.mismatch.hypotheses import hypotheses
 from discovery.models import Model, read_model, write_model
 from discovery.models.reduced import reduced
 from discovery.recordings import Recording
@@ -250,3 +255,17 @@ def test_a_model_of_the_errors_themselves() -> None:
     assert "rates" in found["about"]
     assert set(found["location"]["states"]) == {"E_R"}
     assert found["improvement"]["held_out"]["r2"]["rms_before"] > 2 * NOISE
+
+
+def test_heat_while_an_input_works_is_no_event() -> None:
+    """The drive works once, for a third of the time, and heats the bed, too: that is not an unknown event."""
+    recording = simulated(1)
+    third = (recording.time > 30000) & (recording.time < 66000)
+    runs = changed(recording, P_drive=800.0 * third)
+    context = make_context(campaign(runs), model(), ("r1",), tuple(SEEN), [catalogue()["unmeasured_heat"]])
+    claims = hypotheses(context.baseline.problem.model, CHANNELS, tuple(SEEN), ("r1",), list(context.effects))
+    bed = next(h for h in claims if h.states == ("bed",))
+    for on, off, told in ((30000.0, 66000.0, True), (70000.0, 90000.0, False)):
+        h = bed.at(dict(zip(bed.shapes, (on, off), strict=True)))
+        said = objections(assess(context, (h,)), h, 100.0)
+        assert any("acts just while P_drive does" in text for text in said) == told

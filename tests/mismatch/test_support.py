@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,7 +43,16 @@ def test_what_predicts_nothing_goes(state: str) -> None:
     assert tried == [kept]
 
 
-def test_one_recording_cannot_object() -> None:
-    context, answer = claimed(model(), "bed_memory", "motor", ("r1",))
-    assert np.isnan(left_out(context, answer, answer.best_view.noise))
+def test_a_single_recording_is_left_out_by_quarters() -> None:
+    context, answer = claimed(model(wet=False), "fluid_convection", "table", ("r1",))
     assert supported(context, answer) == (answer, [])
+    noise = answer.best_view.noise
+    dry = replace(answer, hypotheses=())
+    assert left_out(context, answer, noise) < 1.5 < left_out(context, dry, noise)
+
+
+def test_what_has_an_event_of_its_own_is_not_run() -> None:
+    context, answer = claimed(model(), "bed_memory", "motor", ("r1",))
+    (claim,) = answer.hypotheses
+    one = replace(answer, hypotheses=(replace(claim, recording="r1"),))
+    assert np.isnan(left_out(context, one, answer.best_view.noise))
