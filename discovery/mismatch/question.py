@@ -18,7 +18,7 @@ NAMED = 8.0  # log evidence that a claim has to add to be taken up
 SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
 TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the most beside it
 EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
-WORSE = 1.02  # rms on recordings left out, as a share of that without an effect, from which it has to go
+CARRIED = 0.5  # of what an effect takes off in the fit, to show on recordings left out; of a cause 0.8 to 4
 HOPELESS = 0.3  # of the best claim's gain: places where nothing sees more are not tried
 RIVALS = 3  # claims that are tried in the place of another
 
@@ -89,26 +89,34 @@ def question(context: Context, current: Assessment) -> tuple[Assessment, list[As
 
 
 def supported(context: Context, current: Assessment) -> tuple[Assessment, list[Assessment]]:
-    """Drop each effect without which recordings left out of the fit are run no worse: what is there helps to
-    predict. Events of one recording say nothing on others and stay.
+    """Drop what helps to fit and not to predict: a cause makes free runs on recordings left out of the fit
+    better by nearly as much as the fit itself. Events of one recording say nothing on others and stay.
     """
     tried: list[Assessment] = []
-    noise = current.best_view.noise
     while lasting := [h for h in current.hypotheses if h.recording is None]:
-        whole = left_out(context, current, noise)
-        lost = []
-        for h in lasting:
-            rest = replace(current, hypotheses=tuple(o for o in current.hypotheses if o is not h))
-            lost.append((left_out(context, rest, noise) / whole, h))
-        gain, idle = min(lost, key=lambda item: item[0])
-        if not gain < 1 / WORSE:
-            break
-        without = attempt(context, current, tuple(o for o in current.hypotheses if o is not idle))
-        if without is None:
+        weakest = min((_carried(context, current, h, tried) for h in lasting), key=lambda item: item[0])
+        share, without = weakest
+        if without is None or not share < CARRIED:
             break
         current = without
-        tried.append(current)
     return current, tried
+
+
+def _carried(
+    context: Context, current: Assessment, h: Hypothesis, tried: list[Assessment]
+) -> tuple[float, Assessment | None]:
+    """What an effect takes off log rms on recordings left out, as a share of what it takes off in the fit;
+    and the model without it. Infinite where nothing can be left out.
+    """
+    without = attempt(context, current, tuple(o for o in current.hypotheses if o is not h))
+    if without is None:
+        return np.inf, None
+    tried.append(without)
+    noise = current.best_view.noise
+    outside = np.log(left_out(context, without, noise) / left_out(context, current, noise))
+    inside = np.log(without.rms / current.rms)
+    share = outside / inside if inside > 0 else np.sign(outside)
+    return (np.inf if np.isnan(outside) else float(share)), without
 
 
 def _elsewhere(
