@@ -17,23 +17,24 @@ from discovery.models import Model
 from discovery.terms import Apply, Expression, Name, Term, names
 from discovery.terms.expression import rewrite
 
-BETTER = 0.995  # rms of free runs, as a share of the other's, from which the unforgiving fit is taken
+BETTER = 0.99  # rms of free runs, as a share of the other's, from which everyday heat is allowed for
 
 
 def delivered(context: Context, best: Assessment) -> Assessment:
     """The same effects, fitted as they predict recordings best that the fit has not seen.
 
     Only the recordings of the diagnosis take part: of each, left out in turn, free runs with everyday heat
-    and without are compared. Where they run alike, the diagnosis' own fit stays.
+    and without are compared. Where they run alike, nothing is forgiven. With a single recording the
+    diagnosis' own fit stays.
     """
     noise = best.best_view.noise
-    if not any((noise.heat or {}).values()):
+    if not any((noise.heat or {}).values()) or len(context.recordings) == 1:
         return best
     strict = replace(noise, heat=dict.fromkeys(noise.heat or {}, 0.0))
     forgiving, unforgiving = (left_out(context, best, n) for n in (noise, strict))
-    if unforgiving < BETTER * forgiving:
-        return assess(context, best.hypotheses, strict, best)
-    return best
+    if forgiving < BETTER * unforgiving:
+        return best
+    return assess(context, best.hypotheses, strict, best)
 
 
 def written(best: Assessment) -> Model:

@@ -94,29 +94,25 @@ def supported(context: Context, current: Assessment) -> tuple[Assessment, list[A
     """
     tried: list[Assessment] = []
     while lasting := [h for h in current.hypotheses if h.recording is None]:
-        weakest = min((_carried(context, current, h, tried) for h in lasting), key=lambda item: item[0])
-        share, without = weakest
-        if without is None or not share < CARRIED:
+        noise = current.best_view.noise
+        whole = left_out(context, current, noise)
+        if np.isnan(whole):
             break
-        current = without
+        carried = []
+        for h in lasting:
+            without = attempt(context, current, tuple(o for o in current.hypotheses if o is not h))
+            if without is None:
+                continue
+            tried.append(without)
+            inside = np.log(without.rms / current.rms)
+            # where the model runs away both with it and without, nothing speaks for it
+            outside = np.nan_to_num(np.log(left_out(context, without, noise)) - np.log(whole), posinf=np.inf)
+            carried.append((float(outside / inside if inside > 0 else np.sign(outside)), without))
+        share, weakest = min(carried, key=lambda item: item[0], default=(np.inf, current))
+        if share >= CARRIED:
+            break
+        current = weakest
     return current, tried
-
-
-def _carried(
-    context: Context, current: Assessment, h: Hypothesis, tried: list[Assessment]
-) -> tuple[float, Assessment | None]:
-    """What an effect takes off log rms on recordings left out, as a share of what it takes off in the fit;
-    and the model without it. Infinite where nothing can be left out.
-    """
-    without = attempt(context, current, tuple(o for o in current.hypotheses if o is not h))
-    if without is None:
-        return np.inf, None
-    tried.append(without)
-    noise = current.best_view.noise
-    outside = np.log(left_out(context, without, noise) / left_out(context, current, noise))
-    inside = np.log(without.rms / current.rms)
-    share = outside / inside if inside > 0 else np.sign(outside)
-    return (np.inf if np.isnan(outside) else float(share)), without
 
 
 def _elsewhere(
