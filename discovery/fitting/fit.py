@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
 from discovery.errors import UserError
+from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.noise import (
     Noise,
     innovations,
@@ -29,11 +30,6 @@ from discovery.threads import one_thread
 
 Array = NDArray[np.float64]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
-
-Z95 = 1.959963984540054
-_UNSEEN = (
-    1e-4  # share of a column's length that the other unknowns leave; below it the readings do not tell it
-)
 
 
 @dataclass(frozen=True)
@@ -53,7 +49,7 @@ class Fit:
     @property
     def model(self) -> Model:
         """The model with the values found and their 95 % intervals."""
-        return _fitted_model(self)
+        return with_intervals(self.problem, self.theta, self.standard_errors)
 
     @property
     def standard_errors(self) -> Array:
@@ -146,7 +142,7 @@ def fit_model(
         if settled:
             break
     assert solution is not None
-    covariance, lost = _covariance(problem, solution.jacobian, theta)
+    covariance, lost = covariance_of(problem, solution.jacobian, theta)
     if not given and loss == "linear":
         # Stated noise is a claim about the sensor, not about the model: intervals follow the larger of the
         # two.
@@ -266,67 +262,3 @@ def _solve(
         x0 = result.x
     left, trajectories = run(x0)
     return _Solution(x0, trajectories, jacobian(x0), 0.5 * float(left @ left))
-
-
-def _covariance(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array, list[str]]:
-    """Gauss-Newton covariance and a sentence for each parameter that the readings do not tell."""
-    low = problem.bounds[0]
-    total = len(problem.unknowns)
-    length = np.linalg.norm(jacobian, axis=0)
-    sentences = []
-    seen = length > 0
-    scaled = jacobian[:, seen] / length[seen]
-    size, direction = np.linalg.eigh(scaled.T @ scaled)
-    told = size > 1e-12 * size.max(initial=0.0)
-    inverse = (direction[:, told] / size[told]) @ direction[:, told].T
-    blind = np.sum(direction[:, ~told] ** 2, axis=1) > 1e-6  # takes part in a combination that nothing tells
-    covariance = np.zeros((total, total))
-    index = np.flatnonzero(seen)
-    covariance[np.ix_(index, index)] = inverse / np.outer(length[seen], length[seen])
-    for i, u in enumerate(problem.unknowns):
-        if u.is_nuisance:
-            continue
-        where = f" in recording '{u.recording}'" if u.recording else ""
-        if not seen[i]:
-            sentences.append(
-                f"{u.name}{where} has no effect on any reading: it cannot be found from these recordings"
-            )
-            covariance[i, i] = np.inf
-            continue
-        k = int(np.searchsorted(index, i))
-        share = 0.0 if blind[k] else 1.0 / np.sqrt(max(inverse[k, k], 1.0))
-        error = np.sqrt(covariance[i, i])
-        if share < _UNSEEN:
-            covariance[i, i] = np.inf if blind[k] else covariance[i, i]
-            sentences.append(
-                f"{u.name}{where} cannot be told apart from other parameters with these recordings"
-            )
-        elif error * Z95 > max(abs(theta[i]), 1e-12) and not (
-            np.isfinite(low[i]) and theta[i] <= low[i] + 1e-9
-        ):
-            sentences.append(f"{u.name}{where} is not determined: its 95 % interval is wider than its value")
-    return covariance, sentences
-
-
-def _fitted_model(fit: Fit) -> Model:
-    model = fit.problem.model
-    errors = fit.standard_errors
-    parameters = dict(model.parameters)
-    fitted = {system.grid.recording for system in fit.problem.systems}
-    for i, u in enumerate(fit.problem.unknowns):
-        if u.is_nuisance:
-            continue
-        p = parameters[u.name]
-        value = float(fit.theta[i])
-        if u.recording is not None:
-            values = {**p.values, u.recording: value}
-            given = model.parameters[u.name].values
-            # the common value of an event of one recording keeps it out of all others: it stays
-            mean = not given or fitted <= given.keys()
-            common = float(np.mean(list(values.values()))) if mean else p.value
-            parameters[u.name] = replace(p, values=values, value=common, low=None, high=None)
-            continue
-        half = Z95 * float(errors[i])
-        interval = (max(value - half, p.min), min(value + half, p.max)) if np.isfinite(half) else (None, None)
-        parameters[u.name] = replace(p, value=value, low=interval[0], high=interval[1])
-    return replace(model, parameters=parameters)

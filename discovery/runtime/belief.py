@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from discovery.errors import UserError
 from discovery.export.document import Exported
 from discovery.export.knowledge import stretch
+from discovery.fitting.covariance import Z95
 from discovery.fitting.problem import make_problem
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -30,7 +31,6 @@ from discovery.runtime.leastsquares import minimise
 Array = NDArray[np.float64]
 Verdict = Literal["noise", "drift", "new effect"]
 
-Z95 = 1.959963984540054
 WALK = 0.03  # of a parameter from one recording to the next, relative: how fast a machine may age
 SIGNIFICANT = 0.05  # chance of calling noise a drift; a shadow run stands before every change
 AS_NEW = 1.1  # residual, as a multiple of that of the fit, below which there is nothing to gain

@@ -1,0 +1,85 @@
+"""How well a fit knows its numbers: their covariance, and what these recordings do not tell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.fitting.problem import Problem
+from discovery.models import Model
+
+Array = NDArray[np.float64]
+
+Z95 = 1.959963984540054
+_UNSEEN = 1e-4  # share of a column's length that the other unknowns leave; below it readings do not tell it
+
+
+def covariance_of(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array, list[str]]:
+    """Gauss-Newton covariance (U, U) and a sentence for each parameter that the readings do not tell.
+
+    Args:
+        jacobian: (N, U) of whitened residuals and priors.
+        theta: (U,) where the fit ended.
+    """
+    low = problem.bounds[0]
+    total = len(problem.unknowns)
+    length = np.linalg.norm(jacobian, axis=0)
+    sentences = []
+    seen = length > 0
+    scaled = jacobian[:, seen] / length[seen]
+    size, direction = np.linalg.eigh(scaled.T @ scaled)
+    told = size > 1e-12 * size.max(initial=0.0)
+    inverse = (direction[:, told] / size[told]) @ direction[:, told].T
+    blind = np.sum(direction[:, ~told] ** 2, axis=1) > 1e-6  # takes part in a combination that nothing tells
+    covariance = np.zeros((total, total))
+    index = np.flatnonzero(seen)
+    covariance[np.ix_(index, index)] = inverse / np.outer(length[seen], length[seen])
+    for i, u in enumerate(problem.unknowns):
+        if u.is_nuisance:
+            continue
+        where = f" in recording '{u.recording}'" if u.recording else ""
+        if not seen[i]:
+            sentences.append(
+                f"{u.name}{where} has no effect on any reading: it cannot be found from these recordings"
+            )
+            covariance[i, i] = np.inf
+            continue
+        k = int(np.searchsorted(index, i))
+        share = 0.0 if blind[k] else 1.0 / np.sqrt(max(inverse[k, k], 1.0))
+        error = np.sqrt(covariance[i, i])
+        if share < _UNSEEN:
+            covariance[i, i] = np.inf if blind[k] else covariance[i, i]
+            sentences.append(
+                f"{u.name}{where} cannot be told apart from other parameters with these recordings"
+            )
+        elif error * Z95 > max(abs(theta[i]), 1e-12) and not (
+            np.isfinite(low[i]) and theta[i] <= low[i] + 1e-9
+        ):
+            sentences.append(f"{u.name}{where} is not determined: its 95 % interval is wider than its value")
+    return covariance, sentences
+
+
+def with_intervals(problem: Problem, theta: Array, errors: Array) -> Model:
+    """The model with the values found, (U,), and 95 % intervals by their standard errors, (U,)."""
+    model = problem.model
+    parameters = dict(model.parameters)
+    fitted = {system.grid.recording for system in problem.systems}
+    for i, u in enumerate(problem.unknowns):
+        if u.is_nuisance:
+            continue
+        p = parameters[u.name]
+        value = float(theta[i])
+        if u.recording is not None:
+            values = {**p.values, u.recording: value}
+            given = model.parameters[u.name].values
+            # the common value of an event of one recording keeps it out of all others: it stays
+            mean = not given or fitted <= given.keys()
+            common = float(np.mean(list(values.values()))) if mean else p.value
+            parameters[u.name] = replace(p, values=values, value=common, low=None, high=None)
+            continue
+        half = Z95 * float(errors[i])
+        interval = (max(value - half, p.min), min(value + half, p.max)) if np.isfinite(half) else (None, None)
+        parameters[u.name] = replace(p, value=value, low=interval[0], high=interval[1])
+    return replace(model, parameters=parameters)
