@@ -90,7 +90,8 @@ def question(context: Context, current: Assessment) -> tuple[Assessment, list[As
 
 def supported(context: Context, current: Assessment) -> tuple[Assessment, list[Assessment]]:
     """Drop what helps to fit and not to predict: a cause makes free runs on recordings left out of the fit
-    better by nearly as much as the fit itself. Events of one recording say nothing on others and stay.
+    better by nearly as much as the fit itself. Events of one recording say nothing on others and stay; with a
+    single recording all stays.
     """
     tried: list[Assessment] = []
     while lasting := [h for h in current.hypotheses if h.recording is None]:
