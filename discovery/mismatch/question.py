@@ -18,7 +18,7 @@ NAMED = 8.0  # log evidence that a claim has to add to be taken up
 SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
 TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the most beside it
 EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
-CARRIED = 0.5  # of what an effect takes off in the fit, to show on recordings left out; of a cause 0.8 to 4
+CARRIED = 0.65  # of what an effect takes off in the fit, to show on recordings left out; of a cause 0.8 to 4
 HOPELESS = 0.3  # of the best claim's gain: places where nothing sees more are not tried
 RIVALS = 3  # claims that are tried in the place of another
 
