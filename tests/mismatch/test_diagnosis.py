@@ -261,7 +261,7 @@ def test_heat_while_an_input_works_is_no_event() -> None:
     """The drive works once, for a third of the time, and heats the bed, too: that is not an unknown event."""
     recording = simulated(1)
     third = (recording.time > 30000) & (recording.time < 66000)
-    runs = changed(recording, P_drive=800.0 * third)
+    runs = changed(recording, P_drive=np.where(third, 800.0, 0.0))
     context = make_context(campaign(runs), model(), ("r1",), tuple(SEEN), [catalogue()["unmeasured_heat"]])
     claims = hypotheses(context.baseline.problem.model, CHANNELS, tuple(SEEN), ("r1",), list(context.effects))
     bed = next(h for h in claims if h.states == ("bed",))
