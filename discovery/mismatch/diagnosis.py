@@ -20,7 +20,7 @@ from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.locate import Location, locate
-from discovery.mismatch.prove import Improvement, compare, explained, improvements
+from discovery.mismatch.prove import Improvement, compare, explained, improvements, runs_away
 from discovery.mismatch.search import Search, search
 from discovery.mismatch.selfcheck import false_alarm, named_again
 from discovery.mismatch.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
@@ -120,9 +120,13 @@ def diagnose(
     tell("fitting what was found for free runs")
     old = delivered(context, found.baseline)
     new = delivered(context, found.best) if verdict.named else old
+    noise = found.best.best_view.noise
+    if away := runs_away(new.fit.model, campaign, held_out, outputs, noise) if verdict.named else None:
+        # nothing is compared with its readings: a law under which the machine explodes is none
+        reason = f"with it the model runs away on recording '{away}'"
+        verdict, new = Verdict(UNEXPLAINED, (), verdict.named, (reason,)), old
     repaired = written(new) if verdict.named else None
     tell("proving on held-out recordings")
-    noise = found.best.best_view.noise
     proof = improvements(campaign, held_out, outputs, old.fit.model, new.fit.model, noise)
     unexplained = verdict.word == UNEXPLAINED and bool(before)
     tell("asking for the next experiment")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
 from discovery.dynamics.system import predict
+from discovery.errors import UserError
 from discovery.fitting import Noise, predict_recording
 from discovery.mismatch.events import heat_steps
 from discovery.models import Model
@@ -32,6 +33,18 @@ class Improvement:
     floor: float
     low: float
     high: float
+
+
+def runs_away(
+    model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], noise: Noise
+) -> str | None:
+    """The first recording on which a model has no free run: a matter of its inputs, whatever was read."""
+    for run in recordings:
+        try:
+            predict_recording(model, campaign, run, outputs, noise.white)
+        except UserError:
+            return run
+    return None
 
 
 def improvements(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,16 +12,18 @@ import numpy as np
 import pytest
 
 from discovery.dynamics.system import predict
-from discovery.fitting import predict_recording
+from discovery.fitting import Noise, predict_recording
 from discovery.mismatch import Diagnosis, diagnose
 from discovery.mismatch.assess import assess
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import make_context
 from discovery.mismatch.gates import objections
 from discovery.mismatch.hypotheses import hypotheses
-from discovery.models import Model, read_model, write_model
+from discovery.mismatch.prove import runs_away
+from discovery.models import Model, Parameter, read_model, write_model
 from discovery.models.reduced import reduced
 from discovery.recordings import Recording
+from discovery.terms import Term, parse
 from tests.mismatch.machine import (
     CHANNELS,
     NOISE,
@@ -269,3 +271,16 @@ def test_heat_while_an_input_works_is_no_event() -> None:
         h = bed.at(dict(zip(bed.shapes, (on, off), strict=True)))
         said = objections(assess(context, (h,)), h, 100.0)
         assert any("acts just while P_drive does" in text for text in said) == told
+
+
+def test_a_model_that_explodes_on_other_inputs_is_told() -> None:
+    """Heat that grows with what it heats: stable while the table turns slowly, not at the speed of r2."""
+    terms = (*model().terms, Term("feedback", "table", parse("k*speed*(table - T_env)")))
+    hot = replace(model(), terms=terms, parameters={**model().parameters, "k": Parameter(0.001, "1")})
+    slow = simulated(1)
+    slow = changed(slow, speed=np.full(len(slow.time), 300.0))
+    fast = replace(changed(slow, speed=np.full(len(slow.time), 3e6)), name="r2")
+    runs = campaign(slow, fast)
+    noise = Noise(tuple(SEEN), (NOISE,) * 3)
+    assert runs_away(hot, runs, ["r1"], tuple(SEEN), noise) is None
+    assert runs_away(hot, runs, ["r1", "r2"], tuple(SEEN), noise) == "r2"
