@@ -19,6 +19,7 @@ SMALL = 0.1  # share of the whole gain below which an objectionable effect is dr
 TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the most beside it
 EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
 CARRIED = 0.65  # of what an effect takes off in the fit, to show on recordings left out; of a cause 0.8 to 4
+TOLD = 0.01  # of log rms: what an effect takes off the fit below which its share elsewhere is noise
 HOPELESS = 0.3  # of the best claim's gain: places where nothing sees more are not tried
 RIVALS = 3  # claims that are tried in the place of another
 
@@ -108,6 +109,8 @@ def supported(context: Context, current: Assessment) -> tuple[Assessment, list[A
             inside = np.log(without.rms / current.rms)
             # where the model runs away both with it and without, nothing speaks for it
             outside = np.nan_to_num(np.log(left_out(context, without, noise)) - np.log(whole), posinf=np.inf)
+            if 0 < inside < TOLD and outside >= 0:
+                continue
             carried.append((float(outside / inside if inside > 0 else np.sign(outside)), without))
         share, weakest = min(carried, key=lambda item: item[0], default=(np.inf, current))
         if share >= CARRIED:
