@@ -122,7 +122,7 @@ def diagnose(
     new = delivered(context, found.best) if verdict.named else old
     noise = found.best.best_view.noise
     if away := runs_away(new.fit.model, campaign, held_out, outputs, noise) if verdict.named else None:
-        # only its start is set by a reading, as in every free run: a law under which a machine explodes is none
+        # a reading sets its start and no more; a law under which a machine explodes is none
         reason = f"with it the model runs away on recording '{away}'"
         verdict, new = Verdict(UNEXPLAINED, (), verdict.named, (reason,)), old
     repaired = written(new) if verdict.named else None
