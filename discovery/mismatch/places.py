@@ -21,6 +21,8 @@ def places(
     ]
     role = {name: channel.role for name, channel in channels.items()}
     linked = {frozenset((t.into, t.source)) for t in model.terms if t.source}
+    # Neither those of an effect found before nor the memory behind its lag().
+    hand_written = [t for t in model.terms if not t.effect and not t.into.startswith("lag_")]
 
     def fed(wanted: str) -> list[str]:
         return [
@@ -59,19 +61,11 @@ def places(
             )
         case "fluid terms" | "cooling terms":
             wanted = "fluid temperature" if effect.place == "fluid terms" else "cooling power"
-            terms = tuple(
-                t
-                for t in model.terms
-                if not t.effect and any(role.get(n) == wanted for n in names(t.expression))
-            )
+            terms = tuple(t for t in hand_written if any(role.get(n) == wanted for n in names(t.expression)))
             if terms:
                 yield tuple(dict.fromkeys(t.into for t in terms)), terms, ()
         case "inputs of a recording":
-            terms = tuple(
-                t
-                for t in model.terms
-                if not t.effect and names(t.expression) & set(channels) - set(model.states)
-            )
+            terms = tuple(t for t in hand_written if names(t.expression) & set(channels) - set(model.states))
             if terms:
                 yield (), terms, ()
         case "output" | "output of a recording":
