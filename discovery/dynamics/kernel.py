@@ -12,6 +12,8 @@ order otherwise. No code is compiled per model.
 
 from __future__ import annotations
 
+from math import factorial
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -19,7 +21,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_ORDER = 12  # of the Taylor series; below rounding for a scaled norm of 1/2
+# 1/(i + 2)! of the series of phi2; what follows m^12 is below rounding for a scaled norm of 1/2
+_TAYLOR = np.array([1.0 / factorial(i + 2) for i in range(13)])
 _LOOKBACK = 12  # recent transitions looked through before a new one is computed
 
 
@@ -52,23 +55,34 @@ def _exponential(a, h, e, w0, w1):  # type: ignore[no-untyped-def]
     while norm > 0.5:
         norm *= 0.5
         halvings += 1
+    # phi2 = sum m^i / (i + 2)! up to m^12 from m to m^4 (Paterson & Stockmeyer, SIAM J. Comput. 2, 1973)
     m = a * (h / 2.0**halvings)
-    eye = np.eye(n)
-    phi2 = np.zeros((n, n))
-    work = np.zeros((n, n))
-    factorial = 1.0
-    for j in range(2, _ORDER + 3):
-        factorial *= j
-    coefficient = 1.0 / factorial
-    phi2[:] = coefficient * eye
-    for j in range(_ORDER + 2, 2, -1):  # Horner: phi2 = sum m^i / (i + 2)!
-        coefficient *= j
-        _matmul(m, phi2, work)
-        phi2[:] = work + coefficient * eye
+    m2, m3, m4 = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    _matmul(m, m, m2)
+    _matmul(m, m2, m3)
+    _matmul(m2, m2, m4)
+    phi2 = _TAYLOR[12] * m4
+    work = np.empty((n, n))
+    for block in (8, 4, 0):
+        for i in range(n):
+            for j in range(n):
+                phi2[i, j] += (
+                    _TAYLOR[block + 1] * m[i, j]
+                    + _TAYLOR[block + 2] * m2[i, j]
+                    + _TAYLOR[block + 3] * m3[i, j]
+                )
+            phi2[i, i] += _TAYLOR[block]
+        if block:
+            _matmul(m4, phi2, work)
+            phi2[:] = work
     _matmul(m, phi2, work)
-    phi1 = work + eye
+    phi1 = work.copy()
+    for i in range(n):
+        phi1[i, i] += 1.0
     _matmul(m, phi1, work)
-    e[:] = work + eye
+    e[:] = work
+    for i in range(n):
+        e[i, i] += 1.0
     for _ in range(halvings):
         _matmul(phi1, phi1, work)
         phi2[:] = 0.25 * (work + 2.0 * phi2)

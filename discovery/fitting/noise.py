@@ -103,6 +103,25 @@ def readings_as_one(residuals: Sequence[Array]) -> float:
 
 
 @njit(cache=True)
+def _propagate(f, b, heat_decay, slow_decay, x, top):  # type: ignore[no-untyped-def]
+    """Rows of x (states, heats, slow noises) one reading on, in place; `top` is room for the states' rows."""
+    n, nh = b.shape
+    m = x.shape[1]
+    for i in range(n):
+        for c in range(m):
+            top[i, c] = 0.0
+        for j in range(n):
+            for c in range(m):
+                top[i, c] += f[i, j] * x[j, c]
+        for j in range(nh):
+            for c in range(m):
+                top[i, c] += b[i, j] * x[n + j, c]
+    x[:n] = top
+    x[n : n + nh] *= heat_decay
+    x[n + nh :] *= slow_decay
+
+
+@njit(cache=True)
 def _filter(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, data):  # type: ignore[no-untyped-def]
     """Whitened data (R * Y rows in reading order, unmeasured rows zero) and half the log-determinant."""
     readings, outs, n = h.shape
@@ -117,24 +136,14 @@ def _filter(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, data):
         p[n + nh + j, n + nh + j] = slow[j] ** 2
     out = np.zeros((readings, outs, m))
     logdet = 0.0
-    gain = np.zeros(size)
-    hr = np.zeros(size)
     ph = np.zeros(size)
-    fz = np.zeros((size, size))
+    top_z, top_p = np.zeros((n, m)), np.zeros((n, size))
     for r in range(readings):
         if r > 0:
-            fz[:] = 0.0
-            for i in range(n):
-                for j in range(n):
-                    fz[i, j] = f[r - 1, i, j]
-                for j in range(nh):
-                    fz[i, n + j] = b[r - 1, i, j]
-            for j in range(nh):
-                fz[n + j, n + j] = heat_decay[r - 1]
-            for j in range(nv):
-                fz[n + nh + j, n + nh + j] = slow_decay[r - 1]
-            z = fz @ z
-            p = fz @ p @ fz.T
+            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], z, top_z)
+            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], p, top_p)
+            p = p.T.copy()  # symmetric: the other side is the same step on the transpose
+            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], p, top_p)
             for j in range(nh):
                 p[n + j, n + j] += heat[j] ** 2 * (1.0 - heat_decay[r - 1] ** 2)
             for j in range(nv):
@@ -142,34 +151,30 @@ def _filter(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, data):
         for y in range(outs):  # white noise is independent by output: update one at a time
             if not measured[r, y]:
                 continue
+            own = n + nh + y if nv else -1  # a reading shows the states and its own slow noise
             for i in range(size):
-                hr[i] = 0.0
-            for i in range(n):
-                hr[i] = h[r, y, i]
-            if nv:
-                hr[n + nh + y] = 1.0
-            s = white[y] ** 2
-            for i in range(size):
-                total = 0.0
-                for j in range(size):
-                    total += p[i, j] * hr[j]
-                ph[i] = total
-            for i in range(size):
-                s += hr[i] * ph[i]
+                ph[i] = p[own, i] if nv else 0.0
+            for j in range(n):
+                for i in range(size):
+                    ph[i] += h[r, y, j] * p[j, i]
+            s = white[y] ** 2 + (ph[own] if nv else 0.0)
+            for j in range(n):
+                s += h[r, y, j] * ph[j]
             root = np.sqrt(s)
             logdet += np.log(root)
-            for i in range(size):
-                gain[i] = ph[i] / s
             for c in range(m):
-                innovation = data[r, y, c]
-                for i in range(size):
-                    innovation -= hr[i] * z[i, c]
-                out[r, y, c] = innovation / root
-                for i in range(size):
-                    z[i, c] += gain[i] * innovation
+                innovation = data[r, y, c] - (z[own, c] if nv else 0.0)
+                for j in range(n):
+                    innovation -= h[r, y, j] * z[j, c]
+                out[r, y, c] = innovation
             for i in range(size):
+                gain = ph[i] / s
+                for c in range(m):
+                    z[i, c] += gain * out[r, y, c]
                 for j in range(size):
-                    p[i, j] -= gain[i] * ph[j]
+                    p[i, j] -= gain * ph[j]
+            for c in range(m):
+                out[r, y, c] /= root
     return out, logdet
 
 

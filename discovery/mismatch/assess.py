@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -34,12 +33,12 @@ class Assessment:
         """The noise setting that explains the residual best."""
         return max(self.views, key=lambda view: view.level)
 
-    @cached_property
-    def rms(self) -> float:
-        """Root mean square of all residuals over their reading noise."""
+    def rms(self, apart: Collection[str] = ()) -> float:
+        """Root mean square of the residuals over their reading noise, but those of some recordings."""
         white = np.array(self.views[0].noise.white)
-        parts = [(r / white).ravel() for r in self.lens.residuals]
-        z = np.concatenate(parts)
+        runs = [t.system.grid.recording for t in self.fit.trajectories]
+        parts = zip(runs, self.lens.residuals, strict=True)
+        z = np.concatenate([(r / white).ravel() for run, r in parts if run not in apart])
         return float(np.sqrt(np.nanmean(z**2)))
 
 

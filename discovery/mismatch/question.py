@@ -98,6 +98,7 @@ def supported(context: Context, current: Assessment) -> tuple[Assessment, list[A
     while lasting := [h for h in current.hypotheses if h.recording is None]:
         noise = current.best_view.noise
         whole = left_out(context, current, noise)
+        own = {h.recording for h in current.hypotheses if h.recording}  # not run there either
         if np.isnan(whole):
             break
         carried = []
@@ -106,7 +107,7 @@ def supported(context: Context, current: Assessment) -> tuple[Assessment, list[A
             if without is None:
                 continue
             tried.append(without)
-            inside = np.log(without.rms / current.rms)
+            inside = np.log(without.rms(own) / current.rms(own))
             # where the model runs away both with it and without, nothing speaks for it
             outside = np.nan_to_num(np.log(left_out(context, without, noise)) - np.log(whole), posinf=np.inf)
             if 0 < inside < TOLD and outside >= 0:

@@ -14,7 +14,7 @@ from discovery.mismatch.context import Context
 from discovery.mismatch.forcing import Forcing
 from discovery.mismatch.gates import objections
 from discovery.mismatch.hypotheses import Hypothesis
-from discovery.mismatch.question import NAMED, recurs
+from discovery.mismatch.question import NAMED, recurs, trace
 from discovery.mismatch.search import Search
 
 Array = NDArray[np.float64]
@@ -91,7 +91,8 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
         for c in found.looks[-1]
         if context.minor(c.hypothesis)[0] <= abs(c.size[0]) <= c.hypothesis.effect.amplitude.most
     ]
-    if left and left[0].gain > max(NAMED, 0.05 * found.gain):
+    # what the search takes for the trace of a law slightly off in form is none of significance here
+    if left and left[0].gain > max(NAMED + trace(found.gain), 0.05 * found.gain):
         other = left[0].hypothesis
         reasons.append(f"{other.effect.word} at {other.where} is still significant after the repair")
     if free_after > max(FREE, 0.1 * found.gain):

@@ -12,6 +12,7 @@ from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.leftout import left_out
+from discovery.mismatch.look import look
 from discovery.mismatch.question import supported
 from discovery.models import Model
 from tests.mismatch.machine import SEEN, campaign, model, simulated
@@ -47,6 +48,26 @@ def test_a_single_recording_cannot_object() -> None:
     context, answer = claimed(model(), "bed_memory", "motor", ("r1",))
     assert np.isnan(left_out(context, answer, answer.best_view.noise))
     assert supported(context, answer) == (answer, [])
+
+
+def test_the_same_readings_count_in_the_fit_and_outside() -> None:
+    _, answer = claimed(model(wet=False), "fluid_convection", "table", ("r1", "r2"))
+    white = np.array(answer.best_view.noise.white)
+    of_r2 = answer.lens.residuals[1] / white
+    assert answer.rms({"r1"}) == pytest.approx(float(np.sqrt(np.nanmean(of_r2**2))))
+    assert answer.rms() != answer.rms({"r1"})
+
+
+def test_a_look_after_a_memory_was_found() -> None:
+    """The state behind its lag() is no body that the fluid wets."""
+    seen = campaign(simulated(1))
+    effects = [e for e in catalogue().values() if e.word.startswith("fluid_")]
+    context = make_context(seen, model(), ("r1",), tuple(SEEN), effects)
+    found = hypotheses(context.baseline.problem.model, seen.channels, tuple(SEEN), ("r1",), effects)
+    sump = next(h for h in found if h.effect.word == "fluid_sump")
+    claims = look(context, assess(context, (sump,))).claims
+    assert claims
+    assert not any(place.startswith("lag_") for c in claims for place in c.hypothesis.places)
 
 
 def test_what_has_an_event_of_its_own_is_not_run() -> None:
