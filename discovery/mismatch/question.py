@@ -11,15 +11,18 @@ from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.gates import bent, matters, objections
 from discovery.mismatch.hypotheses import Hypothesis, hypotheses
-from discovery.mismatch.leftout import left_out
+from discovery.mismatch.leftout import least_added, left_out
 from discovery.mismatch.look import attempt, look
 
 NAMED = 8.0  # log evidence that a claim has to add to be taken up
 SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
 TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the most beside it
 EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
-CARRIED = 0.65  # of what an effect takes off in the fit, to show on recordings left out; of a cause 0.8 to 4
-TOLD = 0.01  # of log rms: what an effect takes off the fit below which its share elsewhere is noise
+BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
+CARRIED = 0.65  # of the mean square that an effect takes off the fit, to show on recordings left out
+TOLD = (
+    0.02  # share of the mean square that an effect takes off the fit below which its carrying over is noise
+)
 HOPELESS = 0.3  # of the best claim's gain: places where nothing sees more are not tried
 RIVALS = 3  # claims that are tried in the place of another
 
@@ -90,9 +93,9 @@ def question(context: Context, current: Assessment) -> tuple[Assessment, list[As
 
 
 def supported(context: Context, current: Assessment) -> tuple[Assessment, list[Assessment]]:
-    """Drop what helps to fit and not to predict: a cause makes free runs on recordings left out of the fit
-    better by nearly as much as the fit itself. Events of one recording say nothing on others and stay; with a
-    single recording all stays.
+    """Drop what helps to fit and not to predict: a cause takes nearly as much off free runs on recordings
+    left out of the fit as off the fit itself, or each of them speaks for it clearly. Events of one recording
+    say nothing on others and stay; with a single recording all stays.
     """
     tried: list[Assessment] = []
     while lasting := [h for h in current.hypotheses if h.recording is None]:
@@ -107,14 +110,14 @@ def supported(context: Context, current: Assessment) -> tuple[Assessment, list[A
             if without is None:
                 continue
             tried.append(without)
-            inside = np.log(without.rms(own) / current.rms(own))
+            inside = without.rms(own) ** 2 - current.rms(own) ** 2
             # where the model runs away both with it and without, nothing speaks for it
-            outside = np.nan_to_num(np.log(left_out(context, without, noise)) - np.log(whole), posinf=np.inf)
-            if 0 < inside < TOLD and outside >= 0:
+            outside = np.nan_to_num(left_out(context, without, noise) ** 2 - whole**2, posinf=np.inf)
+            if 0 < inside < TOLD * current.rms(own) ** 2 and outside >= 0:
                 continue
             carried.append((float(outside / inside if inside > 0 else np.sign(outside)), without))
         share, weakest = min(carried, key=lambda item: item[0], default=(np.inf, current))
-        if share >= CARRIED:
+        if share >= CARRIED or least_added(context, current, weakest, noise) > BLUNT:
             break
         current = weakest
     return current, tried

@@ -11,12 +11,11 @@ from discovery.mismatch.evidence import Board, Score
 from discovery.mismatch.gates import bent, matters
 from discovery.mismatch.lens import Lens
 from discovery.mismatch.look import attempt, look
-from discovery.mismatch.question import NAMED, prune, question, recurs, supported, trace
+from discovery.mismatch.question import BLUNT, NAMED, prune, question, recurs, supported, trace
 
 REFITS = 6  # claims that are refitted at each step
 QUESTIONED = 3  # with more effects than this the machine is far from its model, and each one is large
 FAR_BELOW = 12.0  # log evidence below the best from which an attempt is no rival under another noise either
-BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
 
 
 @dataclass(frozen=True)
