@@ -20,9 +20,7 @@ TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the m
 EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
 BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
 CARRIED = 0.65  # of the mean square that an effect takes off the fit, to show on recordings left out
-TOLD = (
-    0.02  # share of the mean square that an effect takes off the fit below which its carrying over is noise
-)
+TOLD = 0.02  # of the mean square: what an effect takes off the fit below which its share elsewhere is noise
 HOPELESS = 0.3  # of the best claim's gain: places where nothing sees more are not tried
 RIVALS = 3  # claims that are tried in the place of another
 
