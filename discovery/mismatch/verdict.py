@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.mismatch.context import Context
+from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing
 from discovery.mismatch.gates import objections
 from discovery.mismatch.hypotheses import Hypothesis
@@ -87,13 +88,13 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     if recurs(context, best.hypotheses):
         reasons.append("unrecorded events come again and again: a cause, not an event")
     left = [
-        c
+        (_added(found, c), c.hypothesis)
         for c in found.looks[-1]
         if context.minor(c.hypothesis)[0] <= abs(c.size[0]) <= c.hypothesis.effect.amplitude.most
     ]
+    more, other = max(left, key=lambda item: item[0], default=(0.0, None))
     # what the search takes for the trace of a law slightly off in form is none of significance here
-    if left and left[0].gain > max(NAMED + trace(found.gain), 0.05 * found.gain):
-        other = left[0].hypothesis
+    if other and more > max(NAMED + trace(found.gain), 0.05 * found.gain):
         reasons.append(f"{other.effect.word} at {other.where} is still significant after the repair")
     if free_after > max(FREE, 0.1 * found.gain):
         reasons.append(f"free heat at {after[0].state} still explains much after the repair")
@@ -113,6 +114,13 @@ def _coarse(context: Context, found: Search, free: float) -> bool:
         return False
     top = claims[0]
     return abs(top.size[0]) < context.minor(top.hypothesis)[0] and top.gain > 0.5 * free
+
+
+def _added(found: Search, claim: Score) -> float:
+    """Log evidence of a claim beside the best model: of a refit where it was tried, else at first sight."""
+    keys = {o.key for o in found.best.hypotheses} | {claim.hypothesis.key}
+    refitted = [a.evidence for a in found.tried if {o.key for o in a.hypotheses} == keys]
+    return max(refitted) - found.best.evidence if refitted else claim.gain
 
 
 def _weight(found: Search, h: Hypothesis) -> float:
