@@ -87,6 +87,12 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     reasons = []
     if recurs(context, best.hypotheses):
         reasons.append("unrecorded events come again and again: a cause, not an event")
+    lasting = {h.recording is None for h in best.hypotheses if h.effect.is_physics}
+    if len(context.recordings) == 1 and lasting == {True, False}:
+        reasons.append(
+            "in the only recording an event cannot be told from what a law slightly off in form leaves; "
+            "a second recording to fit would tell"
+        )
     left = [
         (_added(found, c), c.hypothesis)
         for c in found.looks[-1]

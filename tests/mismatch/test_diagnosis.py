@@ -156,6 +156,21 @@ def test_a_window_of_heat_is_found_with_its_body_and_hours() -> None:
     assert np.abs(first.heat["r1"]).mean() < 15.0
 
 
+def test_an_event_beside_a_law_needs_a_second_recording() -> None:
+    """In the only recording heat for some hours may be what the other law leaves."""
+
+    def sun(t: float, _: Array, __: Inputs) -> tuple[float, float, float]:
+        return (0.0, 0.0, 120.0 * (30000 <= t < 52000))
+
+    runs = simulated(1), simulated(2, concealed=sun)
+    alone = diagnose(model(wet=False), campaign(runs[1]), ["r2"]).document()
+    assert alone["verdict"] == "unexplained"
+    assert "second recording" in " ".join(alone["reasons"])
+    assert {p["effect"] for p in alone["closest"]} == {"fluid_convection", "unmeasured_heat"}
+    both = diagnose(model(wet=False), campaign(*runs), ["r1", "r2"]).document()
+    assert {p["effect"] for p in both["physics"]} == {"fluid_convection", "unmeasured_heat"}
+
+
 @pytest.mark.parametrize("size", [-40.0, 15.0, 5.0])
 def test_a_single_wrong_reading_is_a_fault_of_the_measuring_chain(size: float) -> None:
     one, other = simulated(1), simulated(2)
