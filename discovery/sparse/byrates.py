@@ -11,38 +11,25 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid, make_grid
+from discovery.dynamics import Grid
 from discovery.dynamics.system import predict
 from discovery.errors import UserError
 from discovery.fitting import Fit, Noise, predict_recording
 from discovery.fitting.noise import white_noise
 from discovery.models import Model
-from discovery.recordings import Campaign
 from discovery.sparse.discovery import Discovery, PathPoint
-from discovery.sparse.folds import CLAIM, NAME, Blocks, choose, make_blocks, make_folds
+from discovery.sparse.folds import CLAIM, NAME, choose, make_folds
 from discovery.sparse.gram import Gram, solve
 from discovery.sparse.optimisers import pysindy_path
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.path import Support, best_of_each_size, forward
+from discovery.sparse.ratedata import RateData, has_reading, rough_noise, stated_noise
 from discovery.sparse.rates import Evidence, evidence, extended_bic, masked, refit, without
 
 Array = NDArray[np.float64]
 
-_READINGS = 250  # of one output in one recording: more say nothing new about hours or minutes
 _ROUNDS = 3  # of a fit in a fold: it starts where the normal equations of the fold have their minimum
-_FAR = 3.0  # times the rms: start values that are no use
 _SIZES = 5  # that are refitted and run freely, down from the one that the criterion names
-
-
-@dataclass(frozen=True)
-class RateData:
-    """What the choice works on."""
-
-    campaign: Campaign
-    recordings: tuple[str, ...]
-    outputs: tuple[str, ...]
-    grids: Mapping[str, Grid]
-    blocks: Blocks
 
 
 @dataclass(frozen=True)
@@ -57,16 +44,6 @@ class Growth:
     entered: tuple[str, ...] = ()
     most: int = 15
     restart: Mapping[str, float] = field(default_factory=dict)
-
-
-def make_rate_data(
-    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str], blocks: int
-) -> RateData:
-    """Grids of the recordings with all inputs that any candidate may use, dense readings thinned."""
-    campaign = thinned(campaign, recordings, outputs, inputs)
-    grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
-    times = [grids[r].time[grids[r].read] for r in recordings]
-    return RateData(campaign, tuple(recordings), tuple(outputs), grids, make_blocks(times, blocks))
 
 
 def discover_rates(
@@ -94,8 +71,8 @@ def discover_rates(
     """
     if growth is not None:
         model, labels = _grown(data, model, labels, growth)
-    full = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, _rough_noise(data))
-    noise = white_noise(data.outputs, _stated(data), list(full.residuals().values()))
+    full = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, rough_noise(data))
+    noise = white_noise(data.outputs, stated_noise(data), list(full.residuals().values()))
     full = replace(full, noise=noise)
     seen = evidence(full, data.blocks)
     kept = [i for i, name in enumerate(seen.names) if name in always or name not in labels]
@@ -140,48 +117,6 @@ def discover_rates(
     return Discovery(fit.model, points, named, report)
 
 
-def thinned(
-    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str]
-) -> Campaign:
-    """The campaign with at most about `_READINGS` evenly chosen readings of each output in a recording.
-
-    Held inputs keep the stamps at which they change alone, which says the same; both spare nodes of the grid.
-    """
-    made = {}
-    for name in recordings:
-        recording = campaign.recordings[name]
-        values = dict(recording.values)
-        for output in outputs:
-            known = np.flatnonzero(np.isfinite(values[output]))
-            if len(known) >= 2 * _READINGS:
-                few = np.full(len(recording.time), np.nan)
-                few[known[:: len(known) // _READINGS]] = values[output][known[:: len(known) // _READINGS]]
-                values[output] = few
-        for channel in set(inputs) & set(values):
-            known = np.flatnonzero(np.isfinite(values[channel]))
-            if campaign.channels[channel].between == "held" and len(known) > 1:
-                same = known[1:][np.diff(values[channel][known]) == 0]
-                values[channel] = values[channel].copy()
-                values[channel][same] = np.nan
-        made[name] = replace(recording, values=values)
-    return replace(campaign, recordings=made)
-
-
-def _stated(data: RateData) -> dict[str, float | None]:
-    return {name: data.campaign.channels[name].noise for name in data.outputs}
-
-
-def _rough_noise(data: RateData) -> Noise:
-    """Noise that weighs the outputs before anything is fitted: the stated one, else 2 % of the readings'
-    spread.
-    """
-    spread = np.nanstd(np.concatenate([data.grids[r].readings for r in data.recordings]), axis=0)
-    stated = _stated(data).values()
-    return Noise(
-        data.outputs, tuple(n or max(0.02 * float(s), 1e-9) for n, s in zip(stated, spread, strict=True))
-    )
-
-
 def _grown(
     data: RateData, model: Model, labels: Mapping[str, str], growth: Growth
 ) -> tuple[Model, dict[str, str]]:
@@ -192,7 +127,7 @@ def _grown(
     term.
     """
     entered = list(growth.entered)
-    noise = _rough_noise(data)
+    noise = rough_noise(data)
     for _ in range(growth.most + 1):
         small = without(model, [name for name in labels if name not in entered])
         starts = [{}, growth.restart] if growth.restart else [{}]
@@ -295,35 +230,8 @@ def _left_out(data: RateData, model: Model, seen: Evidence, support: Support, no
         except UserError:  # a sparse model that runs away is a bad model, not a mistake of the user
             errors[fold] = np.inf
     # a block without a reading says nothing: it must not tell the sizes apart
-    silent = np.array([not _has_reading(data, b) for b in range(blocks.count)])
+    silent = np.array([not has_reading(data, b) for b in range(blocks.count)])
     return np.where(np.isfinite(errors), errors, np.where(silent, 1.0, 1e12))
-
-
-def _has_reading(data: RateData, block: int) -> bool:
-    of, readings = zip(data.blocks.of, data.recordings, strict=True), data.grids
-    return any(np.isfinite(readings[r].readings[b == block]).any() for b, r in of)
-
-
-def nearer(data: RateData, first: Model, second: Model) -> Model:
-    """The first model unless the second one, as they stand, runs far nearer to the readings.
-
-    Start values from the weak form may belong to a model that runs away: no fit comes back from there.
-    """
-    return second if _missed(data, first) > _FAR**2 * _missed(data, second) else first
-
-
-def _missed(data: RateData, model: Model) -> float:
-    """Mean squared error of free runs over the rough noise; infinite where one runs away."""
-    noise = _rough_noise(data).white
-    squares = []
-    for r in data.recordings:
-        try:
-            run = predict_recording(model, data.campaign, r, data.outputs, noise, data.grids[r])
-        except UserError:
-            return float("inf")
-        squares.append((((data.grids[r].readings - predict(run)) / noise) ** 2).ravel())
-    missed = float(np.nanmean(np.concatenate(squares)))
-    return missed if np.isfinite(missed) else float("inf")
 
 
 def _stability(

@@ -16,7 +16,7 @@ from discovery.models import Model, Parameter, State
 from discovery.models.modelfile import check_names, read_model
 from discovery.recordings import Campaign
 from discovery.sparse.bymasses import MassData, discover_error
-from discovery.sparse.byrates import Growth, RateData, discover_rates, make_rate_data, nearer
+from discovery.sparse.byrates import Growth, discover_rates
 from discovery.sparse.discovery import Discovery, joined
 from discovery.sparse.drives import AMBIENT, Inputs, make_inputs
 from discovery.sparse.families import candidates
@@ -24,6 +24,7 @@ from discovery.sparse.folds import make_blocks
 from discovery.sparse.gram import solve, total
 from discovery.sparse.masses import make_mass_library, respond
 from discovery.sparse.options import SparseOptions
+from discovery.sparse.ratedata import RateData, make_rate_data, nearer
 from discovery.sparse.rates import Candidate, with_candidates, without_idle
 from discovery.sparse.weak import weak_gram, weak_rows
 from discovery.terms import Name, Term, names, parse, text
