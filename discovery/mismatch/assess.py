@@ -42,6 +42,18 @@ class Assessment:
         return float(np.sqrt(np.nanmean(z**2)))
 
 
+def misfits(answer: Assessment, noise: Noise) -> dict[str, float]:
+    """Negative log-likelihood of each recording under a noise, at the fit: 1/2 z^2 of its innovations and the
+    logs of their scales.
+    """
+    found = {}
+    parts = zip(answer.fit.trajectories, answer.lens.filters, answer.lens.residuals, strict=True)
+    for trajectory, part, residual in parts:
+        z, half = part.apply(noise, residual[:, :, None])
+        found[trajectory.system.grid.recording] = 0.5 * float(np.sum(z**2)) + half
+    return found
+
+
 def refit(
     context: Context,
     chosen: Sequence[Hypothesis],

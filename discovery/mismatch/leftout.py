@@ -12,7 +12,7 @@ from discovery.dynamics.system import predict
 from discovery.errors import UserError
 from discovery.evaluation.crossvalidation import folds
 from discovery.fitting import Noise, predict_recording
-from discovery.mismatch.assess import Assessment, assess, refit
+from discovery.mismatch.assess import Assessment, assess, misfits, refit
 from discovery.mismatch.context import Context
 from discovery.mismatch.hypotheses import Hypothesis
 
@@ -60,6 +60,17 @@ def least_added(context: Context, answer: Assessment, without: Assessment, noise
             return -inf
         added.append(gain - (a - b))
     return min(added)
+
+
+def least_taken(context: Context, answer: Assessment, without: Assessment, noise: Noise) -> float:
+    """What an answer takes off the negative log-likelihood of each group of recordings that would be left
+    out, in the fit to all of them, the least.
+
+    No leaving out is needed where this is large: a few sizes that are common to all recordings cannot follow
+    each of them by chance.
+    """
+    before, after = misfits(without, noise), misfits(answer, noise)
+    return min((sum(before[r] - after[r] for r in left) for left, _ in _folds(context)), default=-inf)
 
 
 def _folds(context: Context) -> Iterator[tuple[tuple[str, ...], Context]]:

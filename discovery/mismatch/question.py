@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from discovery.fitting import Noise
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.gates import bent, matters, objections
 from discovery.mismatch.hypotheses import Hypothesis, hypotheses
-from discovery.mismatch.leftout import least_added, left_out
+from discovery.mismatch.leftout import least_added, least_taken, left_out
 from discovery.mismatch.look import attempt, look
 
 NAMED = 8.0  # log evidence that a claim has to add to be taken up
@@ -19,6 +20,7 @@ SMALL = 0.1  # share of the whole gain below which an objectionable effect is dr
 TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the most beside it
 EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
 BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
+CLEAR = 60.0  # of log-likelihood in every recording of the fit: what takes that off each one carries over
 CARRIED = 0.65  # of the mean square that an effect takes off the fit, to show on recordings left out
 TOLD = 0.02  # of the mean square: what an effect takes off the fit below which its share elsewhere is noise
 HOPELESS = 0.3  # of the best claim's gain: places where nothing sees more are not tried
@@ -64,16 +66,21 @@ def prune(context: Context, baseline: Assessment, current: Assessment) -> tuple[
     return current, tried
 
 
-def question(context: Context, current: Assessment) -> tuple[Assessment, list[Assessment]]:
+def question(
+    context: Context, current: Assessment, known: Sequence[Assessment] = ()
+) -> tuple[Assessment, list[Assessment]]:
     """Take each effect out, see what would stand in its place, also the same effect at another body, and drop
     what is not needed.
+
+    Args:
+        known: refits that were made before and need not be made again.
     """
     tried: list[Assessment] = []
     for h in current.hypotheses:
         others = tuple(o for o in current.hypotheses if o.key != h.key)
         if len(others) == len(current.hypotheses) or h.key not in {o.key for o in current.hypotheses}:
             continue
-        without = attempt(context, current, others)
+        without = _apart(context, current, others, known)
         if without is None:
             continue
         tried.append(without)
@@ -90,35 +97,59 @@ def question(context: Context, current: Assessment) -> tuple[Assessment, list[As
     return current, tried
 
 
-def supported(context: Context, current: Assessment) -> tuple[Assessment, list[Assessment]]:
+def supported(
+    context: Context, current: Assessment, known: Sequence[Assessment] = ()
+) -> tuple[Assessment, list[Assessment]]:
     """Drop what helps to fit and not to predict: a cause takes nearly as much off free runs on recordings
     left out of the fit as off the fit itself, or each of them speaks for it clearly. Events of one recording
     say nothing on others and stay; with a single recording all stays.
+
+    Args:
+        known: refits that were made before and need not be made again.
     """
     tried: list[Assessment] = []
+    if len(context.recordings) < 2:
+        return current, tried
     while lasting := [h for h in current.hypotheses if h.recording is None]:
         noise = current.best_view.noise
+        others = [tuple(o for o in current.hypotheses if o is not h) for h in lasting]
+        apart = [a for rest in others if (a := _apart(context, current, rest, known)) is not None]
+        tried += apart
+        unclear = [a for a in apart if least_taken(context, current, a, noise) < CLEAR]
+        if not unclear:
+            break
         whole = left_out(context, current, noise)
-        own = {h.recording for h in current.hypotheses if h.recording}  # not run there either
         if np.isnan(whole):
             break
-        carried = []
-        for h in lasting:
-            without = attempt(context, current, tuple(o for o in current.hypotheses if o is not h))
-            if without is None:
-                continue
-            tried.append(without)
-            inside = without.rms(own) ** 2 - current.rms(own) ** 2
-            # where the model runs away both with it and without, nothing speaks for it
-            outside = np.nan_to_num(left_out(context, without, noise) ** 2 - whole**2, posinf=np.inf)
-            if 0 < inside < TOLD * current.rms(own) ** 2 and outside >= 0:
-                continue
-            carried.append((float(outside / inside if inside > 0 else np.sign(outside)), without))
-        share, weakest = min(carried, key=lambda item: item[0], default=(np.inf, current))
-        if share >= CARRIED or least_added(context, current, weakest, noise) > BLUNT:
+        shares = [_carried(context, current, without, noise, whole) for without in unclear]
+        weakest = unclear[int(np.argmin(shares))]
+        if min(shares) >= CARRIED or least_added(context, current, weakest, noise) > BLUNT:
             break
         current = weakest
     return current, tried
+
+
+def _apart(
+    context: Context, current: Assessment, others: tuple[Hypothesis, ...], known: Sequence[Assessment]
+) -> Assessment | None:
+    """The model with the others alone: a refit that is known under the same noise, or a new one."""
+    for a in known:
+        if a.hypotheses == others and a.views and a.fit.noise == current.best_view.noise:
+            return a
+    return attempt(context, current, others)
+
+
+def _carried(context: Context, current: Assessment, without: Assessment, noise: Noise, whole: float) -> float:
+    """Of the mean square that an effect takes off the fit, the share that it takes off recordings left out,
+    which leave `whole` with it.
+    """
+    own = {h.recording for h in current.hypotheses if h.recording}  # not run there either
+    inside = without.rms(own) ** 2 - current.rms(own) ** 2
+    # where the model runs away both with it and without, nothing speaks for it
+    outside = float(np.nan_to_num(left_out(context, without, noise) ** 2 - whole**2, posinf=np.inf))
+    if 0 < inside < TOLD * current.rms(own) ** 2 and outside >= 0:
+        return np.inf
+    return outside / inside if inside > 0 else float(np.sign(outside))
 
 
 def _elsewhere(

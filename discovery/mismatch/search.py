@@ -53,6 +53,7 @@ def search(
     whole = look(context, current)
     baseline, looks = current, [whole.claims]
     tried: list[Assessment] = []
+    stood = _keys(begun.best) if begun else set()
     if begun:
         noise, near = current.best_view.noise, begun.best.evidence - FAR_BELOW
         current = assess(context, begun.best.hypotheses, noise, begun.best)
@@ -69,10 +70,11 @@ def search(
         tried += more
         questioned = grown != before and 1 < len(current.hypotheses) <= QUESTIONED
         if questioned and not recurs(context, current.hypotheses):
-            current, more = question(context, current)
+            current, more = question(context, current, tried)
             tried += more
-        current, more = supported(context, current)
-        tried += more
+        if _keys(current) != stood:  # what carried over once carries over again
+            current, more = supported(context, current, tried)
+            tried, stood = tried + more, _keys(current)
         # sizes under the noise that stands beside the answer, not beside the one before
         current = assess(context, current.hypotheses, current.best_view.noise, current)
         looks.append(look(context, current).claims)
