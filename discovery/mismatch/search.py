@@ -117,7 +117,7 @@ def _grow(
         step = _step(context, attempts, current.evidence)
         tried += [_light(a) for a in attempts if matters(context, a, a.hypotheses[-1])]
         bar = NAMED if freely else NAMED + trace(current.evidence - baseline.evidence)
-        if current.hypotheses and bent(step, step.hypotheses[-1]):
+        if bent(step, step.hypotheses[-1]):
             bar = max(bar, BLUNT)  # what is left has another law, and there is not much of it
         if not matters(context, step, step.hypotheses[-1]):
             bar = max(bar, BLUNT)  # small for its kind, but no coarse model shows it so clearly
