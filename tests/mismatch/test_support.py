@@ -11,9 +11,9 @@ from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
 from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.leftout import left_out
+from discovery.mismatch.leftout import least_added, least_taken, left_out
 from discovery.mismatch.look import look
-from discovery.mismatch.question import supported
+from discovery.mismatch.question import BLUNT, CLEAR, supported
 from discovery.models import Model
 from tests.mismatch.machine import SEEN, campaign, model, simulated
 
@@ -42,6 +42,23 @@ def test_what_predicts_nothing_goes(state: str) -> None:
     kept, tried = supported(context, answer)
     assert kept.hypotheses == ()
     assert kept in tried
+
+
+def test_every_recording_speaks_for_a_cause_and_none_for_a_ghost() -> None:
+    context, answer = claimed(model(wet=False), "fluid_convection", "table", ("r1", "r2"))
+    noise, without = answer.best_view.noise, assess(context, ())
+    assert least_taken(context, answer, without, noise) > CLEAR
+    assert least_added(context, answer, without, noise) > BLUNT
+    context, ghost = claimed(model(), "bed_memory", "motor", ("r1", "r2"))
+    noise, without = ghost.best_view.noise, assess(context, ())
+    assert least_taken(context, ghost, without, noise) < CLEAR
+    assert least_added(context, ghost, without, noise) < BLUNT
+
+
+def test_a_refit_that_is_known_is_not_made_again() -> None:
+    context, answer = claimed(model(), "bed_memory", "motor", ("r1", "r2"))
+    bare = assess(context, (), answer.best_view.noise)
+    assert supported(context, answer, [bare])[0] is bare
 
 
 def test_a_single_recording_cannot_object() -> None:
