@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics.system import predict as model_outputs
+from discovery.errors import UserError
 from discovery.evaluation import evaluate
 from discovery.evaluation.crossvalidation import cross_validate
 from discovery.experimentfile import Experiment
@@ -77,8 +78,14 @@ def judged(
         progress(f"cross-validating {name}")
         validation = cross_validate(fit.model, experiment.fitting, experiment.fit, outputs, fit.noise)
     seconds = clock.perf_counter() - began
-    predictions = {r: predict(fit, experiment, r) for r in (*experiment.fit, *experiment.held_out)}
-    notes = [*fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]
+    predictions = {r: predict(fit, experiment, r) for r in experiment.fit}
+    lost = []
+    for recording in experiment.held_out:
+        try:
+            predictions[recording] = predict(fit, experiment, recording)
+        except UserError as error:  # a finding about the model, no mistake of the user's
+            lost.append(str(error))
+    notes = [*lost, *fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]
     notes += offset_notes(fit, experiment.campaign.channels)
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
     return Fitted(name, kind, fit, predictions, validation, report or {}, tuple(notes), seconds)

@@ -96,7 +96,8 @@ def write_run(
     for name, one in fitted.items():
         write_model(folder / "models" / f"{name}.toml", one.model)
     for recording in (*experiment.fit, *experiment.held_out):
-        write_atomic(folder / "predictions" / f"{recording}.csv", predictions_table(recording, fitted))
+        if any(recording in one.predictions for one in fitted.values()):
+            write_atomic(folder / "predictions" / f"{recording}.csv", predictions_table(recording, fitted))
     if experiment.form.export:
         from discovery.export import export_model
 
@@ -175,7 +176,9 @@ def predictions_table(recording: str, fitted: Mapping[str, Fitted]) -> str:
     measured: dict[str, dict[float, float]] = {}
     predicted: dict[str, dict[float, float]] = {}
     for name, one in fitted.items():
-        p = one.predictions[recording]
+        p = one.predictions.get(recording)
+        if p is None:  # the model runs away there, its notes say so
+            continue
         stamps = [float(t) for t in p.time]
         for y, output in enumerate(p.outputs):
             measured[output] = measured.get(output, {}) | dict(

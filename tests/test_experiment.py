@@ -21,6 +21,8 @@ from discovery.fitted import offset_notes
 from discovery.fitting import Fit
 from discovery.models import read_model
 from discovery.recordings import Channel
+from discovery.report.ranking import ranked
+from discovery.report.run import load_run
 from discovery.summary import comparison
 
 CAMPAIGN = """
@@ -167,6 +169,32 @@ def test_the_right_model_is_right_on_the_held_out_recording(folder: Path) -> Non
     values = entry["values"]
     assert values["G"]["low"] < 12.0 < values["G"]["high"]
     assert values["loss"]["value"] == pytest.approx(0.4, rel=0.02)
+
+
+def test_a_model_that_runs_away_on_an_unseen_recording_is_told_and_last(folder: Path) -> None:
+    """Its feedback is off in the recordings to fit, where it is the same model as the other."""
+    campaign = CAMPAIGN.replace("[recordings]", 'mode = { role = "other input", unit = "1" }\n[recordings]')
+    for name in "abc":
+        campaign = campaign.replace(
+            f'"{name}.csv" }}', f'"{name}.csv", set = {{ mode = {int(name == "c")} }} }}'
+        )
+    (folder / "campaign.toml").write_text(campaign)
+    feedback = '[[terms]]\ninto = "body"\nexpression = "k*mode*(body - T_env)"\n[outputs]'
+    wild = MODEL.replace("[outputs]", feedback)
+    wild = wild.replace("[states]", 'k = { start = 500.0, unit = "W/K", fixed = true }\n[states]')
+    (folder / "wild.toml").write_text(wild)
+    models = 'wild = { file = "wild.toml" }\none_body      = { file = "model.toml" }\n'
+    text = EXPERIMENT[: EXPERIMENT.index("reduced ")] + models
+    (folder / "experiment.toml").write_text(text)
+    out = run(folder / "experiment.toml", folder / "out")
+    entries = results_of(out)["models"]
+    assert set(entries["wild"]["recordings"]) == {"a", "b"}
+    assert "runs away on recording 'c'" in " ".join(entries["wild"]["notes"])
+    assert set(entries["one_body"]["recordings"]) == {"a", "b", "c"}
+    assert (out / "predictions" / "c.csv").read_text().splitlines()[0].count("|") == 2
+    loaded = load_run(out)
+    assert ranked(loaded) == ["one_body", "wild"]
+    assert "“wild” runs away on the unseen recording “c”." in (out / "report.html").read_text()
 
 
 def test_predictions_are_readings_and_models_side_by_side(folder: Path) -> None:

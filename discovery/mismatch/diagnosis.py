@@ -121,13 +121,17 @@ def diagnose(
     old = delivered(context, found.baseline)
     new = delivered(context, found.best) if verdict.named else old
     noise = found.best.best_view.noise
-    if away := runs_away(new.fit.model, campaign, held_out, outputs, noise) if verdict.named else None:
+    proved = [r for r in held_out if not runs_away(old.fit.model, campaign, (r,), outputs, noise)]
+    if away := runs_away(new.fit.model, campaign, proved, outputs, noise) if verdict.named else None:
         # a reading sets its start and no more; a law under which a machine explodes is none
         reason = f"with it the model runs away on recording '{away}'"
         verdict, new = Verdict(UNEXPLAINED, (), verdict.named, (reason,)), old
+    if lost := ", ".join(r for r in held_out if r not in proved):
+        reason = f"the model itself runs away on unseen recording {lost}: nothing can be proved there"
+        verdict = replace(verdict, reasons=(*verdict.reasons, reason))
     repaired = written(new) if verdict.named else None
     tell("proving on held-out recordings")
-    proof = improvements(campaign, held_out, outputs, old.fit.model, new.fit.model, noise)
+    proof = improvements(campaign, proved, outputs, old.fit.model, new.fit.model, noise)
     unexplained = verdict.word == UNEXPLAINED and bool(before)
     tell("asking for the next experiment")
     white = np.array(noise.white)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from discovery.report.mismatch import sizes
-from discovery.report.ranking import cells, is_error, mean_improvement, origin, ranked, ratio
+from discovery.report.ranking import astray, cells, is_error, mean_improvement, origin, ranked, ratio
 from discovery.report.run import Run
 from discovery.report.text import counted, listed, number, percent, words
 
@@ -47,10 +47,14 @@ def _models(run: Run) -> tuple[str, list[str], list[tuple[str, str]]]:
     if not order:
         return "", [], []
     best = order[0]
-    unseen = run.held_out
+    unseen = [r for r in run.held_out if r not in astray(run, best)]
     where = f"on {_called(unseen)}" if unseen else "on the recordings it was fitted to"
     named = f" “{best}”" if best != origin(run, best) else ""
-    rivals = [model for model in order[1:] if math.isfinite(ratio(run, best, model))]
+    rivals = [
+        model
+        for model in order[1:]
+        if math.isfinite(ratio(run, best, model)) and astray(run, model) == astray(run, best)
+    ]
     headline = f"The {origin(run, best)} model{named} predicts best {where}{_nearly(run, best, rivals)}."
     points, figures = _removed(run, best) if is_error(run) else _left(run, best)
     compared = [f"{_less(ratio(run, best, model))} {_name(run, model)}" for model in rivals]
@@ -64,7 +68,8 @@ def _models(run: Run) -> tuple[str, list[str], list[tuple[str, str]]]:
     ]
     if is_error(run) and (worst := _worst(run, best)):
         points.append(worst)
-    if not unseen:
+    points += [f"“{model}” runs away on {_called(lost)}." for model in order if (lost := astray(run, model))]
+    if not run.held_out:
         points.append(
             "No recording was held out: these figures say how well the models fit, not how well they predict."
         )

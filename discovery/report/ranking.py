@@ -38,6 +38,11 @@ def cells(run: Run, model: str) -> dict[tuple[str, str], Mapping[str, Any]]:
     return {(r, output): score for r in wanted for output, score in found[r].items()}
 
 
+def astray(run: Run, model: str) -> list[str]:
+    """Held-out recordings without scores of a model: it runs away there."""
+    return [r for r in run.held_out if r not in run.results["models"][model].get("recordings", {})]
+
+
 def ratio(run: Run, model: str, other: str | None) -> float:
     """Geometric mean over held-out recordings and errors of rms(model)/rms(other); NaN: nothing is shared.
 
@@ -62,13 +67,20 @@ def _positive(value: object) -> bool:
 
 
 def ranked(run: Run) -> list[str]:
-    """Models, best first, by their rms on held-out recordings; those without a score last."""
+    """Models, best first, by their rms on held-out recordings; those that run away on one, or have no score,
+    last.
+    """
     models = list(run.results.get("models", {}))
     if not models:
         return []
     reference = models[0]
     scores = {model: ratio(run, model, reference) for model in models}
-    return sorted(models, key=lambda model: scores[model] if math.isfinite(scores[model]) else math.inf)
+
+    def place(model: str) -> tuple[int, float]:
+        score = scores[model]
+        return len(astray(run, model)), score if math.isfinite(score) else math.inf
+
+    return sorted(models, key=place)
 
 
 def mean_improvement(run: Run, model: str, recording: str | None = None) -> float:

@@ -291,7 +291,8 @@ def test_heat_while_an_input_works_is_no_event() -> None:
 def test_a_model_that_explodes_on_other_inputs_is_told() -> None:
     """Heat that grows with what it heats: stable while the table turns slowly, not at the speed of r2."""
     terms = (*model().terms, Term("feedback", "table", parse("k*speed*(table - T_env)")))
-    hot = replace(model(), terms=terms, parameters={**model().parameters, "k": Parameter(0.001, "1")})
+    k = Parameter(0.001, "1", fixed=True)
+    hot = replace(model(), terms=terms, parameters={**model().parameters, "k": k})
     slow = simulated(1)
     slow = changed(slow, speed=np.full(len(slow.time), 300.0))
     fast = replace(changed(slow, speed=np.full(len(slow.time), 3e6)), name="r2")
@@ -299,3 +300,6 @@ def test_a_model_that_explodes_on_other_inputs_is_told() -> None:
     noise = Noise(tuple(SEEN), (NOISE,) * 3)
     assert runs_away(hot, runs, ["r1"], tuple(SEEN), noise) is None
     assert runs_away(hot, runs, ["r1", "r2"], tuple(SEEN), noise) == "r2"
+    answer = diagnose(hot, runs, ["r1"], ["r2"])  # the model is wrong before anything is added to it
+    assert answer.held_out == {}
+    assert "runs away on unseen recording r2" in answer.document()["reasons"][-1]
