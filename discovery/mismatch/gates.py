@@ -75,6 +75,8 @@ def matters(context: Context, attempt: Assessment, h: Hypothesis) -> bool:
     A model with few bodies is a little wrong everywhere; with enough readings that shows, as effects of a
     few per cent of the usual size. They are not what is missing.
     """
+    if unseen_lag(context, h, attempt):
+        return False
     if h.effect.amplitude.fixed is not None or not h.effect.is_physics:
         return True
     model = attempt.fit.model
@@ -83,6 +85,20 @@ def matters(context: Context, attempt: Assessment, h: Hypothesis) -> bool:
         for n in h.amplitudes
     ]
     return any(size >= least for size, least in zip(sizes, context.minor(h), strict=True))
+
+
+def unseen_lag(context: Context, h: Hypothesis, attempt: Assessment | None = None) -> bool:
+    """Whether an effect is a lag of a sensor, as an attempt has fitted it, and shorter than the time between
+    its readings: these do not tell it from the way of heat through a body that the model takes for one.
+    """
+    if h.effect.word != "sensor_lag" or h.output is None:
+        return False
+    (name,) = h.shapes
+    lag = attempt.fit.model.parameters[name].value if attempt else h.shapes[name]
+    grids = context.grids.values()
+    read = [g.time[g.read][g.measured[:, g.outputs.index(h.output)]] for g in grids]
+    every = np.concatenate([np.diff(times) for times in read])
+    return len(every) > 0 and lag < float(np.median(every))
 
 
 def _unsteady(best: Assessment, h: Hypothesis, blocks: int, limit: float, text: str) -> str | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from discovery.mismatch.context import Context
 from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing
-from discovery.mismatch.gates import objections
+from discovery.mismatch.gates import objections, unseen_lag
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.question import NAMED, recurs, trace
 from discovery.mismatch.search import Search
@@ -97,6 +97,7 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
         (_added(found, c), c.hypothesis)
         for c in found.looks[-1]
         if context.minor(c.hypothesis)[0] <= abs(c.size[0]) <= c.hypothesis.effect.amplitude.most
+        and not unseen_lag(context, c.hypothesis)
     ]
     more, other = max(left, key=lambda item: item[0], default=(0.0, None))
     # what the search takes for the trace of a law slightly off in form is none of significance here

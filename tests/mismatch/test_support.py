@@ -10,6 +10,7 @@ import pytest
 from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
+from discovery.mismatch.gates import unseen_lag
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.leftout import least_added, least_taken, left_out
 from discovery.mismatch.look import look
@@ -97,3 +98,14 @@ def test_what_has_an_event_of_its_own_is_not_run() -> None:
     )
     assert np.isfinite(left_out(context, one, noise))  # of r2
     assert np.isnan(left_out(context, both, noise))
+
+
+@pytest.mark.parametrize(("lag", "unseen"), [(300.0, True), (1800.0, False)])
+def test_a_lag_shorter_than_the_time_between_readings_is_not_seen(lag: float, unseen: bool) -> None:
+    """EVERY is 900 s: a shorter delay may as well be the way of heat through a body."""
+    seen = campaign(simulated(1))
+    effect = catalogue()["sensor_lag"]
+    context = make_context(seen, model(), ("r1",), tuple(SEEN), [effect])
+    found = hypotheses(context.baseline.problem.model, seen.channels, tuple(SEEN), ("r1",), [effect])
+    claim = next(h for h in found if h.output == "E_Z")
+    assert unseen_lag(context, claim.at(dict.fromkeys(claim.shapes, lag))) is unseen
