@@ -1,4 +1,4 @@
-"""The one exception that a user sees."""
+"""The one exception that a user sees, and the kind of it that is a finding about a model."""
 
 
 class UserError(Exception):
@@ -7,3 +7,7 @@ class UserError(Exception):
     The text is one clear sentence: what is wrong, where (file, line, column, key) and what to do.
     The command line prints it as ``error: ...`` and ends with status 1.
     """
+
+
+class RunsAwayError(UserError):
+    """A free run of a model does not stay finite; where models are compared, the others are shown as ever."""

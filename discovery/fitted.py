@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics.system import predict as model_outputs
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError
 from discovery.evaluation import evaluate
 from discovery.evaluation.crossvalidation import cross_validate
 from discovery.experimentfile import Experiment
@@ -83,7 +83,7 @@ def judged(
     for recording in experiment.held_out:
         try:
             predictions[recording] = predict(fit, experiment, recording)
-        except UserError as error:  # a finding about the model, no mistake of the user's
+        except RunsAwayError as error:  # a finding about the model, no mistake of the user's
             lost.append(str(error))
     notes = [*lost, *fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]
     notes += offset_notes(fit, experiment.campaign.channels)

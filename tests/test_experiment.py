@@ -183,7 +183,9 @@ def test_a_model_that_runs_away_on_an_unseen_recording_is_told_and_last(folder: 
     wild = MODEL.replace("[outputs]", feedback)
     wild = wild.replace("[states]", 'k = { start = 500.0, unit = "W/K", fixed = true }\n[states]')
     (folder / "wild.toml").write_text(wild)
-    models = 'wild = { file = "wild.toml" }\none_body      = { file = "model.toml" }\n'
+    models = (
+        'wild = { file = "wild.toml" }\nreduced = { kind = "reduced" }\none_body = { file = "model.toml" }\n'
+    )
     text = EXPERIMENT[: EXPERIMENT.index("reduced ")] + models
     (folder / "experiment.toml").write_text(text)
     out = run(folder / "experiment.toml", folder / "out")
@@ -191,9 +193,9 @@ def test_a_model_that_runs_away_on_an_unseen_recording_is_told_and_last(folder: 
     assert set(entries["wild"]["recordings"]) == {"a", "b"}
     assert "runs away on recording 'c'" in " ".join(entries["wild"]["notes"])
     assert set(entries["one_body"]["recordings"]) == {"a", "b", "c"}
-    assert (out / "predictions" / "c.csv").read_text().splitlines()[0].count("|") == 2
+    assert (out / "predictions" / "c.csv").read_text().splitlines()[0].count("|") == 4
     loaded = load_run(out)
-    assert ranked(loaded) == ["one_body", "wild"]
+    assert ranked(loaded) == ["one_body", "reduced", "wild"]
     assert "“wild” runs away on the unseen recording “c”." in (out / "report.html").read_text()
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import kernel
 from discovery.dynamics.grid import Grid, Memory
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError, UserError
 from discovery.models import Model, expanded
 from discovery.terms import Dual, degree, evaluate, names
 
@@ -174,7 +174,7 @@ def simulate(
         guess: (T, n) trajectory to start Newton from (nonlinear terms only).
 
     Raises:
-        UserError: the trajectory runs away or does not settle.
+        RunsAwayError: the trajectory does not stay finite.
     """
     first = start_values(system, values) if start is None else start
     x = np.tile(first, (len(system.grid.time), 1)) if guess is None else guess
@@ -185,7 +185,7 @@ def simulate(
         which, e, w0, w1 = kernel.transitions(a, system.grid.step)
         new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
         if not np.all(np.abs(new) < _FAR):
-            raise UserError(
+            raise RunsAwayError(
                 f"model '{system.model.name}' runs away on recording '{system.grid.recording}'; "
                 "check signs, bounds and start values of its parameters"
             )

@@ -91,7 +91,9 @@ def unseen_lag(context: Context, h: Hypothesis, attempt: Assessment | None = Non
     """Whether an effect is a lag of a sensor, as an attempt has fitted it, and shorter than the time between
     its readings: these do not tell it from the way of heat through a body that the model takes for one.
     """
-    if h.effect.word != "sensor_lag" or h.output is None:
+    if (
+        h.effect.word != "sensor_lag" or h.output is None or len(h.shapes) != 1
+    ):  # an engineer's own may differ
         return False
     (name,) = h.shapes
     lag = attempt.fit.model.parameters[name].value if attempt else h.shapes[name]

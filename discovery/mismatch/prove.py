@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
 from discovery.dynamics.system import predict
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError
 from discovery.fitting import Noise, predict_recording
 from discovery.mismatch.events import heat_steps
 from discovery.models import Model
@@ -42,7 +42,7 @@ def runs_away(
     for run in recordings:
         try:
             predict_recording(model, campaign, run, outputs, noise.white)
-        except UserError:
+        except RunsAwayError:
             return run
     return None
 

@@ -73,7 +73,7 @@ def ranked(run: Run) -> list[str]:
     models = list(run.results.get("models", {}))
     if not models:
         return []
-    reference = models[0]
+    reference = min(models, key=lambda model: len(astray(run, model)))  # shares the most with the others
     scores = {model: ratio(run, model, reference) for model in models}
 
     def place(model: str) -> tuple[int, float]:

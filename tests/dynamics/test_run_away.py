@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discovery.dynamics import make_grid, make_system, simulate
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -28,5 +28,5 @@ def test_far_is_away(rate: float, runs: bool) -> None:
         x = simulate(make_system(model, grid), model.values()).x
         np.testing.assert_allclose(x[-1, 0], np.exp(5.0), rtol=1e-6)
     else:
-        with pytest.raises(UserError, match="runs away"):
+        with pytest.raises(RunsAwayError, match="runs away"):
             simulate(make_system(model, grid), model.values())
