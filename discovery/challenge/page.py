@@ -11,7 +11,7 @@ from discovery.challenge.document import power_rows, reliability_rows, said, tol
 from discovery.challenge.figures import KINDS, all_figures
 from discovery.challenge.lines import LINES, behind, rows
 from discovery.challenge.methods import WORKBENCH
-from discovery.challenge.scoring import RIGHT
+from discovery.challenge.scoring import NEAR, RIGHT
 from discovery.challenge.tally import Scored, Tally
 from discovery.report.text import counted
 
@@ -75,7 +75,7 @@ def _figures(t: Tally) -> list[tuple[str, str]]:
 def _row(s: Scored) -> dict[str, Any]:
     answer = s.answer or {}
     gap = (answer.get("improvement") or {}).get("explained")
-    rivals = [a for a in answer.get("alternatives", ()) if a["log_evidence_below_best"] <= 3]
+    rivals = [a for a in answer.get("alternatives", ()) if a["log_evidence_below_best"] <= NEAR]
     return {
         "case": s.case,
         "kind": KINDS.get(str(s.key["kind"]), s.key["kind"]),

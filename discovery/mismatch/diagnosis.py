@@ -23,7 +23,7 @@ from discovery.mismatch.locate import Location, locate
 from discovery.mismatch.prove import Improvement, compare, explained, improvements, runs_away
 from discovery.mismatch.search import Search, search
 from discovery.mismatch.selfcheck import false_alarm, named_again
-from discovery.mismatch.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
+from discovery.mismatch.verdict import FAULT, NO_MISMATCH, RIVAL, UNEXPLAINED, Verdict, decide
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.threads import one_thread
@@ -135,7 +135,7 @@ def diagnose(
     unexplained = verdict.word == UNEXPLAINED and bool(before)
     tell("asking for the next experiment")
     white = np.array(noise.white)
-    rivals = [r for n in shown for r in n.rivals if r.below <= 3.0]
+    rivals = [r for n in shown for r in n.rivals if r.below <= RIVAL]
     rival_model = _rival_model(found, rivals[0].hypothesis) if rivals else None
     if verdict.word == NO_MISMATCH:
         question = _smallest(found)

@@ -55,7 +55,8 @@ def prune(context: Context, baseline: Assessment, current: Assessment) -> tuple[
         tried += [without for _, _, without in lost]
         shorter = []
         for h, share, without in lost:
-            largest = max((s for o, s, _ in lost if o is not h and o.effect.is_physics), default=0.0)
+            beside = max((s for o, s, _ in lost if o is not h and o.effect.is_physics), default=0.0)
+            largest = min(beside, gain)  # alone, h may be worse than nothing
             # heat that comes again and again is a sign of its own: the verdict needs to see it
             bar = NAMED + (0.0 if recurs(context, current.hypotheses) else trace(largest))
             if share < bar or (share < SMALL * gain and objections(current, h, gain)):
@@ -99,17 +100,21 @@ def question(
 
 def supported(
     context: Context, current: Assessment, known: Sequence[Assessment] = ()
-) -> tuple[Assessment, list[Assessment]]:
+) -> tuple[Assessment, list[Assessment], list[Hypothesis]]:
     """Drop what helps to fit and not to predict: a cause takes nearly as much off free runs on recordings
     left out of the fit as off the fit itself, or each of them speaks for it clearly. Events of one recording
     say nothing on others and stay; with a single recording all stays.
 
     Args:
         known: refits that were made before and need not be made again.
+
+    Returns:
+        The model, everything tried, what was dropped.
     """
     tried: list[Assessment] = []
+    dropped: list[Hypothesis] = []
     if len(context.recordings) < 2:
-        return current, tried
+        return current, tried, dropped
     while lasting := [h for h in current.hypotheses if h.recording is None]:
         noise = current.best_view.noise
         others = [tuple(o for o in current.hypotheses if o is not h) for h in lasting]
@@ -125,8 +130,9 @@ def supported(
         weakest = unclear[int(np.argmin(shares))]
         if min(shares) >= CARRIED or least_added(context, current, weakest, noise) > BLUNT:
             break
+        dropped += [h for h in current.hypotheses if h not in weakest.hypotheses]
         current = weakest
-    return current, tried
+    return current, tried, dropped
 
 
 def _apart(

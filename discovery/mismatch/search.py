@@ -9,6 +9,7 @@ from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.context import Context
 from discovery.mismatch.evidence import Board, Score
 from discovery.mismatch.gates import bent, matters
+from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.lens import Lens
 from discovery.mismatch.look import attempt, look
 from discovery.mismatch.question import BLUNT, NAMED, prune, question, recurs, supported, trace
@@ -27,6 +28,7 @@ class Search:
     tried: tuple[Assessment, ...]  # without their views
     board: Board  # signatures of all claims on what the baseline leaves
     looks: tuple[tuple[Score, ...], ...]  # claims on each model taken up, last on what the best one leaves
+    dropped: tuple[Hypothesis, ...] = ()  # what helped to fit and did not carry over
 
     @property
     def gain(self) -> float:
@@ -41,7 +43,8 @@ def search(
     begun: Search | None = None,
 ) -> Search:
     """Add effects one by one while each adds evidence, drop what the others have made idle, question each one
-    that is left; where that changed something, see whether more can be added now.
+    that is left; where that changed something, see whether more can be added now. Where an effect did not
+    carry over nothing is added any more: it would be the same one, or one that looks like it.
 
     Args:
         most: effects at once.
@@ -53,10 +56,11 @@ def search(
     whole = look(context, current)
     baseline, looks = current, [whole.claims]
     tried: list[Assessment] = []
+    dropped: list[Hypothesis] = []
     stood = _keys(begun.best) if begun else set()
     if begun:
         noise, near = current.best_view.noise, begun.best.evidence - FAR_BELOW
-        current = assess(context, begun.best.hypotheses, noise, begun.best)
+        current = assess(context, (*begun.best.hypotheses, *begun.dropped), noise, begun.best)
         tried = [_light(assess(context, a.hypotheses, noise, a)) for a in begun.tried if a.evidence > near]
         looks.append(look(context, current).claims)
     for freely in (True, False):
@@ -73,14 +77,15 @@ def search(
             current, more = question(context, current, tried)
             tried += more
         if _keys(current) != stood:  # what carried over once carries over again
-            current, more = supported(context, current, tried)
+            current, more, dropped = supported(context, current, tried)
             tried, stood = tried + more, _keys(current)
         # sizes under the noise that stands beside the answer, not beside the one before
         current = assess(context, current.hypotheses, current.best_view.noise, current)
         looks.append(look(context, current).claims)
-        if _keys(current) == grown:
+        if _keys(current) == grown or dropped:
             break
-    return Search(baseline, current, tuple(_light(a) for a in tried), whole.board, tuple(looks))
+    light = tuple(_light(a) for a in tried)
+    return Search(baseline, current, light, whole.board, tuple(looks), tuple(dropped))
 
 
 def _keys(answer: Assessment) -> set[object]:

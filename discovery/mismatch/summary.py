@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from discovery.mismatch.verdict import RIVAL
+
 
 def summary(path: Path) -> list[str]:
     """Lines that say what a diagnosis.json says."""
@@ -15,7 +17,7 @@ def summary(path: Path) -> list[str]:
         sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q))
         said = f"  {p['effect']} {_place(p)}, probability {p['probability']:.2f}"
         lines.append(f"{said}: {sizes}" if sizes else said)
-    near = [a for a in d["alternatives"] if a["log_evidence_below_best"] <= 3]
+    near = [a for a in d["alternatives"] if a["log_evidence_below_best"] <= RIVAL]
     lines += [f"  could also be {a['effect']} {_place(a)}" for a in near]
     lines += [f"  {reason}" for reason in d["reasons"]]
     if about := d["description"]:

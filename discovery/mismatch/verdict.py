@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
-from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing
-from discovery.mismatch.gates import objections, unseen_lag
+from discovery.mismatch.gates import bent, objections, unseen_lag
 from discovery.mismatch.hypotheses import Hypothesis
-from discovery.mismatch.question import NAMED, recurs, trace
+from discovery.mismatch.question import BLUNT, NAMED, recurs, trace
 from discovery.mismatch.search import Search
 
 Array = NDArray[np.float64]
@@ -80,7 +80,8 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
             )
         if context.outliers:
             return Verdict(FAULT, (), (), (f"single wrong readings ({len(context.outliers)}), nothing else",))
-        return Verdict(NO_MISMATCH, (), (), ("no effect of the catalogue and no free heat adds evidence",))
+        nothing = "no effect of the catalogue and no free heat adds evidence"
+        return Verdict(NO_MISMATCH, (), (), _dropped(found) or (nothing,))
 
     named = tuple(_named(found, h) for h in best.hypotheses)
     named = tuple(sorted(named, key=lambda n: -_weight(found, n.hypothesis)))
@@ -93,15 +94,7 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
             "in the only recording an event cannot be told from what a law slightly off in form leaves; "
             "a second recording to fit would tell"
         )
-    left = [
-        (_added(found, c), c.hypothesis)
-        for c in found.looks[-1]
-        if context.minor(c.hypothesis)[0] <= abs(c.size[0]) <= c.hypothesis.effect.amplitude.most
-        and not unseen_lag(context, c.hypothesis)
-    ]
-    more, other = max(left, key=lambda item: item[0], default=(0.0, None))
-    # what the search takes for the trace of a law slightly off in form is none of significance here
-    if other and more > max(NAMED + trace(found.gain), 0.05 * found.gain):
+    if other := _left(context, found):
         reasons.append(f"{other.effect.word} at {other.where} is still significant after the repair")
     if free_after > max(FREE, 0.1 * found.gain):
         reasons.append(f"free heat at {after[0].state} still explains much after the repair")
@@ -111,7 +104,39 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     if reasons:
         return Verdict(UNEXPLAINED, (), named, tuple(reasons))
     kinds = {n.hypothesis.effect.is_physics for n in named}
-    return Verdict(MISSING if True in kinds else FAULT, named, (), ())
+    return Verdict(MISSING if True in kinds else FAULT, named, (), _dropped(found))
+
+
+def _dropped(found: Search) -> tuple[str, ...]:
+    return tuple(
+        f"{h.effect.word} at {h.where} helps the fit and does not carry over to recordings left out of it"
+        for h in found.dropped
+    )
+
+
+def _left(context: Context, found: Search) -> Hypothesis | None:
+    """What is still significant beside the best model, if anything.
+
+    By the bars of the search: what would be bent to its limit has to add more, and so has what may be the
+    trace of a law slightly off in form. Where something was dropped because it did not carry over, the search
+    had found nothing more beside it.
+    """
+    if found.dropped:
+        return None
+    significant = []
+    for c in found.looks[-1]:
+        h = c.hypothesis
+        usual = context.minor(h)[0] <= abs(c.size[0]) <= h.effect.amplitude.most
+        if not usual or unseen_lag(context, h):
+            continue
+        refit = _beside(found, h)
+        more = refit.evidence - found.best.evidence if refit else c.gain
+        bar = max(NAMED + trace(found.gain + more), 0.05 * found.gain)
+        if refit and any(bent(refit, o) for o in refit.hypotheses if o.key == h.key):
+            bar = max(bar, BLUNT)
+        if more > bar:
+            significant.append((more, h))
+    return max(significant, key=lambda item: item[0])[1] if significant else None
 
 
 def _coarse(context: Context, found: Search, free: float) -> bool:
@@ -123,11 +148,11 @@ def _coarse(context: Context, found: Search, free: float) -> bool:
     return abs(top.size[0]) < context.minor(top.hypothesis)[0] and top.gain > 0.5 * free
 
 
-def _added(found: Search, claim: Score) -> float:
-    """Log evidence of a claim beside the best model: of a refit where it was tried, else at first sight."""
-    keys = {o.key for o in found.best.hypotheses} | {claim.hypothesis.key}
-    refitted = [a.evidence for a in found.tried if {o.key for o in a.hypotheses} == keys]
-    return max(refitted) - found.best.evidence if refitted else claim.gain
+def _beside(found: Search, h: Hypothesis) -> Assessment | None:
+    """The best refit of a claim beside the best model, where it was tried."""
+    keys = {o.key for o in found.best.hypotheses} | {h.key}
+    refits = [a for a in found.tried if {o.key for o in a.hypotheses} == keys]
+    return max(refits, key=lambda a: a.evidence, default=None)
 
 
 def _weight(found: Search, h: Hypothesis) -> float:

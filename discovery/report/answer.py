@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from discovery.report.mismatch import sizes
+from discovery.report.mismatch import NEAR, sizes
 from discovery.report.ranking import astray, cells, is_error, mean_improvement, origin, ranked, ratio
 from discovery.report.run import Run
 from discovery.report.text import counted, listed, number, percent, words
@@ -166,9 +166,7 @@ def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
         chance = "less than 1 in 1000" if p_value < 1e-3 else f"p = {number(p_value, 2)}"
         points.append(f"Chance that a complete model would look this wrong: {chance}.")
     points += _proof(diagnosis) if found else []
-    rivals = [
-        one for one in diagnosis.get("alternatives") or [] if one.get("log_evidence_below_best", 99) < 3
-    ]
+    rivals = [one for one in diagnosis.get("alternatives") or [] if one["log_evidence_below_best"] <= NEAR]
     if rivals:
         points.append(
             f"These recordings cannot tell it from {listed([_effect(one) for one in rivals], 'or')}."

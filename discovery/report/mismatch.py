@@ -11,6 +11,7 @@ from discovery.report.run import Run, pretty_unit
 from discovery.report.text import listed, number, percent, with_unit, words
 
 _MOST_RIVALS = 6
+NEAR = 3.0  # log evidence below which no rival is told apart: `mismatch.verdict.RIVAL`, not loaded here
 _HEAT_NOTE = (
     "What would close the gap, cause unknown, over time and against each input and state (band: 95 %). "
     "What it follows is missing."
@@ -166,16 +167,8 @@ def _windows(run: Run, d: Mapping[str, Any]) -> Printed:
 def _rivals(d: Mapping[str, Any]) -> Printed:
     rows = []
     for one in (d.get("alternatives") or [])[:_MOST_RIVALS]:
-        below = one.get("log_evidence_below_best")
-        judged = (
-            ""
-            if below is None
-            else "cannot be told apart"
-            if below < 3
-            else "less likely"
-            if below < 10
-            else "ruled out"
-        )
+        below = one["log_evidence_below_best"]
+        judged = "cannot be told apart" if below <= NEAR else "less likely" if below < 10 else "ruled out"
         rows.append(Line((words(one["effect"]), _place(one), number(below), judged)))
     return Printed(
         "Rivals",

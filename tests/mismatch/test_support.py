@@ -15,6 +15,8 @@ from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.leftout import least_added, least_taken, left_out
 from discovery.mismatch.look import look
 from discovery.mismatch.question import BLUNT, CLEAR, supported
+from discovery.mismatch.search import Search
+from discovery.mismatch.verdict import decide
 from discovery.models import Model
 from tests.mismatch.machine import SEEN, campaign, model, simulated
 
@@ -40,9 +42,10 @@ def test_what_predicts_nothing_goes(state: str) -> None:
     context, answer = claimed(model(), "bed_memory", state, ("r1", "r2"))
     noise = answer.best_view.noise
     assert left_out(context, answer, noise) > left_out(context, assess(context, ()), noise)
-    kept, tried = supported(context, answer)
+    kept, tried, dropped = supported(context, answer)
     assert kept.hypotheses == ()
     assert kept in tried
+    assert dropped == list(answer.hypotheses)
 
 
 def test_every_recording_speaks_for_a_cause_and_none_for_a_ghost() -> None:
@@ -65,7 +68,43 @@ def test_a_refit_that_is_known_is_not_made_again() -> None:
 def test_a_single_recording_cannot_object() -> None:
     context, answer = claimed(model(), "bed_memory", "motor", ("r1",))
     assert np.isnan(left_out(context, answer, answer.best_view.noise))
-    assert supported(context, answer) == (answer, [])
+    assert supported(context, answer) == (answer, [], [])
+
+
+def test_what_does_not_carry_over_is_told_and_not_held_against_the_answer() -> None:
+    """A left claim beside an answer makes it unexplained, unless it was that one that did not carry over."""
+    baseline = model(wet=False)
+    context, answer = claimed(baseline, "fluid_convection", "table", ("r1", "r2"))
+    _, ghost = claimed(baseline, "bed_memory", "bed", ("r1", "r2"))
+    before, (h,) = assess(context, ()), ghost.hypotheses
+    before = replace(before, evidence=answer.evidence - 100.0)
+    whole = look(context, before)
+    claim = replace(whole.claims[0], hypothesis=h, gain=100.0, size=(context.spread(h)[0],))
+    found = Search(before, answer, (), whole.board, ((claim,), (claim,)))
+    open_ = decide(context, found, (), ())
+    assert open_.word == "unexplained"
+    assert open_.reasons == ("bed_memory at bed is still significant after the repair",)
+    settled = decide(context, replace(found, dropped=(h,)), (), ())
+    assert settled.word == "missing physics"
+    assert [n.hypothesis.effect.word for n in settled.named] == ["fluid_convection"]
+    (told,) = settled.reasons
+    assert told.startswith("bed_memory at bed helps the fit and does not carry over")
+
+
+@pytest.mark.parametrize(("pressed", "word"), [(True, "missing physics"), (False, "unexplained")])
+def test_what_is_bent_to_its_limit_objects_less(
+    pressed: bool, word: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the bar of the search: 28 of a law bent to its limit would not be taken up, and is no objection."""
+    context, answer = claimed(model(wet=False), "fluid_convection", "table", ("r1", "r2"))
+    _, other = claimed(model(), "friction_speed", "motor", ("r1", "r2"))
+    before, (h,) = replace(assess(context, ()), evidence=answer.evidence - 100.0), other.hypotheses
+    whole = look(context, before)
+    claim = replace(whole.claims[0], hypothesis=h, gain=20.0, size=tuple(context.spread(h)))
+    both = replace(assess(context, (*answer.hypotheses, h)), evidence=answer.evidence + 28.0)
+    found = Search(before, answer, (both,), whole.board, ((claim,), (claim,)))
+    monkeypatch.setattr("discovery.mismatch.verdict.bent", lambda _, o: pressed and o.key == h.key)
+    assert decide(context, found, (), ()).word == word
 
 
 def test_the_same_readings_count_in_the_fit_and_outside() -> None:

@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from discovery.challenge import scoring
 from discovery.errors import UserError
+from discovery.mismatch.verdict import RIVAL
 from discovery.models import Parameter
 from discovery.report import equations, write_comparison, write_figures, write_report
 from discovery.report.chart import thinned
+from discovery.report.mismatch import NEAR
 from discovery.report.ranking import ratio
 from discovery.report.run import load_run
 from discovery.report.series import autocorrelation
@@ -249,3 +252,7 @@ def test_autocorrelation_is_that_of_statsmodels() -> None:
 
     values = np.cumsum(np.random.default_rng(1).standard_normal(300))
     np.testing.assert_allclose(autocorrelation(values, 12), acf(values, nlags=12, fft=False)[1:], rtol=1e-10)
+
+
+def test_report_and_engine_mean_the_same_by_a_rival_that_cannot_be_excluded() -> None:
+    assert {NEAR, scoring.NEAR} == {RIVAL}
