@@ -6,6 +6,7 @@ import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +61,11 @@ class Problem:
             self.experiment.campaign, self.experiment.held_out, self.context.outputs, fitted, repaired, noise
         )
         rows = {
-            run: {"rms_before": i.before, "rms_after": i.after, "noise_floor": i.floor}
+            run: {
+                "rms_before": i.before,
+                "rms_after": i.after if isfinite(i.after) else None,
+                "noise_floor": i.floor,
+            }
             for run, i in found.items()
         }
         return {"held_out": rows, "explained": explained(found)}

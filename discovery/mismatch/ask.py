@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 from discovery.dynamics import Trajectory, make_system, simulate
 from discovery.dynamics.grid import Grid, Samples
 from discovery.dynamics.system import predict
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError
 from discovery.mismatch.context import Context
 from discovery.models import Model
 
 Array = NDArray[np.float64]
 
 DECISIVE = 3.0  # log evidence that settles a question
-HOURS = 12.0
-READ_EVERY = 600.0  # s
+LONGEST = 12 * 3600.0  # s, a shift on a machine tool; less where recordings are shorter
+STEPS, READINGS = 720, 72  # of inputs and readings in a pattern
+HOPELESS = 16  # times the pattern would have to be repeated
 
 
 def next_experiment(context: Context, answer: Model, rival: Model | None, white: Array) -> str:
@@ -27,18 +28,19 @@ def next_experiment(context: Context, answer: Model, rival: Model | None, white:
     Without a rival the answer is compared with the refitted baseline, as a confirmation.
     """
     other = rival or context.baseline.model
+    length = min(LONGEST, max(float(g.time[-1] - g.time[0]) for g in context.grids.values()))
     results: list[tuple[float, str, Trajectory, Trajectory]] = []
-    for text, samples in _designs(context).items():
+    for text, inputs in _designs(context, length).items():
         try:
-            a, b = _run(context, answer, samples), _run(context, other, samples)
-        except UserError:
+            a, b = _run(context, answer, inputs, length), _run(context, other, inputs, length)
+        except RunsAwayError:
             continue
         separation = 0.5 * float(np.sum(((predict(a) - predict(b)) / white) ** 2))
         results.append((separation, text, a, b))
     if not results:
         return "record the machine longer, with every input moving on its own"
     separation, text, a, b = max(results, key=lambda r: r[0])
-    hours = HOURS * DECISIVE / max(separation, 1e-9)
+    needed = length * DECISIVE / max(separation, 1e-9)
     shared = [
         s
         for s in a.system.states
@@ -50,11 +52,12 @@ def next_experiment(context: Context, answer: Model, rival: Model | None, white:
     }
     sensor = max(spread, key=lambda s: spread[s]) if spread else None
     purpose = "tells the rivals apart" if rival else "would confirm the answer"
-    if hours > 200:
-        sentence = f"no input pattern of {HOURS:.0f} h {purpose} with the errors alone"
+    every = length / READINGS
+    if needed > HOPELESS * length:
+        sentence = f"no input pattern of {_told(length)} {purpose} with these outputs alone"
     else:
         sentence = (
-            f"{text}: {purpose} within about {max(hours, READ_EVERY / 3600):.1f} h of readings every 10 min"
+            f"{text}: {purpose} within about {_told(max(needed, every))} of readings every {_told(every)}"
         )
     if sensor and spread[sensor] > 0.02:
         apart = f"the two answers differ there by {spread[sensor]:.2f} K rms"
@@ -62,62 +65,71 @@ def next_experiment(context: Context, answer: Model, rival: Model | None, white:
     return sentence
 
 
-def _designs(context: Context) -> dict[str, Mapping[str, Array]]:
-    """Patterns of 12 h in words, with each input on a grid of minutes."""
-    time = np.arange(0.0, HOURS * 3600 + 1, 60.0)
+def _told(seconds: float) -> str:
+    """A duration as one says it."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.2g} s"
+
+
+def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
+    """Patterns in words, each input at the instants of the pattern: of what this machine has to be moved."""
+    time = np.linspace(0.0, length, STEPS + 1)
     channels = context.campaign.channels
-    known = context.grids[context.recordings[0]].samples
-    middle = {
-        n: float(np.median(np.concatenate([context.grids[r].samples[n].value for r in context.recordings])))
-        for n in known
+    series = {
+        n: np.concatenate([context.grids[r].samples[n].value for r in context.recordings])
+        for n in context.grids[context.recordings[0]].samples
     }
-    high = {
-        n: float(
-            np.quantile(np.concatenate([context.grids[r].samples[n].value for r in context.recordings]), 0.95)
-        )
-        for n in known
-    }
-    roles = {n: channels[n].role for n in known}
-    on = ((time // 7200) % 2 == 0).astype(float)
-    quick = ((time // 3600) % 2 == 0).astype(float)
+    roles = {n: channels[n].role for n in series}
 
     def build(speed: Array, load: Array, pump: Array, warm: bool) -> dict[str, Array]:
+        share = {
+            "rotation speed": speed,
+            "heat load": load,
+            "cooling power": load,
+            "fluid flow": pump,
+            "fluid temperature": np.ones(len(time)) if warm else None,
+        }
         out = {}
         for n, role in roles.items():
-            level = np.full(len(time), middle[n])
-            if role == "rotation speed":
-                level = speed * high[n]
-            elif role in ("heat load", "cooling power"):
-                level = load * high[n]
-            elif role == "fluid flow":
-                level = pump * high[n]
-            elif role == "fluid temperature" and warm:
-                level = np.full(len(time), high[n])
-            out[n] = level
+            moved = share.get(role)
+            level = np.quantile(series[n], 0.95) if moved is not None else np.median(series[n])
+            out[n] = level * (np.ones(len(time)) if moved is None else moved)
         return out
 
-    zero, one, first = np.zeros(len(time)), np.ones(len(time)), (time < HOURS * 1800).astype(float)
-    wanted: dict[str, dict[str, Array]] = {}
-    if any(r == "fluid flow" for r in roles.values()):
-        wanted["switch the pump every 2 h at standstill with warm fluid"] = build(zero, zero, on, True)
-        wanted["switch the pump every 2 h at full speed"] = build(one, one, on, False)
-        wanted["step the speed every hour with the pump running"] = build(quick, quick, one, False)
-    if any(r in ("rotation speed", "heat load") for r in roles.values()):
-        wanted["run 6 h at full load dry, then stand still for 6 h"] = build(first, first, zero, False)
-        wanted["step speed and load every hour, dry"] = build(quick, quick, zero, False)
-        wanted["run at half speed and full load, dry"] = build(0.5 * one, one, zero, False)
-    wanted["stand still and let the machine follow the room"] = build(zero, zero, zero, False)
-    return dict(wanted)
+    zero, one, first = np.zeros(len(time)), np.ones(len(time)), (time < length / 2).astype(float)
+    sixth, twelfth = (((time // (length / n)) % 2 == 0).astype(float) for n in (6, 12))
+    speed, load, pump = (r in roles.values() for r in ("rotation speed", "heat load", "fluid flow"))
+    moving = " and ".join(word for word, there in (("speed", speed), ("load", load)) if there)
+    dry, still = ", dry" if pump else "", "stand still" if speed else "leave everything off"
+    half, two, hour = (_told(length / n) for n in (2, 6, 12))
+    wanted: dict[str, Mapping[str, Array]] = {}
+    if pump:
+        wanted[f"switch the pump every {two} at standstill with warm fluid"] = build(zero, zero, sixth, True)
+    if pump and moving:
+        wanted[f"switch the pump every {two} at full {moving}"] = build(one, one, sixth, False)
+        wanted[f"step the {moving} every {hour} with the pump running"] = build(twelfth, twelfth, one, False)
+    if moving:
+        wanted[f"run {half} at full {moving}{dry}, then {still} for {half}"] = build(
+            first, first, zero, False
+        )
+        wanted[f"step {moving} every {hour}{dry}"] = build(twelfth, twelfth, zero, False)
+    if speed and load:
+        wanted[f"run at half speed and full load{dry}"] = build(0.5 * one, one, zero, False)
+    wanted[f"{still} and follow the room"] = build(zero, zero, zero, False)
+    return wanted
 
 
-def _run(context: Context, model: Model, inputs: Mapping[str, Array]) -> Trajectory:
-    time = np.arange(0.0, HOURS * 3600 + 1, 60.0)
+def _run(context: Context, model: Model, inputs: Mapping[str, Array], length: float) -> Trajectory:
+    """A model under a pattern of inputs, started where the first recording was."""
+    time = np.linspace(0.0, length, STEPS + 1)
     samples = {
         n: Samples(time, v, context.campaign.channels[n].between == "linear") for n, v in inputs.items()
     }
-    read = np.arange(0, len(time), int(READ_EVERY // 60))
-    grid = Grid(
-        "design", time, samples, context.outputs, read, np.full((len(read), len(context.outputs)), np.nan)
-    )
-    system = make_system(model, grid)
-    return simulate(system, model.values("design"))
+    read = np.arange(0, STEPS + 1, STEPS // READINGS)
+    readings = np.full((len(read), len(context.outputs)), np.nan)
+    known = context.grids[context.recordings[0]].readings
+    readings[0] = [next((v for v in column if np.isfinite(v)), np.nan) for column in known.T]
+    grid = Grid("next experiment", time, samples, context.outputs, read, readings)
+    return simulate(make_system(model, grid), model.values(grid.recording))

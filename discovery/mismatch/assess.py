@@ -70,7 +70,8 @@ def refit(
         sizes: amplitudes to start from.
     """
     model, priors = context.model, {}
-    for h in chosen:
+    # what moves the zero of a sensor comes behind what smooths it: no lag makes a slope of a jump
+    for h in sorted(chosen, key=lambda h: h.shifts_the_zero):
         model = h.added_to(model)
         for name, sd in zip(h.amplitudes, context.spread(h), strict=True):
             if h.effect.amplitude.fixed is None:

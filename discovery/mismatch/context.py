@@ -73,10 +73,14 @@ class Context:
                 size if u in ("um", "um/m") or h.effect.amplitude.unit == "1" else min(size, 10 * level[name])
                 for u, name in zip(unit, h.shown, strict=True)
             )[: len(h.amplitudes)]
-        trajectory = self.baseline.trajectories[0]
-        values = {**trajectory.at_ends(), **h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
+        runs = [
+            t for t in self.baseline.trajectories if h.recording in (None, t.system.grid.recording)
+        ]  # the largest counts: one recording may be dry, and which comes first says nothing
+        ones = {**h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
         unit_flow = max(
-            _rms(evaluate(t.expression, values, memory=trajectory.system.ends).value) for t in h.terms
+            _rms(evaluate(t.expression, {**run.at_ends(), **ones}, memory=run.system.ends).value)
+            for run in runs
+            for t in h.terms
         )
         largest = max(self.flows.values())
         return (min(size, largest / unit_flow) if unit_flow > 0 else size,) * len(h.amplitudes)

@@ -20,7 +20,7 @@ from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.locate import Location, locate
-from discovery.mismatch.prove import Improvement, compare, explained, improvements, runs_away
+from discovery.mismatch.prove import Improvement, compare, explained, improvements
 from discovery.mismatch.search import Search, search
 from discovery.mismatch.selfcheck import false_alarm, named_again
 from discovery.mismatch.verdict import FAULT, NO_MISMATCH, RIVAL, UNEXPLAINED, Verdict, decide
@@ -95,7 +95,8 @@ def diagnose(
         UserError: a model that does not run, or recordings without readings.
     """
     began = clock.perf_counter()
-    outputs = tuple(outputs or [n for n in (*model.outputs, *model.states) if n in campaign.channels])
+    shared = [n for n in {**model.outputs, **model.states} if n in campaign.channels]
+    outputs = tuple(dict.fromkeys(outputs or shared))
     outputs = tuple(n for n in outputs if n in model.outputs or n in model.states)
     if not outputs:
         raise UserError(f"model '{model.name}' predicts no measured channel; name one under [outputs]")
@@ -121,17 +122,12 @@ def diagnose(
     old = delivered(context, found.baseline)
     new = delivered(context, found.best) if verdict.named else old
     noise = found.best.best_view.noise
-    proved = [r for r in held_out if not runs_away(old.fit.model, campaign, (r,), outputs, noise)]
-    if away := runs_away(new.fit.model, campaign, proved, outputs, noise) if verdict.named else None:
-        # a reading sets its start and no more; a law under which a machine explodes is none
-        reason = f"with it the model runs away on recording '{away}'"
-        verdict, new = Verdict(UNEXPLAINED, (), verdict.named, (reason,)), old
-    if lost := ", ".join(r for r in held_out if r not in proved):
-        reason = f"the model itself runs away on unseen recording {lost}: nothing can be proved there"
-        verdict = replace(verdict, reasons=(*verdict.reasons, reason))
     repaired = written(new) if verdict.named else None
     tell("proving on held-out recordings")
-    proof = improvements(campaign, proved, outputs, old.fit.model, new.fit.model, noise)
+    proof = improvements(campaign, held_out, outputs, old.fit.model, new.fit.model, noise)
+    if lost := ", ".join(r for r in held_out if r not in proof):
+        reason = f"the model itself runs away on unseen recording {lost}: nothing can be proved there"
+        verdict = replace(verdict, reasons=(*verdict.reasons, reason))
     unexplained = verdict.word == UNEXPLAINED and bool(before)
     tell("asking for the next experiment")
     white = np.array(noise.white)

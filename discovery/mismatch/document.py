@@ -106,9 +106,11 @@ def document(d: Diagnosis) -> dict[str, Any]:
                     "noise_floor": _number(i.floor),
                     "gain_low": _number(i.low),
                     "gain_high": _number(i.high),
+                    **({"runs_away": True} if np.isinf(i.after) else {}),
                 }
                 for run, i in d.held_out.items()
             },
+            "contradicted_by": [run for run, i in d.held_out.items() if d.repaired and i.contradicts],
             "explained": _number(d.explained, 4),
         },
         "set_aside": [
@@ -176,7 +178,9 @@ def _physics(d: Diagnosis, n: Named, checked: float | None) -> dict[str, Any]:
             "high": _number(value if p.fixed else high),
             "unit": p.unit,
         }
-    expressions = [text(t.expression) for t in h.terms] or [text(e) for e in h.shown.values()]
+    expressions = [text(t.expression) for t in h.terms] or [
+        text(e) for e in h.shows(d.context.model).values()
+    ]
     return {
         "effect": h.effect.word,
         "title": h.effect.title,

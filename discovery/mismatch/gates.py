@@ -13,6 +13,8 @@ BLOCKS = 12  # per recording, in which an effect is asked for its size
 STEADY = 6.0  # log evidence for a size that changes with time beyond which the form is wrong
 FORM = 0.03  # share of the gain that a law slightly off in form may leave unsteady
 ALIKE = 0.8  # squared correlation of a window with an input from which the two cannot be told apart
+AROUND = 8  # readings on each side in which a jump has to show
+JUMPS = ("sensor_offset", "rezero")
 PRESSED = 0.03  # relative distance from the end of a physical range
 
 
@@ -26,6 +28,8 @@ def objections(best: Assessment, h: Hypothesis, gain: float) -> list[str]:
     limit = STEADY + FORM * max(gain, 0.0)
     found = (
         bent(best, h),
+        _untold(best, h),
+        _no_jump(best, h),
         _is_an_input(best, h),
         _unsteady(best, h, 1, limit, "from recording to recording"),
         _unsteady(best, h, BLOCKS, limit, "with time"),
@@ -52,6 +56,60 @@ def bent(attempt: Assessment, h: Hypothesis) -> str | None:
             size = f"{shape.name} = {value:.3g} {shape.unit}"
             return f"{h.effect.word} would need {size}, at the end of what is physical"
     return None
+
+
+def _untold(best: Assessment, h: Hypothesis) -> str | None:
+    """A sentence when an effect whose only size is a time or a width could as well be nearly none."""
+    if h.effect.amplitude.fixed is None or len(h.shapes) != 1 or h.recording is not None:
+        return None
+    (name,) = h.shapes
+    p = best.model.parameters[name]
+    if p.low is None or p.high is None or p.high - p.low < 2 * abs(p.value):
+        return None
+    return f"{h.effect.word}: these data do not tell {name}, {p.low:.3g} to {p.high:.3g} {p.unit}"
+
+
+def _no_jump(best: Assessment, h: Hypothesis) -> str | None:
+    """A sentence when a sensor said to have jumped shows no jump, only a slope, in the readings around.
+
+    Around the instant each output gets a line of its own and a step; the steps have to be half of what is
+    claimed, within twice their error.
+    """
+    if h.effect.word not in JUMPS or h.recording is None:
+        return None
+    trajectory, residual = next(
+        (t, r)
+        for t, r in zip(best.fit.trajectories, best.lens.residuals, strict=True)
+        if t.system.grid.recording == h.recording
+    )
+    grid, parameters = trajectory.system.grid, best.model.parameters
+    time, (instant,) = grid.time[grid.read], (parameters[n].values[h.recording] for n in h.shapes)
+    seen = claimed = 0.0
+    for name, amplitude in zip(h.shown, h.amplitudes, strict=True):
+        y, size = grid.outputs.index(name), parameters[amplitude].values[h.recording]
+        known = np.flatnonzero(np.isfinite(residual[:, y]))
+        k = int(np.searchsorted(time[known], instant))
+        near = known[max(0, k - AROUND) : k + AROUND]
+        if len(near) < 6:
+            continue
+        step = (time[near] >= instant).astype(float)
+        line = np.column_stack([np.ones(len(near)), time[near] - instant])
+        left, values = (
+            v - line @ np.linalg.lstsq(line, v, rcond=None)[0]
+            for v in (step, residual[near, y] + size * step)
+        )
+        slope = float(left @ values) / max(float(left @ left), 1e-12)
+        # what the fit takes for noise may be its own misfit: here the scatter around counts
+        scatter = float(np.sum((values - slope * left) ** 2)) / (len(near) - 3)
+        white = best.best_view.noise.white[best.best_view.noise.outputs.index(name)]
+        weight = size / max(min(white**2, scatter), 1e-4 * white**2)
+        seen += weight * float(left @ values)
+        claimed += weight * size * float(left @ left)
+    # `claimed` is also the variance of `seen`: each step is weighed by its size over its noise
+    if claimed <= 0 or seen + 2 * np.sqrt(claimed) > 0.5 * claimed:
+        return None
+    share = f"{100 * max(seen / claimed, 0.0):.0f} %"
+    return f"{h.effect.word}: the readings around show {share} of the jump, the rest is a slope"
 
 
 def _is_an_input(best: Assessment, h: Hypothesis) -> str | None:

@@ -13,12 +13,15 @@ from discovery.models.dimensions import differences, same_dimension
 from discovery.recordings import Channel
 from discovery.terms import Apply, Expression, Name, Term, names, parse, substitute
 
+BEFORE = Name("what the output showed before")  # no channel has such a name
+
 
 @dataclass(frozen=True)
 class Hypothesis:
     """An effect at a place with its shape parameters at given values.
 
-    `terms` enter states, `shown` is what outputs show in addition; both hold the amplitudes and shapes as
+    `terms` enter states; `shown` is what outputs show in addition, in terms of what they showed before
+    (`BEFORE`), or by how much they see the body of `states` moved. Both hold the amplitudes and shapes as
     parameters.
     """
 
@@ -49,6 +52,11 @@ class Hypothesis:
         """The places, or the recording of what concerns all of it."""
         return ", ".join(self.places) or self.recording or "all recordings"
 
+    @property
+    def shifts_the_zero(self) -> bool:
+        """Whether outputs are shifted by something that does not depend on what they showed before."""
+        return any(BEFORE.id not in names(change) for change in self.shown.values()) and not self.states
+
     def at(self, shapes: Mapping[str, float]) -> Hypothesis:
         """The same claim with other shape values."""
         return replace(self, shapes={**self.shapes, **shapes})
@@ -72,10 +80,23 @@ class Hypothesis:
             parameters[name] = self._parameter(
                 name, start.get(name, value), shape.low, shape.high, shape.fixed
             )
-        outputs = {}
-        for name, extra in self.shown.items():
-            outputs[name] = Apply("+", (model.outputs.get(name, Name(name)), extra))
+        outputs = {
+            name: Apply("+", (model.outputs.get(name, Name(name)), extra))
+            for name, extra in self.shows(model).items()
+        }
         return model.with_terms(*self.terms, parameters=parameters, outputs=outputs)
+
+    def shows(self, model: Model) -> dict[str, Expression]:
+        """What outputs show in addition where the effect comes to a model: whatever else that one has."""
+        found: dict[str, Expression] = {}
+        for name, change in self.shown.items():
+            y = model.outputs.get(name, Name(name))
+            if self.states:
+                moved = Apply("+", (Name(self.states[0]), change))
+                found[name] = Apply("-", (substitute(y, {self.states[0]: moved}), y))
+            else:
+                found[name] = substitute(change, {BEFORE.id: y})
+        return found
 
     def _parameter(self, name: str, value: float, low: float, high: float, fixed: bool) -> Parameter:
         unit = self.units.get(name, "1")
@@ -220,13 +241,8 @@ def _claim(
             )
     elif shown:
         for name, size in zip(shown, amplitudes if several else amplitudes * len(shown), strict=True):
-            y = model.outputs.get(name, Name(name))
-            bodies = {"body": Name(states[0])} if states else {"y": y}
-            change = substitute(formula, {**base, **bodies, effect.amplitude.name: Name(size)})
-            if states:
-                seen = substitute(y, {states[0]: Apply("+", (Name(states[0]), change))})
-                change = Apply("-", (seen, y))
-            extra[name] = change
+            at = {"body": Name(states[0])} if states else {"y": BEFORE}
+            extra[name] = substitute(formula, {**base, **at, effect.amplitude.name: Name(size)})
     else:
         bodies = {"body": Name(states[0]), **({"other": Name(states[1])} if len(states) > 1 else {})}
         expression = substitute(formula, {**base, **bodies, effect.amplitude.name: amplitude})

@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 
 from discovery.dynamics.system import predict
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError
 from discovery.evaluation.crossvalidation import folds
 from discovery.fitting import Noise, predict_recording
 from discovery.mismatch.assess import Assessment, assess, misfits, refit
@@ -33,7 +33,7 @@ def left_out(context: Context, answer: Assessment, noise: Noise) -> float:
     for left, seen in _folds(context):
         try:
             model = refit(seen, _known(answer, seen), noise, answer).model
-        except UserError:  # the others alone do not hold it: it runs away
+        except RunsAwayError:  # the others alone do not hold it: it runs away
             return inf
         for name in (r for r in left if r not in events):
             run = predict_recording(
@@ -56,7 +56,7 @@ def least_added(context: Context, answer: Assessment, without: Assessment, noise
     for _, seen in _folds(context):
         try:
             a, b = (assess(seen, _known(o, seen), noise, o).evidence for o in (answer, without))
-        except UserError:
+        except RunsAwayError:
             return -inf
         added.append(gain - (a - b))
     return min(added)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError
+from discovery.fitting import Noise
 from discovery.mismatch.assess import WIDE, Assessment, assess
 from discovery.mismatch.context import Context
 from discovery.mismatch.events import place_events
@@ -63,7 +64,20 @@ def attempt(
     if claim and claim.effect.amplitude.fixed is None:
         start = dict(zip(claim.amplitudes, sizes, strict=True))
     chosen = (*others, claim) if claim else others
+    return again(context, current, chosen, current.best_view.noise, start)
+
+
+def again(
+    context: Context,
+    start: Assessment,
+    chosen: tuple[Hypothesis, ...],
+    noise: Noise,
+    sizes: dict[str, float] | None = None,
+) -> Assessment | None:
+    """Refit with a set of effects from where an assessment stands; None where the model runs away: what it
+    cannot run with is no explanation.
+    """
     try:
-        return assess(context, chosen, current.best_view.noise, current, start)
-    except UserError:  # a combination under which the model runs away is no explanation
+        return assess(context, chosen, noise, start, sizes)
+    except RunsAwayError:
         return None

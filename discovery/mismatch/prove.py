@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,8 @@ CLOSABLE = 1.03  # rms over the noise floor from which a recording holds a misma
 class Improvement:
     """Residual rms of a recording before and after the repair, and what no model can go below.
 
-    `low` and `high` bound the improvement of the rms (before - after) by block bootstrap, 95 %.
+    `low` and `high` bound the improvement of the rms (before - after) by block bootstrap, 95 %. `after` is
+    infinite where the repaired model runs away.
     """
 
     before: float
@@ -34,17 +36,10 @@ class Improvement:
     low: float
     high: float
 
-
-def runs_away(
-    model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], noise: Noise
-) -> str | None:
-    """The first recording on which a model has no free run: a matter of its inputs, whatever was read."""
-    for run in recordings:
-        try:
-            predict_recording(model, campaign, run, outputs, noise.white)
-        except RunsAwayError:
-            return run
-    return None
+    @property
+    def contradicts(self) -> bool:
+        """Whether the recording is predicted worse than without the repair, beyond chance."""
+        return self.high < 0
 
 
 def improvements(
@@ -58,14 +53,27 @@ def improvements(
     """Free runs on each recording, zeroed on the first reading alone.
 
     rms is over all outputs, each weighed by its reading noise and scaled back to the mean noise, so that um
-    and um/m count alike.
+    and um/m count alike. A recording on which the model runs away before the repair proves nothing and is
+    left out.
     """
     out = {}
     for run in recordings:
-        old = predict_recording(before, campaign, run, outputs, noise.white)
-        new = predict_recording(after, campaign, run, outputs, noise.white)
-        out[run] = compare(old, new, noise)
+        old = _free_run(before, campaign, run, outputs, noise)
+        new = _free_run(after, campaign, run, outputs, noise)
+        if old and new:
+            out[run] = compare(old, new, noise)
+        elif old:
+            out[run] = replace(compare(old, old, noise), after=inf, low=-inf, high=-inf)
     return out
+
+
+def _free_run(
+    model: Model, campaign: Campaign, run: str, outputs: Sequence[str], noise: Noise
+) -> Trajectory | None:
+    try:
+        return predict_recording(model, campaign, run, outputs, noise.white)
+    except RunsAwayError:
+        return None
 
 
 def compare(old: Trajectory, new: Trajectory, noise: Noise) -> Improvement:

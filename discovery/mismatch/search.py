@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.context import Context
 from discovery.mismatch.evidence import Board, Score
-from discovery.mismatch.gates import bent, matters
+from discovery.mismatch.gates import bent, matters, unseen_lag
 from discovery.mismatch.hypotheses import Hypothesis
 from discovery.mismatch.lens import Lens
-from discovery.mismatch.look import attempt, look
+from discovery.mismatch.look import again, attempt, look
 from discovery.mismatch.question import BLUNT, NAMED, prune, question, recurs, supported, trace
 
 REFITS = 6  # claims that are refitted at each step
@@ -60,8 +60,10 @@ def search(
     stood = _keys(begun.best) if begun else set()
     if begun:
         noise, near = current.best_view.noise, begun.best.evidence - FAR_BELOW
-        current = assess(context, (*begun.best.hypotheses, *begun.dropped), noise, begun.best)
-        tried = [_light(assess(context, a.hypotheses, noise, a)) for a in begun.tried if a.evidence > near]
+        chosen = (*begun.best.hypotheses, *begun.dropped)
+        current = again(context, begun.best, chosen, noise) or current
+        known = [again(context, a, a.hypotheses, noise) for a in begun.tried if a.evidence > near]
+        tried = [_light(a) for a in known if a]
         looks.append(look(context, current).claims)
     for freely in (True, False):
         before = _keys(current)
@@ -138,15 +140,16 @@ def _grow(
 def _step(context: Context, attempts: Sequence[Assessment], before: float) -> Assessment:
     """The attempt to go on with: the best of those that pass, unless the very best adds far more.
 
-    An attempt passes when its law is not bent to its limit, its size matters and it acts in every
-    recording. One that does not pass gives way to another that adds half as much, and, where it is a minor
-    size that wins, far
-    more than a coarse model would show.
+    An attempt passes when its law is not bent to its limit, its size matters (a short lag of a sensor: adds
+    more than a coarse model would show) and it acts in every recording. One that does not pass gives way to
+    another that adds half as much, and, where it is a minor size that wins, far more than a coarse model
+    would show.
     """
 
     def passes(a: Assessment) -> bool:
         h = a.hypotheses[-1]
-        return matters(context, a, h) and bent(a, h) is None and h.recording is None
+        clear = unseen_lag(context, h, a) and a.evidence - before > BLUNT
+        return (clear or matters(context, a, h)) and bent(a, h) is None and h.recording is None
 
     best = max(attempts, key=lambda a: a.evidence)
     minor = not matters(context, best, best.hypotheses[-1])

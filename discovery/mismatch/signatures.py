@@ -38,7 +38,7 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
             columns.append(Column(owner, term.into, np.asarray(series, dtype=float), term.source))
         if h.shown:
             nodes = nodes if nodes is not None else trajectory.at_nodes()
-            for k, (name, expression) in enumerate(h.shown.items()):
+            for k, (name, expression) in enumerate(h.shows(system.model).items()):
                 column = owner + (k if len(h.amplitudes) > 1 else 0)
                 series = evaluate(expression, {**nodes, **values}, memory=system.nodes).value
                 at_reading = np.broadcast_to(np.asarray(series, dtype=float), system.grid.time.shape)[

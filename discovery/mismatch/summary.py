@@ -12,7 +12,7 @@ from discovery.mismatch.verdict import RIVAL
 def summary(path: Path) -> list[str]:
     """Lines that say what a diagnosis.json says."""
     d: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    lines = [f"{d['verdict']}: what '{d['model']}' leaves out"]
+    lines = [f"{d['verdict']} in '{d['model']}'"]
     for p in d["physics"]:
         sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q))
         said = f"  {p['effect']} {_place(p)}, probability {p['probability']:.2f}"
@@ -23,9 +23,13 @@ def summary(path: Path) -> list[str]:
     if about := d["description"]:
         what = f"the missing heat at {about['state']} follows {about['formula']}"
         lines.append(f"  {what} (a description, not a cause)")
+    worse = d["improvement"]["contradicted_by"]
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
-        rms = f"rms {i['rms_before']:.3g} -> {i['rms_after']:.3g} (noise {i['noise_floor']:.3g})"
-        lines.append(f"  unseen recording {run}: {rms}")
+        after = "runs away" if i["rms_after"] is None else f"{i['rms_after']:.3g}"
+        rms = f"rms {i['rms_before']:.3g} -> {after} (noise {i['noise_floor']:.3g})"
+        lines.append(f"  unseen recording {run}: {rms}{', worse than without' if run in worse else ''}")
+    if worse:
+        lines.append("  do not use the repaired model: unseen recordings contradict it; fit more recordings")
     lines.append(f"  next: {d['next_experiment']}")
     return lines
 

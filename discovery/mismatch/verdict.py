@@ -25,6 +25,8 @@ RIVAL = 3.0  # log evidence within which a rival stays in the answer
 TRUST = 0.6  # evidence ratios are tempered: models are never exact
 DOUBT = 0.02  # share of the answer that stays with causes outside the catalogue
 
+MUCH = 3.0  # times the reading noise: a machine that leaves so much in no pattern is not well modelled
+
 NO_MISMATCH, MISSING, FAULT, UNEXPLAINED = (
     "no mismatch",
     "missing physics",
@@ -81,15 +83,15 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
         if context.outliers:
             return Verdict(FAULT, (), (), (f"single wrong readings ({len(context.outliers)}), nothing else",))
         nothing = "no effect of the catalogue and no free heat adds evidence"
-        return Verdict(NO_MISMATCH, (), (), _dropped(found) or (nothing,))
+        return Verdict(NO_MISMATCH, (), (), (*(_dropped(found) or (nothing,)), *_much(best)))
 
     named = tuple(_named(found, h) for h in best.hypotheses)
     named = tuple(sorted(named, key=lambda n: -_weight(found, n.hypothesis)))
     reasons = []
     if recurs(context, best.hypotheses):
         reasons.append("unrecorded events come again and again: a cause, not an event")
-    lasting = {h.recording is None for h in best.hypotheses if h.effect.is_physics}
-    if len(context.recordings) == 1 and lasting == {True, False}:
+    heated = any(h.recording and h.effect.word == "unmeasured_heat" for h in best.hypotheses)
+    if len(context.recordings) == 1 and heated and any(h.recording is None for h in best.hypotheses):
         reasons.append(
             "in the only recording an event cannot be told from what a law slightly off in form leaves; "
             "a second recording to fit would tell"
@@ -105,6 +107,17 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
         return Verdict(UNEXPLAINED, (), named, tuple(reasons))
     kinds = {n.hypothesis.effect.is_physics for n in named}
     return Verdict(MISSING if True in kinds else FAULT, named, (), _dropped(found))
+
+
+def _much(best: Assessment) -> tuple[str, ...]:
+    """A sentence where much is left that only everyday heat and slow noise account for."""
+    times = best.rms()
+    if times < MUCH:
+        return ()
+    return (
+        f"what is left is {times:.1f} times the reading noise: irregular, or too few recordings to tell from "
+        "everyday heat",
+    )
 
 
 def _dropped(found: Search) -> tuple[str, ...]:

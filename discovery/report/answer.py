@@ -156,13 +156,13 @@ def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
     sentence = f"{lead} in “{model}”"
     if found:
         sentence += f": {listed([_effect(one) for one in found])}"
-    worse = contradicted(diagnosis)
+    worse = (diagnosis.get("improvement") or {}).get("contradicted_by") or []
     if worse:
         contradict = "contradicts" if len(worse) == 1 else "contradict"
         sentence += f"; but the unseen {listed([f'“{name}”' for name in worse])} {contradict} the repair"
     points = [f"Size of {words(one['effect'])}: {listed(sizes(one))}." for one in found if sizes(one)]
     p_value = diagnosis.get("detection", {}).get("p_value")
-    if p_value is not None:
+    if p_value is not None and verdict != "no mismatch":  # the first look alone, not the answer
         chance = "less than 1 in 1000" if p_value < 1e-3 else f"p = {number(p_value, 2)}"
         points.append(f"Chance that a complete model would look this wrong: {chance}.")
     points += _proof(diagnosis) if found else []
@@ -197,7 +197,7 @@ def _proof(diagnosis: Mapping[str, Any]) -> list[str]:
             f"{listed(each)}."
         )
     explained = improvement.get("explained")
-    if contradicted(diagnosis):
+    if improvement.get("contradicted_by"):
         points.append(
             "There it is worse than without: what is named fits the recordings at hand and may be no more "
             "than that. Do not use the repaired model; fit more recordings, each input moving on its own."
@@ -206,10 +206,3 @@ def _proof(diagnosis: Mapping[str, Any]) -> list[str]:
         share = percent(explained) if explained >= 0.005 else "nothing"
         points.append(f"The repair closes {share} of the gap that can be closed there.")
     return points
-
-
-def contradicted(diagnosis: Mapping[str, Any]) -> list[str]:
-    """Unseen recordings that the repair predicts worse than the model did before it, beyond chance."""
-    held = (diagnosis.get("improvement") or {}).get("held_out") or {}
-    worse = {name: one.get("gain_high") for name, one in held.items() if diagnosis.get("physics")}
-    return [name for name, gain in worse.items() if gain is not None and gain < 0]

@@ -94,7 +94,7 @@ def _proof(d: Mapping[str, Any]) -> Printed:
             (
                 name,
                 number(one["rms_before"]),
-                number(one.get("rms_after")),
+                "runs away" if one.get("runs_away") else number(one.get("rms_after")),
                 number(one.get("noise_floor")),
                 _gain(one),
             )

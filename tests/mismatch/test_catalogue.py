@@ -16,6 +16,7 @@ from discovery.mismatch.catalogue import Effect, catalogue
 from discovery.mismatch.catalogue.effect import ROLE_OF
 from discovery.mismatch.catalogue.worked import worked
 from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.scales import scaled
 from discovery.models import Model, read_model, write_model
 from discovery.models.dimensions import check_dimensions
 from discovery.recordings.roles import ROLES
@@ -173,3 +174,13 @@ def test_terms_carry_the_word(effect: Effect) -> None:
         assert all(t.effect == effect.word for t in h.terms)
         assert h.terms or h.shown
         assert not (h.terms and h.shown)
+
+
+def test_slow_masses_are_those_of_what_was_recorded_for_weeks() -> None:
+    """Three days change nothing; walls that are recorded for twelve days may take a day."""
+    mass, lag = catalogue()["second_thermal_mass"], catalogue()["sensor_lag"]
+    assert scaled(mass, 72 * 3600.0) == mass
+    (shape,) = scaled(mass, 12 * 86400.0).shapes
+    assert shape.high == 3 * mass.shapes[0].high
+    assert max(shape.grid) == shape.high / 3
+    assert scaled(lag, 12 * 86400.0) == lag

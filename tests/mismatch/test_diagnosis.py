@@ -19,7 +19,7 @@ from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import make_context
 from discovery.mismatch.gates import objections
 from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.prove import runs_away
+from discovery.mismatch.prove import Improvement, improvements
 from discovery.models import Model, Parameter, read_model, write_model
 from discovery.models.reduced import reduced
 from discovery.recordings import Recording
@@ -298,8 +298,22 @@ def test_a_model_that_explodes_on_other_inputs_is_told() -> None:
     fast = replace(changed(slow, speed=np.full(len(slow.time), 3e6)), name="r2")
     runs = campaign(slow, fast)
     noise = Noise(tuple(SEEN), (NOISE,) * 3)
-    assert runs_away(hot, runs, ["r1"], tuple(SEEN), noise) is None
-    assert runs_away(hot, runs, ["r1", "r2"], tuple(SEEN), noise) == "r2"
+    proof = improvements(runs, ["r1", "r2"], tuple(SEEN), model(), hot, noise)
+    assert np.isfinite(proof["r1"].after)
+    assert proof["r2"].after == np.inf
+    assert proof["r2"].contradicts
     answer = diagnose(hot, runs, ["r1"], ["r2"])  # the model is wrong before anything is added to it
     assert answer.held_out == {}
     assert "runs away on unseen recording r2" in answer.document()["reasons"][-1]
+
+
+def test_unseen_recordings_contradict_a_repair_and_change_no_verdict() -> None:
+    answer = solved("a body that the fluid wets")
+    assert answer.document()["improvement"]["contradicted_by"] == []
+    for after, shown in ((np.inf, None), (9.0, 9.0)):
+        worse = replace(answer, held_out={"r3": Improvement(1.0, after, 0.5, -np.inf, -1.0)}).document()
+        assert worse["verdict"] == "missing physics"
+        assert worse["physics"] == answer.document()["physics"]
+        assert worse["improvement"]["contradicted_by"] == ["r3"]
+        assert worse["improvement"]["held_out"]["r3"]["rms_after"] == shown
+        assert worse["improvement"]["explained"] == -1.0

@@ -122,3 +122,19 @@ def test_what_a_refit_absorbs_is_no_evidence() -> None:
     ]
     assert min(absorbed) < 0.02  # air at a body that has it already
     assert max(s.share for s in sheet.values() if s.hypothesis.effect.word == "fluid_convection") > 0.1
+
+
+def test_which_recording_comes_first_says_nothing() -> None:
+    """A size is plausible by the heat that it moves where it moves most: one recording may be dry."""
+    wet, dry = machine.simulated(1), machine.simulated(2)
+    dry = machine.changed(dry, pump=np.zeros(len(dry.time)))
+    effect = catalogue()["fluid_convection"]
+    found = []
+    for order in (["r1", "r2"], ["r2", "r1"]):
+        context = make_context(
+            machine.campaign(wet, dry), machine.model(wet=False), order, tuple(machine.SEEN), [effect]
+        )
+        claims = hypotheses(context.model, context.campaign.channels, tuple(machine.SEEN), order, [effect])
+        found.append({h.states: (context.spread(h), context.minor(h)) for h in claims})
+    for states, sizes in found[0].items():
+        assert np.allclose(sizes, found[1][states], rtol=1e-3)

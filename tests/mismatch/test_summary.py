@@ -30,7 +30,7 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
         "alternatives": [],
         "reasons": [],
         "description": None,
-        "improvement": {"held_out": {}},
+        "improvement": {"held_out": {}, "contradicted_by": []},
         "next_experiment": "none",
     }
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")

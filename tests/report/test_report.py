@@ -148,7 +148,12 @@ def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path
         {**diagnosis["physics"][0], "effect": "clock_shift", "states": [], "recording": "fit"}
     )
     held = {"rms_before": 1.6, "rms_after": 25.0, "noise_floor": 0.4, "gain_low": -27.0, "gain_high": -19.0}
-    diagnosis["improvement"] = {"fit": {}, "held_out": {"left": held}, "explained": -1.0}
+    diagnosis["improvement"] = {
+        "fit": {},
+        "held_out": {"left": held},
+        "explained": -1.0,
+        "contradicted_by": ["left"],
+    }
     path.write_text(json.dumps(diagnosis))
     page = write_report(folder).read_text("utf-8")
     assert "clock shift in fit (98 % sure); but the unseen “left” contradicts the repair." in page
