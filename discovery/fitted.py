@@ -74,16 +74,19 @@ def judged(
     began = clock.perf_counter() - seconds
     outputs = fit.problem.outputs
     validation: Mapping[str, Mapping[str, float]] = {}
+    lost = []
     if experiment.form.cross_validate:
         progress(f"cross-validating {name}")
-        validation = cross_validate(fit.model, experiment.fitting, experiment.fit, outputs, fit.noise)
+        try:
+            validation = cross_validate(fit.model, experiment.fitting, experiment.fit, outputs, fit.noise)
+        except RunsAwayError:  # a finding about the model, no mistake of the user's
+            lost.append(f"with a part of the readings left out the fit of {name} runs away: do not trust it")
     seconds = clock.perf_counter() - began
     predictions = {r: predict(fit, experiment, r) for r in experiment.fit}
-    lost = []
     for recording in experiment.held_out:
         try:
             predictions[recording] = predict(fit, experiment, recording)
-        except RunsAwayError as error:  # a finding about the model, no mistake of the user's
+        except RunsAwayError as error:
             lost.append(str(error))
     notes = [*lost, *fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]
     notes += offset_notes(fit, experiment.campaign.channels)

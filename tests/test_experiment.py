@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError, UserError
 from discovery.experiment import run
 from discovery.experimentfile import load_experiment
 from discovery.fitted import offset_notes
@@ -370,3 +370,17 @@ def test_the_experiments_of_the_repository_load(name: str) -> None:
     for model, entry in experiment.form.models.items():
         if entry.kind == "file":
             assert experiment.model_file(model).outputs or experiment.model_file(model).states
+
+
+def test_a_model_that_runs_away_in_cross_validation_is_told_and_kept(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def explode(*_: object) -> None:
+        raise RunsAwayError("model 'x' runs away on recording 'a'")
+
+    monkeypatch.setattr("discovery.fitted.cross_validate", explode)
+    out = run(folder / "experiment.toml", folder / "out")
+    for name, entry in results_of(out)["models"].items():
+        assert entry["cross_validation"] == {}
+        assert f"the fit of {name} runs away" in entry["notes"][0]
+        assert set(entry["recordings"]) == {"a", "b", "c"}

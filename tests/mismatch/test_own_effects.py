@@ -28,6 +28,13 @@ source = "maintenance log"
 """
 
 
+@pytest.mark.parametrize("formula", ["1 + k_rub*speed*exp(-time/t_free)", "k_rub**2*speed*exp(-time/t_free)"])
+def test_the_amplitude_has_to_be_a_factor(formula: str, tmp_path: Path) -> None:
+    text = RUB.replace("k_rub*speed*exp(-time/t_free)", formula)
+    with pytest.raises(UserError, match=r"effect 'rub': its formula has to be zero where k_rub is zero"):
+        diagnosis(load_experiment(experiment(tmp_path, text)))
+
+
 def rub(t: float, _: Array, u: Inputs) -> tuple[float, float, float]:
     return 0.15 * u["speed"] * np.exp(-t / 20000), 0.0, 0.0
 

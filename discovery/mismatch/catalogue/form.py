@@ -5,12 +5,26 @@ from __future__ import annotations
 from math import inf
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from discovery.errors import UserError
 from discovery.mismatch.catalogue.effect import ROLE_OF, Amplitude, Effect, Place, Shape
 from discovery.schema import Strict
-from discovery.terms import names, parse
+from discovery.terms import Expression, degree, evaluate, names, parse
+from discovery.terms.expression import rewrite
+
+# places where the formula is what a channel becomes, not a flow that comes in addition
+REPLACING = ("fluid terms", "cooling terms", "inputs of a recording")
+
+
+def _is_a_factor(amplitude: str, formula: Expression) -> bool:
+    """Whether a formula is zero where an amplitude is, and linear in it, at some values of the rest."""
+    if degree(formula, frozenset({amplitude})) > 1:
+        return False
+    still = rewrite(formula, lambda a: a.arguments[0] if a.function in ("lag", "delay", "play") else None)
+    values = {name: 1.3 + 0.37 * i for i, name in enumerate(sorted(names(formula)))}
+    return not np.any(evaluate(still, {**values, amplitude: 0.0}).value)
 
 
 class ShapeForm(Strict):
@@ -58,6 +72,12 @@ class EffectForm(Strict):
             )
         if self.amplitude not in names(parse(self.formula, where)):
             raise UserError(f"{where}: the amplitude '{self.amplitude}' does not stand in the formula")
+        formula = parse(self.formula, where)
+        if self.place not in REPLACING and not _is_a_factor(self.amplitude, formula):
+            raise UserError(
+                f"{where}: its formula has to be zero where {self.amplitude} is zero, and linear in it; "
+                f"write it as {self.amplitude}*(...)"
+            )
         if self.plausible > self.most:
             raise UserError(
                 f"{where}: its usual size {self.plausible:g} is more than {self.most:g}, its most; "
