@@ -144,3 +144,17 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, lines: list[str], s
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="cannot be read"):
         read_own(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("nothing", ["NaN", "NAN", "nan", "NA", "null", "-", "", "#N/A", "None"])
+def test_a_first_row_that_holds_nothing_is_no_row_of_units(tmp_path: Path, nothing: str) -> None:
+    rows = [f"{10 * k},{20 + k * k / 9},{k % 3}" for k in range(1, 15)]
+    table = read_own(_file(tmp_path, "time,T1,heater1", f"0,{nothing},{nothing}", *rows))
+    assert len(table.time) == 15
+    assert [(c.name, c.unit) for c in table.columns] == [("T1", ""), ("heater1", "")]
+    assert np.isnan(table.columns[0].values[0])
+
+
+def test_a_row_of_units_may_say_that_there_is_none(tmp_path: Path) -> None:
+    table = read_own(_file(tmp_path, "time,T1,door", "s,-,n/a", *(f"{k},{k * k},{k % 2}" for k in range(15))))
+    assert [(c.name, c.unit) for c in table.columns] == [("T1", "-"), ("door", "")]
