@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -168,17 +169,21 @@ def _instants(
     if re.fullmatch(_DATE, cells[0]):
         for other in [k for k in dict.fromkeys([*order, at + 1]) if k != at and k < len(body[0][1])]:
             joined = [f"{cell} {row[other]}" for cell, (_, row) in zip(cells, body, strict=True)]
-            if _TIME_OF_DAY.match(body[0][1][other]) and (seconds := _parsed(joined)) is not None:
-                yield (at, other), seconds, "instants"
-    if (seconds := _parsed(cells)) is not None:
-        yield (at,), seconds, "instants"
+            if _TIME_OF_DAY.match(body[0][1][other]) and (found := _parsed(joined)) is not None:
+                yield (at, other), *found
+    if (found := _parsed(cells)) is not None:
+        yield (at,), *found
     if (seconds := _of_day(cells)) is not None:
         yield (at,), seconds, "time of day"
 
 
-def _parsed(cells: Sequence[str]) -> Array | None:
-    """Seconds by the first spelling in which all cells can be read and do not run backwards, else any."""
-    found = None
+def _parsed(cells: Sequence[str]) -> tuple[Array, str] | None:
+    """Seconds, and how they were read: by the spelling in which all cells run forward, else by any.
+
+    03/01 is the third of January or the first of March: the spelling with the most even steps counts.
+    """
+    forward: list[tuple[str, Array]] = []
+    backward = None
     for form in ("", *_FORMS):
         try:
             stamps = [
@@ -189,9 +194,31 @@ def _parsed(cells: Sequence[str]) -> Array | None:
         except (ValueError, TypeError):
             continue
         if (np.diff(seconds) >= 0).all():
-            return seconds
-        found = seconds if found is None else found
-    return found
+            forward.append((form, seconds))
+        elif backward is None:
+            backward = seconds
+    if not forward:
+        return None if backward is None else (backward, "instants")
+    form, best = min(forward, key=lambda one: _unevenness(one[1]))
+    others = [one for one in forward if not np.array_equal(one[1], best)]
+    if not others:
+        return best, "instants"
+    other = min(others, key=lambda one: _unevenness(one[1]))[0]
+    return best, f"instants (? dates read as {_order(form)}, the most even; {_order(other)} runs forward too)"
+
+
+def _unevenness(seconds: Array) -> float:
+    """Spread of the steps against their mean: 0 where all are alike."""
+    steps = np.diff(seconds)
+    return float(np.std(steps) / np.mean(steps)) if steps.any() else math.inf
+
+
+def _order(form: str) -> str:
+    """Day, month and year of a spelling, as a person writes them."""
+    date = form.split(" ")[0] or "%Y-%m-%d"
+    for mark, word in (("%d", "day"), ("%m", "month"), ("%Y", "year"), ("%y", "year")):
+        date = date.replace(mark, word)
+    return date
 
 
 def _of_day(cells: Sequence[str]) -> Array | None:

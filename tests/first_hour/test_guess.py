@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -158,3 +159,24 @@ def test_a_first_row_that_holds_nothing_is_no_row_of_units(tmp_path: Path, nothi
 def test_a_row_of_units_may_say_that_there_is_none(tmp_path: Path) -> None:
     table = read_own(_file(tmp_path, "time,T1,door", "s,-,n/a", *(f"{k},{k * k},{k % 2}" for k in range(15))))
     assert [(c.name, c.unit) for c in table.columns] == [("T1", "-"), ("door", "")]
+
+
+def _stamped(first: datetime, form: str, minutes: float, count: int = 40) -> list[str]:
+    stamps = [first + timedelta(minutes=minutes * k) for k in range(count)]
+    return ["Time,T1", *(f"{stamp.strftime(form)},{20 + k * k / 9}" for k, stamp in enumerate(stamps))]
+
+
+@pytest.mark.parametrize(
+    ("form", "read"), [("%m/%d/%Y %H:%M", "month/day/year"), ("%d/%m/%Y %H:%M", "day/month/year")]
+)
+def test_a_date_that_reads_two_ways_has_even_steps(tmp_path: Path, form: str, read: str) -> None:
+    table = read_own(_file(tmp_path, *_stamped(datetime(2026, 3, 1, 23), form, 5.0)))
+    assert table.time[-1] == pytest.approx(39 * 300.0)  # not from March to February, nor to the next month
+    assert f"? dates read as {read}" in table.about_time
+
+
+def test_a_date_that_reads_one_way_is_not_asked_about(tmp_path: Path) -> None:
+    for first, minutes in ((datetime(2026, 3, 13, 23), 5.0), (datetime(2026, 3, 1, 8), 5.0)):
+        table = read_own(_file(tmp_path, *_stamped(first, "%m/%d/%Y %H:%M", minutes)))
+        assert table.time[-1] == pytest.approx(39 * 300.0)
+        assert "?" not in table.about_time
