@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.firsthour.rows import Row, is_number, is_stamp, number
+from discovery.firsthour.words import plain
 
 Array = NDArray[np.float64]
 
@@ -42,12 +43,12 @@ _FORMS = (
 _DATE = r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}"
 _TIME_OF_DAY = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+)?))?")
 # what a clock is called: a plain name before one that only holds the word
-_NAMES = (
+CLOCK_NAMES = (
     r"(time|zeit|datetime|timestamp|zeitstempel|date|datum|elapsed|seconds|minutes|hours|clock|stamp)\b",
     r"(\w+ )*(time|zeit|stamp|timestamp|elapsed|seconds)\b",
     r"t$",
 )
-_UNITS = {
+TIME_UNITS = {
     "ns": 1e-9,
     "us": 1e-6,
     "µs": 1e-6,
@@ -86,8 +87,10 @@ def find_clock(path: Path, names: Sequence[str], units: Sequence[str], body: Seq
     Raises:
         UserError: no column is, or the one that should be does not run forward.
     """
-    plain = [re.sub(r"[\W_]+", " ", name.lower()).strip() for name in names]
-    named = list(dict.fromkeys(k for form in _NAMES for k in range(len(names)) if re.match(form, plain[k])))
+    words = [plain(name) for name in names]
+    named = list(
+        dict.fromkeys(k for form in CLOCK_NAMES for k in range(len(names)) if re.match(form, words[k]))
+    )
     backwards = None
     for columns, seconds, how in _candidates(path, [*named, 0], names, units, body):
         steps = np.diff(seconds)
@@ -111,31 +114,6 @@ def find_clock(path: Path, names: Sequence[str], units: Sequence[str], body: Seq
     )
 
 
-def is_clock(name: str, values: Array, seconds: Array) -> bool:
-    """Whether a column tells the time once more, or counts the rows."""
-    plain = re.sub(r"[\W_]+", " ", name.lower()).strip()
-    if not np.isfinite(values).all() or not (np.diff(values) > 0).all():
-        return False
-    if plain in (
-        "",
-        "index",
-        "unnamed 0",
-        "row",
-        "nr",
-        "no",
-        "n",
-        "id",
-        "sample",
-        "entry",
-        "record",
-        "count",
-    ):
-        return bool(np.ptp(np.diff(values)) < 1e-9)
-    if not re.match("|".join(_NAMES[:2]), plain):
-        return False
-    return bool(np.corrcoef(values, seconds)[0, 1] > 0.999)
-
-
 def _candidates(
     path: Path, order: Sequence[int], names: Sequence[str], units: Sequence[str], body: Sequence[Row]
 ) -> Iterator[tuple[tuple[int, ...], Array, str]]:
@@ -151,12 +129,12 @@ def _candidates(
         except UserError:
             continue
         unit = _unit(names[at], units[at], values)
-        yield (at,), (values - values[0]) * _UNITS[unit], f"counted in {unit}"
+        yield (at,), (values - values[0]) * TIME_UNITS[unit], f"counted in {unit}"
 
 
 def _unit(name: str, unit: str, values: Array) -> str:
     word = unit.strip().lower()
-    if word in _UNITS:
+    if word in TIME_UNITS:
         return word
     named = next((u for u in ("minutes", "hours", "days", "ms", "ns") if u in name.lower()), None)
     return named or next((u for least, u in _SINCE_1970 if values[0] > least), "s")
