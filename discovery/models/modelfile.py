@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 import math
 from pathlib import Path
 from typing import Any, Literal
@@ -12,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from discovery.errors import UserError
 from discovery.files import dotted, locate, read_toml, write_toml
 from discovery.models.model import TIME_UNITS, Model, Parameter, State, in_time_unit
+from discovery.naming import is_taken, is_word
 from discovery.terms import Expression, Term, names, parse, text
-from discovery.terms.expression import FUNCTIONS
 
 
 class _Strict(BaseModel):
@@ -87,10 +86,10 @@ def read_model(path: Path) -> Model:
 
     for kind in ("parameters", "states"):
         for name in getattr(form, kind):
-            if not name.isidentifier() or keyword.iskeyword(name) or name in FUNCTIONS or name == "time":
+            if not is_word(name) or is_taken(name):
                 raise UserError(
                     f"{at(kind, name)}: '{name}' cannot name a {kind[:-1]}; "
-                    "use letters, digits and _ and no reserved word"
+                    "use letters (a to z), digits and _ and no word that expressions know"
                 )
     for name in form.parameters.keys() & form.states.keys():
         raise UserError(f"{at('parameters', name)}: '{name}' is also a state; rename one of them")
