@@ -60,7 +60,7 @@ class Trajectory:
 
 def make_system(model: Model, grid: Grid) -> System:
     """Bind a model to a grid."""
-    model = expanded(model)
+    model = expanded(model, {*grid.samples, *grid.outputs})
     states = tuple(model.states)
     index = {name: i for i, name in enumerate(states)}
     variables = frozenset(states)

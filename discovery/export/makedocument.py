@@ -31,7 +31,7 @@ def exportable(model: Model, campaign: Campaign) -> Model:
     Raises:
         UserError: a model without outputs, or a measured body and no room temperature.
     """
-    model = expanded(model)
+    model = expanded(model, campaign.channels)
     own = {
         name: Name(name) for name in model.states if name in campaign.channels and name not in model.outputs
     }
@@ -132,6 +132,7 @@ def make_document(
                 "start": text(s.start) if s.start is not None else None,
                 "start_sd": s.start_sd,
             }
+            | ({"memory": True} if s.memory else {})
             for name, s in model.states.items()
         ],
         "terms": [

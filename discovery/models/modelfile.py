@@ -48,6 +48,7 @@ class StateForm(_Strict):
         None, description="number or expression; without it the first reading, else 0"
     )
     start_sd: float | None = Field(None, ge=0, description="spread of the start value; default 0.5 K or 1 um")
+    memory: bool = Field(False, description="true: what a lag() remembers, no body (written by a fit)")
 
 
 class TermForm(_Strict):
@@ -126,7 +127,7 @@ def read_model(path: Path) -> Model:
             else (0.5 if state.unit in ("degC", "K", "kelvin") else 1.0)
         )
         scale = 1.0 / state.capacity if state.capacity else per_unit
-        states[name] = State(name, state.unit, state.capacity, start, spread, scale)
+        states[name] = State(name, state.unit, state.capacity, start, spread, scale, state.memory)
     terms = []
     for i, term in enumerate(form.terms):
         for key, state_name in (("into", term.into), ("from", term.source)):
@@ -195,6 +196,7 @@ def model_document(model: Model) -> dict[str, Any]:
                 "capacity": s.capacity,
                 "start": s.start and text(s.start),
                 "start_sd": s.start_sd,
+                "memory": s.memory or None,
             }
         )
         for name, s in model.states.items()

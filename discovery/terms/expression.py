@@ -19,6 +19,7 @@ from discovery.naming import FUNCTIONS
 MAX_LENGTH = 4000  # characters of one expression
 MAX_NODES = 400
 MAX_DEPTH = 40
+MEMORY = ("delay", "lag", "play")  # what they give depends on what was before
 
 _BINARY: dict[type[ast.operator], str] = {
     ast.Add: "+",

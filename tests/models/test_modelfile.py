@@ -124,6 +124,37 @@ def test_a_lag_becomes_a_hidden_state(tmp_path: Path) -> None:
     assert list(model.states) == ["a", "b", "y", "lag_1"]
 
 
+def test_a_memory_keeps_to_itself(tmp_path: Path) -> None:
+    """Every lag_N that anything else is called by stays what it was, and a file says what is a memory."""
+    mine = GOOD.replace("b =", "lag_1 =").replace('"b"', '"lag_1"').replace("b - a", "lag_1 - a")
+    mine = mine.replace("tau ", "lag_2 ").replace("lag(P, tau)", "lag(P, lag_2)*lag(lag_3, 60)")
+    before = read_model(written(tmp_path, mine))
+    model = expanded(before, {"P", "T_env", "lag_3", "lag_4"})
+    assert list(model.states) == ["a", "lag_1", "y", "lag_5", "lag_6"]
+    assert {name: model.states[name] for name in before.states} == before.states
+    assert [text(t.expression) for t in model.terms[1:]] == [
+        "loss*lag_5*lag_6",
+        "a - 22",
+        "(P - lag_5)/lag_2",
+        "(lag_3 - lag_6)/60",
+    ]
+    assert [s.name for s in model.states.values() if s.memory] == ["lag_5", "lag_6"]
+    write_model(tmp_path / "again.toml", model)
+    assert [s.name for s in read_model(tmp_path / "again.toml").states.values() if s.memory] == [
+        "lag_5",
+        "lag_6",
+    ]
+    assert read_model(written(tmp_path, mine)).states["lag_1"].memory is False
+
+
+def test_a_memory_of_memories_starts_settled(tmp_path: Path) -> None:
+    nested = GOOD.replace("lag(P, tau)", "lag(delay(P, 60) + play(lag(T_env, 9), 1), tau)")
+    model = expanded(read_model(written(tmp_path, nested)))
+    start = model.states["lag_2"].start
+    assert start is not None
+    assert text(start) == "P + T_env"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
