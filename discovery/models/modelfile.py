@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from discovery.errors import UserError
 from discovery.files import dotted, locate, read_toml, write_toml
+from discovery.models.memory import check_memory, check_start
 from discovery.models.model import TIME_UNITS, Model, Parameter, State, in_time_unit
 from discovery.naming import is_taken, is_word
 from discovery.terms import Expression, Term, names, parse, text
@@ -118,9 +119,10 @@ def read_model(path: Path) -> Model:
     states = {}
     per_unit = 1.0 / TIME_UNITS[form.time_unit]
     for name, state in form.states.items():
-        start: Expression | None = (
-            None if state.start is None else parse(state.start, at("states", name, "start"))
-        )
+        start: Expression | None = None
+        if state.start is not None:
+            start = parse(state.start, place := at("states", name, "start"))
+            check_start(start, place)
         spread = (
             state.start_sd
             if state.start_sd is not None
@@ -135,25 +137,26 @@ def read_model(path: Path) -> Model:
                 raise UserError(
                     f"{at('terms', i, key)}: '{state_name}' is not a state; states are {', '.join(states)}"
                 )
-        terms.append(
-            Term(
-                term.name or f"term {i + 1}",
-                term.into,
-                parse(term.expression, at("terms", i, "expression")),
-                term.source,
-                term.effect,
-            )
-        )
-    outputs = {name: parse(expression, at("outputs", name)) for name, expression in form.outputs.items()}
+        expression = parse(term.expression, place := at("terms", i, "expression"))
+        check_memory(expression, parameters, states, place)
+        terms.append(Term(term.name or f"term {i + 1}", term.into, expression, term.source, term.effect))
+    outputs = {}
+    for name, formula in form.outputs.items():
+        outputs[name] = parse(formula, place := at("outputs", name))
+        check_memory(outputs[name], parameters, states, place)
     return Model(form.name or Path(path).stem, parameters, states, tuple(terms), outputs, form.time_unit)
 
 
 def check_names(model: Model, known: set[str], path: Path | str) -> None:
-    """Refuse a model that uses a name which is neither its own nor a channel of the campaign.
+    """Refuse a model that uses a name which is neither its own nor a channel of the campaign, or both.
 
     Raises:
-        UserError: naming the unknown name and where it stands.
+        UserError: naming the name and where it stands.
     """
+    for name in sorted(known & set(model.parameters)):
+        raise UserError(
+            f"{path}, key parameters.{name}: '{name}' is also a channel of the campaign; rename the parameter"
+        )
     own = set(model.states) | set(model.parameters) | {"time"} | known
     places = [(f"term '{term.name}'", term.expression) for term in model.terms]
     places += [(f"output '{name}'", expression) for name, expression in model.outputs.items()]

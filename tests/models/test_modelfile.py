@@ -172,6 +172,20 @@ def test_a_memory_of_memories_starts_settled(tmp_path: Path) -> None:
         ("y = {", '"ÿ" = {', ["line 13", "cannot name a state"]),
         ("G    =", "a =", ["line 6", "also a state"]),
         ('per = "recording"', 'per = "day"', ["line 7", "recording"]),
+        ('start = "T_env"', 'start = "lag(T_env, 600)"', ["line 11", "before the recording"]),
+        ('start = "T_env"', 'start = "22 + delay(T_env, 600)"', ["line 11", "before the recording"]),
+        ("lag(P, tau)", "delay(b, 600)", ["line 23", "'delay(b, 600)'", "only a channel can be delayed"]),
+        ("lag(P, tau)", "delay(tau, 600)", ["line 23", "only a channel can be delayed"]),
+        ("lag(P, tau)", "delay(time, 600)", ["line 23", "only a channel can be delayed"]),
+        ("lag(P, tau)", "exp(delay(P, 10*P))", ["line 23", "the delay in", "no states and no channels"]),
+        ("lag(P, tau)", "delay(P, -tau)", ["line 23", "a number of seconds from 0 up"]),
+        ("lag(P, tau)", "delay(P, 1/0)", ["line 23", "a number of seconds from 0 up"]),
+        ("lag(P, tau)", "delay(P, 60*G - 60*tau)", ["line 23", "a number of seconds from 0 up"]),
+        ("lag(P, tau)", "delay(P, lag(3, tau))", ["line 23", "the delay in"]),
+        ("lag(P, tau)", "lag(P, a)", ["line 23", "time constant", "no states and no channels"]),
+        ("lag(P, tau)", "lag(P, 0*tau)", ["line 23", "a number of seconds above 0"]),
+        ("lag(P, tau)", "play(P, P)", ["line 23", "the width in 'play(P, P)' must be a number"]),
+        ("1.92*(a - 22) + y", "delay(P, -60)", ["line 30", "a number of seconds from 0 up"]),
     ],
 )
 def test_mistakes(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
@@ -182,6 +196,30 @@ def test_mistakes(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
     assert "\n" not in sentence
     for word in ("model.toml", *words):
         assert word in sentence
+
+
+def test_no_fit_looks_into_the_future(tmp_path: Path) -> None:
+    late = GOOD.replace("lag(P, tau)", "delay(P, 60*wait)")
+    for bounds, good in (("", False), (", min = 0.0", True), (", fixed = true", True)):
+        wait = f"[parameters]\nwait = {{ start = 3.0{bounds} }}"
+        content = late.replace("[parameters]", wait)
+        if good:
+            assert "wait" in read_model(written(tmp_path, content)).parameters
+        else:
+            with pytest.raises(UserError, match=r"line 24.*'wait' a value below 0.*give the parameter min"):
+                read_model(written(tmp_path, content))
+
+
+def test_the_clock_of_one_recording_may_be_early(tmp_path: Path) -> None:
+    late = GOOD.replace("lag(P, tau)", "delay(P, shift)")
+    shift = '[parameters]\nshift = { start = 0.0, per = "recording", values = { r = -900.0 } }'
+    assert read_model(written(tmp_path, late.replace("[parameters]", shift))).inputs == ("P",)
+
+
+def test_a_parameter_hides_no_channel(tmp_path: Path) -> None:
+    model = read_model(written(tmp_path, GOOD))
+    with pytest.raises(UserError, match=r"m.toml, key parameters.loss: 'loss' is also a channel.*rename"):
+        check_names(model, {"P", "T_env", "loss"}, "m.toml")
 
 
 def test_a_name_that_nobody_knows(tmp_path: Path) -> None:
