@@ -17,7 +17,7 @@ from discovery.errors import UserError
 from discovery.files import dotted, locate, read_text, read_toml
 from discovery.fitting.fit import Loss
 from discovery.mismatch.catalogue.form import EffectForm
-from discovery.models import Model, check_names, read_model
+from discovery.models import Model, check_model, read_model
 from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, campaign_path
 from discovery.recordings.roles import CORRECTION
@@ -187,7 +187,7 @@ class Experiment:
         """The model that entry `name` reads from its file, checked against the campaign. Raises UserError."""
         path = self.path.parent / cast(FileEntry, self.form.models[name]).file
         model = read_model(path)
-        check_names(model, set(self.campaign.channels), path)
+        check_model(model, {n: c.unit for n, c in self.campaign.channels.items()}, path)
         return model
 
 

@@ -18,7 +18,8 @@ from discovery.experimentfile import Experiment
 from discovery.fitting import Fit, predict_recording
 from discovery.models import Model
 from discovery.models.convection import validity_of_model
-from discovery.models.dimensions import check_dimensions, differences
+from discovery.models.dimensions import check_dimensions
+from discovery.models.units import differences
 from discovery.progress import Progress, silent
 from discovery.recordings import Channel
 

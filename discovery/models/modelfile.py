@@ -13,7 +13,7 @@ from discovery.files import dotted, locate, read_toml, write_toml
 from discovery.models.memory import check_memory, check_start
 from discovery.models.model import TIME_UNITS, Model, Parameter, State, in_time_unit
 from discovery.naming import is_taken, is_word
-from discovery.terms import Expression, Term, names, parse, text
+from discovery.terms import Expression, Term, parse, text
 
 
 class _Strict(BaseModel):
@@ -145,29 +145,6 @@ def read_model(path: Path) -> Model:
         outputs[name] = parse(formula, place := at("outputs", name))
         check_memory(outputs[name], parameters, states, place)
     return Model(form.name or Path(path).stem, parameters, states, tuple(terms), outputs, form.time_unit)
-
-
-def check_names(model: Model, known: set[str], path: Path | str) -> None:
-    """Refuse a model that uses a name which is neither its own nor a channel of the campaign, or both.
-
-    Raises:
-        UserError: naming the name and where it stands.
-    """
-    for name in sorted(known & set(model.parameters)):
-        raise UserError(
-            f"{path}, key parameters.{name}: '{name}' is also a channel of the campaign; rename the parameter"
-        )
-    own = set(model.states) | set(model.parameters) | {"time"} | known
-    places = [(f"term '{term.name}'", term.expression) for term in model.terms]
-    places += [(f"output '{name}'", expression) for name, expression in model.outputs.items()]
-    places += [(f"start of '{s.name}'", s.start) for s in model.states.values() if s.start is not None]
-    for place, expression in places:
-        for name in sorted(names(expression) - own):
-            raise UserError(
-                f"{path}, {place}: '{name}' is neither a state or parameter of the model "
-                "nor a channel of the campaign "
-                f"({', '.join(sorted(known))}); mend the name or add the channel"
-            )
 
 
 def model_document(model: Model) -> dict[str, Any]:

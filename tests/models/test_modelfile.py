@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from discovery.errors import UserError
-from discovery.models import Model, check_names, expanded, read_model, write_model
+from discovery.models import Model, check_model, expanded, read_model, write_model
 from discovery.models.thermobalance import thermobalance
 from discovery.terms import text
 
@@ -219,11 +219,44 @@ def test_the_clock_of_one_recording_may_be_early(tmp_path: Path) -> None:
 def test_a_parameter_hides_no_channel(tmp_path: Path) -> None:
     model = read_model(written(tmp_path, GOOD))
     with pytest.raises(UserError, match=r"m.toml, key parameters.loss: 'loss' is also a channel.*rename"):
-        check_names(model, {"P", "T_env", "loss"}, "m.toml")
+        check_model(model, {"P": "W", "T_env": "degC", "loss": "W"}, "m.toml")
 
 
 def test_a_name_that_nobody_knows(tmp_path: Path) -> None:
     model: Model = read_model(written(tmp_path, GOOD))
-    check_names(model, {"P", "T_env"}, "model.toml")
+    check_model(model, {"P": "W", "T_env": "degC"}, "model.toml")
     with pytest.raises(UserError, match=r"start of 'a': 'T_env' is neither"):
-        check_names(model, {"P"}, "model.toml")
+        check_model(model, {"P": "W"}, "model.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"W/K"', '"kW/K"', r"parameters.G.unit: 'kW/K' counts in kW, .*write unit, value and bounds in W$"),
+        ('"W/K"', '"W/degF"', r"'W/degF' counts in (delta_)?degF, .* in degC, in differences K$"),
+        ('"W/K"', '"J/ms/K"', r"'J/ms/K' counts in ms, .* in s or min or h or d$"),
+        ('"W/K"', '"W/mK"', r"'W/mK' counts in mK"),
+        ("a = {", 'a = { unit = "degF",', r"states.a.unit: 'degF' counts in degF"),
+        ('unit = "um"', 'unit = "inch"', r"states.y.unit: 'inch' counts in in, .* in um or mm or m$"),
+    ],
+)
+def test_nothing_is_converted_inside(tmp_path: Path, old: str, new: str, said: str) -> None:
+    model = read_model(written(tmp_path, GOOD.replace(old, new, 1)))
+    with pytest.raises(UserError, match=rf"m.toml, key .*{said}"):
+        check_model(model, {"P": "W", "T_env": "degC"}, "m.toml")
+
+
+@pytest.mark.parametrize(
+    "unit", ["um/m/(W*rpm**2)/h", "l/min", "W/percent", "J/kg/K", "bar", "K**1.25", "kg/m**3", "N", "", "1/d"]
+)
+def test_what_models_count_in(tmp_path: Path, unit: str) -> None:
+    model = read_model(written(tmp_path, GOOD.replace('"W/K"', f'"{unit}"')))
+    check_model(model, {"P": "W", "T_env": "degC"}, "m.toml")
+
+
+def test_a_unit_that_a_channel_has_is_counted_in(tmp_path: Path) -> None:
+    """An input of any kind keeps its unit; so do the coefficients that go with it."""
+    model = read_model(written(tmp_path, GOOD.replace('"W/K"', '"K/kW/delta_degF"')))
+    with pytest.raises(UserError, match="'K/kW/delta_degF' counts in"):
+        check_model(model, {"P": "kW", "T_env": "degC"}, "m.toml")
+    check_model(model, {"P": "kW", "T_env": "degF"}, "m.toml")

@@ -55,6 +55,8 @@ def test_a_difference_takes_the_factor_alone() -> None:
         ("foo", "other input", "not known"),
         ("", "error", "not known"),
         ("9**9**9**9", "other input", "not known"),
+        ("K**9.9**9", "other input", "not known"),
+        ("K**99", "other input", "not known"),
         ("__import__('os')", "other input", "not known"),
         ("m" * 1000, "other input", "not known"),
     ],
