@@ -19,7 +19,7 @@ _COMMON = frozenset({"1", "percent", "degC", "K", "W", "rpm", "mm", "um", "um/m"
 # Names, products, quotients and powers of one digit (and a fraction): pint would compute 9**9**9**9 for as
 # long as it takes.
 _POWER = r"(\*\*|\^)\s?-?\d(\.\d{1,6})?(?!\s*(\*\*|\^|[\d.]))"
-_SPELLING = re.compile(rf"1?([^\W\d]|[/*() %°·²³⁻¹]|{_POWER})*")
+_SPELLING = re.compile(rf"1?([^\W\d]|[/*() %°·²³⁻¹]|{_POWER}|(?<=[/(])1(?![\d.]))*")
 _LONGEST = 100  # letters; the coefficient of a product of several inputs has a long one
 _MISTAKEN = {"C": "degC", "c": "degC", "F": "degF", "u/min": "rpm", "U/min": "rpm", "µ": "um", "l/m": "l/min"}
 

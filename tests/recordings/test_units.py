@@ -32,6 +32,8 @@ from discovery.recordings.units import UnitError, conversion
         ("inch", "nozzle height", 2.0, 50.8, "mm"),
         ("bar", "other input", 6.0, 6.0, "bar"),
         ("J/kg/K", "other input", 6.0, 6.0, "J/kg/K"),
+        ("K/1/s", "other input", 6.0, 6.0, "K/1/s"),
+        ("K**1.25", "other input", 6.0, 6.0, "K**1.25"),
     ],
 )
 def test_values_become_canonical(unit: str, role: str, given: float, value: float, canonical: str) -> None:
