@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from discovery.errors import UserError
+from discovery.models.memory import check_before_fit
 from discovery.models.model import Model
 from discovery.models.units import atoms, dimension, known, of_atom, ratio
 from discovery.recordings.units import short
-from discovery.terms import names
+from discovery.terms import Expression, names
 
 # Values are never converted: what stands in one of these can be compared with what a channel gives.
 _COUNTED = (("K",), ("W",), ("J",), ("s", "min", "h", "d"), ("um", "mm", "m"), ("l", "m**3"), ("kg",))
@@ -24,9 +25,12 @@ def check_model(model: Model, channels: Mapping[str, str], path: Path | str) -> 
 
     Raises:
         UserError: a name that is neither the model's own nor a channel, or a parameter that is also one; a
-        unit that models do not count in (kW, degF), unless a channel does.
+        delay that a fit may make negative; a unit that models do not count in (kW, degF), unless a channel
+        does.
     """
     _check_names(model, channels, path)
+    for place, expression in _formulas(model):
+        check_before_fit(expression, model.parameters, f"{path}, {place}")
     for key, unit in _units(model):
         _check_unit(unit, channels, f"{path}, key {key}.unit")
 
@@ -37,8 +41,7 @@ def _check_names(model: Model, channels: Mapping[str, str], path: Path | str) ->
             f"{path}, key parameters.{name}: '{name}' is also a channel of the campaign; rename the parameter"
         )
     own = set(model.states) | set(model.parameters) | {"time"} | set(channels)
-    places = [(f"term '{term.name}'", term.expression) for term in model.terms]
-    places += [(f"output '{name}'", expression) for name, expression in model.outputs.items()]
+    places = _formulas(model)
     places += [(f"start of '{s.name}'", s.start) for s in model.states.values() if s.start is not None]
     for place, expression in places:
         for name in sorted(names(expression) - own):
@@ -47,6 +50,11 @@ def _check_names(model: Model, channels: Mapping[str, str], path: Path | str) ->
                 "nor a channel of the campaign "
                 f"({', '.join(sorted(channels))}); mend the name or add the channel"
             )
+
+
+def _formulas(model: Model) -> list[tuple[str, Expression]]:
+    terms = [(f"term '{term.name}'", term.expression) for term in model.terms]
+    return terms + [(f"output '{name}'", expression) for name, expression in model.outputs.items()]
 
 
 def _units(model: Model) -> Iterator[tuple[str, str]]:

@@ -51,12 +51,24 @@ def check_memory(
                 f"{where}: the {word} in {shown} must be {wanted}; "
                 "it may hold parameters, no states and no channels"
             )
-        for name in sorted(names(size)) if apply.function == "delay" else ():
+
+    rewrite(expression, visit)
+
+
+def check_before_fit(expression: Expression, parameters: Mapping[str, Parameter], where: str) -> None:
+    """Refuse a delay that a fit may make negative.
+
+    Raises:
+        UserError: naming the parameter without a bound.
+    """
+
+    def visit(apply: Apply) -> None:
+        for name in sorted(names(apply.arguments[1])) if apply.function == "delay" else ():
             p = parameters[name]
             if p.min < 0 and not p.fixed and not p.per_recording:
                 raise UserError(
-                    f"{where}: a fit may give '{name}' a value below 0, where {shown} would look into the "
-                    f"future; give the parameter min = 0.0"
+                    f"{where}: a fit may give '{name}' a value below 0, where '{text(apply)[:60]}' would "
+                    "look into the future; give the parameter min = 0.0"
                 )
 
     rewrite(expression, visit)

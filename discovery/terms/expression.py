@@ -85,6 +85,11 @@ def parse(source: str | float, where: str = "expression") -> Expression:
         raise UserError(
             f"{where}: the expression has {len(source)} characters, at most {MAX_LENGTH} are read; split it"
         )
+    if not source.isascii():  # Python's parser reads some letters as others
+        odd = next(letter for letter in source if not letter.isascii())
+        raise UserError(
+            f"{where}: '{odd}' in '{source[:60]}' is no ASCII letter or sign; use a to z and - * /"
+        )
     try:
         with warnings.catch_warnings():  # Python's remarks on style, as on `1if a else 2`
             warnings.simplefilter("ignore", SyntaxWarning)

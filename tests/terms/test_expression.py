@@ -108,6 +108,8 @@ def test_nothing_else_parses(source: str) -> None:
         ("where(x, y)", "takes 3 arguments"),
         ("exp()", "takes 1 argument,"),
         ("1if x else 2", "not allowed"),
+        ("2*ﬁx", "'ﬁ' in '2.ﬁx' is no ASCII letter"),  # would be read as fix
+        ("x − y", "'−' in 'x − y' is no ASCII letter or sign"),
     ],
 )
 @pytest.mark.filterwarnings("error")  # Python's own parser must not speak beside ours
