@@ -23,6 +23,7 @@ from discovery.recordings.campaignfile import CampaignForm, campaign_path
 from discovery.recordings.roles import CORRECTION
 from discovery.schema import Strict, suggest
 from discovery.sparse.options import SparseOptions
+from discovery.targets import Target
 
 _INPUT_ROLES = (
     "ambient temperature",
@@ -101,7 +102,7 @@ class ExportForm(Strict):
     """[export]: the model that goes to the machine, and the forms it takes."""
 
     model: str
-    to: list[Literal["json", "c", "fmu", "st"]] = Field(["json"], min_length=1)
+    to: list[Target] = Field(["json"], min_length=1)
 
 
 class ExperimentForm(Strict):
@@ -277,18 +278,3 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
 
 def _mistake(path: Path, key: tuple[str | int, ...], what: str) -> UserError:
     return UserError(f"{path}, line {locate(read_text(path), key)}: {dotted(key)}: {what}")
-
-
-def input_files(experiment: Experiment) -> Mapping[str, Path]:
-    """Every file that the experiment reads, by the name that it has in the results."""
-    campaign = experiment.campaign.path
-    files = {experiment.path.name: experiment.path, campaign.name: campaign}
-    form = read_toml(campaign, CampaignForm)
-    files |= {
-        form.recordings[name].file: campaign.parent / form.recordings[name].file
-        for name in experiment.campaign.recordings
-    }
-    for entry in experiment.form.models.values():
-        if isinstance(entry, FileEntry):
-            files[entry.file] = experiment.path.parent / entry.file
-    return files

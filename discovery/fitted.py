@@ -48,6 +48,7 @@ class Fitted:
 
     name: str
     kind: str
+    start: Model  # that the fit began from
     fit: Fit
     predictions: Mapping[str, Prediction]  # by recording
     cross_validation: Mapping[str, Mapping[str, float]]
@@ -92,7 +93,7 @@ def judged(
     notes = [*lost, *fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]
     notes += offset_notes(fit, experiment.campaign.channels)
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
-    return Fitted(name, kind, fit, predictions, validation, report or {}, tuple(notes), seconds)
+    return Fitted(name, kind, model, fit, predictions, validation, report or {}, tuple(notes), seconds)
 
 
 def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from discovery.errors import UserError
 from discovery.evaluation.tables import Table, as_text
-from discovery.files import read_text
+from discovery.runfolder import read_results
 
 MOST_NOTES = 5  # of a model, in the terminal
 
@@ -61,17 +60,3 @@ def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
     units = {y: one["units"].get(y, "") for one in runs.values() for y in one["outputs"]}
     header = ("rms", "", *(f"{y} [{units[y]}]" for y in outputs))
     return Table(f"Recording '{recording}' ({' / '.join(sorted(parts))})", header, tuple(rows))
-
-
-def read_results(folder: Path) -> dict[str, Any]:
-    """Content of a run's results.json. Raises UserError where there is none."""
-    path = Path(folder) / "results.json"
-    if not path.is_file():
-        raise UserError(f"{folder}: no results.json there; name the folder of a finished `discovery run`")
-    try:
-        results: dict[str, Any] = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise UserError(
-            f"{path}, line {error.lineno}: not valid JSON ({error.msg}); make the run again"
-        ) from None
-    return results

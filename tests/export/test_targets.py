@@ -215,7 +215,15 @@ def test_the_command_exports_a_run(model: Model, tmp_path: Path, monkeypatch: py
     run = tmp_path / "run"
     write_model(run / "models" / "everything.toml", model)
     (run / "results.json").write_text(
-        json.dumps({"experiment": "small", "fit": ["fit"], "campaign_file": "campaign.toml"})
+        json.dumps(
+            {
+                "experiment": "small",
+                "fit": ["fit"],
+                "held_out": [],
+                "models": {},
+                "campaign_file": "campaign.toml",
+            }
+        )
     )
     monkeypatch.chdir(tmp_path)
     rows = make_campaign(2.0).recordings["fit"]
@@ -237,7 +245,7 @@ def test_the_command_exports_a_run(model: Model, tmp_path: Path, monkeypatch: py
     for words, sentence in (
         (["run", "--model", "nobody", "--to", "c"], "no model 'nobody'"),
         (["run", "--model", "everything", "--to", "pickle"], "unknown export target 'pickle'"),
-        (["elsewhere", "--model", "everything", "--to", "c"], "no folder of a finished run"),
+        (["elsewhere", "--model", "everything", "--to", "c"], "no results.json there"),
     ):
         done = runner.invoke(app, ["export", *words])
         assert done.exit_code == 1
