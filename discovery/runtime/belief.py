@@ -53,10 +53,6 @@ class Belief:
     gain: float = 0.0
     effective: float = 0.0
 
-    def released(self) -> Belief:
-        """After a revision: the model believed in is the one at work."""
-        return replace(self, at_work=self.model, gain=0.0, effective=0.0)
-
 
 @dataclass(frozen=True)
 class Finding:
