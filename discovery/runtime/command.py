@@ -75,8 +75,8 @@ def compensate_rows(
         if not goes_on:
             stream.write(header(session.compensator))
         last = None
-        for now, newest, fresh in ticks(csv_rows(lines), step, session.resumed):
-            found = session.tick(newest, fresh, now)
+        for now, newest in ticks(csv_rows(lines), step, session.resumed):
+            found = session.tick(newest, now)
             stream.write(line(session.compensator, found))
             if source == "-":
                 stream.flush()
@@ -84,7 +84,7 @@ def compensate_rows(
         if last is None:
             say("no row came after the saved state; nothing was done")
         else:
-            session.save(last)
+            session.close(last)
 
 
 def header(compensator: Compensator) -> str:
