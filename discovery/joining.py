@@ -62,12 +62,14 @@ def join(folder: Path, temporary: Path) -> None:
     joined = {
         "command": then if then.endswith(command) else f"{then} && {command}",
         "models": models | now["models"],
-        "seconds": now["seconds"] + sum(float(before["models"][name]["seconds"]) for name in staying),
+        "seconds": now["seconds"] + sum(before["models"][name].get("seconds", 0.0) for name in staying),
         "inputs": {**before["inputs"], **now["inputs"]},
     }
     write_json(temporary / RESULTS, now | joined)
     for name in staying:
-        shutil.copy2(folder / "models" / f"{name}.toml", temporary / "models" / f"{name}.toml")
+        model = Path("models") / f"{name}.toml"
+        if (folder / model).exists():
+            shutil.copy2(folder / model, temporary / model)
     for path in (temporary / "predictions").glob("*.csv"):
         earlier = folder / "predictions" / path.name
         if earlier.exists():

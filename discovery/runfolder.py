@@ -16,7 +16,10 @@ from discovery.files import read_text
 
 RESULTS, DIAGNOSIS = "results.json", "diagnosis.json"
 OWNED = frozenset({RESULTS, DIAGNOSIS, "report.html", "models", "predictions"})
-_KEYS = {RESULTS: ("experiment", "fit", "held_out", "models"), DIAGNOSIS: ("model", "verdict", "physics")}
+_KEYS: dict[str, dict[str, type]] = {
+    RESULTS: {"experiment": str, "fit": list, "held_out": list, "models": dict},
+    DIAGNOSIS: {"model": str, "verdict": str, "physics": list},
+}
 
 
 def default_folder(experiment: str) -> Path:
@@ -45,10 +48,10 @@ def _read(folder: Path, name: str) -> dict[str, Any]:
         line = f", line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         what = error.msg if isinstance(error, json.JSONDecodeError) else str(error)
         raise UserError(f"{path}{line}: not valid JSON ({what}); make the run again") from None
-    missing = [key for key in _KEYS[name] if not isinstance(content, dict) or key not in content]
-    if missing:
-        raise UserError(f"{path}: the key '{missing[0]}' is missing; make the run again")
-    found: dict[str, Any] = content
+    found: dict[str, Any] = content if isinstance(content, dict) else {}
+    for key, kind in _KEYS[name].items():
+        if not isinstance(found.get(key), kind):
+            raise UserError(f"{path}: the key '{key}' is missing or wrong; make the run again")
     return found
 
 

@@ -44,7 +44,8 @@ def comparison(folders: Sequence[Path]) -> Iterator[str]:
 def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
     """rms of each output, a row for each model that predicted the recording; uncompensated errors first."""
     rows: list[tuple[str | float | None, ...]] = []
-    outputs = list(dict.fromkeys(name for one in runs.values() for name in one["outputs"]))
+    models = [model for one in runs.values() for model in one["models"].values()]
+    outputs = list(dict.fromkeys(y for m in models for scores in m["recordings"].values() for y in scores))
     parts = set()
     for run, results in runs.items():
         parts.add("held out" if recording in results["held_out"] else "fitted")
@@ -57,6 +58,6 @@ def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
         for name, entry in entries.items():
             size = f"{results['models'][name]['terms']} terms"
             rows.append((label + name, size, *(entry[y]["rms"] if y in entry else None for y in outputs)))
-    units = {y: one["units"].get(y, "") for one in runs.values() for y in one["outputs"]}
-    header = ("rms", "", *(f"{y} [{units[y]}]" for y in outputs))
+    units = {y: unit for one in runs.values() for y, unit in one.get("units", {}).items()}
+    header = ("rms", "", *(f"{y} [{units.get(y, '')}]" for y in outputs))
     return Table(f"Recording '{recording}' ({' / '.join(sorted(parts))})", header, tuple(rows))

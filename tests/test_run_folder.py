@@ -250,6 +250,7 @@ READERS: dict[str, list[Callable[[Path], object]]] = {
         ('{\n"fit": [', "line 2: not valid JSON"),
         ("[]", "is missing"),
         ('{"fit": [], "physics": []}', "is missing"),
+        ('{"experiment": "x", "fit": 3, "held_out": [], "models": {}, "model": 3}', "is missing or wrong"),
         ("[" * 100_000, "not valid JSON"),
     ],
 )
