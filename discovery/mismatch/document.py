@@ -174,8 +174,8 @@ def _physics(d: Diagnosis, n: Named, checked: float | None) -> dict[str, Any]:
             low, high = min(low, value), max(high, value)
         parameters[name] = {
             "value": _number(value),
-            "low": _number(value if p.fixed else low),
-            "high": _number(value if p.fixed else high),
+            "low": _number(h.spans[name][0] if name in h.spans else value if p.fixed else low),
+            "high": _number(h.spans[name][1] if name in h.spans else value if p.fixed else high),
             "unit": p.unit,
         }
     expressions = [text(t.expression) for t in h.terms] or [

@@ -87,7 +87,8 @@ def _windows(
     found = []
     for h in group:
         body, sd = h.states[0], spread[h.amplitudes[0]]
-        i, j = _best_window(lens, view, run, heat_steps(trajectory, body, coarse), coarse <= latest, sd)
+        gains = _window_gains(lens, view, run, heat_steps(trajectory, body, coarse), coarse <= latest, sd)
+        i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
         width = coarse[1] - coarse[0]
         fine = np.unique(
             np.concatenate(
@@ -97,16 +98,27 @@ def _windows(
                 ]
             )
         )
-        i, j = _best_window(lens, view, run, heat_steps(trajectory, body, fine), fine <= latest, sd)
+        gains = _window_gains(lens, view, run, heat_steps(trajectory, body, fine), fine <= latest, sd)
+        i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
         edges = dict(zip(h.shapes, (float(fine[i]), float(fine[j])), strict=True))
-        found.append(replace(h.at(edges), cost=float(2 * np.log(COARSE))))  # two edges were searched
+        with np.errstate(over="ignore"):
+            ranges = [_span(np.logaddexp.reduce(gains, axis=axis), fine) for axis in (1, 0)]
+        claim = replace(h.at(edges), spans=dict(zip(h.shapes, ranges, strict=True)))
+        found.append(replace(claim, cost=float(2 * np.log(COARSE))))  # two edges were searched
     return found
 
 
-def _best_window(
+def _span(gains: Array, instants: Array) -> tuple[float, float]:
+    """Where an instant lies at 95 %, by its log evidence: from one tried instant outside to another."""
+    share = np.cumsum(np.exp(gains - np.max(gains)))
+    first, last = np.searchsorted(share / share[-1], (0.025, 0.975))
+    return float(instants[max(first - 1, 0)]), float(instants[min(last + 1, len(instants) - 1)])
+
+
+def _window_gains(
     lens: Lens, view: View, run: str, steps: Array, starts: NDArray[np.bool_], sd: float
-) -> tuple[int, int]:
-    """Indices of the edges that speak for a window most; it begins where `starts` allows."""
+) -> Array:
+    """Log evidence for a window between each two edges, on at the first; it begins where `starts` allows."""
     z = whiten_one(lens, view, run, steps)
     dot = z.T @ view.residual
     gram = z.T @ z
@@ -114,8 +126,7 @@ def _best_window(
     gain = 0.5 * np.subtract.outer(dot, dot) ** 2 / size - 0.5 * np.log(size * sd**2)
     gain[np.tril_indices(len(dot))] = -np.inf
     gain[~starts] = -np.inf
-    i, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    return int(i), int(j)
+    return np.asarray(gain)
 
 
 def _jumps(
@@ -142,20 +153,22 @@ def _jumps(
     for h in group:
         rows = [grid.outputs.index(name) for name in h.shown]
         sd = [spread[a] for a in h.amplitudes]
-        k = _best_jump(view, first, rows, len(coarse), sd)
+        k = int(np.argmax(_jump_gains(view, first, rows, len(coarse), sd)))
         centre = int(np.searchsorted(read_time, coarse[k]))
         near = read_time[max(LEAST, centre - every) : min(centre + every + 1, last)]
-        k = _best_jump(view, columns(near), rows, len(near), sd)
+        gains = _jump_gains(view, columns(near), rows, len(near), sd)
         (name,) = h.shapes
-        found.append(replace(h.at({name: float(near[k])}), cost=float(np.log(COARSE))))
+        claim = h.at({name: float(near[int(np.argmax(gains))])})
+        found.append(replace(claim, spans={name: _span(gains, near)}, cost=float(np.log(COARSE))))
     return found
 
 
-def _best_jump(view: View, z: Array, rows: list[int], count: int, sd: list[float]) -> int:
+def _jump_gains(view: View, z: Array, rows: list[int], count: int, sd: list[float]) -> Array:
+    """Log evidence for a jump at each of the instants of `z`."""
     gains = np.zeros(count)
     for k in range(count):
         mine = z[:, [row * count + k for row in rows]]
         precision = mine.T @ mine + np.diag(np.array(sd) ** -2.0)
         dot = mine.T @ view.residual
         gains[k] = 0.5 * dot @ np.linalg.solve(precision, dot) - 0.5 * np.linalg.slogdet(precision)[1]
-    return int(np.argmax(gains))
+    return gains

@@ -36,6 +36,7 @@ class Hypothesis:
     channels: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)  # parameter name -> unit at this place
     cost: float = 0.0  # log of the number of instants that were searched for it
+    spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # 95 % range of such an instant
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], str | None, str | None, tuple[str, ...]]:

@@ -106,7 +106,7 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     if reasons:
         return Verdict(UNEXPLAINED, (), named, tuple(reasons))
     kinds = {n.hypothesis.effect.is_physics for n in named}
-    return Verdict(MISSING if True in kinds else FAULT, named, (), _dropped(found))
+    return Verdict(MISSING if True in kinds else FAULT, named, (), (*_dropped(found), *_much(best)))
 
 
 def _much(best: Assessment) -> tuple[str, ...]:
@@ -115,8 +115,7 @@ def _much(best: Assessment) -> tuple[str, ...]:
     if times < MUCH:
         return ()
     return (
-        f"what is left is {times:.1f} times the reading noise: irregular, or too few recordings to tell from "
-        "everyday heat",
+        f"what is left is {times:.1f} times the reading noise, in no pattern: it is taken for everyday heat",
     )
 
 

@@ -115,6 +115,13 @@ def test_what_is_concealed_is_named(name: str) -> None:
         assert size["value"] == pytest.approx(case.size, rel=0.2)
 
 
+def test_the_instant_of_a_jump_has_an_interval() -> None:
+    """Between two readings nobody knows; this one came at 50000 s."""
+    (physics,) = solved("an offset").document()["physics"]
+    _, instant = physics["parameters"].values()
+    assert 50000 - 3600 < instant["low"] < 50000 <= instant["high"] < 50000 + 3600
+
+
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.recording is None])
 def test_the_repair_is_proved_on_what_no_fit_saw(name: str, tmp_path: Path) -> None:
     """The repaired model is a file like any other, and scipy's unseen recording agrees with it."""
@@ -142,6 +149,9 @@ def test_a_window_of_heat_is_found_with_its_body_and_hours() -> None:
     (physics,) = answer.document()["physics"]
     assert (physics["effect"], physics["states"], physics["recording"]) == ("unmeasured_heat", ["bed"], "r2")
     assert next(iter(physics["parameters"].values()))["value"] == pytest.approx(120.0, rel=0.15)
+    _, on, off = physics["parameters"].values()
+    assert 30000 - 3600 < on["low"] < 30000 < on["high"] < 30000 + 3600
+    assert 52000 - 3600 < off["low"] < 52000 < off["high"] < 52000 + 3600
     (window,) = answer.location.windows
     assert (window.state, window.recording) == ("bed", "r2")
     assert abs(window.start_s - 30000) < 1800
