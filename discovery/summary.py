@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from discovery.errors import UserError
+from discovery.errors import UsageError, UserError
 from discovery.evaluation.tables import Table, as_text
 from discovery.files import read_text
 
@@ -31,10 +31,10 @@ def summary(folder: Path) -> Iterator[str]:
 def comparison(folders: Sequence[Path]) -> Iterator[str]:
     """Models of several runs side by side, one table for each recording that any of them predicted.
 
-    Raises UserError: fewer than two runs, or a folder without results.
+    Raises UsageError: fewer than two runs; UserError: a folder without results.
     """
     if len(folders) < 2:
-        raise UserError("compare takes two or more runs, as in `discovery compare runs/one runs/two`")
+        raise UsageError("compare takes two or more runs, as in `discovery compare runs/one runs/two`")
     runs = {str(folder): read_results(folder) for folder in folders}
     recordings = dict.fromkeys(name for one in runs.values() for name in (*one["fit"], *one["held_out"]))
     for recording in recordings:
