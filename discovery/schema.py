@@ -70,9 +70,12 @@ def suggest(word: str, allowed: list[str]) -> str:
 
     >>> suggest("unitt", ["role", "unit"])
     "did you mean 'unit'? Allowed are: role, unit"
+    >>> suggest("T_enf", ["T_env", "E_Y0C"])
+    "did you mean 'T_env'? Allowed are: T_env, E_Y0C"
     """
-    near = get_close_matches(word.lower(), allowed, n=1, cutoff=0.6)
-    hint = f"did you mean '{near[0]}'? " if near else ""
+    plain = {name.lower(): name for name in allowed}
+    near = get_close_matches(word.lower(), plain, n=1, cutoff=0.6)
+    hint = f"did you mean '{plain[near[0]]}'? " if near else ""
     text = f"{hint}allowed are: {', '.join(allowed)}" if allowed else "none is allowed here"
     return text.replace("? allowed", "? Allowed")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,12 +21,23 @@ def summary(folder: Path) -> Iterator[str]:
     for recording in (*results["fit"], *results["held_out"]):
         yield as_text(rms_table({"": results}, recording))
         yield ""
+    yield from remarks(folder)
+    yield f"{results['seconds']:.0f} s; the report: {folder / 'report.html'}"
+
+
+def remarks(folder: Path) -> Iterator[str]:
+    """The notes of each model, and that something is wrong with the recordings."""
+    results = read_results(folder)
     for name, model in results["models"].items():
         notes = model["notes"]
         yield from (f"note, {name}: {note}" for note in notes[:MOST_NOTES])
         if len(notes) > MOST_NOTES:
             yield f"note, {name}: {len(notes) - MOST_NOTES} more in results.json"
-    yield f"{results['seconds']:.0f} s; the report: {folder / 'report.html'}"
+    if findings := results["findings"]:
+        worst = min(findings, key=lambda one: not one.startswith("error"))
+        many = f"{len(findings)} findings in the recordings, the first: " if findings[1:] else ""
+        check = f"`discovery check {shlex.quote(results['campaign_file'])}`"
+        yield f"{many}{worst}; {check} lists what is wrong with the recordings"
 
 
 def comparison(folders: Sequence[Path]) -> Iterator[str]:

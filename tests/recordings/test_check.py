@@ -190,6 +190,15 @@ def test_all_mistakes_of_the_campaign_file_are_told_and_the_rest_is_checked(writ
         assert any(line.startswith(beginning) for line in told), (beginning, told)
 
 
+def test_one_recording_under_two_names(write: Write) -> None:
+    text = CAMPAIGN + 'again = { file = "fit.csv", set = { speed = 3 } }\n'
+    told = [line for line in found(write(campaign=text)) if "same readings" in line]
+    assert told == [
+        "warning: campaign.toml, line 10: recordings.again holds the same readings as fit; "
+        "name another file, or take one of them out"
+    ]
+
+
 def test_parquet_troubles(write: Write) -> None:
     assert "not a readable Parquet file" in found(write(b"PAR1 nothing", name="fit.parquet"))[0]
 
