@@ -11,9 +11,13 @@ Key = tuple[str | int, ...]
 
 
 class Strict(BaseModel):
-    """The base of every file form: unknown keys are refused, nothing changes after reading."""
+    """The base of every file form: unknown keys are refused, numbers are finite and no texts, nothing changes
+    after reading.
+    """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", populate_by_name=True, strict=True, allow_inf_nan=False
+    )
 
 
 def sentences(schema: type[BaseModel], data: Any, error: ValidationError) -> list[tuple[Key, str]]:
@@ -47,7 +51,7 @@ def _explain(schema: type[BaseModel], mistake: ErrorDetails, key: Key) -> str:
     kind, given = mistake["type"], mistake["input"]
     context = mistake.get("ctx", {})
     if kind == "extra_forbidden":
-        return f"unknown key; {suggest(str(key[-1]), _known_keys(schema, key[:-1]))}"
+        return f"unknown key; {suggest(str(key[-1]), _known_keys(schema, mistake['loc'][:-1]))}"
     if kind == "missing":
         return f"the key '{mistake['loc'][-1]}' is missing"
     if kind in ("literal_error", "enum"):
@@ -55,6 +59,8 @@ def _explain(schema: type[BaseModel], mistake: ErrorDetails, key: Key) -> str:
     if kind == "union_tag_invalid":
         known = suggest(context["tag"], _quoted(context["expected_tags"]))
         return f"kind {context['tag']!r} is not known; {known}"
+    if kind == "too_short":
+        return f"is empty; it needs at least {context['min_length']}"
     if kind in ("value_error", "assertion_error"):
         return str(context["error"])
     what = mistake["msg"].replace("Input should be", "should be").removesuffix(".")
@@ -80,16 +86,23 @@ def suggest(word: str, allowed: list[str]) -> str:
     return text.replace("? allowed", "? Allowed")
 
 
-def _known_keys(schema: Any, key: Key) -> list[str]:
-    """The keys that a table at `key` may hold."""
+def _known_keys(schema: Any, place: Key) -> list[str]:
+    """The keys that a table may hold at a place as pydantic names it, with the kind chosen among several."""
     found = [schema]
-    for part in key:
-        found = [inner for one in found for inner in _step(one, part)]
+    for part in place:
+        chosen = [one for one in found if _kind(one) == part]
+        found = chosen or [inner for one in found for inner in _step(one, part)]
     names: dict[str, None] = {}
     for one in found:
         if _is_model(one):
             names |= dict.fromkeys(field.alias or name for name, field in one.model_fields.items())
     return list(names)
+
+
+def _kind(annotation: Any) -> Any:
+    """What a table has to say as its kind; None where it has none."""
+    field = annotation.model_fields.get("kind") if _is_model(annotation) else None
+    return field and next(iter(get_args(field.annotation)), None)
 
 
 def _step(annotation: Any, part: str | int) -> list[Any]:

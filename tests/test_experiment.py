@@ -275,6 +275,7 @@ def test_one_influence_after_the_other(folder: Path) -> None:
         ('fit = ["a", "b"]', 'fits = ["a", "b"]', ["line 4", "unknown key", "did you mean 'fit'"]),
         ('kind = "reduced"', 'kind = "redced"', ["line 8", "is not known", "mean 'reduced'"]),
         ('kind = "reduced"', 'kind = "reduced", file = "x"', ["line 8", "unknown key"]),
+        ('kind = "reduced"', 'kind = "sindy", file = "x"', ["line 8", "kind, inputs, baseline"]),
         ('kind = "reduced"', 'kind = "reduced", input = ["P"]', ["line 8", "did you mean 'inputs'"]),
         ('inputs = ["T_env", "P"]', 'inputs = ["T_env", "Q"]', ["line 9", "no channel 'Q'"]),
         ('inputs = ["T_env", "P"]', 'separate = { P = ["c"] }', ["line 9", "'c' is held out"]),

@@ -19,15 +19,16 @@ def check(
     """
     from discovery.recordings.check import check_campaign, summary
 
-    findings = check_campaign(campaign)
+    findings, misfits = check_campaign(campaign), []
     for finding in findings:
         typer.echo(str(finding))
-    typer.echo(summary(findings))
     if models:
         from discovery.models.check import check_models
 
-        for warning in check_models(campaign, models):
-            typer.echo(f"warning: {warning}")
+        for misfit in check_models(campaign, models):
+            typer.echo(f"warning: {misfit}")
+            misfits.append(misfit)
+    typer.echo(summary(findings, misfits))
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(1)
 

@@ -1,7 +1,7 @@
 """Everything that is wrong with a campaign: the campaign file first, then recording by recording."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,11 +59,11 @@ def check_campaign(path: str | os.PathLike[str]) -> list[Finding]:
     return findings
 
 
-def summary(findings: list[Finding]) -> str:
-    """One line about all findings."""
+def summary(findings: Sequence[Finding], misfits: Sequence[str] = ()) -> str:
+    """One line about all findings, and about the places where models do not fit the campaign."""
     errors = sum(finding.severity == "error" for finding in findings)
-    warnings = len(findings) - errors
-    if not findings:
+    warnings = len(findings) - errors + len(misfits)
+    if not findings and not misfits:
         return "nothing is wrong with these recordings"
     return f"{errors} error{'s' * (errors != 1)}, {warnings} warning{'s' * (warnings != 1)}"
 

@@ -135,6 +135,30 @@ def test_a_spread_is_a_positive_number(write: Write, given: str, said: str) -> N
     ), told
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("noise = 0.5", "noise = inf", "channels.E_Y0C.noise: should be a finite number, not inf"),
+        ("noise = 0.5", "noise = nan", "channels.E_Y0C.noise: should be a finite number, not nan"),
+        ("noise = 0.5", 'noise = "0.5"', "channels.E_Y0C.noise: should be a valid number, not '0.5'"),
+        (
+            '"fit.csv"',
+            '"fit.csv", set = { speed = "1" }',
+            "recordings.fit.set.speed: should be a valid number",
+        ),
+        (
+            '"fit.csv"',
+            '"fit.csv", set = { speed = nan }',
+            "recordings.fit.set.speed: should be a finite number",
+        ),
+        ('fit = { file = "fit.csv" }', "", "recordings: is empty; it needs at least 1"),
+    ],
+)
+def test_numbers_are_finite_and_no_texts(write: Write, old: str, new: str, said: str) -> None:
+    told = found(write(campaign=CAMPAIGN.replace(old, new)))
+    assert any(line.startswith("error: campaign.toml") and said in line for line in told), told
+
+
 def test_a_spread_belongs_to_inputs(write: Write) -> None:
     told = found(write(campaign=CAMPAIGN.replace("noise = 0.5", "spread = 0.5")))
     wanted = "error: campaign.toml, line 6: channels.E_Y0C: spread belongs to inputs of models, not to"
