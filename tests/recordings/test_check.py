@@ -190,6 +190,28 @@ def test_a_clock_that_is_put_back(write: Write) -> None:
     assert "UTC" in told
 
 
+@pytest.mark.parametrize(
+    ("stamps", "said"),
+    [
+        (
+            [60e3 * k for k in range(480)],
+            "a stamp every 60000 s over 333 days: perhaps these are milliseconds",
+        ),
+        ([1.7e12 + 1000 * k for k in range(9000)], "a stamp every 1000 s over 104 days: perhaps these are"),
+        ([45000 + k / 1440 for k in range(361)], "361 rows within 0.25 s: perhaps these are days"),
+        ([k / 17280 for k in range(20000)], "20000 rows within 1.16 s: perhaps these are days"),
+        ([3600.0 * k for k in range(3000)], ""),  # hourly for four months
+        ([60.0 * k for k in range(4000)], ""),
+        ([0.1 * k for k in range(361)], ""),
+    ],
+)
+def test_stamps_that_are_hardly_seconds(write: Write, stamps: list[float], said: str) -> None:
+    told = found(write(with_column(0, [f"{stamp:.10g}" for stamp in stamps])))
+    clock = [line for line in told if "time in seconds" in line]
+    assert bool(clock) == bool(said)
+    assert all(line.startswith(f"warning: fit.csv, line 2: {said}") for line in clock), clock
+
+
 def test_a_trouble_of_many_cells_is_told_once(write: Write) -> None:
     told = found(write(with_column(1, ["bad"] * 60)))
     assert [line for line in told if "not a number" in line] == [
