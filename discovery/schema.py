@@ -8,6 +8,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 Key = tuple[str | int, ...]
+_TABLE, _LIST = "a table, as { key = value }", 'a list, as ["a", "b"]'
+_SHAPES = {"model_type": _TABLE, "dict_type": _TABLE, "list_type": _LIST, "tuple_type": _LIST}
 
 
 class Strict(BaseModel):
@@ -59,6 +61,8 @@ def _explain(schema: type[BaseModel], mistake: ErrorDetails, key: Key) -> str:
     if kind == "union_tag_invalid":
         known = suggest(context["tag"], _quoted(context["expected_tags"]))
         return f"kind {context['tag']!r} is not known; {known}"
+    if kind in _SHAPES:
+        return f"should be {_SHAPES[kind]}, not {_short(given)}"
     if kind == "too_short":
         return f"is empty; it needs at least {context['min_length']}"
     if kind in ("value_error", "assertion_error"):
