@@ -11,13 +11,15 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from discovery.dynamics.system import predict as model_outputs
-from discovery.export.document import from_document, render
+from discovery.export.document import Exported, from_document, render
 from discovery.export.makedocument import make_document
 from discovery.export.seal import open_seal
 from discovery.fitting import fit_model, predict_recording
@@ -25,6 +27,7 @@ from discovery.models import Model
 from discovery.models.modelfile import read_model
 from discovery.recordings import Campaign, Recording, load_campaign
 from discovery.runtime.belief import belief_of, residual_levels, update_belief
+from discovery.runtime.update import next_revision
 from discovery.virtual.machine import Machine
 from discovery.virtual.record import Order, take
 
@@ -66,12 +69,17 @@ def error_left(model: Model, campaign: Campaign, name: str) -> float:
     return float(np.sqrt(np.nanmean(residual[1:] ** 2)))
 
 
+def sealed(document: Mapping[str, Any]) -> Exported:
+    """The model of a document, as a runtime reads it."""
+    return from_document(*open_seal(render(document), "model"), "model")
+
+
 def main(days: int, seed: int) -> None:
     """Print the error left day by day."""
     began = time.perf_counter()
     campaign = load_campaign(DATA / "campaign.toml", only=["fit"])
     model = fit_model(read_model(DATA / "thermobalance.toml"), campaign, ["fit"]).model
-    exported = from_document(*open_seal(render(make_document(model, campaign, ["fit"])), "model"), "model")
+    exported = sealed(make_document(model, campaign, ["fit"]))
     belief, levels = belief_of(exported), residual_levels(exported)
     rows = []
     for day in range(1, days + 1):
@@ -88,7 +96,9 @@ def main(days: int, seed: int) -> None:
         belief, finding = update_belief(
             belief, levels, day_of(campaign, day, aged(day - 1), seed, few=True), name
         )
-        belief = belief.released() if finding.verdict == "drift" else belief
+        if finding.verdict == "drift":
+            exported = sealed(next_revision(exported, belief, [finding]))
+            belief = belief_of(exported)
         updated, left, fresh_left = rows[-1]
         print(
             f"day {day:2d}: left {updated:.2f} with updating, {left:.2f} without, {fresh_left:.2f} had it "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from discovery.errors import UserError
 from discovery.experimentfile import (
     Experiment,
+    ExportForm,
     FileEntry,
     MismatchForm,
     ModelEntry,
@@ -25,13 +26,17 @@ from discovery.fitting import fit_model
 from discovery.fitting.fit import Loss, written_with
 from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.starts import warm_start
+from discovery.joining import check_joins, join
 from discovery.models import Model
 from discovery.models.dimensions import with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
 from discovery.progress import Progress, silent
-from discovery.results import default_folder, staged, write_run
+from discovery.report import write_report
+from discovery.results import write_run
+from discovery.runfolder import default_folder, staged
 from discovery.sparse.options import SparseOptions
+from discovery.targets import check_targets
 
 if TYPE_CHECKING:
     from discovery.mismatch import Diagnosis
@@ -42,65 +47,86 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
 
     Args:
         path: the experiment file.
-        out: folder of the results; default runs/<experiment name>. It is replaced as a whole at the very end,
-            so an interrupted run leaves what was there before.
+        out: folder of the results; default runs/<experiment name>. The results in it are replaced as a whole
+            at the very end, so an interrupted run leaves what was there before; exports, figures and
+            whatever else stands there stay.
         progress: told what begins.
 
     Returns:
         The folder.
 
     Raises:
-        UserError: a mistake in a file, or a model that cannot be fitted.
+        UserError: a mistake in a file, a model that cannot be fitted, or one that cannot be exported; then
+            the run is kept.
     """
     began = clock.perf_counter()
     progress("reading the recordings")
     experiment = load_experiment(path)
     folder = out or default_folder(experiment.name)
+    if experiment.form.export:
+        check_targets(experiment.form.export.to)
     with staged(folder) as temporary:
-        fitted = {}
+        fitted: dict[str, Fitted] = {}
         for name, entry in experiment.form.models.items():
             fitted[name] = fit_entry(experiment, name, entry, progress)
-        found = diagnosis(experiment, progress)
+        found = diagnosis(experiment, progress, fitted)
         if found is not None and found.repaired is not None:
             name = _free_name("repaired", fitted)
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
         seconds = clock.perf_counter() - began
         progress("writing the report")
-        write_run(temporary, experiment, fitted, found.document() if found else None, seconds)
+        write_run(temporary, "run", experiment, fitted, found.document() if found else None, seconds)
+        write_report(temporary)
+    if experiment.form.export:
+        progress(f"exporting {experiment.form.export.model}")
+        export_of(folder, experiment.form.export)
     return folder
+
+
+def export_of(folder: Path, wanted: ExportForm) -> None:
+    """Export what [export] asks for, out of the run that stands in `folder`. Raises UserError, which says
+    that the run is kept.
+    """
+    from discovery.export import export_run
+
+    try:
+        export_run(folder, wanted.model, wanted.to)
+    except UserError as error:
+        raise UserError(f"the run is done and kept in {folder}, but its export failed: {error}") from None
 
 
 def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
     """What the model of [mismatch] leaves out, alone: that model, the diagnosis, the repaired one, a report.
 
-    Without [mismatch] the experiment's only (or first) model is taken. Files and failures as in `run`.
+    Without [mismatch] the experiment's only (or first) model is taken. Files and failures as in `run`; other
+    models that a run left in the folder stay there (see `joining`).
     """
     began = clock.perf_counter()
     progress("reading the recordings")
     experiment = load_experiment(path)
-    if experiment.form.mismatch is None:
-        asked = MismatchForm(model=next(iter(experiment.form.models)))
-        experiment = replace(experiment, form=experiment.form.model_copy(update={"mismatch": asked}))
-    experiment = replace(
-        experiment, form=experiment.form.model_copy(update={"cross_validate": False, "export": None})
-    )
+    form = experiment.form
+    asked = form.mismatch or MismatchForm(model=next(iter(form.models)))
+    name, entry = asked.model, form.models[asked.model]
+    alone = {"models": {name: entry}, "mismatch": asked, "cross_validate": False, "export": None}
+    experiment = replace(experiment, form=form.model_copy(update=alone))
     folder = out or default_folder(experiment.name)
+    check_joins(folder, experiment, name)
     with staged(folder) as temporary:
         found = diagnosis(experiment, progress)
         assert found is not None
-        assert experiment.form.mismatch is not None
-        name = experiment.form.mismatch.model
-        kind = experiment.form.models[name].kind
-        fitted = {name: fit_model_of(experiment, name, kind, replace(found.context.model, name=name))}
+        fitted = {name: fit_model_of(experiment, name, entry.kind, replace(found.context.model, name=name))}
         if found.repaired is not None:
-            name = _free_name("repaired", fitted)
+            name = _free_name("repaired", form.models)
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
         progress("writing the report")
-        write_run(temporary, experiment, fitted, found.document(), clock.perf_counter() - began)
+        seconds = clock.perf_counter() - began
+        write_run(temporary, "diagnose", experiment, fitted, found.document(), seconds)
+        join(folder, temporary)
+        write_report(temporary)
     return folder
 
 
-def _free_name(wanted: str, taken: Mapping[str, Fitted]) -> str:
+def _free_name(wanted: str, taken: Collection[str]) -> str:
     """A name that no model of the experiment has."""
     return wanted if wanted not in taken else _free_name(f"{wanted}_", taken)
 
@@ -183,25 +209,29 @@ def discovered(
     return with_coefficient_units(found.model, experiment.campaign.channels), dict(found.report)
 
 
-def diagnosis(experiment: Experiment, progress: Progress = silent) -> Diagnosis | None:
-    """What the model of [mismatch] leaves out, where the experiment asks."""
+def diagnosis(
+    experiment: Experiment, progress: Progress = silent, fitted: Mapping[str, Fitted] | None = None
+) -> Diagnosis | None:
+    """What the model of [mismatch] leaves out, where the experiment asks.
+
+    Args:
+        fitted: models whose start values are known already: a search for one is not made twice.
+    """
     wanted = experiment.form.mismatch
     if wanted is None:
         return None
     from discovery.mismatch import diagnose as find_missing
 
-    entry = experiment.form.models[wanted.model]
-    model, _ = starting_model(experiment, wanted.model, entry)
-    effects = [form.effect() for form in wanted.effects]
-    progress(f"looking for what {wanted.model} leaves out")
-    outputs = experiment.outputs_of(entry)
+    name, entry = wanted.model, experiment.form.models[wanted.model]
+    model = fitted[name].start if fitted else starting_model(experiment, name, entry, progress)[0]
+    progress(f"looking for what {name} leaves out")
     return find_missing(
         model,
         experiment.campaign,
         experiment.fit,
         experiment.held_out,
-        outputs,
-        effects,
+        experiment.outputs_of(entry),
+        [form.effect() for form in wanted.effects],
         physical=entry.kind == "file",
         tell=progress,
     )

@@ -17,7 +17,7 @@ from discovery.errors import UserError
 from discovery.files import dotted, locate, read_text, read_toml
 from discovery.fitting.fit import Loss
 from discovery.mismatch.catalogue.form import EffectForm
-from discovery.models import Model, check_names, read_model
+from discovery.models import Model, check_model, read_model
 from discovery.models.check import check_outputs
 from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, campaign_path
@@ -25,6 +25,7 @@ from discovery.recordings.roles import CORRECTION
 from discovery.recordings.twins import twins
 from discovery.schema import Strict, suggest
 from discovery.sparse.options import SparseOptions
+from discovery.targets import Target
 
 _INPUT_ROLES = (
     "ambient temperature",
@@ -103,7 +104,7 @@ class ExportForm(Strict):
     """[export]: the model that goes to the machine, and the forms it takes."""
 
     model: str
-    to: list[Literal["json", "c", "fmu", "st"]] = Field(["json"], min_length=1)
+    to: list[Target] = Field(["json"], min_length=1)
 
 
 class ExperimentForm(Strict):
@@ -190,7 +191,7 @@ class Experiment:
         entry = cast(FileEntry, self.form.models[name])
         path = self.path.parent / entry.file
         model = read_model(path)
-        check_names(model, set(self.campaign.channels), path)
+        check_model(model, {n: c.unit for n, c in self.campaign.channels.items()}, path)
         check_outputs(model, self.campaign.channels, path)
         given = [*model.outputs, *model.states]
         for output in entry.outputs or []:
@@ -292,18 +293,3 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
 
 def _mistake(path: Path, key: tuple[str | int, ...], what: str) -> UserError:
     return UserError(f"{path}, line {locate(read_text(path), key)}: {dotted(key)}: {what}")
-
-
-def input_files(experiment: Experiment) -> Mapping[str, Path]:
-    """Every file that the experiment reads, by the name that it has in the results."""
-    campaign = experiment.campaign.path
-    files = {experiment.path.name: experiment.path, campaign.name: campaign}
-    form = read_toml(campaign, CampaignForm)
-    files |= {
-        form.recordings[name].file: campaign.parent / form.recordings[name].file
-        for name in experiment.campaign.recordings
-    }
-    for entry in experiment.form.models.values():
-        if isinstance(entry, FileEntry):
-            files[entry.file] = experiment.path.parent / entry.file
-    return files

@@ -19,7 +19,8 @@ from discovery.experimentfile import Experiment
 from discovery.fitting import Fit, predict_recording
 from discovery.models import Model
 from discovery.models.convection import validity_of_model
-from discovery.models.dimensions import check_dimensions, differences
+from discovery.models.dimensions import check_dimensions
+from discovery.models.units import differences
 from discovery.progress import Progress, silent
 from discovery.recordings import Channel
 
@@ -48,6 +49,7 @@ class Fitted:
 
     name: str
     kind: str
+    start: Model  # that the fit began from
     fit: Fit
     predictions: Mapping[str, Prediction]  # by recording
     cross_validation: Mapping[str, Mapping[str, float]]
@@ -97,7 +99,7 @@ def judged(
     ]
     notes += offset_notes(fit, experiment.campaign.channels)
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
-    return Fitted(name, kind, fit, predictions, validation, report or {}, tuple(notes), seconds)
+    return Fitted(name, kind, model, fit, predictions, validation, report or {}, tuple(notes), seconds)
 
 
 def missing_outputs(experiment: Experiment, name: str, model: Model) -> list[str]:

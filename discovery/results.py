@@ -1,19 +1,14 @@
-"""The results folder: results.json, models, predictions, report; written beside its place and moved there at
-the end.
-"""
+"""What a run leaves behind: results.json, diagnosis.json, models, predictions."""
 
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
 import json
 import math
-import shutil
+import shlex
 import sys
-import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,14 +16,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import discovery
-from discovery.errors import UserError
 from discovery.evaluation.crossvalidation import parts_of_the_paper
 from discovery.evaluation.shares import term_shares
-from discovery.experimentfile import Experiment, input_files
+from discovery.experimentfile import Experiment
 from discovery.files import write_atomic
+from discovery.inputfiles import hashes, input_files
 from discovery.models import Model, write_model
 from discovery.models.equations import equations
 from discovery.recordings.check import check_campaign
+from discovery.runfolder import DIAGNOSIS, RESULTS
 
 if TYPE_CHECKING:
     from discovery.fitted import Fitted
@@ -36,85 +32,33 @@ if TYPE_CHECKING:
 _PACKAGES = ("numpy", "scipy", "numba", "pandas", "scikit-learn", "pysindy", "pint")
 
 
-def default_folder(experiment: str) -> Path:
-    """Where results go unless the user says otherwise."""
-    return Path("runs") / experiment
-
-
-@contextmanager
-def staged(folder: Path) -> Iterator[Path]:
-    """A temporary folder beside `folder` that takes its place when the block ends well, and vanishes when
-    not.
-
-    Raises UserError: `folder` holds something else than the results of a run, or cannot be written.
-    """
-    _refuse_foreign(folder)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
-    except OSError as error:
-        raise UserError(
-            f"{folder}: cannot be written ({error.strerror}); choose another place with --out"
-        ) from None
-    try:
-        temporary.chmod(0o755)
-        yield temporary
-        old = None
-        if folder.exists():
-            old = temporary.with_name(f"{temporary.name}.old")
-            folder.replace(old)
-        temporary.replace(folder)
-        if old:
-            shutil.rmtree(old)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _refuse_foreign(folder: Path) -> None:
-    if not folder.exists():
-        return
-    if not folder.is_dir():
-        raise UserError(f"{folder}: this is a file; name a folder with --out")
-    content = {entry.name for entry in folder.iterdir()}
-    if content and not content & {"results.json", "diagnosis.json"}:
-        raise UserError(
-            f"{folder}: this folder holds something else than results; name another one with --out"
-        )
-
-
 def write_run(
     folder: Path,
+    verb: str,
     experiment: Experiment,
     fitted: Mapping[str, Fitted],
     diagnosis: Mapping[str, Any] | None,
     seconds: float,
 ) -> None:
-    """Everything that a run leaves behind."""
-    write_json(folder / "results.json", results_document(experiment, fitted, seconds))
+    """Everything that a run leaves behind but the report. `verb`: of the command that made it."""
+    write_json(folder / RESULTS, results_document(verb, experiment, fitted, seconds))
     if diagnosis is not None:
-        write_json(folder / "diagnosis.json", diagnosis)
+        write_json(folder / DIAGNOSIS, diagnosis)
     for name, one in fitted.items():
         write_model(folder / "models" / f"{name}.toml", one.model)
     for recording in (*experiment.fit, *experiment.held_out):
         if any(recording in one.predictions for one in fitted.values()):
             write_atomic(folder / "predictions" / f"{recording}.csv", predictions_table(recording, fitted))
-    if experiment.form.export:
-        from discovery.export import export_model
-
-        wanted = experiment.form.export
-        place = folder / "export" / wanted.model
-        export_model(fitted[wanted.model].model, experiment.campaign, experiment.fit, wanted.to, place)
-    from discovery.report import write_report
-
-    write_report(folder)
 
 
-def results_document(experiment: Experiment, fitted: Mapping[str, Fitted], seconds: float) -> dict[str, Any]:
+def results_document(
+    verb: str, experiment: Experiment, fitted: Mapping[str, Fitted], seconds: float
+) -> dict[str, Any]:
     """The content of results.json."""
     channels = experiment.campaign.channels
     return {
         "experiment": experiment.name,
-        "command": f"discovery run {experiment.path}",
+        "command": shlex.join(["discovery", verb, str(experiment.path)]),
         "campaign": experiment.campaign.name,
         "campaign_file": str(experiment.campaign.path),
         "fit": list(experiment.fit),
@@ -129,7 +73,7 @@ def results_document(experiment: Experiment, fitted: Mapping[str, Fitted], secon
         "models": {name: model_entry(one) for name, one in fitted.items()},
         "seconds": seconds,
         "versions": versions(),
-        "inputs": {name: _sha256(path) for name, path in input_files(experiment).items()},
+        "inputs": hashes(input_files(experiment)),
     }
 
 
@@ -207,10 +151,6 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from discovery.errors import UsageError, UserError
+from discovery.errors import UsageError
 from discovery.evaluation.tables import Table, as_text
-from discovery.files import read_text
+from discovery.runfolder import read_results
 
 MOST_NOTES = 5  # of a model, in the terminal
 
@@ -57,7 +56,8 @@ def comparison(folders: Sequence[Path]) -> Iterator[str]:
 def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
     """rms of each output, a row for each model that predicted the recording; uncompensated errors first."""
     rows: list[tuple[str | float | None, ...]] = []
-    outputs = list(dict.fromkeys(name for one in runs.values() for name in one["outputs"]))
+    models = [model for one in runs.values() for model in one["models"].values()]
+    outputs = list(dict.fromkeys(y for m in models for scores in m["recordings"].values() for y in scores))
     parts = set()
     for run, results in runs.items():
         parts.add("held out" if recording in results["held_out"] else "fitted")
@@ -70,20 +70,6 @@ def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
         for name, entry in entries.items():
             size = f"{results['models'][name]['terms']} terms"
             rows.append((label + name, size, *(entry[y]["rms"] if y in entry else None for y in outputs)))
-    units = {y: one["units"].get(y, "") for one in runs.values() for y in one["outputs"]}
-    header = ("rms", "", *(f"{y} [{units[y]}]" for y in outputs))
+    units = {y: unit for one in runs.values() for y, unit in one.get("units", {}).items()}
+    header = ("rms", "", *(f"{y} [{units.get(y, '')}]" for y in outputs))
     return Table(f"Recording '{recording}' ({' / '.join(sorted(parts))})", header, tuple(rows))
-
-
-def read_results(folder: Path) -> dict[str, Any]:
-    """Content of a run's results.json. Raises UserError where there is none."""
-    path = Path(folder) / "results.json"
-    if not path.is_file():
-        raise UserError(f"{folder}: no results.json there; name the folder of a finished `discovery run`")
-    try:
-        results: dict[str, Any] = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise UserError(
-            f"{path}, line {error.lineno}: not valid JSON ({error.msg}); make the run again"
-        ) from None
-    return results

@@ -24,82 +24,12 @@ from discovery.recordings import Channel
 from discovery.report.ranking import ranked
 from discovery.report.run import load_run
 from discovery.summary import comparison
-
-CAMPAIGN = """
-name = "small"
-
-[channels]
-T_env = { role = "ambient temperature", unit = "degC" }
-P     = { role = "heat load", unit = "W" }
-E_Y0C = { role = "error", unit = "um", noise = 0.3 }
-E_R0T = { role = "error", unit = "um", noise = 0.3 }
-
-[recordings]
-a = { file = "a.csv" }
-b = { file = "b.csv" }
-c = { file = "c.csv" }
-"""
-
-MODEL = """
-name = "one body"
-
-[parameters]
-G    = { start = 10.0, unit = "W/K", min = 0.0 }
-loss = { start = 0.5, unit = "1", min = 0.0 }
-
-[states]
-body = { capacity = 60e3, start = "T_env" }
-
-[[terms]]
-into = "body"
-expression = "G*(T_env - body)"
-
-[[terms]]
-into = "body"
-expression = "loss*P"
-
-[outputs]
-E_Y0C = "-5*(body - 22)"
-E_R0T = "2*(body - 22)"
-"""
-
-EXPERIMENT = """
-name = "small"
-campaign = "campaign.toml"
-fit = ["a", "b"]
-held_out = ["c"]
-
-[models]
-reduced       = { kind = "reduced" }
-superposition = { kind = "superposition", inputs = ["T_env", "P"] }
-one_body      = { file = "model.toml" }
-"""
-
-
-def write_recording(path: Path, seed: int) -> None:
-    """24 h of the body of MODEL with G = 12 W/K and loss = 0.4; readings every 15 minutes, 0.3 um noise."""
-    rng = np.random.default_rng(seed)
-    lines, x, room, power = ["time,T_env,P,E_Y0C,E_R0T"], 22.0, 22.0, 0.0
-    for k in range(24 * 12 + 1):
-        if k % 12 == 0:
-            power = float(rng.choice([0.0, 100.0, 250.0]))
-        room = 22.0 + 0.8 * np.sin(k / 40.0 + seed)
-        errors = ["", ""]
-        if k % 3 == 0:
-            errors = [f"{factor * (x - 22) + 0.3 * rng.standard_normal():.3f}" for factor in (-5.0, 2.0)]
-        lines.append(f"{300 * k},{room:.3f},{power:.0f},{','.join(errors)}")
-        steady = room + 0.4 * power / 12.0
-        x = steady + (x - steady) * float(np.exp(-300 * 12.0 / 60e3))
-    path.write_text("\n".join(lines) + "\n")
+from tests.small import CAMPAIGN, EXPERIMENT, MODEL, write_recording, write_small
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    for seed, name in enumerate("abc"):
-        write_recording(tmp_path / f"{name}.csv", seed)
-    (tmp_path / "campaign.toml").write_text(CAMPAIGN)
-    (tmp_path / "model.toml").write_text(MODEL)
-    (tmp_path / "experiment.toml").write_text(EXPERIMENT)
+    write_small(tmp_path)
     return tmp_path
 
 

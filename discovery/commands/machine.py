@@ -6,12 +6,13 @@ from typing import Annotated
 import typer
 
 from discovery.errors import UsageError
+from discovery.targets import TARGETS
 
 
 def export(
     run: Annotated[Path, typer.Argument(help="Folder of a finished run.")],
     model: Annotated[str, typer.Option(help="Name of one of its models.")],
-    to: Annotated[list[str], typer.Option(help="json, c, fmu, fmu3 or st; may be repeated.")],
+    to: Annotated[list[str], typer.Option(help=f"{', '.join(TARGETS)}; may be repeated.")],
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the files [RUN/export/MODEL].")] = None,
     campaign: Annotated[Path | None, typer.Option(help="Campaign file [the one of the run].")] = None,
     step: Annotated[float, typer.Option(help="Fixed internal step, s.")] = 10.0,

@@ -12,7 +12,8 @@ def run(
 ) -> None:
     """Do the main job: fit, discover, cross-validate, compare, diagnose, report, export.
 
-    The folder of results is written as a whole at the end; an interrupted run leaves nothing behind.
+    The results in the folder are replaced as a whole at the end: an interrupted run leaves nothing behind.
+    Exports, figures and notes in it stay.
     """
     from discovery.experiment import run as run_experiment
     from discovery.progress import shown
@@ -35,8 +36,9 @@ def diagnose(
     """Find what the model of [mismatch] leaves out: where, which physics, how sure, and how much better the
     repair fits.
 
-    Writes diagnosis.json, the repaired model and report.html. "no mismatch" and "unexplained" are answers
-    too: nothing is named that the recordings cannot tell apart.
+    Writes diagnosis.json, the repaired model and report.html; other models that a run of the same recordings
+    left in the folder stay. "no mismatch" and "unexplained" are answers too: nothing is named that the
+    recordings cannot tell apart.
     """
     from discovery.experiment import diagnose as find
     from discovery.mismatch.summary import summary
@@ -45,7 +47,7 @@ def diagnose(
 
     with shown() as progress:
         folder = find(experiment, out, progress)
-    for line in summary(folder / "diagnosis.json"):
+    for line in summary(folder):
         typer.echo(line)
     for line in remarks(folder):
         typer.echo(line)

@@ -60,7 +60,7 @@ class Trajectory:
 
 def make_system(model: Model, grid: Grid) -> System:
     """Bind a model to a grid."""
-    model = expanded(model)
+    model = expanded(model, {*grid.samples, *grid.outputs})
     states = tuple(model.states)
     index = {name: i for i, name in enumerate(states)}
     variables = frozenset(states)
@@ -217,9 +217,22 @@ def outputs(trajectory: Trajectory, wrt: frozenset[str] = frozenset()) -> list[D
 
 
 def predict(trajectory: Trajectory) -> Array:
-    """Outputs at the reading instants, (R, Y)."""
-    read, count = trajectory.system.grid.read, len(trajectory.system.grid.time)
-    columns = [np.broadcast_to(dual.value, (count,))[read] for dual in outputs(trajectory)]
+    """Outputs at the reading instants, (R, Y).
+
+    Raises:
+        RunsAwayError: one that is not finite where it was read.
+    """
+    grid = trajectory.system.grid
+    count = len(grid.time)
+    columns = [np.broadcast_to(dual.value, (count,))[grid.read] for dual in outputs(trajectory)]
+    for name, column, seen in zip(grid.outputs, columns, grid.measured.T, strict=True):
+        lost = seen & ~np.isfinite(column)
+        if lost.any():
+            raise RunsAwayError(
+                f"model '{trajectory.system.model.name}': the output '{name}' is not a finite number "
+                f"{grid.time[grid.read][lost][0]:.0f} s after the start of recording '{grid.recording}'; "
+                "check what it divides by and what log(), sqrt() and ** are taken of"
+            )
     return np.column_stack(columns)
 
 

@@ -22,9 +22,18 @@ _CALL = {"exp": "R_EXP", "log": "R_LOG", "sqrt": "R_SQRT", "tanh": "R_TANH", "ab
 _COMPARE = ("<", "<=", ">", ">=", "==", "!=")
 
 
+# Files that stand beside those of a model, in C or in an FMU, and headers that they include: no model's.
+_TAKEN = frozenset(
+    {"replay", "instance", "fmi2", "fmi3", "math", "stdbool", "stddef", "stdint", "stdio", "stdlib"}
+    | {"string", "time", *(f"fmi{v}{part}" for v in (2, 3) for part in ("functions", "functiontypes"))}
+    | {"fmi2typesplatform", "fmi3platformtypes"}
+)
+
+
 def c_prefix(exported: Exported) -> str:
-    """Beginning of every name in the C files of a model."""
-    return identifier(exported.model.name).lower()
+    """Beginning of every name in the C files of a model, and name of its files."""
+    word = identifier(exported.model.name).lower()
+    return f"{word}_model" if word in _TAKEN else word
 
 
 def real(value: float) -> str:

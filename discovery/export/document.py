@@ -119,6 +119,7 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
             None if s["start"] is None else parse(s["start"], f"{place}, start of {s['name']}"),
             s["start_sd"],
             s["scale"],
+            s.get("memory", False),
         )
         for s in document["states"]
     }

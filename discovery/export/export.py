@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,12 +29,12 @@ from discovery.export.st import KINDS, st_name, st_text
 from discovery.export.stproof import prove_st
 from discovery.models import Model
 from discovery.recordings import Campaign
+from discovery.runfolder import read_results
 from discovery.schema import suggest
+from discovery.targets import check_targets
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-
-TARGETS = ("json", "c", "fmu", "fmu3", "st")
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ def export_model(
 
     Args:
         recordings: those of the fit; ranges, limits and the reference of the replay come from them alone.
-        to: targets, some of `TARGETS`.
+        to: targets, some of `discovery.targets.TARGETS`.
         out_dir: folder that the files go to.
         step_s: fixed internal step [s].
         states: reduce the model to so many states first (see `discovery.export.reduce`).
@@ -84,9 +83,7 @@ def export_model(
         UserError: a model that cannot be exported, or a target that is not equal; then nothing is written.
     """
     targets = (to,) if isinstance(to, str) else tuple(to)
-    for target in targets:
-        if target not in TARGETS:
-            raise UsageError(f"unknown export target '{target}'; {suggest(target, list(TARGETS))}")
+    check_targets(targets)
     if not 0.001 <= step_s <= 3600.0:
         raise UsageError(
             f"a step of {step_s:g} s is not possible; give one between 0.001 and 3600, usually 1 to 10"
@@ -183,17 +180,8 @@ def export_run(
     from discovery.models.modelfile import read_model
     from discovery.recordings import load_campaign
 
-    results_file = run / "results.json"
-    if not results_file.is_file():
-        raise UserError(
-            f"{run}: this is no folder of a finished run (results.json is missing); make one with "
-            f"`discovery run`"
-        )
-    try:
-        results = json.loads(results_file.read_text(encoding="utf-8"))
-        fit, experiment = [str(r) for r in results["fit"]], str(results.get("experiment", run.name))
-    except (ValueError, KeyError, TypeError):
-        raise UserError(f"{results_file}: cannot be read; run the experiment again") from None
+    results = read_results(run)
+    fit = [str(recording) for recording in results["fit"]]
     model_file = run / "models" / f"{name}.toml"
     if not model_file.is_file():
         known = sorted(path.stem for path in (run / "models").glob("*.toml"))
@@ -202,7 +190,7 @@ def export_run(
     loaded = load_campaign(place, only=fit)
     model = read_model(model_file)
     out_dir = out_dir or run / "export" / name
-    provenance = {"experiment": experiment, "model_file": model_file.name}
+    provenance = {"experiment": str(results["experiment"]), "model_file": model_file.name}
     return export_model(
         model, loaded, fit, to, out_dir, step_s=step_s, states=states, key=key, provenance=provenance
     )

@@ -28,16 +28,21 @@ def exportable(model: Model, campaign: Campaign) -> Model:
     values that need no reading, since a controller has none: errors count from 0, bodies begin at the
     temperature of the room.
 
+    Outputs that are no channel are left out: nothing says what they are, and nobody may compensate them.
+
     Raises:
-        UserError: a model without outputs, or a measured body and no room temperature.
+        UserError: no output is a channel, or a measured body and no room temperature.
     """
-    model = expanded(model)
+    model = expanded(model, campaign.channels)
     own = {
         name: Name(name) for name in model.states if name in campaign.channels and name not in model.outputs
     }
-    outputs = {**model.outputs, **own}
+    outputs = {name: e for name, e in model.outputs.items() if name in campaign.channels} | own
     if not outputs:
-        raise UserError(f"model '{model.name}' has no outputs; give it some under [outputs]")
+        raise UserError(
+            f"model '{model.name}': no output is a channel of campaign {campaign.path}; name the errors "
+            "under [outputs] as their channels"
+        )
     unread: dict[str, Expression] = {
         name: Number(0.0) for name, channel in campaign.channels.items() if channel.role == "error"
     }
@@ -101,12 +106,12 @@ def make_document(
         )
     outputs = []
     for name, expression in model.outputs.items():
-        found = campaign.channels.get(name)
+        channel = campaign.channels[name]
         outputs.append(
             {
                 "name": name,
-                "role": found.role if found else "temperature" if name in model.states else "error",
-                "unit": found.unit if found else "um",
+                "role": channel.role,
+                "unit": channel.unit,
                 "expression": text(expression),
             }
             | asdict(limits[name])
@@ -128,6 +133,7 @@ def make_document(
                 "start": text(s.start) if s.start is not None else None,
                 "start_sd": s.start_sd,
             }
+            | ({"memory": True} if s.memory else {})
             for name, s in model.states.items()
         ],
         "terms": [

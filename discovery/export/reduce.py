@@ -35,7 +35,6 @@ class Reduction:
     full_states: int
     largest_error: Mapping[str, float]  # by output, in its unit
     rms_error: Mapping[str, float]
-    singular_values: tuple[float, ...]  # Hankel, of all directions
 
     def note(self) -> dict[str, Any]:
         """For the provenance of the exported model."""
@@ -65,7 +64,7 @@ def reduce_model(
     compiled = compile_model(full, step_s)
     inputs = {r: sampled_inputs(campaign, r, compiled.inputs, step_s) for r in recordings}
     truth = {r: _run(compiled, u) for r, u in inputs.items()}
-    mean, right, left, values = _directions(compiled, np.concatenate(list(inputs.values())), truth, states)
+    mean, right, left, _ = _directions(compiled, np.concatenate(list(inputs.values())), truth, states)
     reduced = _projected(full, mean, right, left)
     small = compile_model(reduced, step_s)
     errors = []
@@ -84,7 +83,6 @@ def reduce_model(
         len(names),
         dict(zip(outputs, worst.tolist(), strict=True)),
         dict(zip(outputs, rms.tolist(), strict=True)),
-        tuple(values.tolist()),
     )
 
 

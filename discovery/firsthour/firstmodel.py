@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from discovery.firsthour.guess import Guess, drives
+from discovery.recordings.units import UnitError, conversion
 
 
 def first_model(guesses: Mapping[str, Guess], outputs: Sequence[str], *, has_room: bool) -> str:
@@ -35,16 +36,10 @@ def first_model(guesses: Mapping[str, Guess], outputs: Sequence[str], *, has_roo
         found = add(output, guesses, room, outputs)
         parameters += found[0]
         terms += found[1]
-    states = [f'{output} = {{ unit = "{_state_unit(guesses[output])}" }}' for output in outputs]
+    states = [f'{output} = {{ unit = "{_canonical(guesses[output])}" }}' for output in outputs]
     return "\n".join(
         [*lines, *parameters, "", "[states]   # each starts at its first reading", *states, "", *terms]
     )
-
-
-def _state_unit(one: Guess) -> str:
-    if one.role == "temperature":
-        return "degC"
-    return "um/m" if one.unit.endswith("/m") else "um"
 
 
 def _temperature(
@@ -79,7 +74,7 @@ def _error(
     output: str, guesses: Mapping[str, Guess], room: str | None, outputs: Sequence[str]
 ) -> tuple[list[str], list[str]]:
     del outputs
-    unit = _state_unit(guesses[output])
+    unit = _canonical(guesses[output])
     parameters = [
         f'decay_{output} = {{ start = 1e-4, unit = "1/s", min = 1e-6 }}',
         f'zero_{output} = {{ start = 0.0, unit = "{unit}/s" }}',
@@ -116,7 +111,11 @@ def _belonging(output: str, loads: Sequence[str], outputs: Sequence[str]) -> lis
 
 
 def _canonical(one: Guess) -> str:
-    return "W" if one.unit in ("W", "kW") else one.unit
+    """The unit that values have once they are loaded."""
+    try:
+        return conversion(one.unit, one.role).unit
+    except UnitError:  # the check of the campaign says so
+        return one.unit
 
 
 def _start(unit: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.firsthour.table import Column
+from discovery.firsthour.words import A_ROOM, DEGREES, TEMPERATURES, Named, role_of, surroundings, unit_of
 from discovery.recordings.correction import corrected_by_name
 from discovery.recordings.units import UnitError, conversion
 
@@ -27,84 +28,6 @@ class Guess:
     corrects: str | None = None  # of an applied correction
 
 
-# words of a name -> role; the first match counts
-_WORDS: tuple[tuple[str, str], ...] = (
-    (r"corr(ection)?|comp(ensation)?|offset|applied", "applied correction"),
-    (
-        r"e [xyzabcr]\d?[0a-z]*|e[xyzabc]\d[abct]|error|dev(iation)?|displacement",
-        "error",
-    ),
-    (r"probe|r test|growth|shift|drift", "error"),
-    (r"eff(iciency)?|status|state|mode|fault|set ?point", "other input"),
-    (r"nozzle.*(height|h)|h nozzle", "nozzle height"),
-    (r"nozzle.*side|side.*nozzle", "nozzle side"),
-    (r"(p|power|q|heat).*cool(ing|er)?|cool(ing|er)? *(power|p)|chiller *(power|p)", "cooling power"),
-    (r"(t|temp(erature)?)? *(coolant|chiller|cool(er|ing)?)", "coolant temperature"),
-    (
-        r"(t|temp(erature)?)? *(fluid|emulsion|kss|sump|tank|cutting fluid)( *t(emp(erature)?)?)?$",
-        "fluid temperature",
-    ),
-    (
-        r"(t|temp(erature)?)? *"
-        r"(amb(ient)?|env(ironment)?|room|air|hall|outside|outdoor|ext(ern(al)?)?|surroundings?|umgebung|raum)",
-        "ambient temperature",
-    ),
-    (r"pump|flow|volume stream", "fluid flow"),
-    (r"speed|rpm|spindle|n|rev(olution)?s?|drehzahl", "rotation speed"),
-    (r"heater\w*|p|power|load|drive|torque|loss(es)?|q|heat|current|motor|leistung", "heat load"),
-    (r"t|temp(erature)?s?|thermo(couple)?|pt\d*|tc\d*", "temperature"),
-    (r"sensor|housing|bearing|plate|body|bed|table", "temperature"),
-)
-_ROLE_OF_UNIT = {
-    "degC": "temperature",
-    "degF": "temperature",
-    "K": "temperature",
-    "rpm": "rotation speed",
-    "W": "heat load",
-    "kW": "heat load",
-    "um": "error",
-    "um/m": "error",
-    "l/min": "fluid flow",
-}
-_UNITS = {
-    "°c": "degC",
-    "c": "degC",
-    "degc": "degC",
-    "celsius": "degC",
-    "deg c": "degC",
-    "°f": "degF",
-    "f": "degF",
-    "degf": "degF",
-    "fahrenheit": "degF",
-    "deg f": "degF",
-    "k": "K",
-    "kelvin": "K",
-    "%": "percent",
-    "pct": "percent",
-    "percent": "percent",
-    "rpm": "rpm",
-    "1/min": "rpm",
-    "u/min": "rpm",
-    "min-1": "rpm",
-    "w": "W",
-    "watt": "W",
-    "kw": "kW",
-    "um": "um",
-    "µm": "um",
-    "μm": "um",
-    "micron": "um",
-    "mm": "mm",
-    "um/m": "um/m",
-    "µm/m": "um/m",
-    "l/min": "l/min",
-    "lpm": "l/min",
-    "a": "A",
-    "v": "V",
-    "-": "1",
-    "1": "1",
-}
-_DEGREES = str.maketrans("º˚", "°°")  # what passes for the sign of degrees
-_TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
 _USUAL = {
     "rotation speed": "rpm",
     "error": "um",
@@ -117,12 +40,14 @@ _ROOM_F = (55.0, 100.0)  # a machine starts near room temperature: 13 to 38 degC
 
 def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
     """Role and unit of each column by name, and which error a correction belongs to."""
-    guesses, stated = {column.name: guess(column) for column in columns}, {c.name: c.unit for c in columns}
-    told = [g.unit for c, g in zip(columns, guesses.values(), strict=True) if _is_load(g) and c.values.any()]
-    for column in columns:  # a load that is never on has the unit of its neighbour
-        one = guesses[column.name]
-        if told and _is_load(one) and not column.unit and not column.values.any():
-            guesses[column.name] = replace(one, unit=told[0], why=f"{one.why}, in {told[0]} as the others")
+    fahrenheit = _fahrenheit(columns)
+    guesses = {column.name: guess(column, fahrenheit=fahrenheit) for column in columns}
+    stated, on = {c.name: c.unit for c in columns}, {c.name: np.nan_to_num(c.values).any() for c in columns}
+    told = [one.unit for name, one in guesses.items() if _is_load(one) and on[name]]
+    for name, one in guesses.items():  # a load that is never on has the unit of its neighbour
+        if told and _is_load(one) and not stated[name] and not on[name]:
+            guesses[name] = replace(one, unit=told[0], why=f"{one.why}, in {told[0]} as the others")
+    guesses = _one_room(_one_unit(columns, guesses))
     errors = [name for name, one in guesses.items() if one.role == "error"]
     corrections = [name for name, one in guesses.items() if one.role == "applied correction"]
     for name in corrections:
@@ -139,7 +64,7 @@ def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
             guesses[name] = replace(one, unit=unit, why=why, sure=False, corrects=error)
     if errors and not drives(guesses):
         for name, one in guesses.items():
-            if one.role == "temperature" and one.unit in ("degC", "K"):
+            if one.role == "temperature" and one.unit in DEGREES:
                 why = f"{one.why}; an input of the errors, since nothing else says what heats the machine"
                 guesses[name] = replace(one, role="other input", why=why, sure=False)
     return guesses
@@ -152,17 +77,19 @@ def drives(guesses: Mapping[str, Guess]) -> list[str]:
     return loads or likely
 
 
-def guess(column: Column) -> Guess:
-    """Role and unit of a column."""
-    spelled = column.unit.strip().translate(_DEGREES)
-    named = _UNITS.get(spelled.lower())
-    role, why = _role(column, named)
+def guess(column: Column, *, fahrenheit: bool = False) -> Guess:
+    """Role and unit of a column. `fahrenheit`: other columns speak for it."""
+    spelled, named = unit_of(column.unit)
+    name = role_of(column.name, named, column.values)
+    role, why = name.role, name.why
     if named:
-        if role in _TEMPERATURES and named not in ("degC", "degF", "K"):
+        if role in TEMPERATURES and named not in DEGREES:
             role, why = "other input", f"the unit {column.unit} is none of a temperature"
-        return Guess(role, named, f"{why}; the header says {column.unit}", role != "other input")
+        return Guess(
+            role, named, f"{why}; the header says {column.unit}", name.sure and role != "other input"
+        )
     if not spelled:
-        return _by_values(role, why, column.values)
+        return _by_values(name, column.values, fahrenheit=fahrenheit)
     # a unit that the role cannot have is worth more than the word that suggested the role
     for likely in dict.fromkeys((role, "other input")):
         if _known(spelled, likely):
@@ -186,42 +113,72 @@ def _known(unit: str, role: str) -> bool:
     return True
 
 
-def _role(column: Column, unit: str | None) -> tuple[str, str]:
-    words = re.sub(r"[\W_]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", column.name)).lower().strip()
-    spaced = re.sub(r"(?<=[a-z])(?=\d)", " ", words)
-    for pattern, role in _WORDS:
-        found = re.search(rf"(?<![a-z0-9])(?:{pattern})(?![a-z])", words) or re.search(
-            rf"(?<![a-z0-9])(?:{pattern})(?![a-z])", spaced
-        )
-        if found and (unit is None or _fits(unit, role)):
-            return role, f"'{found[0].strip()}' in its name"
-    if unit in _ROLE_OF_UNIT:
-        return _ROLE_OF_UNIT[unit], "by its unit"
-    return "other input", "nothing in its name says what it is"
+def _one_room(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Of several columns that may be the air around, the clearest is; the other rooms are what is measured.
+
+    So are rooms beside which nothing else is measured.
+    """
+    air = {name: surroundings(name) for name, one in guesses.items() if one.role == "ambient temperature"}
+    found = dict(guesses)
+    if not air:
+        return found
+    clearest = min(air, key=lambda name: air[name])
+    measured = any(one.role in ("temperature", "error") for one in guesses.values())
+    all_alike = len(set(air.values())) == 1
+    why = f"{clearest} is the air around"
+    if not measured and all_alike and air[clearest][0] >= A_ROOM:
+        clearest, why = "", "nothing else is measured"
+    for name, (rank, more_words) in air.items():
+        one = guesses[name]
+        if name != clearest and rank > 0:
+            found[name] = replace(one, role="temperature", why=f"{one.why}; {why}", sure=False)
+        elif rank > 0:
+            found[name] = replace(one, sure=one.sure and rank >= A_ROOM and not more_words)
+    return found
 
 
-def _fits(unit: str, role: str) -> bool:
-    if role in _TEMPERATURES:
-        return unit in ("degC", "degF", "K")
-    if role in ("error", "applied correction"):
-        return unit in ("um", "mm", "um/m")
-    if role in ("heat load", "cooling power"):
-        return unit in ("W", "kW", "percent", "1")
-    if role == "rotation speed":
-        return unit == "rpm"
-    return unit not in ("degC", "degF", "K")
+def _one_unit(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Loads that differ in their number alone have one unit, guessed from all their values."""
+    found = dict(guesses)
+    bare = [column for column in columns if _is_load(guesses[column.name]) and not column.unit]
+    for column in bare:
+        alike = [c.values for c in bare if re.sub(r"\d", "", c.name) == re.sub(r"\d", "", column.name)]
+        one, unit = guesses[column.name], guess(replace(column, values=np.concatenate(alike))).unit
+        if unit != one.unit:
+            found[column.name] = replace(one, unit=unit, why=f"{one.why}, but {unit} with those of its kind")
+    return found
 
 
-def _by_values(role: str, why: str, values: Array) -> Guess:
+def _fahrenheit(columns: Sequence[Column]) -> bool:
+    """Whether columns without a unit are in Fahrenheit: another says so, or several start like a room in it.
+
+    One that starts at 60 may as well be an oven in degrees Celsius.
+    """
+    units = {c.name: unit_of(c.unit)[1] for c in columns}
+    if any(unit in DEGREES for unit in units.values()):
+        return "degF" in units.values()
+    bare = [c.values for c in columns if not c.unit and role_of(c.name, None, c.values).role in TEMPERATURES]
+    known = [values[np.isfinite(values)] for values in bare if np.isfinite(values).any()]
+    return sum(map(_may_be_f, known)) > 1 and all(values.min() > _ROOM_F[0] - 5 for values in known)
+
+
+def _may_be_f(known: Array) -> bool:
+    """Whether readings start like a room in Fahrenheit and stay above one."""
+    return bool(known.min() > _ROOM_F[0] - 5 and _ROOM_F[0] <= known[0] <= _ROOM_F[1])
+
+
+def _by_values(name: Named, values: Array, *, fahrenheit: bool) -> Guess:
+    role, why = name.role, name.why
     known = values[np.isfinite(values)]
     if not len(known):
         return Guess(role, _USUAL.get(role, "1"), f"{why}; it holds no value", sure=False)
     low, high, first = float(known.min()), float(known.max()), float(known[0])
     span = f"from {low:.4g} to {high:.4g}"
-    if role in _TEMPERATURES:
+    if role in TEMPERATURES:
         if low > 200:
             return Guess(role, "K", f"{why}; values {span} can only be kelvin")
-        if low > _ROOM_F[0] - 5 and _ROOM_F[0] <= first <= _ROOM_F[1]:
+        # no air around a machine is at 70 degrees Celsius
+        if _may_be_f(known) and (fahrenheit or role == "ambient temperature"):
             return Guess(
                 role,
                 "degF",
@@ -232,6 +189,8 @@ def _by_values(role: str, why: str, values: Array) -> Guess:
     if role in ("heat load", "cooling power"):
         if low >= -1e-9 and 10 < high <= 100:
             return Guess(role, "percent", f"{why}; values {span} look like percent", sure=False)
+        if np.isin(known, (0.0, 1.0)).all() or not name.sure:
+            return Guess(role, "1", f"{why}; values {span} taken as steps or a switch", sure=False)
         return Guess(role, "W", f"{why}; values {span} taken as watts", sure=False)
     if role == "fluid flow":
         return Guess(role, "1" if high <= 1 else "l/min", f"{why}; values {span}", sure=high <= 1)

@@ -17,7 +17,7 @@ Row = tuple[int, list[str]]
 """Number of the line, and its cells."""
 
 _EMPTY = {"", "nan", "inf", "-inf", "na", "n/a", "null", "none", "nil", "-", "--", "---", "?", "ol"}
-_EMPTY |= {"#n/a", "#value!", "#div/0!", "undefined", "unknown", "unavailable"}
+_EMPTY |= {"#n/a", "#nv", "#value!", "#div/0!", "<na>", "nat", "-nan", "undefined", "unknown", "unavailable"}
 _SWITCH = {"true": 1.0, "on": 1.0, "yes": 1.0, "false": 0.0, "off": 0.0, "no": 0.0}
 _FEWEST = 10  # rows of a recording
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
@@ -53,7 +53,7 @@ def read_sheet(path: Path) -> Sheet:
             f"{path}: no header above the rows of {width} cells; write {width} names, starting with time"
         )
     at = max(above, key=lambda k: (sum(map(bool, rows[k][1])), -k))
-    units = rows[at + 1][1] if first is not None and at + 1 < first else [""] * width
+    units = _units(rows[at + 1][1]) if first is not None and at + 1 < first else [""] * width
     body = rows[first:] if first is not None else rows[at + 1 :]
     if len(body) < _FEWEST:
         raise UserError(
@@ -132,8 +132,16 @@ def _cut(path: Path, text: str) -> list[Row]:
     return [(k, [cell.strip() for cell in next(csv.reader([line], delimiter=mark))]) for k, line in lines]
 
 
+def _units(cells: Sequence[str]) -> list[str]:
+    """A row of units; "-" is one, other words for "nothing here" are none."""
+    return [cell if cell == "-" or cell.lower() not in _EMPTY else "" for cell in cells]
+
+
 def _is_data(cells: Sequence[str]) -> bool:
-    """More numbers, stamps and switches than words; a header or a row of units has none."""
-    known = [cell for cell in cells if cell]
+    """More numbers, stamps and switches than words; a header or a row of units has none.
+
+    Words for "not measured" count for neither: a logger often has nothing yet in its first row.
+    """
+    known = [cell for cell in cells if cell.lower() not in _EMPTY]
     readable = [c for c in known if is_number(c) or is_stamp(c) or c.lower() in _SWITCH]
     return len(readable) > len(known) / 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.firsthour.rows import Row, is_number, is_stamp, number
+from discovery.firsthour.words import plain
 
 Array = NDArray[np.float64]
 
@@ -41,12 +43,12 @@ _FORMS = (
 _DATE = r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}"
 _TIME_OF_DAY = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+)?))?")
 # what a clock is called: a plain name before one that only holds the word
-_NAMES = (
+CLOCK_NAMES = (
     r"(time|zeit|datetime|timestamp|zeitstempel|date|datum|elapsed|seconds|minutes|hours|clock|stamp)\b",
     r"(\w+ )*(time|zeit|stamp|timestamp|elapsed|seconds)\b",
     r"t$",
 )
-_UNITS = {
+TIME_UNITS = {
     "ns": 1e-9,
     "us": 1e-6,
     "µs": 1e-6,
@@ -85,8 +87,10 @@ def find_clock(path: Path, names: Sequence[str], units: Sequence[str], body: Seq
     Raises:
         UserError: no column is, or the one that should be does not run forward.
     """
-    plain = [re.sub(r"[\W_]+", " ", name.lower()).strip() for name in names]
-    named = list(dict.fromkeys(k for form in _NAMES for k in range(len(names)) if re.match(form, plain[k])))
+    words = [plain(name) for name in names]
+    named = list(
+        dict.fromkeys(k for form in CLOCK_NAMES for k in range(len(names)) if re.match(form, words[k]))
+    )
     backwards = None
     for columns, seconds, how in _candidates(path, [*named, 0], names, units, body):
         steps = np.diff(seconds)
@@ -110,31 +114,6 @@ def find_clock(path: Path, names: Sequence[str], units: Sequence[str], body: Seq
     )
 
 
-def is_clock(name: str, values: Array, seconds: Array) -> bool:
-    """Whether a column tells the time once more, or counts the rows."""
-    plain = re.sub(r"[\W_]+", " ", name.lower()).strip()
-    if not np.isfinite(values).all() or not (np.diff(values) > 0).all():
-        return False
-    if plain in (
-        "",
-        "index",
-        "unnamed 0",
-        "row",
-        "nr",
-        "no",
-        "n",
-        "id",
-        "sample",
-        "entry",
-        "record",
-        "count",
-    ):
-        return bool(np.ptp(np.diff(values)) < 1e-9)
-    if not re.match("|".join(_NAMES[:2]), plain):
-        return False
-    return bool(np.corrcoef(values, seconds)[0, 1] > 0.999)
-
-
 def _candidates(
     path: Path, order: Sequence[int], names: Sequence[str], units: Sequence[str], body: Sequence[Row]
 ) -> Iterator[tuple[tuple[int, ...], Array, str]]:
@@ -150,12 +129,12 @@ def _candidates(
         except UserError:
             continue
         unit = _unit(names[at], units[at], values)
-        yield (at,), (values - values[0]) * _UNITS[unit], f"counted in {unit}"
+        yield (at,), (values - values[0]) * TIME_UNITS[unit], f"counted in {unit}"
 
 
 def _unit(name: str, unit: str, values: Array) -> str:
     word = unit.strip().lower()
-    if word in _UNITS:
+    if word in TIME_UNITS:
         return word
     named = next((u for u in ("minutes", "hours", "days", "ms", "ns") if u in name.lower()), None)
     return named or next((u for least, u in _SINCE_1970 if values[0] > least), "s")
@@ -168,17 +147,21 @@ def _instants(
     if re.fullmatch(_DATE, cells[0]):
         for other in [k for k in dict.fromkeys([*order, at + 1]) if k != at and k < len(body[0][1])]:
             joined = [f"{cell} {row[other]}" for cell, (_, row) in zip(cells, body, strict=True)]
-            if _TIME_OF_DAY.match(body[0][1][other]) and (seconds := _parsed(joined)) is not None:
-                yield (at, other), seconds, "instants"
-    if (seconds := _parsed(cells)) is not None:
-        yield (at,), seconds, "instants"
+            if _TIME_OF_DAY.match(body[0][1][other]) and (found := _parsed(joined)) is not None:
+                yield (at, other), *found
+    if (found := _parsed(cells)) is not None:
+        yield (at,), *found
     if (seconds := _of_day(cells)) is not None:
         yield (at,), seconds, "time of day"
 
 
-def _parsed(cells: Sequence[str]) -> Array | None:
-    """Seconds by the first spelling in which all cells can be read and do not run backwards, else any."""
-    found = None
+def _parsed(cells: Sequence[str]) -> tuple[Array, str] | None:
+    """Seconds, and how they were read: by the spelling in which all cells run forward, else by any.
+
+    03/01 is the third of January or the first of March: the spelling with the most even steps counts.
+    """
+    forward: list[tuple[str, Array]] = []
+    backward = None
     for form in ("", *_FORMS):
         try:
             stamps = [
@@ -189,9 +172,31 @@ def _parsed(cells: Sequence[str]) -> Array | None:
         except (ValueError, TypeError):
             continue
         if (np.diff(seconds) >= 0).all():
-            return seconds
-        found = seconds if found is None else found
-    return found
+            forward.append((form, seconds))
+        elif backward is None:
+            backward = seconds
+    if not forward:
+        return None if backward is None else (backward, "instants")
+    form, best = min(forward, key=lambda one: _unevenness(one[1]))
+    others = [one for one in forward if not np.array_equal(one[1], best)]
+    if not others:
+        return best, "instants"
+    other = min(others, key=lambda one: _unevenness(one[1]))[0]
+    return best, f"instants (? dates read as {_order(form)}, the most even; {_order(other)} runs forward too)"
+
+
+def _unevenness(seconds: Array) -> float:
+    """Spread of the steps against their mean: 0 where all are alike."""
+    steps = np.diff(seconds)
+    return float(np.std(steps) / np.mean(steps)) if steps.any() else math.inf
+
+
+def _order(form: str) -> str:
+    """Day, month and year of a spelling, as a person writes them."""
+    date = form.split(" ")[0] or "%Y-%m-%d"
+    for mark, word in (("%d", "day"), ("%m", "month"), ("%Y", "year"), ("%y", "year")):
+        date = date.replace(mark, word)
+    return date
 
 
 def _of_day(cells: Sequence[str]) -> Array | None:

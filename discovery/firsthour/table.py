@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.errors import UserError
+from discovery.firsthour.clocks import is_clock
 from discovery.firsthour.rows import is_word, number, read_sheet
-from discovery.firsthour.stamps import find_clock, is_clock
+from discovery.firsthour.stamps import find_clock
 
 Array = NDArray[np.float64]
 

@@ -34,7 +34,7 @@ def predict_recording(
         outputs: measured channels.
         white: (Y,) reading noise that weighs the first reading against the declared start; default 1 um each.
     """
-    model = expanded(model)
+    model = expanded(model, campaign.channels)
     used = set().union(*(names(s.start) for s in model.states.values() if s.start is not None)) & set(
         campaign.channels
     )

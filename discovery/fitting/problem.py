@@ -167,7 +167,7 @@ def make_problem(
         all.
     """
     priors = priors or {}
-    model = expanded(model)
+    model = expanded(model, campaign.channels)
     if outputs is None:
         outputs = [name for name in (*model.outputs, *model.states) if name in campaign.channels]
     used = set().union(*(names(s.start) for s in model.states.values() if s.start is not None)) & set(

@@ -44,7 +44,7 @@ def next_experiment(context: Context, answer: Model, rival: Model | None, white:
     shared = [
         s
         for s in a.system.states
-        if s in b.system.states and s not in a.system.grid.outputs and not s.startswith("lag_")
+        if s in b.system.states and s not in a.system.grid.outputs and not a.system.model.states[s].memory
     ]
     spread = {
         s: float(np.sqrt(np.mean((a.x[:, a.system.states.index(s)] - b.x[:, b.system.states.index(s)]) ** 2)))

@@ -118,7 +118,7 @@ def make_context(
         if state.capacity
         else 0.04 * max(flows.get(name, 0.0), 0.1 * largest)  # also where nothing drives it
         for name, state in fit.problem.model.states.items()
-        if not name.startswith("lag_")
+        if not state.memory
     }
     duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
     white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)

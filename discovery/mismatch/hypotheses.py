@@ -9,7 +9,7 @@ from itertools import product
 from discovery.mismatch.catalogue.effect import ROLE_OF, Effect
 from discovery.mismatch.places import places
 from discovery.models import Model, Parameter
-from discovery.models.dimensions import differences, same_dimension
+from discovery.models.units import differences, same_dimension
 from discovery.recordings import Channel
 from discovery.terms import Apply, Expression, Name, Term, names, parse, substitute
 

@@ -22,7 +22,8 @@ def left_out(context: Context, answer: Assessment, noise: Noise) -> float:
 
     Each recording of the diagnosis in turn (or a quarter of them) is left out, the model fitted anew to the
     others under a noise setting, and run freely on what was left out. A recording with an event of its own
-    cannot be predicted and is not run. nan where nothing can be left out, inf where a fit runs away.
+    cannot be predicted and is not run. nan where nothing can be left out, inf where a fit or a free run
+    runs away.
 
     Quarters of a single recording do not serve: how the level at their ends is met outweighs what an effect
     does (true sensor lags of two real heaters had shares of -0.8 and -25).
@@ -33,14 +34,14 @@ def left_out(context: Context, answer: Assessment, noise: Noise) -> float:
     for left, seen in _folds(context):
         try:
             model = refit(seen, _known(answer, seen), noise, answer).model
+            for name in (r for r in left if r not in events):
+                run = predict_recording(
+                    model, context.campaign, name, context.outputs, noise.white, context.grids[name]
+                )
+                z = (run.system.grid.readings - predict(run)) / white
+                squares, count = squares + float(np.nansum(z**2)), count + int(np.isfinite(z).sum())
         except RunsAwayError:  # the others alone do not hold it: it runs away
             return inf
-        for name in (r for r in left if r not in events):
-            run = predict_recording(
-                model, context.campaign, name, context.outputs, noise.white, context.grids[name]
-            )
-            z = (run.system.grid.readings - predict(run)) / white
-            squares, count = squares + float(np.nansum(z**2)), count + int(np.isfinite(z).sum())
     return float(np.sqrt(squares / count)) if count else float("nan")
 
 

@@ -17,12 +17,12 @@ def places(
     bodies = [
         name
         for name, state in model.states.items()
-        if not name.startswith("lag_") and (state.capacity or not _has_bodies(model))
+        if not state.memory and (state.capacity or not _has_bodies(model))
     ]
     role = {name: channel.role for name, channel in channels.items()}
     linked = {frozenset((t.into, t.source)) for t in model.terms if t.source}
     # Neither those of an effect found before nor the memory behind its lag().
-    hand_written = [t for t in model.terms if not t.effect and not t.into.startswith("lag_")]
+    hand_written = [t for t in model.terms if not t.effect and not model.states[t.into].memory]
 
     def fed(wanted: str) -> list[str]:
         return [

@@ -70,10 +70,13 @@ def improvements(
 def _free_run(
     model: Model, campaign: Campaign, run: str, outputs: Sequence[str], noise: Noise
 ) -> Trajectory | None:
+    """None where the model, or an output of it, does not stay finite."""
     try:
-        return predict_recording(model, campaign, run, outputs, noise.white)
+        trajectory = predict_recording(model, campaign, run, outputs, noise.white)
+        predict(trajectory)
     except RunsAwayError:
         return None
+    return trajectory
 
 
 def compare(old: Trajectory, new: Trajectory, noise: Noise) -> Improvement:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from discovery.mismatch.verdict import RIVAL
+from discovery.runfolder import read_diagnosis
 
 
-def summary(path: Path) -> list[str]:
-    """Lines that say what a diagnosis.json says."""
-    d: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+def summary(folder: Path) -> list[str]:
+    """Lines that say what the diagnosis.json of a folder says."""
+    d = read_diagnosis(folder)
     lines = [f"{d['verdict']} in '{d['model']}'"]
     for p in d["physics"]:
         sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q))

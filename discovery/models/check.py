@@ -7,9 +7,10 @@ from pathlib import Path
 
 from discovery.errors import UserError
 from discovery.files import locate, read_text, read_toml
+from discovery.models.accept import check_model
 from discovery.models.dimensions import check_dimensions
 from discovery.models.model import Model
-from discovery.models.modelfile import check_names, read_model
+from discovery.models.modelfile import read_model
 from discovery.recordings.campaign import Channel, make_channel
 from discovery.recordings.campaignfile import CampaignForm, campaign_path
 from discovery.recordings.units import UnitError, conversion
@@ -18,7 +19,7 @@ from discovery.recordings.units import UnitError, conversion
 def check_models(campaign: Path, models: Sequence[Path]) -> Iterator[str]:
     """A sentence for each place where the units of a model do not fit.
 
-    Raises UserError: a mistake in a file, or a name that is neither the model's own nor a channel.
+    Raises UserError: a mistake in a file, or a model that cannot be used with the campaign.
     """
     form = read_toml(campaign_path(campaign), CampaignForm)
     channels = {}
@@ -29,7 +30,7 @@ def check_models(campaign: Path, models: Sequence[Path]) -> Iterator[str]:
             continue
     for path in models:
         model = read_model(path)
-        check_names(model, set(form.channels), path)
+        check_model(model, {n: channels[n].unit if n in channels else "" for n in form.channels}, path)
         check_outputs(model, channels, path)
         yield from check_dimensions(model, channels)
 

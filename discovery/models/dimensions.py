@@ -4,62 +4,46 @@ wrote.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
 
-from discovery.models.model import Model
+from discovery.models.model import TIME_UNITS, Model, State
+from discovery.models.units import Dimension, differences, dimension, known, plain, ratio, times
 from discovery.recordings import Channel
 from discovery.terms import Apply, Expression, Name, Number, text
 from discovery.terms.expression import COMPARISONS
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-# Exponents of the base quantities; None: a wildcard, of any dimension.
-Dimension = Mapping[str, float] | None
 _SAME = ("+", "-", "min", "max", *COMPARISONS)
 _PURE = ("exp", "log", "tanh")
-_TURNS = ("revolutions_per_minute", "revolution", "turn", "radian", "degree")
 
 
 class _Mismatch(Exception):  # noqa: N818  (control flow, caught here)
     """Two units that cannot meet."""
 
 
-def same_dimension(one: str, other: str) -> bool:
-    """Whether two units measure the same quantity; False for a unit that is not known."""
-    return _known(one) and _known(other) and _dimension(one) == _dimension(other)
-
-
 def check_dimensions(model: Model, channels: Mapping[str, Channel]) -> list[str]:
     """A sentence for each term and output whose units do not fit; empty when all do.
 
-    A literal is a wildcard, and so is whatever it is multiplied with: its unit is not written down. An angle
-    counts as a dimension (rpm is not 1/s), a temperature as an absolute one (a difference of degC is a K).
+    A literal is a wildcard, and so is whatever it is multiplied with: its unit is not written down. Nothing
+    is converted inside, so that units of one dimension have to be the same ones (s, min and h are not).
     """
     units = {name: p.unit for name, p in model.parameters.items()}
     units |= {name: s.unit for name, s in model.states.items()}
     units |= {name: c.unit for name, c in channels.items() if name not in units} | {"time": "s"}
     sentences = [
-        f"model '{model.name}': the unit '{u}' of {n} is not known" for n, u in units.items() if not _known(u)
+        f"model '{model.name}': the unit '{u}' of {n} is not known" for n, u in units.items() if not known(u)
     ]
-    dimensions = {name: _dimension(unit) for name, unit in units.items()}
+    dimensions = {name: dimension(unit) for name, unit in units.items()}
     for term in model.terms:
-        state = model.states[term.into]
-        wanted, name = (
-            ("W", "W, a heat flow")
-            if state.capacity
-            else (f"({differences(state.unit)})/({model.time_unit})", f"{state.unit}/{model.time_unit}")
-        )
-        found = _compare(term.expression, dimensions, _dimension(wanted), name)
+        found = _compare(term.expression, dimensions, *_entering(model, model.states[term.into]))
         if found:
             sentences.append(f"model '{model.name}', term '{term.name}': {found}")
-    for name, expression in model.outputs.items():
-        unit = channels[name].unit if name in channels else None
-        found = _compare(expression, dimensions, _dimension(unit) if unit else None, unit or "")
+    measured = {name: Name(name) for name in model.states if name in channels}
+    for name, expression in {**measured, **model.outputs}.items():
+        unit = channels[name].unit if name in channels else ""
+        found = _compare(expression, dimensions, dimension(unit), unit)
         if found:
             sentences.append(f"model '{model.name}', output '{name}': {found}")
     return sentences
@@ -74,14 +58,15 @@ def with_coefficient_units(model: Model, channels: Mapping[str, Channel]) -> Mod
         name: p.unit for name, p in model.parameters.items()
     }
     units |= {name: s.unit for name, s in model.states.items()}
-    dimensions = {name: _dimension(unit) for name, unit in units.items()}
+    dimensions = {name: dimension(unit) for name, unit in units.items()}
     parameters = dict(model.parameters)
     for term in model.terms:
         match term.expression:
             case Apply("*", (Name(coefficient), rest)) if coefficient in parameters:
                 state = model.states[term.into]
-                rate = "W" if state.capacity else f"{differences(state.unit)}/{model.time_unit}"
-                if not _compare(term.expression, dimensions, _dimension(rate), rate):
+                wanted, name = _entering(model, state)
+                rate = "W" if state.capacity else f"{differences(state.unit)}/{_clock(model, state)}"
+                if not _compare(term.expression, dimensions, wanted, name):
                     continue
                 of = unit_of(rest, units)
                 unit = rate if of == "1" else f"{rate}/({of})" if set("*/") & set(of) else f"{rate}/{of}"
@@ -89,6 +74,20 @@ def with_coefficient_units(model: Model, channels: Mapping[str, Channel]) -> Mod
             case _:
                 pass
     return replace(model, parameters=parameters)
+
+
+def _entering(model: Model, state: State) -> tuple[Dimension, str]:
+    """What the terms of a state are, and how a sentence calls it."""
+    if state.capacity:
+        return dimension("W"), "W"
+    name = f"{state.unit}/{_clock(model, state)}"
+    return _combine(dimension(state.unit), dimension(_clock(model, state)), -1.0), name
+
+
+def _clock(model: Model, state: State) -> str:
+    """The time unit of a state's rates; a hidden one may have a clock of its own."""
+    own = (unit for unit, seconds in TIME_UNITS.items() if math.isclose(state.scale * seconds, 1.0))
+    return next(own, model.time_unit)
 
 
 def unit_of(expression: Expression, units: Mapping[str, str]) -> str:
@@ -140,9 +139,12 @@ def _compare(
         found = _of(expression, dimensions)
     except _Mismatch as mismatch:
         return str(mismatch)
-    if found is not None and wanted is not None and found != wanted:
-        return f"'{text(expression)[:60]}' has the dimension {_spell(found)} where {name} is expected"
-    return None
+    if found is None or wanted is None or (apart := ratio(found, wanted)) == 1.0:
+        return None
+    shown = f"'{text(expression)[:60]}'"
+    if apart is None:
+        return f"{shown} has the dimension {_spell(found)} where {name} is expected"
+    return f"{shown} counts in {apart:.4g} {name} where {name} is expected; mend the units and the numbers"
 
 
 def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimension:
@@ -158,16 +160,16 @@ def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimensio
             return _combine(_of(a, dimensions), _of(b, dimensions), -1.0)
         case Apply(function="**", arguments=(a, b)):
             base, power = _of(a, dimensions), _of(b, dimensions)
-            if power:
+            if power and plain(power):
                 raise _Mismatch(
                     f"the exponent '{text(b)}' has the dimension {_spell(power)}; it must be a pure number"
                 )
             if base == {}:
                 return {}
-            return _times(base, b.value) if base is not None and isinstance(b, Number) else None
+            return times(base, b.value) if base is not None and isinstance(b, Number) else None
         case Apply(function="sqrt", arguments=(a,)):
             inner = _of(a, dimensions)
-            return None if inner is None else _times(inner, 0.5)
+            return None if inner is None else times(inner, 0.5)
         case Apply(function="where", arguments=(condition, a, b)):
             _of(condition, dimensions)
             return _equal(a, b, dimensions)
@@ -182,7 +184,7 @@ def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimensio
             return {} if function in COMPARISONS else shared
         case Apply(function=function, arguments=(a,)) if function in _PURE:
             inner = _of(a, dimensions)
-            if inner:
+            if inner and plain(inner):
                 raise _Mismatch(
                     f"{function}() of '{text(a)}', which is {_spell(inner)}; it must be a pure number"
                 )
@@ -190,9 +192,8 @@ def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimensio
         case Apply(function="sign"):
             return {}
         case Apply(function="lag" | "delay", arguments=(a, seconds)):
-            duration = _of(seconds, dimensions)
-            if duration not in (None, {"[time]": 1.0}):
-                raise _Mismatch(f"'{text(seconds)}' is a time in s but has the dimension {_spell(duration)}")
+            if found := _compare(seconds, dimensions, dimension("s"), "s"):
+                raise _Mismatch(found)
             return _of(a, dimensions)
         case Apply(arguments=arguments):  # abs, neg, play
             return _of(arguments[0], dimensions)
@@ -200,10 +201,11 @@ def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimensio
 
 def _equal(a: Expression, b: Expression, dimensions: Mapping[str, Dimension]) -> Dimension:
     left, right = _of(a, dimensions), _of(b, dimensions)
-    if left is not None and right is not None and left != right:
-        raise _Mismatch(
-            f"'{text(a)[:40]}' ({_spell(left)}) meets '{text(b)[:40]}' ({_spell(right)}), another dimension"
-        )
+    if left is not None and right is not None and (apart := ratio(left, right)) != 1.0:
+        one, other = f"'{text(a)[:40]}'", f"'{text(b)[:40]}'"
+        if apart is None:
+            raise _Mismatch(f"{one} ({_spell(left)}) meets {other} ({_spell(right)}), another dimension")
+        raise _Mismatch(f"{one} meets {other}, but its unit is {apart:.4g} times as large")
     return right if left is None else left
 
 
@@ -211,55 +213,10 @@ def _combine(a: Dimension, b: Dimension, sign: float) -> Dimension:
     if a is None or b is None:
         return None
     total = {base: a.get(base, 0.0) + sign * b.get(base, 0.0) for base in a.keys() | b.keys()}
-    return _times(total, 1.0)
+    return times(total, 1.0)
 
 
-def _times(a: Mapping[str, float], power: float) -> dict[str, float]:
-    return {base: round(power * n, 9) for base, n in a.items() if abs(power * n) > 1e-9}
-
-
-def _spell(dimension: Dimension) -> str:
-    if not dimension:
+def _spell(measured: Dimension) -> str:
+    if not measured or not plain(measured):
         return "of a pure number"
-    return " ".join(base + (f"^{n:g}" if n != 1 else "") for base, n in sorted(dimension.items()))
-
-
-@lru_cache(maxsize=512)
-def _dimension(unit: str) -> Dimension:
-    if not _known(unit) or unit == "":
-        return None
-    if unit == "1":
-        return {}
-    parsed = _units()(unit)
-    # rpm and rad count turns, which pint holds for a pure number
-    turns = sum(float(n) for name, n in parsed._units.items() if name in _TURNS)
-    found = {str(base): float(n) for base, n in parsed.dimensionality.items()}
-    return found | ({"[angle]": turns} if turns else {})
-
-
-@lru_cache(maxsize=512)
-def _known(unit: str) -> bool:
-    if unit in ("", "1"):
-        return True
-    try:
-        _units()(unit)
-    except Exception:  # pint's parser fails in many ways
-        return False
-    return True
-
-
-@lru_cache(maxsize=1)
-def _units() -> Callable[[str], Any]:
-    import pint
-
-    registry: Any = pint.UnitRegistry()
-
-    def parse(unit: str) -> Any:
-        return registry.Unit(differences(unit))
-
-    return parse
-
-
-def differences(unit: str) -> str:
-    """degC counts as K: here only dimensions matter."""
-    return unit.replace("delta_degC", "K").replace("degC", "K").replace("degF", "K")
+    return " ".join(base + (f"^{n:g}" if n != 1 else "") for base, n in sorted(plain(measured).items()))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import count
 
 from discovery.terms import Apply, Expression, Name, Number, Term, names, substitute
-from discovery.terms.expression import rewrite
+from discovery.terms.expression import MEMORY, rewrite
 
 _ZERO = Number(0.0)
 TIME_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
@@ -42,7 +43,7 @@ class State:
 
     `start` is an expression of channels and parameters at the first instant, or None: the first reading of
     the channel of that name. `start_sd` is the spread that a fit allows around it (0: exact). `scale` turns
-    the sum of its terms into unit per second.
+    the sum of its terms into unit per second. `memory`: it is what a lag() remembers, no part of the machine.
     """
 
     name: str
@@ -51,6 +52,7 @@ class State:
     start: Expression | None = _ZERO
     start_sd: float = 0.5
     scale: float = 1.0
+    memory: bool = False
 
 
 @dataclass(frozen=True)
@@ -146,18 +148,26 @@ def in_time_unit(model: Model) -> Model:
     return replace(model, terms=tuple(terms), states=states)
 
 
-def expanded(model: Model) -> Model:
+def expanded(model: Model, channels: Collection[str] = ()) -> Model:
     """The model with every lag(e, tau) written out as a hidden state: tau ds/dt = e - s, s(0) = e(0).
 
     One mechanism then serves its dynamics, its sensitivities to e and to tau, its report and its export.
     Equal lags share one state.
+
+    Args:
+        channels: names that the campaign has; no hidden state takes one of them, or one of the model's.
     """
     found: dict[Apply, str] = {}
+    own = {*model.states, *model.parameters, *model.outputs}
+    taken = own.union(channels, *(names(e) for e in model.expressions()))
+    free = (name for n in count(1) if (name := f"lag_{n}") not in taken)
 
     def rule(apply: Apply) -> Expression | None:
         if apply.function != "lag":
             return None
-        return Name(found.setdefault(apply, f"lag_{len(found) + 1}"))
+        if apply not in found:
+            found[apply] = next(free)
+        return Name(found[apply])
 
     terms = tuple(replace(term, expression=rewrite(term.expression, rule)) for term in model.terms)
     outputs = {name: rewrite(expression, rule) for name, expression in model.outputs.items()}
@@ -168,6 +178,12 @@ def expanded(model: Model) -> Model:
         inner, tau = apply.arguments
         starts = {s: state.start for s, state in states.items() if state.start is not None}
         spread = max((states[s].start_sd for s in names(inner) if s in states), default=0.0)
-        states[name] = State(name, "", None, substitute(inner, starts), spread, 1.0)
+        start = rewrite(substitute(inner, starts), _settled)
+        states[name] = State(name, "", None, start, spread, 1.0, memory=True)
         extra.append(Term(f"{name} follows", name, Apply("/", (Apply("-", (inner, Name(name))), tau))))
     return replace(model, states=states, terms=terms + tuple(extra), outputs=outputs)
+
+
+def _settled(apply: Apply) -> Expression | None:
+    """At the first instant nothing has moved yet: what remembers shows what it is fed with."""
+    return apply.arguments[0] if apply.function in MEMORY else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 import math
 from itertools import count
 from pathlib import Path
@@ -12,10 +11,11 @@ from pydantic import Field
 
 from discovery.errors import UserError
 from discovery.files import dotted, locate, read_toml, write_toml
+from discovery.models.memory import check_memory, check_start
 from discovery.models.model import TIME_UNITS, Model, Parameter, State, in_time_unit
+from discovery.naming import is_taken, is_word
 from discovery.schema import Strict
-from discovery.terms import Expression, Term, names, parse, text
-from discovery.terms.expression import FUNCTIONS
+from discovery.terms import Expression, Term, parse, text
 
 
 class ParameterForm(Strict):
@@ -47,6 +47,7 @@ class StateForm(Strict):
         None, description="number or expression; without it the first reading, else 0"
     )
     start_sd: float | None = Field(None, ge=0, description="spread of the start value; default 0.5 K or 1 um")
+    memory: bool = Field(False, description="true: what a lag() remembers, no body (written by a fit)")
 
 
 class TermForm(Strict):
@@ -85,10 +86,10 @@ def read_model(path: Path) -> Model:
 
     for kind in ("parameters", "states"):
         for name in getattr(form, kind):
-            if not name.isidentifier() or keyword.iskeyword(name) or name in FUNCTIONS or name == "time":
+            if not is_word(name) or is_taken(name):
                 raise UserError(
                     f"{at(kind, name)}: '{name}' cannot name a {kind[:-1]}; "
-                    "use letters, digits and _ and no reserved word"
+                    "use letters (a to z), digits and _ and no word that expressions know"
                 )
     for name in form.parameters.keys() & form.states.keys():
         raise UserError(f"{at('parameters', name)}: '{name}' is also a state; rename one of them")
@@ -116,16 +117,17 @@ def read_model(path: Path) -> Model:
     states = {}
     per_unit = 1.0 / TIME_UNITS[form.time_unit]
     for name, state in form.states.items():
-        start: Expression | None = (
-            None if state.start is None else parse(state.start, at("states", name, "start"))
-        )
+        start: Expression | None = None
+        if state.start is not None:
+            start = parse(state.start, place := at("states", name, "start"))
+            check_start(start, place)
         spread = (
             state.start_sd
             if state.start_sd is not None
             else (0.5 if state.unit in ("degC", "K", "kelvin") else 1.0)
         )
         scale = 1.0 / state.capacity if state.capacity else per_unit
-        states[name] = State(name, state.unit, state.capacity, start, spread, scale)
+        states[name] = State(name, state.unit, state.capacity, start, spread, scale, state.memory)
     terms: list[Term] = []
     for i, term in enumerate(form.terms):
         if term.source == term.into:
@@ -140,36 +142,14 @@ def read_model(path: Path) -> Model:
                 raise UserError(
                     f"{at('terms', i, key)}: '{state_name}' is not a state; states are {', '.join(states)}"
                 )
-        terms.append(
-            Term(
-                name,
-                term.into,
-                parse(term.expression, at("terms", i, "expression")),
-                term.source,
-                term.effect,
-            )
-        )
-    outputs = {name: parse(expression, at("outputs", name)) for name, expression in form.outputs.items()}
+        expression = parse(term.expression, place := at("terms", i, "expression"))
+        check_memory(expression, parameters, states, place)
+        terms.append(Term(name, term.into, expression, term.source, term.effect))
+    outputs = {}
+    for name, formula in form.outputs.items():
+        outputs[name] = parse(formula, place := at("outputs", name))
+        check_memory(outputs[name], parameters, states, place)
     return Model(form.name or Path(path).stem, parameters, states, tuple(terms), outputs, form.time_unit)
-
-
-def check_names(model: Model, known: set[str], path: Path | str) -> None:
-    """Refuse a model that uses a name which is neither its own nor a channel of the campaign.
-
-    Raises:
-        UserError: naming the unknown name and where it stands.
-    """
-    own = set(model.states) | set(model.parameters) | {"time"} | known
-    places = [(f"term '{term.name}'", term.expression) for term in model.terms]
-    places += [(f"output '{name}'", expression) for name, expression in model.outputs.items()]
-    places += [(f"start of '{s.name}'", s.start) for s in model.states.values() if s.start is not None]
-    for place, expression in places:
-        for name in sorted(names(expression) - own):
-            raise UserError(
-                f"{path}, {place}: '{name}' is neither a state or parameter of the model "
-                "nor a channel of the campaign "
-                f"({', '.join(sorted(known))}); mend the name or add the channel"
-            )
 
 
 def model_document(model: Model) -> dict[str, Any]:
@@ -201,6 +181,7 @@ def model_document(model: Model) -> dict[str, Any]:
                 "capacity": s.capacity,
                 "start": s.start and text(s.start),
                 "start_sd": s.start_sd,
+                "memory": s.memory or None,
             }
         )
         for name, s in model.states.items()

@@ -1,25 +1,23 @@
 """The form of `campaign.toml`."""
 
-import keyword
 import re
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from discovery.naming import is_taken, is_word
 from discovery.recordings.roles import CORRECTION, ROLES, Between, Role
 from discovery.schema import Strict
 
-_FUNCTIONS = ("abs", "min", "max", "exp", "log", "sqrt", "sign", "where", "tanh", "delay", "lag", "play")
-
 
 def _channel_name(name: str) -> str:
-    if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII) or keyword.iskeyword(name):
+    if not is_word(name):
         raise ValueError(
             "a channel's name is a word of letters, digits and _ (expressions use it); choose one, and say"
             f' column = "{name}" where the header of the files has to stay'
         )
-    if name in ("time", *_FUNCTIONS):
+    if is_taken(name):
         raise ValueError("this word has a meaning of its own in expressions; choose another name")
     return name
 

@@ -19,7 +19,7 @@ from discovery.recordings.inputcheck import input_findings
 from discovery.recordings.reading import read_columns
 from discovery.recordings.twins import fingerprint
 from discovery.recordings.units import Conversion, UnitError, conversion
-from discovery.recordings.valuecheck import few_findings, frozen_findings, range_findings
+from discovery.recordings.valuecheck import few_findings, frozen_findings, lone_findings, range_findings
 from discovery.schema import sentences, suggest
 
 
@@ -154,6 +154,7 @@ def _content_findings(
         yield from range_findings(file, columns.lines, channels[name], column)
         if name not in recording.set:
             yield from frozen_findings(file, columns.lines, channels[name], column)
+            yield from lone_findings(file, columns.lines, channels[name], column)
             if channels[name].measured:
                 yield from few_findings(file, channels[name], column)
     yield from input_findings(file, columns, channels, values)

@@ -16,9 +16,11 @@ if TYPE_CHECKING:
 
 # What needs no look into pint's tables, which take a third of a second to load.
 _COMMON = frozenset({"1", "percent", "degC", "K", "W", "rpm", "mm", "um", "um/m", "l/min", "s", "A", "V"})
-# Names, products, quotients and powers of one digit: pint would compute 9**9**9**9 for as long as it takes.
-_SPELLING = re.compile(r"1?([^\W\d]|[/*() %°·²³⁻¹]|(\*\*|\^)\s?-?\d(?!\s*(\*\*|\^|\d)))*")
-_LONGEST = 40  # letters
+# Names, products, quotients and powers of one digit (and a fraction): pint would compute 9**9**9**9 for as
+# long as it takes.
+_POWER = r"(\*\*|\^)\s?-?\d(\.\d{1,6})?(?!\s*(\*\*|\^|[\d.]))"
+_SPELLING = re.compile(rf"1?([^\W\d]|[/*() %°·²³⁻¹]|{_POWER}|(?<=[/(])1(?![\d.]))*")
+_LONGEST = 100  # letters; the coefficient of a product of several inputs has a long one
 _MISTAKEN = {"C": "degC", "c": "degC", "F": "degF", "u/min": "rpm", "U/min": "rpm", "µ": "um", "l/m": "l/min"}
 
 
@@ -52,8 +54,8 @@ def conversion(unit: str, role: str) -> Conversion:
     if facts.plain and unit in ("1", "percent", "%"):
         return Conversion("1" if unit == "1" else "percent")
     try:
-        given = _parse(unit)
-    except Exception:  # pint's parser fails in many ways: tokens, recursion, attributes, division by zero
+        given = parse_unit(unit)
+    except ValueError:
         raise UnitError(f"the unit '{unit}' is not known; {_allowed(unit, role)}") from None
     if not facts.units or (facts.plain and given.dimensionless):
         return Conversion(unit)
@@ -86,11 +88,26 @@ def _per_revolution(given: "pint.Unit") -> "pint.Unit":
     return given if turns else given * _registry().Unit("revolution")
 
 
-def _parse(unit: str) -> "pint.Unit":
+@lru_cache(maxsize=512)
+def parse_unit(unit: str) -> "pint.Unit":
+    """The unit of a text, as pint knows it. Raises ValueError: it does not, or it might never end."""
     if not unit or len(unit) > _LONGEST or not _SPELLING.fullmatch(unit):
         raise ValueError(unit)
-    given: pint.Unit = _registry().Unit(_pint(unit))
+    try:
+        given: pint.Unit = _registry().Unit(_pint(unit))
+    except Exception:  # pint's parser fails in many ways: tokens, recursion, attributes, division by zero
+        raise ValueError(unit) from None
     return given
+
+
+def short(name: str) -> str:
+    """A unit as it is written.
+
+    >>> short("kilowatt"), short("degree_Fahrenheit")
+    ('kW', 'degF')
+    """
+    spelt = f"{parse_unit(name):~}"
+    return spelt.replace("Δ", "delta_").replace("°", "deg").replace("µ", "u")
 
 
 def _pint(unit: str) -> str:

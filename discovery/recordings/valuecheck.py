@@ -1,4 +1,4 @@
-"""Values: what the role can be, sensors that stand still, too few readings."""
+"""Values: what the role can be, sensors that stand still, lone wrong readings, too few readings."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +12,13 @@ from discovery.recordings.roles import ROLES
 
 FEW = 20  # readings: fewer carry no model
 _STANDS = 5.0  # a sensor that stands still so many times longer than chance explains
+_LONE = 20.0  # robust standard deviations of a step: a single reading so far from its neighbours is wrong
+_LEAST = {
+    "degC": 30.0,
+    "um": 100.0,
+    "um/m": 100.0,
+}  # and so far: what is nearer may be true, a diagnosis tells
+_AGREE = 0.1  # of that distance: what the neighbours differ by
 _SENSORS = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature", "error")
 
 
@@ -67,6 +74,29 @@ def frozen_findings(file: Path, lines: Lines, channel: Channel, column: FloatArr
         yield Finding(
             "warning", file, int(lines[first]), what, "check the sensor; empty the cells if it hung"
         )
+
+
+def lone_findings(file: Path, lines: Lines, channel: Channel, column: FloatArray) -> Iterator[Finding]:
+    """A single reading far from both neighbours, which agree: a loose contact, a lost byte."""
+    known = np.flatnonzero(np.isfinite(column))
+    if channel.role not in _SENSORS or channel.unit not in _LEAST or known.size < FEW:
+        return
+    readings = column[known]
+    steps = np.diff(readings)
+    usual = 1.4826 * float(np.median(np.abs(steps)))
+    away = np.minimum(np.abs(steps[:-1]), np.abs(steps[1:]))
+    far = away > max(_LONE * usual, _LEAST[channel.unit])
+    low, high = ROLES[channel.role].ranges[channel.unit].usual  # what lies outside is told already
+    lone = np.flatnonzero(far & (np.abs(readings[2:] - readings[:-2]) < _AGREE * away)) + 1
+    lone = lone[(readings[lone] >= low) & (readings[lone] <= high)]
+    if lone.size:
+        first = int(lone[0])
+        what = (
+            f"'{channel.name}' is {readings[first]:g} {channel.unit} in one reading between "
+            f"{readings[first - 1]:g} and {readings[first + 1]:g}"
+        )
+        do = "leave the cell empty if the sensor failed there"
+        yield Finding("warning", file, int(lines[known[first]]), what + more(lone.size), do)
 
 
 def few_findings(file: Path, channel: Channel, column: FloatArray) -> Iterator[Finding]:

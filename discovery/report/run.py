@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from discovery.errors import UserError
 from discovery.files import read_text
 from discovery.models import Model
 from discovery.models.modelfile import read_model
+from discovery.runfolder import DIAGNOSIS, RESULTS, read_diagnosis, read_results
 
 Array = NDArray[np.float64]
 
@@ -98,32 +98,19 @@ def load_run(folder: Path) -> Run:
         UserError: no results in the folder, or a file in it cannot be read.
     """
     folder = Path(folder)
-    results_file, diagnosis_file = folder / "results.json", folder / "diagnosis.json"
-    if not results_file.exists() and not diagnosis_file.exists():
+    has_results, has_diagnosis = (folder / RESULTS).exists(), (folder / DIAGNOSIS).exists()
+    if not has_results and not has_diagnosis:
         raise UserError(
             f"{folder}: neither results.json nor diagnosis.json is there; "
             "make them with `discovery run EXPERIMENT`"
         )
-    results = read_json(results_file) if results_file.exists() else {}
-    diagnosis = read_json(diagnosis_file) if diagnosis_file.exists() else None
+    results = read_results(folder) if has_results else {}
+    diagnosis = read_diagnosis(folder) if has_diagnosis else None
     predictions = {
         path.stem: read_predictions(path) for path in sorted((folder / "predictions").glob("*.csv"))
     }
     models = {path.stem: read_model(path) for path in sorted((folder / "models").glob("*.toml"))}
     return Run(folder, results, diagnosis, predictions, models)
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """A JSON object. Raises UserError with file and line."""
-    try:
-        data = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise UserError(
-            f"{path}, line {error.lineno}: not valid JSON ({error.msg}); make the run again"
-        ) from None
-    if not isinstance(data, dict):
-        raise UserError(f"{path}: a JSON object is expected; make the run again")
-    return data
 
 
 def read_predictions(path: Path) -> Predictions:

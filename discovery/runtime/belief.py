@@ -36,6 +36,7 @@ SIGNIFICANT = 0.05  # chance of calling noise a drift; a shadow run stands befor
 AS_NEW = 1.1  # residual, as a multiple of that of the fit, below which there is nothing to gain
 EXCESS = 1.6  # residual after the update, as a multiple of that of the fit, from which an effect is new
 WIDEST = 3.0  # prior standard deviations never grow beyond this multiple of the first fit's
+SURPRISE = 2.0  # prior standard deviations that a parameter moves, from which its prior was too narrow
 
 
 @dataclass(frozen=True)
@@ -51,10 +52,6 @@ class Belief:
     slow_share: float  # of the variance of the fit's residual
     gain: float = 0.0
     effective: float = 0.0
-
-    def released(self) -> Belief:
-        """After a revision: the model believed in is the one at work."""
-        return replace(self, at_work=self.model, gain=0.0, effective=0.0)
 
 
 @dataclass(frozen=True)
@@ -133,6 +130,9 @@ def update_belief(
     weights = 1.0 / np.array([levels[n] for n in outputs]) / np.sqrt(alike)
     fixed = minimise(now, weights, starts, starts, np.zeros((0, 0)))
     freed = minimise(problem, weights, [*known, *starts], starts, prior)
+    prior, surprised = _widened(belief, prior, freed.theta[known])
+    if surprised:
+        freed = minimise(problem, weights, [*known, *starts], starts, prior)
     from scipy.stats import chi2
 
     gain, effective = belief.gain + fixed.cost - freed.cost, belief.effective + freed.effective
@@ -172,6 +172,18 @@ def _prior(belief: Belief) -> Array:
     sd = np.sqrt(np.maximum(np.diag(wider), 1e-300))
     shrink = np.minimum(1.0, WIDEST * belief.first / sd)
     return np.asarray(wider * np.outer(shrink, shrink))
+
+
+def _widened(belief: Belief, prior: Array, values: Array) -> tuple[Array, bool]:
+    """A prior that allows a full step of the walk to what has left it, and whether anything has.
+
+    What the first fit knew well may not stay so: a prior that forbids the machine to age would pull the
+    estimate back, and its interval would miss the truth.
+    """
+    old = np.array([belief.model.parameters[name].value for name in belief.parameters])
+    sd = np.sqrt(np.maximum(np.diag(prior), 1e-300))
+    wider = np.where(np.abs(values - old) > SURPRISE * sd, np.maximum(1.0, WALK * np.abs(old) / sd), 1.0)
+    return np.asarray(prior * np.outer(wider, wider)), bool(np.any(wider > 1.0))
 
 
 def _with(model: Model, names: Sequence[str], values: Array, sd: Array) -> Model:

@@ -105,8 +105,8 @@ def compensate_rows(
         goes_on = out is not None and out.exists() and session.resumed is not None
         stream: TextIO | None = None
         last = None
-        for now, newest, fresh in ticks(csv_rows(lines), step, session.resumed):
-            found = session.tick(newest, fresh, now)
+        for now, newest in ticks(csv_rows(lines), step, session.resumed):
+            found = session.tick(newest, now)
             if stream is None:
                 stream = _output(out, stack, "a" if goes_on else "w")
                 stream.write("" if goes_on else header(session.compensator))
@@ -118,7 +118,7 @@ def compensate_rows(
             after = " after the saved state" if session.resumed is not None else ""
             say(f"no row with a time came{after}; nothing was done")
         else:
-            session.save(last)
+            session.close(last)
 
 
 def header(compensator: Compensator) -> str:

@@ -70,7 +70,7 @@ async def run_loop(link: Link, session: Session, seconds: float | None, say: Say
             if link.client is None and (again is None or again.done()):
                 again = asyncio.create_task(_reconnect(link, say))
             # values that are no longer renewed grow too old by themselves: the guards see to it
-            tick = session.tick(readings, readings, time.time(), enabled=enabled)
+            tick = session.tick(readings, time.time(), enabled=enabled)
             if link.client is not None:
                 try:
                     await asyncio.wait_for(link.write(tick), 0.8 * tick_s)
@@ -89,7 +89,7 @@ async def run_loop(link: Link, session: Session, seconds: float | None, say: Say
     finally:
         if again is not None:
             again.cancel()
-        session.save(time.time())
+        session.close(time.time())
         await link.close()
     return found
 

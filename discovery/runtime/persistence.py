@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import os
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,19 +19,27 @@ from discovery.runtime.compensator import Compensator, State
 NAMES = ("state.json", "state.previous.json")
 
 
-def save(compensator: Compensator, folder: Path, beside: Executor | None = None) -> None:
+def save(compensator: Compensator, folder: Path, beside: Executor | None = None) -> Future[None]:
     """Write the state of a compensator; what was there before becomes the previous copy.
 
     A crash at any instant leaves at least one whole copy.
 
     Args:
         beside: writes in a thread of its own (one worker), so that a slow disk delays no tick.
+
+    Returns:
+        What became of it: an OSError where the disk did not take it.
     """
     body = json.dumps(_content(compensator), allow_nan=True)
-    if beside is None:
+    if beside is not None:
+        return beside.submit(_write, body, folder)
+    done: Future[None] = Future()
+    try:
         _write(body, folder)
-    else:
-        beside.submit(_write, body, folder)
+        done.set_result(None)
+    except OSError as error:
+        done.set_exception(error)
+    return done
 
 
 def _write(body: str, folder: Path) -> None:

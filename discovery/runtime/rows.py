@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from datetime import datetime
+from datetime import UTC
 
 from discovery.errors import UserError
+from discovery.recordings.clock import parse_instant
 from discovery.runtime.guards import Reading
 
 LONGEST_SILENCE_S = 3600.0  # a longer gap in the rows: the machine, and its runtime, were off
@@ -47,43 +48,39 @@ def csv_rows(lines: Iterable[str]) -> Iterator[tuple[float, dict[str, Reading]]]
 
 def ticks(
     rows: Iterable[tuple[float, Mapping[str, Reading]]], tick_s: float, after: float | None = None
-) -> Iterator[tuple[float, dict[str, Reading], dict[str, Reading]]]:
-    """Instants of the ticks: with the newest readings of each input, and the readings that are new since the
-    last tick.
+) -> Iterator[tuple[float, dict[str, Reading]]]:
+    """Instants of the ticks with the newest reading of each column.
 
     Args:
         tick_s: time between ticks [s].
         after: the first tick comes after this instant (a restart); rows before it fill in what is known.
     """
     newest: dict[str, Reading] = {}
-    fresh: dict[str, Reading] = {}
     following: float | None = None if after is None else after + tick_s
     for time, readings in rows:
         if following is None:
             following = time
         if time - following > LONGEST_SILENCE_S:
             if newest:
-                yield following, newest, fresh
-                fresh = {}
+                yield following, newest
             following = time
         while following < time:
-            yield following, newest, fresh
-            fresh = {}
+            yield following, newest
             following += tick_s
         newest.update(readings)
-        if after is None or time > after:
-            fresh.update(readings)
     if following is not None and newest:
-        yield following, newest, fresh
+        yield following, newest
 
 
 def _time(cell: str) -> float:
+    """Seconds; an instant without a zone is taken as UTC, so that no clock of a computer comes into it."""
     try:
         return float(cell)
     except ValueError:
         pass
     try:
-        return datetime.fromisoformat(cell.strip()).timestamp()
+        instant = parse_instant(cell)
+        return (instant if instant.tzinfo else instant.replace(tzinfo=UTC)).timestamp()
     except (ValueError, OverflowError):
         return math.nan
 

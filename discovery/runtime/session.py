@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,6 +41,8 @@ class Session:
         self.shadow: Shadow | None = None
         self.resumed: float | None = None
         self.saved: float | None = None
+        self.saving: Future[None] | None = None  # the last save, which may still be under way
+        self.unsaved = False  # it has been said that saves fail
         if folder is not None and model is not None:
             models = open_store(folder, model, exported, trusted)
             exported = models.active
@@ -55,18 +57,11 @@ class Session:
             if self.resumed is None:
                 succeed(self.compensator, folder)
 
-    def tick(
-        self,
-        readings: Mapping[str, Reading],
-        measured: Mapping[str, Reading],
-        now: float,
-        *,
-        enabled: bool = True,
-    ) -> Tick:
-        """One tick; `measured`: readings that came since the last one, among them measured errors."""
+    def tick(self, readings: Mapping[str, Reading], now: float, *, enabled: bool = True) -> Tick:
+        """One tick with the newest readings, measured errors among them if there are any."""
         found = self.compensator.tick(readings, now, enabled=enabled)
         if self.shadow is not None:
-            self.shadow.tick(self.compensator, readings, measured, now)
+            self.shadow.tick(self.compensator, readings, now)
             verdict = self.shadow.verdict(now)
             if verdict is not None:
                 self._decide(*verdict)
@@ -87,7 +82,31 @@ class Session:
         self.shadow = None
 
     def save(self, now: float) -> None:
-        """Write the state to disk."""
-        if self.folder is not None and self.compensator.origin is not None:
-            save(self.compensator, self.folder, self.beside)
-            self.saved = now
+        """Write the state to disk, unless the save before is still under way."""
+        if self.folder is None or self.compensator.origin is None:
+            return
+        if self.saving is not None and not self.saving.done():
+            return
+        self._hear()
+        self.saving = save(self.compensator, self.folder, self.beside)
+        self.saved = now
+        if self.beside is None:
+            self._hear()
+
+    def close(self, now: float) -> None:
+        """Write the state a last time, and wait until it stands on the disk."""
+        self._hear()
+        self.save(now)
+        self._hear()
+
+    def _hear(self) -> None:
+        """What became of the last save; the first of several that fail is told, the compensation goes on."""
+        if self.saving is None:
+            return
+        error, self.saving = self.saving.exception(), None
+        if error is not None and not self.unsaved:
+            self.say(
+                f"{self.folder}: the state cannot be saved ({error}); the compensation goes on, but a "
+                "restart would begin from an older state: make room or give it another folder with --state"
+            )
+        self.unsaved = error is not None

@@ -10,6 +10,8 @@ from discovery.export.document import Exported
 from discovery.runtime.compensator import Compensator, Settings, State
 from discovery.runtime.guards import Reading, number
 
+LONGEST_AHEAD_S = 60.0  # of the clock of a reading; one that claims more would keep all later ones out
+
 
 @dataclass(frozen=True)
 class Rule:
@@ -32,18 +34,13 @@ class Shadow:
     difference: float = 0.0
     trouble: bool = False
     residuals: dict[str, list[tuple[float, float]]] = field(default_factory=dict)  # old, new
+    counted: dict[str, float] = field(default_factory=dict)  # instant [s] of the last reading of each error
 
-    def tick(
-        self,
-        active: Compensator,
-        readings: Mapping[str, Reading],
-        measured: Mapping[str, Reading],
-        now: float,
-    ) -> None:
-        """Follow a tick of the model at work.
+    def tick(self, active: Compensator, readings: Mapping[str, Reading], now: float) -> None:
+        """Follow a tick of the model at work; errors may be among the readings.
 
-        A measured error counts as uncompensated; where the machine was compensated, `NAME_applied` says by
-        how much, and is added.
+        A measured error counts once, where it is good. It counts as uncompensated; where the machine was
+        compensated, `NAME_applied` says by how much, and is added.
         """
         if self.began is None and active.predicted is not None:
             self.began = now
@@ -55,11 +52,24 @@ class Shadow:
         old, new = predictions(active), predictions(self.compensator)
         for name in old.keys() & new.keys():
             self.difference = max(self.difference, abs(old[name] - new[name]))
-            reading = number(measured[name].value) if name in measured else math.nan
-            if (applied := f"{name}_applied") in readings:
-                reading += number(readings[applied].value)
-            if math.isfinite(reading):
-                self.residuals.setdefault(name, []).append((reading - old[name], reading - new[name]))
+            error = self._new_error(name, readings, now)
+            if math.isfinite(error):
+                self.residuals.setdefault(name, []).append((error - old[name], error - new[name]))
+
+    def _new_error(self, name: str, readings: Mapping[str, Reading], now: float) -> float:
+        """The uncompensated error, if it is a good reading newer than the last one counted; NaN if not.
+
+        A source may show one reading for many ticks, from before the shadow run as well.
+        """
+        reading, applied = readings.get(name), readings.get(f"{name}_applied", Reading(0.0, now))
+        if reading is None or not reading.good or not applied.good or self.began is None:
+            return math.nan
+        if not self.counted.get(name, self.began) < number(reading.time) <= now + LONGEST_AHEAD_S:
+            return math.nan
+        error = number(reading.value) + number(applied.value)
+        if math.isfinite(error):
+            self.counted[name] = number(reading.time)
+        return error
 
     def verdict(self, now: float) -> tuple[bool, str] | None:
         """Whether the candidate may take over, and why; None: not yet known."""

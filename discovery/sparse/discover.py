@@ -13,7 +13,8 @@ from discovery.dynamics import make_grid
 from discovery.errors import UserError
 from discovery.fitting import fit_model
 from discovery.models import Model, Parameter, State
-from discovery.models.modelfile import check_names, read_model
+from discovery.models.accept import check_model
+from discovery.models.modelfile import read_model
 from discovery.recordings import Campaign
 from discovery.sparse.bymasses import MassData, discover_error
 from discovery.sparse.byrates import Growth, discover_rates
@@ -232,7 +233,7 @@ def _on_file(
     """A gray-box model file and what the library adds to its states."""
     path = Path(options.baseline) if Path(options.baseline).is_absolute() else folder / options.baseline
     baseline = read_model(path)
-    check_names(baseline, set(campaign.channels), path)
+    check_model(baseline, {n: c.unit for n, c in campaign.channels.items()}, path)
     for name in options.into or ():
         if name not in baseline.states:
             raise UserError(

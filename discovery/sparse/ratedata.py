@@ -104,8 +104,8 @@ def _missed(data: RateData, model: Model) -> float:
     for r in data.recordings:
         try:
             run = predict_recording(model, data.campaign, r, data.outputs, noise, data.grids[r])
+            squares.append((((data.grids[r].readings - predict(run)) / noise) ** 2).ravel())
         except UserError:
             return float("inf")
-        squares.append((((data.grids[r].readings - predict(run)) / noise) ** 2).ravel())
     missed = float(np.nanmean(np.concatenate(squares)))
     return missed if np.isfinite(missed) else float("inf")

@@ -9,31 +9,17 @@ from __future__ import annotations
 
 import ast
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from discovery.errors import UserError
+from discovery.naming import FUNCTIONS
 
 MAX_LENGTH = 4000  # characters of one expression
 MAX_NODES = 400
 MAX_DEPTH = 40
-
-# name -> (fewest, most) arguments
-FUNCTIONS = {
-    "abs": (1, 1),
-    "min": (2, 8),
-    "max": (2, 8),
-    "exp": (1, 1),
-    "log": (1, 1),
-    "sqrt": (1, 1),
-    "sign": (1, 1),
-    "where": (3, 3),
-    "tanh": (1, 1),
-    "delay": (2, 2),
-    "lag": (2, 2),
-    "play": (2, 2),
-}
-MEMORY = ("delay", "lag", "play")
+MEMORY = ("delay", "lag", "play")  # what they give depends on what was before
 
 _BINARY: dict[type[ast.operator], str] = {
     ast.Add: "+",
@@ -50,7 +36,6 @@ _COMPARE: dict[type[ast.cmpop], str] = {
     ast.Eq: "==",
     ast.NotEq: "!=",
 }
-OPERATORS = (*_BINARY.values(), *_COMPARE.values(), "neg")
 COMPARISONS = tuple(_COMPARE.values())
 
 
@@ -100,8 +85,15 @@ def parse(source: str | float, where: str = "expression") -> Expression:
         raise UserError(
             f"{where}: the expression has {len(source)} characters, at most {MAX_LENGTH} are read; split it"
         )
+    if not source.isascii():  # Python's parser reads some letters as others
+        odd = next(letter for letter in source if not letter.isascii())
+        raise UserError(
+            f"{where}: '{odd}' in '{source[:60]}' is no ASCII letter or sign; use a to z and - * /"
+        )
     try:
-        tree = ast.parse(source.strip(), mode="eval")
+        with warnings.catch_warnings():  # Python's remarks on style, as on `1if a else 2`
+            warnings.simplefilter("ignore", SyntaxWarning)
+            tree = ast.parse(source.strip(), mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
         detail = getattr(error, "msg", None) or "it is nested too deeply"
         column = getattr(error, "offset", None)
@@ -160,7 +152,7 @@ def _convert(node: ast.AST, source: str, where: str, counter: list[int], depth: 
             fewest, most = FUNCTIONS[name]
             if not fewest <= len(args) <= most:
                 raise UserError(
-                    f"{where}: {name}() takes {fewest} arguments, '{source[:60]}' gives it {len(args)}"
+                    f"{where}: {name}() takes {_count(fewest, most)}, '{source[:60]}' gives it {len(args)}"
                 )
             if name == "delay" and not isinstance(args[0], ast.Name):
                 raise UserError(f"{where}: delay() takes a channel and seconds, as in delay(T_fluid, 600)")
@@ -177,6 +169,12 @@ def _convert(node: ast.AST, source: str, where: str, counter: list[int], depth: 
         f"{where}: '{fragment or source[:60]}' is not allowed in an expression; "
         "use + - * / **, comparisons, parentheses, names, numbers and " + ", ".join(sorted(FUNCTIONS))
     )
+
+
+def _count(fewest: int, most: int) -> str:
+    if fewest == most:
+        return f"{fewest} argument{'s' if fewest > 1 else ''}"
+    return f"{fewest} to {most} arguments"
 
 
 def names(expression: Expression) -> frozenset[str]:

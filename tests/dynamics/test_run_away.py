@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from discovery.dynamics import make_grid, make_system, simulate
+from discovery.dynamics.system import predict
 from discovery.errors import RunsAwayError
+from discovery.fitting import fit_model
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -30,3 +32,34 @@ def test_far_is_away(rate: float, runs: bool) -> None:
     else:
         with pytest.raises(RunsAwayError, match="runs away"):
             simulate(make_system(model, grid), model.values())
+
+
+@pytest.mark.parametrize("formula", ["T + log(u - 300)", "T + 0*(1/(u - 400))", "T + 0*sqrt(100 - u)"])
+def test_an_output_that_is_no_number_is_told(formula: str) -> None:
+    """u is the time in s: the formulas are numbers before 200 s, or after 300 s, but not at every reading."""
+    time = np.arange(0.0, 1001.0, 100.0)
+    channels = {
+        "u": Channel("u", "heat load", "W", None, "held"),
+        "E": Channel("E", "error", "um", None, "linear"),
+    }
+    recording = Recording("r", time, {"u": time, "E": np.where(time < 350, np.nan, 0.0)})
+    state = State("T", "degC", None, parse("20"))
+    campaign = Campaign("c", channels, {"r": recording})
+
+    def of(output: str) -> np.ndarray:
+        model = Model("m", {}, {"T": state}, (), {"E": parse(output)})
+        return predict(simulate(make_system(model, make_grid(campaign, "r", ["u"], ["E"])), {}))
+
+    if "log" in formula:  # NaN where nothing was read is nobody's business
+        np.testing.assert_allclose(of(formula)[:, 0], 20 + np.log(time[time > 350] - 300))
+        formula = formula.replace("300", "500")
+    with pytest.raises(
+        RunsAwayError, match=r"the output 'E' is not a finite number 400 s after the start of"
+    ):
+        of(formula)
+    with pytest.raises(RunsAwayError, match="'E' is not a finite number"):  # not scipy's words
+        fit_model(
+            Model("m", {"k": Parameter(1.0)}, {"T": state}, (), {"E": parse(f"{formula} + k")}),
+            campaign,
+            ["r"],
+        )

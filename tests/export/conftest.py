@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,9 @@ import pytest
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
+
+HAS_GCC = shutil.which("gcc") is not None
+needs_gcc = pytest.mark.skipif(not HAS_GCC, reason="no C compiler (gcc) is installed")
 
 
 def make_campaign(hours: float = 12.0, seed: int = 1) -> Campaign:

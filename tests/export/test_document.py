@@ -40,6 +40,7 @@ def test_what_is_written_is_read_back_and_steps_the_same(
         stepper.start(u[0])
         runs.append(stepper.run(u))
     assert np.array_equal(runs[0], runs[1])
+    assert [name for name, state in back.model.states.items() if state.memory] == ["lag_1"]
     assert back.provenance["experiment"] == "small"
     assert [(i.name, i.role, i.unit) for i in back.inputs][:2] == [
         ("P_drive", "heat load", "W"),

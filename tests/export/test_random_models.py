@@ -16,6 +16,7 @@ from discovery.export.seal import Seal
 from discovery.export.stproof import prove_st
 from discovery.models import Model, Parameter, State
 from discovery.terms import Term, parse
+from tests.export.conftest import needs_gcc
 
 INPUTS = ("T_env", "T_fluid", "pump", "speed", "P_drive")
 LOW, HIGH = np.array([20.0, 24.0, 0.0, 0.0, 0.0]), np.array([25.0, 30.0, 1.0, 1200.0, 800.0])
@@ -107,6 +108,7 @@ def random_inputs(names: tuple[str, ...], steps: int, seed: int) -> np.ndarray:
     return u[:, [INPUTS.index(name) for name in names]]
 
 
+@needs_gcc
 @settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(models(), some.sampled_from([1.0, 10.0, 60.0]), some.integers(0, 1000))
 def test_c_in_double_and_float_is_the_python_model(model: Model, step_s: float, seed: int) -> None:
@@ -126,6 +128,7 @@ def test_structured_text_is_the_python_model(model: Model, step_s: float, seed: 
     assert len(prove_st(one, reference)) == 2
 
 
+@needs_gcc
 def test_the_size_of_the_temporary_folder_is_given_back() -> None:
     before = set(Path(tempfile.gettempdir()).iterdir())
     one = exported(Model("x", {}, {"x": State("x")}, (), {"y": parse("x")}), 1.0)

@@ -19,12 +19,15 @@ from discovery.models import Model, State
 from discovery.models.modelfile import write_model
 from discovery.recordings import Campaign
 from discovery.terms import Term, parse
+from tests.export.conftest import HAS_GCC, needs_gcc
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from tests.export.conftest import make_campaign, make_model
 
+    if not HAS_GCC:
+        pytest.skip("no C compiler (gcc) is installed")
     place = tmp_path_factory.mktemp("export")
     done = export_model(make_model(), make_campaign(4.0), ["fit"], ["json", "c", "fmu", "fmu3", "st"], place)
     limits = {proof.target: (proof.deviation, proof.limit) for proof in done.proofs}
@@ -155,10 +158,11 @@ def test_a_model_that_runs_away_is_refused_and_nothing_is_written(campaign: Camp
     states = {"a": State("a", "um", None, parse(0.0), 0.0, 1.0)}
     model = Model("wild", {}, states, (Term("t", "a", parse("0.01*a**2 + T_env")),), {"E_Z0T": parse("a")})
     with pytest.raises(UserError, match="runs away"):
-        export_model(model, campaign, ["fit"], "c", tmp_path / "out")
+        export_model(model, campaign, ["fit"], "st", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
+@needs_gcc
 def test_reduction_states_its_error(campaign: Campaign, model: Model, tmp_path: Path) -> None:
     from discovery.export.document import read_document
     from discovery.export.reduce import reduce_model
@@ -207,6 +211,7 @@ def test_a_linear_reduction_keeps_its_error_below_the_bound_of_the_theory() -> N
     assert expm(np.zeros((1, 1))) == 1.0
 
 
+@needs_gcc
 def test_the_command_exports_a_run(model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import json
 
@@ -215,7 +220,15 @@ def test_the_command_exports_a_run(model: Model, tmp_path: Path, monkeypatch: py
     run = tmp_path / "run"
     write_model(run / "models" / "everything.toml", model)
     (run / "results.json").write_text(
-        json.dumps({"experiment": "small", "fit": ["fit"], "campaign_file": "campaign.toml"})
+        json.dumps(
+            {
+                "experiment": "small",
+                "fit": ["fit"],
+                "held_out": [],
+                "models": {},
+                "campaign_file": "campaign.toml",
+            }
+        )
     )
     monkeypatch.chdir(tmp_path)
     rows = make_campaign(2.0).recordings["fit"]
@@ -237,7 +250,7 @@ def test_the_command_exports_a_run(model: Model, tmp_path: Path, monkeypatch: py
     everything = ["run", "--model", "everything", "--to"]
     for words, sentence, status in (
         (["run", "--model", "nobody", "--to", "c"], "no model 'nobody'", 1),
-        (["elsewhere", "--model", "everything", "--to", "c"], "no folder of a finished run", 1),
+        (["elsewhere", "--model", "everything", "--to", "c"], "no results.json there", 1),
         ([*everything, "pickle"], "unknown export target 'pickle'", 2),
         ([*everything, "json", "--step", "0"], "a step of 0 s is not possible", 2),
         ([*everything, "json", "--step", "-5"], "a step of -5 s is not possible", 2),
@@ -279,3 +292,47 @@ def test_a_controller_needs_no_reading_to_start(campaign: Campaign, tmp_path: Pa
     roomless = replace(campaign, channels={n: c for n, c in channels.items() if n != "T_env"})
     with pytest.raises(UserError, match="starts at the reading of T_table"):
         export_model(model, roomless, ["fit"], "json", tmp_path)
+
+
+@needs_gcc
+@pytest.mark.parametrize("name", ["replay", "Replay", "instance", "fmi2", "fmi3", "math"])
+def test_a_model_may_have_the_name_of_a_file_beside_it(
+    campaign: Campaign, model: Model, tmp_path: Path, name: str
+) -> None:
+    """Every file that was proved stands there: the C files compile as they were written."""
+    from dataclasses import replace
+
+    done = export_model(replace(model, name=name), campaign, ["fit"], ["c", "fmu", "fmu3"], tmp_path)
+    assert {proof.target for proof in done.proofs} == {"C double", "C float", "FMI 2.0", "FMI 3.0"}
+    sources = sorted(path.name for path in (tmp_path / "c").glob("*.c"))
+    assert len(sources) == 2
+    assert "int main(" in (tmp_path / "c" / "replay.c").read_text()
+    subprocess.run(
+        ["gcc", "-std=c99", "-I.", *sources, "-lm", "-o", tmp_path / "a.out"], cwd=tmp_path / "c", check=True
+    )
+    for path in tmp_path.glob("*.fmu"):
+        with zipfile.ZipFile(path) as archive:
+            names = [Path(n).name.lower() for n in archive.namelist()]
+            assert len(names) == len(set(names))
+            assert len([n for n in names if n.endswith(".c")]) == 2
+
+
+def test_an_output_that_is_no_channel_is_not_compensated(
+    campaign: Campaign, model: Model, tmp_path: Path
+) -> None:
+    from dataclasses import replace
+
+    from discovery.export.document import read_document
+    from discovery.runtime.compensator import Compensator
+
+    more = replace(model, outputs={"T_guess": parse("a"), **model.outputs})
+    done = export_model(more, campaign, ["fit"], "st", tmp_path)
+    back = read_document(done.files[0])
+    assert [(o.name, o.role, o.unit) for o in back.outputs] == [
+        ("E_Z0T", "error", "um"),
+        ("E_A0C", "error", "um/m"),
+    ]
+    assert Compensator(back).names == ["E_Z0T", "E_A0C"]
+    assert done.agreement["integrator_um"] < 1e-3
+    with pytest.raises(UserError, match="no output is a channel"):
+        export_model(replace(model, outputs={"T_guess": parse("a")}), campaign, ["fit"], "json", tmp_path)

@@ -132,6 +132,21 @@ def test_a_table_of_errors_makes_files_that_load(tmp_path: Path) -> None:
     assert experiment.model_file("first_order").outputs == {}
 
 
+def test_the_first_model_counts_in_what_values_have_once_they_are_loaded(tmp_path: Path) -> None:
+    from discovery.experimentfile import load_experiment
+    from discovery.models.dimensions import check_dimensions
+
+    rows = ["time,T_hall [°C],P_drive [hp],E_Y0C [mm],E_A0C [mm/m]"]
+    rows += [f"{60 * k},{22 + k / 30:.2f},{k % 2},{k / 900:.4f},{k / 700:.4f}" for k in range(60)]
+    (tmp_path / "shift.csv").write_text("\n".join(rows), "utf-8")
+    CliRunner().invoke(app, ["new", str(tmp_path / "machine"), "--from", str(tmp_path / "shift.csv")])
+    experiment = load_experiment(tmp_path / "machine" / "experiment.toml")
+    model, channels = experiment.model_file("first_order"), experiment.campaign.channels
+    assert (channels["P_drive"].unit, channels["E_A0C"].unit) == ("W", "um/m")
+    assert model.parameters["gain_E_A0C_P_drive"].unit == "um/m/W/s"
+    assert check_dimensions(model, channels) == []
+
+
 def test_columns_that_say_nothing_stay_out(tmp_path: Path) -> None:
     for name, column in (("one", "extra"), ("two", "other")):
         rows = [f"{k},{k % 3},{20 + k / 9},24.3,7,{k % 5}" for k in range(30)]

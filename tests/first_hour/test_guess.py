@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from discovery.errors import UserError
-from discovery.firsthour.guess import guess, guess_all
+from discovery.firsthour.guess import Guess, guess, guess_all
 from discovery.firsthour.table import Column, read_own
 
 CASES = [
@@ -33,6 +34,27 @@ CASES = [
     ("Torque", "lbf·ft", np.linspace(0, 0.3, 50), "other input", "lbf·ft"),
     ("heat flux", "W/quux", np.linspace(0, 9, 50), "other input", "1"),
     ("Motor Efficiency", "%", np.linspace(0, 90, 50), "other input", "percent"),
+    ("DutyCycle", "%", np.linspace(0, 90, 50), "heat load", "percent"),
+    ("duty", "", np.linspace(0, 90, 50), "heat load", "percent"),
+    ("PWM", "", np.arange(50) * 5.0, "heat load", "1"),
+    ("Heating", "", np.arange(50) % 2, "heat load", "1"),
+    ("heating_north", "kW", np.linspace(0, 9, 50), "heat load", "kW"),
+    ("Output", "%", np.linspace(0, 90, 50), "heat load", "percent"),
+    ("Output", "", np.linspace(20, 90, 50), "other input", "1"),
+    ("control", "", np.arange(50) * 4.0, "heat load", "1"),
+    ("control", "", np.linspace(-3, 3, 50), "other input", "1"),
+    ("u", "", np.linspace(0, 1, 50), "heat load", "1"),
+    ("valve", "%", np.linspace(0, 90, 50), "heat load", "percent"),
+    ("Q1", "", np.linspace(0, 90, 50), "heat load", "percent"),
+    ("T_control", "", np.linspace(20, 30, 50), "temperature", "degC"),
+    ("T_spindle", "", np.linspace(20, 30, 50), "temperature", "degC"),
+    ("motor temp", "", np.linspace(20, 30, 50), "temperature", "degC"),
+    ("solar", "W/m2", np.linspace(0, 900, 50), "other input", "W/m**2"),
+    ("solar", "W/m^2", np.linspace(0, 900, 50), "other input", "W/m^2"),
+    ("solar", "W/m²", np.linspace(0, 900, 50), "other input", "W/m²"),
+    ("incubator temp", "", np.linspace(59, 61, 50), "temperature", "degC"),
+    ("Ta", "", np.linspace(2, 14, 50), "ambient temperature", "degC"),
+    ("yTi1", "", np.linspace(19, 24, 50), "temperature", "degC"),
 ]
 
 
@@ -57,6 +79,64 @@ def test_a_correction_is_given_to_the_error_of_its_name() -> None:
 def test_a_load_that_is_never_on_has_the_unit_of_the_other() -> None:
     columns = [Column("Q1", "Q1", "", np.linspace(0, 80, 9)), Column("Q2", "Q2", "", np.zeros(9))]
     assert [one.unit for one in guess_all(columns).values()] == ["percent", "percent"]
+
+
+def _guessed(*columns: tuple[str, str, float, float]) -> dict[str, Guess]:
+    """Guesses of columns that run from one value to another."""
+    return guess_all(
+        [Column(n, n.replace(" ", "_"), unit, np.linspace(low, high, 50)) for n, unit, low, high in columns]
+    )
+
+
+def test_what_goes_to_a_heater_is_asked_about_and_a_heater_is_not() -> None:
+    found = _guessed(("DutyCycle", "%", 0, 90), ("Heater", "%", 0, 90))
+    assert [one.sure for one in found.values()] == [False, True]
+
+
+def test_loads_of_one_kind_have_one_unit() -> None:
+    watts = _guessed(("Ph1", "", 0, 11), ("Ph2", "", -0.1, 14))
+    assert [one.unit for one in watts.values()] == ["W", "W"]
+    percent = _guessed(("heater1", "", 0, 80), ("heater2", "", 0, 5))
+    assert [one.unit for one in percent.values()] == ["percent", "percent"]
+
+
+@pytest.mark.parametrize(
+    ("names", "roles"),
+    [
+        (["T_room1", "T_room2", "T_ambient"], ["measured", "measured", "air"]),
+        (["yTi1", "Ta"], ["measured", "air"]),
+        (["T_room", "Ta"], ["measured", "air"]),
+        (["T_air", "T_room"], ["air", "measured"]),
+        (["T_air_spindle", "T_hall"], ["measured", "air"]),
+        (["T_table", "T_room"], ["measured", "air"]),
+        (["T_table", "T_room1", "T_room2"], ["measured", "air", "measured"]),
+        (["T_room1", "T_room2"], ["measured", "measured"]),  # nothing else is
+        (["T_ambient", "T_outside", "T_bed"], ["air", "air", "measured"]),
+    ],
+)
+def test_of_several_rooms_the_clearest_is_the_air_around(names: list[str], roles: list[str]) -> None:
+    words = {"measured": "temperature", "air": "ambient temperature"}
+    found = _guessed(*((name, "degC", 18.0, 24.0) for name in names))
+    assert [one.role for one in found.values()] == [words[role] for role in roles]
+    rooms = [one for name, one in found.items() if "room" in name and one.role == "temperature"]
+    assert not any(one.sure for one in rooms)
+
+
+@pytest.mark.parametrize(
+    ("columns", "unit"),
+    [
+        ([("T1", "", 60.0, 61.0)], "degC"),  # an incubator as well as a room
+        ([("T1", "", 60.0, 61.0), ("T2", "", 70.0, 75.0)], "degF"),
+        ([("T1", "", 60.0, 61.0), ("T2", "", 22.0, 25.0)], "degC"),
+        ([("T1", "", 60.0, 61.0), ("T2", "°F", 70.0, 75.0)], "degF"),
+        ([("T1", "", 60.0, 61.0), ("T3", "", 60.0, 61.0), ("T2", "°C", 60.0, 75.0)], "degC"),
+    ],
+)
+def test_fahrenheit_needs_more_than_one_witness(
+    columns: list[tuple[str, str, float, float]], unit: str
+) -> None:
+    assert _guessed(*columns)["T1"].unit == unit
+    assert not _guessed(*columns)["T1"].sure
 
 
 def _file(folder: Path, *lines: str) -> Path:
@@ -144,3 +224,38 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, lines: list[str], s
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="cannot be read"):
         read_own(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("nothing", ["NaN", "NAN", "nan", "NA", "null", "-", "", "#N/A", "None"])
+def test_a_first_row_that_holds_nothing_is_no_row_of_units(tmp_path: Path, nothing: str) -> None:
+    rows = [f"{10 * k},{20 + k * k / 9},{k % 3}" for k in range(1, 15)]
+    table = read_own(_file(tmp_path, "time,T1,heater1", f"0,{nothing},{nothing}", *rows))
+    assert len(table.time) == 15
+    assert [(c.name, c.unit) for c in table.columns] == [("T1", ""), ("heater1", "")]
+    assert np.isnan(table.columns[0].values[0])
+
+
+def test_a_row_of_units_may_say_that_there_is_none(tmp_path: Path) -> None:
+    table = read_own(_file(tmp_path, "time,T1,door", "s,-,n/a", *(f"{k},{k * k},{k % 2}" for k in range(15))))
+    assert [(c.name, c.unit) for c in table.columns] == [("T1", "-"), ("door", "")]
+
+
+def _stamped(first: datetime, form: str, minutes: float, count: int = 40) -> list[str]:
+    stamps = [first + timedelta(minutes=minutes * k) for k in range(count)]
+    return ["Time,T1", *(f"{stamp.strftime(form)},{20 + k * k / 9}" for k, stamp in enumerate(stamps))]
+
+
+@pytest.mark.parametrize(
+    ("form", "read"), [("%m/%d/%Y %H:%M", "month/day/year"), ("%d/%m/%Y %H:%M", "day/month/year")]
+)
+def test_a_date_that_reads_two_ways_has_even_steps(tmp_path: Path, form: str, read: str) -> None:
+    table = read_own(_file(tmp_path, *_stamped(datetime(2026, 3, 1, 23), form, 5.0)))
+    assert table.time[-1] == pytest.approx(39 * 300.0)  # not from March to February, nor to the next month
+    assert f"? dates read as {read}" in table.about_time
+
+
+def test_a_date_that_reads_one_way_is_not_asked_about(tmp_path: Path) -> None:
+    for first, minutes in ((datetime(2026, 3, 13, 23), 5.0), (datetime(2026, 3, 1, 8), 5.0)):
+        table = read_own(_file(tmp_path, *_stamped(first, "%m/%d/%Y %H:%M", minutes)))
+        assert table.time[-1] == pytest.approx(39 * 300.0)
+        assert "?" not in table.about_time

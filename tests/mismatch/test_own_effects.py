@@ -113,6 +113,8 @@ MISTAKES = {
     "0.1*speed": "effect 'rub': the amplitude 'k_rub' does not stand in the formula",
     "k_rub*speed*(": "effect 'rub'",
     "k_rub*__import__('os')": "effect 'rub'",
+    "k_rub*delay(body, t_free)": "effect 'rub': 'delay.body, t_free.' is not of an input",
+    "k_rub*delay(speed, speed)": "effect 'rub': the delay in",
 }
 
 

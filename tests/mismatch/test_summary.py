@@ -34,7 +34,7 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
         "next_experiment": "none",
     }
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
-    assert summary(tmp_path / "diagnosis.json")[1:-1] == [
+    assert summary(tmp_path)[1:-1] == [
         "  sensor_lag at T1, probability 0.90: t_lag_T1 = 18 s (17 to 19)",
         "  cooling_hysteresis at T1, probability 0.90",
         "  thermal_preload at T1, probability 0.90: k = 0.03 1/K (0.02 to 0.04), share = 0.5 (0.4 to 0.6)",

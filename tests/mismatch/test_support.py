@@ -17,7 +17,8 @@ from discovery.mismatch.look import look
 from discovery.mismatch.question import BLUNT, CLEAR, supported
 from discovery.mismatch.search import Search
 from discovery.mismatch.verdict import decide
-from discovery.models import Model
+from discovery.models import Model, expanded
+from discovery.terms import Term, parse
 from tests.mismatch.machine import SEEN, campaign, model, simulated
 
 
@@ -125,6 +126,22 @@ def test_a_look_after_a_memory_was_found() -> None:
     claims = look(context, assess(context, (sump,))).claims
     assert claims
     assert not any(place.startswith("lag_") for c in claims for place in c.hypothesis.places)
+
+
+def test_a_body_may_be_called_after_a_lag() -> None:
+    """What is a memory says so itself; a name says nothing."""
+    plain = model()
+    named = replace(
+        plain,
+        states={**plain.states, "lag_plate": replace(plain.states["bed"], name="lag_plate")},
+        terms=(*plain.terms, Term("air at plate", "lag_plate", parse("hA_b*(T_env - lag_plate)"))),
+        outputs={"E_Y": parse("2*lag_plate + 3*lag(T_env, 3600)")},
+    )
+    found = expanded(named, seen := campaign(simulated(1)).channels)
+    (effect,) = (e for e in catalogue().values() if e.word == "radiation")
+    placed = {h.places for h in hypotheses(found, seen, ("E_Y",), ("r1",), [effect])}
+    assert ("lag_plate",) in placed
+    assert ("lag_1",) not in placed
 
 
 def test_what_has_an_event_of_its_own_is_not_run() -> None:

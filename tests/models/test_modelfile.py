@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from discovery.errors import UserError
-from discovery.models import Model, check_names, expanded, read_model, write_model
+from discovery.models import Model, check_model, expanded, read_model, write_model
 from discovery.models.thermobalance import thermobalance
 from discovery.terms import text
 
@@ -132,6 +132,37 @@ def test_a_lag_becomes_a_hidden_state(tmp_path: Path) -> None:
     assert list(model.states) == ["a", "b", "y", "lag_1"]
 
 
+def test_a_memory_keeps_to_itself(tmp_path: Path) -> None:
+    """Every lag_N that anything else is called by stays what it was, and a file says what is a memory."""
+    mine = GOOD.replace("b =", "lag_1 =").replace('"b"', '"lag_1"').replace("b - a", "lag_1 - a")
+    mine = mine.replace("tau ", "lag_2 ").replace("lag(P, tau)", "lag(P, lag_2)*lag(lag_3, 60)")
+    before = read_model(written(tmp_path, mine))
+    model = expanded(before, {"P", "T_env", "lag_3", "lag_4"})
+    assert list(model.states) == ["a", "lag_1", "y", "lag_5", "lag_6"]
+    assert {name: model.states[name] for name in before.states} == before.states
+    assert [text(t.expression) for t in model.terms[1:]] == [
+        "loss*lag_5*lag_6",
+        "a - 22",
+        "(P - lag_5)/lag_2",
+        "(lag_3 - lag_6)/60",
+    ]
+    assert [s.name for s in model.states.values() if s.memory] == ["lag_5", "lag_6"]
+    write_model(tmp_path / "again.toml", model)
+    assert [s.name for s in read_model(tmp_path / "again.toml").states.values() if s.memory] == [
+        "lag_5",
+        "lag_6",
+    ]
+    assert read_model(written(tmp_path, mine)).states["lag_1"].memory is False
+
+
+def test_a_memory_of_memories_starts_settled(tmp_path: Path) -> None:
+    nested = GOOD.replace("lag(P, tau)", "lag(delay(P, 60) + play(lag(T_env, 9), 1), tau)")
+    model = expanded(read_model(written(tmp_path, nested)))
+    start = model.states["lag_2"].start
+    assert start is not None
+    assert text(start) == "P + T_env"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -144,12 +175,29 @@ def test_a_lag_becomes_a_hidden_state(tmp_path: Path) -> None:
         ("fixed = true", "fixd = true", ["line 8", "did you mean 'fixed'"]),
         ('time_unit = "min"', 'time_unit = "minutes"', ["line 3", "min"]),
         ("G    =", "exp =", ["line 6", "cannot name"]),
+        ("G    =", '"µ" =', ["line 6", "'µ' cannot name a parameter"]),
+        ("G    =", '"ﬁx" =', ["line 6", "cannot name a parameter"]),
+        ("y = {", '"ÿ" = {', ["line 13", "cannot name a state"]),
         ("G    =", "a =", ["line 6", "also a state"]),
         ('per = "recording"', 'per = "day"', ["line 7", "recording"]),
         ("start = 24.0", 'start = "24"', ["line 6", "should be a valid number"]),
         ("start = 24.0", "start = nan", ["line 6", "should be a finite number"]),
         ('from = "b"', 'from = "a"', ["line 18", "'a' is also into"]),
         ("[outputs]", '[[terms]]\nname = "link"\ninto = "a"\nexpression = "G"\n[outputs]', ["named 'link'"]),
+        ('start = "T_env"', 'start = "lag(T_env, 600)"', ["line 11", "before the recording"]),
+        ('start = "T_env"', 'start = "22 + delay(T_env, 600)"', ["line 11", "before the recording"]),
+        ("lag(P, tau)", "delay(b, 600)", ["line 23", "'delay(b, 600)'", "only a channel can be delayed"]),
+        ("lag(P, tau)", "delay(tau, 600)", ["line 23", "only a channel can be delayed"]),
+        ("lag(P, tau)", "delay(time, 600)", ["line 23", "only a channel can be delayed"]),
+        ("lag(P, tau)", "exp(delay(P, 10*P))", ["line 23", "the delay in", "no states and no channels"]),
+        ("lag(P, tau)", "delay(P, -tau)", ["line 23", "a number of seconds from 0 up"]),
+        ("lag(P, tau)", "delay(P, 1/0)", ["line 23", "a number of seconds from 0 up"]),
+        ("lag(P, tau)", "delay(P, 60*G - 60*tau)", ["line 23", "a number of seconds from 0 up"]),
+        ("lag(P, tau)", "delay(P, lag(3, tau))", ["line 23", "the delay in"]),
+        ("lag(P, tau)", "lag(P, a)", ["line 23", "time constant", "no states and no channels"]),
+        ("lag(P, tau)", "lag(P, 0*tau)", ["line 23", "a number of seconds above 0"]),
+        ("lag(P, tau)", "play(P, P)", ["line 23", "the width in 'play(P, P)' must be a number"]),
+        ("1.92*(a - 22) + y", "delay(P, -60)", ["line 30", "a number of seconds from 0 up"]),
     ],
 )
 def test_mistakes(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
@@ -162,8 +210,67 @@ def test_mistakes(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
         assert word in sentence
 
 
+def test_no_fit_looks_into_the_future(tmp_path: Path) -> None:
+    late = GOOD.replace("lag(P, tau)", "delay(P, 60*wait)")
+    for bounds, good in (("", False), (", min = 0.0", True), (", fixed = true", True)):
+        wait = f"[parameters]\nwait = {{ start = 3.0{bounds} }}"
+        content = late.replace("[parameters]", wait)
+        model = read_model(written(tmp_path, content))  # as it is, it may be exported
+        if good:
+            check_model(model, {"P": "W", "T_env": "degC"}, "m.toml")
+        else:
+            with pytest.raises(UserError, match=r"term 2'.*'wait' a value below 0.*give the parameter min"):
+                check_model(model, {"P": "W", "T_env": "degC"}, "m.toml")
+
+
+def test_the_clock_of_one_recording_may_be_early(tmp_path: Path) -> None:
+    late = GOOD.replace("lag(P, tau)", "delay(P, shift)")
+    shift = '[parameters]\nshift = { start = 0.0, per = "recording", values = { r = -900.0 } }'
+    model = read_model(written(tmp_path, late.replace("[parameters]", shift)))
+    check_model(model, {"P": "W", "T_env": "degC"}, "m.toml")
+
+
+def test_a_parameter_hides_no_channel(tmp_path: Path) -> None:
+    model = read_model(written(tmp_path, GOOD))
+    with pytest.raises(UserError, match=r"m.toml, key parameters.loss: 'loss' is also a channel.*rename"):
+        check_model(model, {"P": "W", "T_env": "degC", "loss": "W"}, "m.toml")
+
+
 def test_a_name_that_nobody_knows(tmp_path: Path) -> None:
     model: Model = read_model(written(tmp_path, GOOD))
-    check_names(model, {"P", "T_env"}, "model.toml")
+    check_model(model, {"P": "W", "T_env": "degC"}, "model.toml")
     with pytest.raises(UserError, match=r"start of 'a': 'T_env' is neither"):
-        check_names(model, {"P"}, "model.toml")
+        check_model(model, {"P": "W"}, "model.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"W/K"', '"kW/K"', r"parameters.G.unit: 'kW/K' counts in kW, .*write unit, value and bounds in W$"),
+        ('"W/K"', '"W/degF"', r"'W/degF' counts in (delta_)?degF, .* in degC, in differences K$"),
+        ('"W/K"', '"J/ms/K"', r"'J/ms/K' counts in ms, .* in s or min or h or d$"),
+        ('"W/K"', '"W/mK"', r"'W/mK' counts in mK"),
+        ("a = {", 'a = { unit = "degF",', r"states.a.unit: 'degF' counts in degF"),
+        ('unit = "um"', 'unit = "inch"', r"states.y.unit: 'inch' counts in in, .* in um or mm or m$"),
+    ],
+)
+def test_nothing_is_converted_inside(tmp_path: Path, old: str, new: str, said: str) -> None:
+    model = read_model(written(tmp_path, GOOD.replace(old, new, 1)))
+    with pytest.raises(UserError, match=rf"m.toml, key .*{said}"):
+        check_model(model, {"P": "W", "T_env": "degC"}, "m.toml")
+
+
+@pytest.mark.parametrize(
+    "unit", ["um/m/(W*rpm**2)/h", "l/min", "W/percent", "J/kg/K", "bar", "K**1.25", "kg/m**3", "N", "", "1/d"]
+)
+def test_what_models_count_in(tmp_path: Path, unit: str) -> None:
+    model = read_model(written(tmp_path, GOOD.replace('"W/K"', f'"{unit}"')))
+    check_model(model, {"P": "W", "T_env": "degC"}, "m.toml")
+
+
+def test_a_unit_that_a_channel_has_is_counted_in(tmp_path: Path) -> None:
+    """An input of any kind keeps its unit; so do the coefficients that go with it."""
+    model = read_model(written(tmp_path, GOOD.replace('"W/K"', '"K/kW/delta_degF"')))
+    with pytest.raises(UserError, match="'K/kW/delta_degF' counts in"):
+        check_model(model, {"P": "kW", "T_env": "degC"}, "m.toml")
+    check_model(model, {"P": "kW", "T_env": "degF"}, "m.toml")

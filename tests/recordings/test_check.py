@@ -90,6 +90,14 @@ def test_nothing_is_wrong(write: Write) -> None:
             "warning: fit.csv, line 42: 'T_env' stands still at 20 for 161 readings, up to line 202",
         ),
         (
+            with_column(1, ["20", "20.1"] * 20 + ["-28"] + ["20.1", "20"] * 10),
+            "warning: fit.csv, line 42: 'T_env' is -28 degC in one reading between 20.1 and 20.1; leave",
+        ),
+        (
+            with_column(3, ["7", "", "8", ""] * 10 + ["900", ""] + ["7", "", "8", ""] * 5),
+            "warning: fit.csv, line 42: 'E_Y0C' is 900 um in one reading between 8 and 7; leave the cell",
+        ),
+        (
             "\n".join(rows()).replace(",", ";"),
             "error: fit.csv, line 1: the columns are separated by a semicolon",
         ),
@@ -269,6 +277,21 @@ def test_slow_quantised_and_switched_signals_are_no_frozen_sensors(write: Write)
     slow = 22 + np.cumsum(random.normal(0, 0.02, 600))
     cells = [f"{value:.1f}" for value in slow]  # a sensor of 0.1 degC that changes every few readings
     assert found(write(with_column(1, cells))) == []
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        [20.0] * 30 + [55.0] * 30,  # a step stays
+        [20.0] * 30 + [55.0, 55.0] + [20.0] * 30,  # two readings agree
+        [20.0] * 30 + [59.0] + [25.0] * 30,  # an overshoot: the neighbours differ
+        [20.0 + 35.0 * (k % 2) for k in range(60)],  # a signal that is so
+        [20.0] * 30 + [32.0] + [20.0] * 30,  # a door
+    ],
+)
+def test_what_moves_is_no_lone_wrong_reading(write: Write, cells: list[float]) -> None:
+    told = found(write(with_column(1, [f"{cell}" for cell in cells])))
+    assert not any("in one reading" in line for line in told)
 
 
 mutations = st.lists(

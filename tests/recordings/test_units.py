@@ -32,6 +32,8 @@ from discovery.recordings.units import UnitError, conversion
         ("inch", "nozzle height", 2.0, 50.8, "mm"),
         ("bar", "other input", 6.0, 6.0, "bar"),
         ("J/kg/K", "other input", 6.0, 6.0, "J/kg/K"),
+        ("K/1/s", "other input", 6.0, 6.0, "K/1/s"),
+        ("K**1.25", "other input", 6.0, 6.0, "K**1.25"),
     ],
 )
 def test_values_become_canonical(unit: str, role: str, given: float, value: float, canonical: str) -> None:
@@ -55,6 +57,8 @@ def test_a_difference_takes_the_factor_alone() -> None:
         ("foo", "other input", "not known"),
         ("", "error", "not known"),
         ("9**9**9**9", "other input", "not known"),
+        ("K**9.9**9", "other input", "not known"),
+        ("K**99", "other input", "not known"),
         ("__import__('os')", "other input", "not known"),
         ("m" * 1000, "other input", "not known"),
     ],

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from discovery.export.document import Exported
 from discovery.runtime.compensator import Compensator, Settings, State
 from discovery.runtime.guards import Reading
 from discovery.runtime.persistence import NAMES, restore, save
+from discovery.runtime.session import Session
 
 STEP = 10.0
 
@@ -39,7 +41,7 @@ def running(exported: Exported, minutes: np.ndarray) -> Compensator:
 def test_a_saved_state_goes_on_bit_for_bit(
     running: Compensator, exported: Exported, minutes: np.ndarray, tmp_path: Path
 ) -> None:
-    save(running, tmp_path)
+    save(running, tmp_path).result()
     other = Compensator(exported, Settings(tick_s=60.0))
     assert restore(other, tmp_path) == running.last
     for one in (running, other):
@@ -51,10 +53,10 @@ def test_a_saved_state_goes_on_bit_for_bit(
 def test_a_damaged_copy_is_passed_over_for_the_one_before(
     running: Compensator, exported: Exported, minutes: np.ndarray, tmp_path: Path
 ) -> None:
-    save(running, tmp_path)
+    save(running, tmp_path).result()
     before = running.last
     run(running, minutes[600:610], 600 * 60.0)
-    save(running, tmp_path)
+    save(running, tmp_path).result()
     data = (tmp_path / NAMES[0]).read_text()
     for damage in ("", data[:-100], data.replace("ACTIVE", "FAULTY"), "null", "[]", '{"body": 3}'):
         (tmp_path / NAMES[0]).write_text(damage)
@@ -67,7 +69,7 @@ def test_a_damaged_copy_is_passed_over_for_the_one_before(
 def test_a_state_of_another_model_is_not_restored(
     running: Compensator, exported: Exported, tmp_path: Path
 ) -> None:
-    save(running, tmp_path)
+    save(running, tmp_path).result()
     data = json.loads((tmp_path / NAMES[0]).read_text())
     body = json.loads(data["body"]) | {"model": "0" * 64}
     import hashlib
@@ -83,7 +85,7 @@ def test_through_a_gap_the_state_is_that_of_a_machine_at_rest(
     running: Compensator, exported: Exported, minutes: np.ndarray, tmp_path: Path
 ) -> None:
     """Four hours off: against a runtime that was fed the resting machine all the time."""
-    save(running, tmp_path)
+    save(running, tmp_path).result()
     woken = Compensator(exported, Settings(tick_s=60.0))
     restore(woken, tmp_path)
     names = list(exported.compiled.inputs)
@@ -97,6 +99,45 @@ def test_through_a_gap_the_state_is_that_of_a_machine_at_rest(
     run(woken, np.repeat(rest[-1:], 300, axis=0), 840 * 60.0)
     run(running, np.repeat(rest[-1:], 300, axis=0), 840 * 60.0)
     assert woken.offsets == pytest.approx(running.offsets, abs=0.05)
+
+
+@pytest.mark.parametrize("threaded", [False, True])
+def test_a_save_that_fails_is_told_once_and_nothing_stops(
+    exported: Exported, minutes: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, threaded: bool
+) -> None:
+    """A disk that is full for a while: told once, and again when it is full again."""
+    names, said = exported.compiled.inputs, list[str]()
+    full = True
+
+    def fsync(_: int) -> None:
+        if full:
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("discovery.runtime.persistence.os.fsync", fsync)
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        settings = Settings(tick_s=60.0)
+        session = Session(
+            exported,
+            folder=tmp_path / "memory",
+            settings=settings,
+            save_every_s=60.0,
+            beside=pool if threaded else None,
+            say=said.append,
+        )
+        told = []
+        for k in range(9):
+            full = k < 3 or k >= 6
+            row = minutes[k].tolist()
+            session.tick({n: Reading(v, k * 60.0) for n, v in zip(names, row, strict=True)}, k * 60.0)
+            pool.submit(lambda: None).result()  # what was begun is done
+            told.append(len(said))
+        session.close(9 * 60.0)
+    late = int(threaded)  # a thread's failure is heard at the next save
+    assert told == [0] * late + [1] * 6 + [2] * (3 - late)
+    assert len(said) == 2
+    assert all("No space left" in text and str(tmp_path / "memory") in text for text in said)
+    assert session.compensator.heartbeat == 9
+    assert restore(Compensator(exported), tmp_path / "memory") == 5 * 60.0
 
 
 @pytest.mark.parametrize("instants", [(0.1, 0.02, 0.15)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,7 @@ def work(
                 n: Reading(v, now)
                 for n, v in zip(names_of_errors, (measured[k] - applied).tolist(), strict=True)
             }
-        out.append(list(session.tick(readings, found, now).offsets.values()))
+        out.append(list(session.tick(readings | found, now).offsets.values()))
     session.save(now)
     return np.array(out)
 
@@ -125,6 +126,34 @@ def test_measured_errors_decide_where_there_are_enough(
     work(begin(files["old"], memory, said, rule), minutes, 0)
     work(begin(files["near"], memory, said, rule), minutes, 400, measured, compensated)
     assert ("takes over" in said[-1]) is passes
+
+
+@pytest.mark.parametrize(
+    ("reading", "counted"),
+    [
+        (Reading(999.0, 0.0, False), 0),  # a dead sensor, shown every tick
+        (Reading(999.0, 24_600.0, False), 0),
+        (Reading(3.0, 0.0), 0),  # from before the shadow run
+        (Reading(3.0, 1e9), 0),  # from the future
+        (Reading(math.nan, 24_600.0), 0),
+        (Reading(3.0, 24_600.0), 1),  # good, and still shown long afterwards
+    ],
+)
+def test_a_reading_counts_once_and_only_if_it_is_good(
+    files: dict[str, Path], minutes: np.ndarray, tmp_path: Path, reading: Reading, counted: int
+) -> None:
+    """One reading on ten ticks from 24 600 s on, in a shadow run that begins at 24 000 s."""
+    memory, said, rule = tmp_path / "memory", list[str](), Rule(hours=1000.0)
+    work(begin(files["old"], memory, said, rule), minutes, 0)
+    session = begin(files["near"], memory, said, rule)
+    names = session.compensator.exported.compiled.inputs
+    for k in range(400, 420):
+        readings = {n: Reading(v, k * 60.0) for n, v in zip(names, minutes[k].tolist(), strict=True)}
+        session.tick(readings | ({"E_Y0C": reading} if k >= 410 else {}), k * 60.0)
+    assert session.shadow is not None
+    assert {n: len(pairs) for n, pairs in session.shadow.residuals.items()} == (
+        {"E_Y0C": counted} if counted else {}
+    )
 
 
 def test_what_nobody_signed_is_not_run(document: bytes, tmp_path: Path) -> None:

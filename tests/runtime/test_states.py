@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 
 import numpy as np
@@ -166,13 +167,30 @@ def test_ticks_use_what_was_known_by_then() -> None:
         (25.0, {"P": Reading(2.0, 25.0)}),
         (30.0, {"P": Reading(3.0, 30.0)}),
     ]
-    found = [
-        (now, newest["P"].value) for now, newest, _ in ((n, dict(a), f) for n, a, f in ticks(rows, 10.0))
-    ]
+    found = [(now, newest["P"].value) for now, newest in ((n, dict(a)) for n, a in ticks(rows, 10.0))]
     assert found == [(0.0, 1.0), (10.0, 1.0), (20.0, 1.0), (30.0, 3.0)]
-    assert [now for now, _, _ in ticks(rows, 10.0, after=10.0)] == [20.0, 30.0]
+    assert [now for now, _ in ticks(rows, 10.0, after=10.0)] == [20.0, 30.0]
     far = [*rows, (1e5, {"P": Reading(4.0, 1e5)})]
-    assert [now for now, _, _ in ticks(far, 10.0)] == [0.0, 10.0, 20.0, 30.0, 1e5]  # the machine was off
+    assert [now for now, _ in ticks(far, 10.0)] == [0.0, 10.0, 20.0, 30.0, 1e5]  # the machine was off
+
+
+@pytest.mark.parametrize("zone", ["UTC", "Europe/Berlin", "America/New_York"])
+def test_instants_do_not_depend_on_the_clock_of_the_computer(
+    monkeypatch: pytest.MonkeyPatch, zone: str
+) -> None:
+    """The hours of both changes of summer time, every half hour: none is lost, and naive means UTC."""
+    monkeypatch.setenv("TZ", zone)
+    time.tzset()
+    try:
+        for day, first in (("2026-03-29", 1774746000.0), ("2026-10-25", 1792890000.0)):
+            stamps = [f"{day}T{h:02d}:{m:02d}:00" for h in range(1, 4) for m in (0, 30)]
+            rows = list(csv_rows(["time,P", *(f"{stamp},1" for stamp in stamps)]))
+            assert [t for t, _ in rows] == [first + 1800.0 * k for k in range(6)]
+        [(zoned, _)] = csv_rows(["time,P", "2026-03-29T03:00:00+02:00,1"])
+        assert zoned == 1774746000.0
+    finally:
+        monkeypatch.undo()
+        time.tzset()
 
 
 def test_the_command_says_what_is_missing(model_file: Path, tmp_path: Path) -> None:

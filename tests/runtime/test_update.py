@@ -17,8 +17,8 @@ from discovery.export.document import Exported, read_document, write_document
 from discovery.export.knowledge import stretch
 from discovery.recordings import Campaign, Recording
 from discovery.runtime import update as module
-from discovery.runtime.belief import belief_of, residual_levels, update_belief
-from discovery.runtime.update import update_file
+from discovery.runtime.belief import belief_of
+from discovery.runtime.update import next_name, update_file
 from discovery.virtual.effects import Request
 from discovery.virtual.machine import Machine
 from discovery.virtual.record import Order, take
@@ -88,13 +88,17 @@ def test_a_drift_is_followed_and_written_with_its_history(machine: Campaign, at_
     assert old.document["inputs"] == new.document["inputs"]
 
 
-def test_what_was_learnt_stands_in_the_residual(machine: Campaign, exported: Exported) -> None:
+def test_what_was_learnt_stands_in_the_residual(machine: Campaign, at_work: Path) -> None:
+    """`discovery update` every day, with the days since the last revision."""
     campaign = days(machine, 4, less_loss(0.8))
-    belief, levels, findings = belief_of(exported), residual_levels(exported), []
+    path, since, findings = at_work, list[str](), []
     for name in campaign.recordings:
-        belief, finding = update_belief(belief, levels, campaign, name)
-        belief = belief.released() if finding.verdict == "drift" else belief
-        findings.append(finding)
+        since.append(name)
+        found = update_file(path, campaign, since, next_name(path))
+        findings.append(found.findings[-1])
+        if found.path is not None:
+            path, since = found.path, []
+    assert read_document(path).revision >= 2
     assert findings[0].before > 1.5
     assert findings[-1].before < 1.3
 

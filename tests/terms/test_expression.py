@@ -6,8 +6,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from discovery.errors import UserError
+from discovery.naming import FUNCTIONS
 from discovery.terms import Apply, Expression, Name, Number, degree, evaluate, names, parse, substitute, text
-from discovery.terms.expression import FUNCTIONS, MAX_DEPTH, MAX_LENGTH
+from discovery.terms.expression import MAX_DEPTH, MAX_LENGTH
 
 VARIABLES = ("x", "y", "T_fluid")
 VALUES = {
@@ -97,6 +98,23 @@ def test_any_text_is_read_or_refused_with_a_sentence(source: str) -> None:
 )
 def test_nothing_else_parses(source: str) -> None:
     with pytest.raises(UserError):
+        parse(source)
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("min(x)", "takes 2 to 8 arguments"),
+        ("where(x, y)", "takes 3 arguments"),
+        ("exp()", "takes 1 argument,"),
+        ("1if x else 2", "not allowed"),
+        ("2*ﬁx", "'ﬁ' in '2.ﬁx' is no ASCII letter"),  # would be read as fix
+        ("x − y", "'−' in 'x − y' is no ASCII letter or sign"),
+    ],
+)
+@pytest.mark.filterwarnings("error")  # Python's own parser must not speak beside ours
+def test_the_sentence_says_what_is_allowed(source: str, said: str) -> None:
+    with pytest.raises(UserError, match=said):
         parse(source)
 
 

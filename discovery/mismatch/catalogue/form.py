@@ -10,6 +10,8 @@ from pydantic import Field
 
 from discovery.errors import UserError
 from discovery.mismatch.catalogue.effect import ROLE_OF, Amplitude, Effect, Place, Shape
+from discovery.models import Parameter
+from discovery.models.memory import check_memory
 from discovery.schema import Strict
 from discovery.terms import Expression, degree, evaluate, names, parse
 from discovery.terms.expression import rewrite
@@ -65,15 +67,17 @@ class EffectForm(Strict):
         """The effect as the catalogue holds it.
 
         Raises:
-            UserError: a formula that does not parse, or a name in it that means nothing here.
+            UserError: a formula that does not parse or that delays by no constant, or a name in it that means
+            nothing here.
         """
         where = f"effect '{self.word}'"
         known = {self.amplitude, *self.shapes, *ROLE_OF, "body", "other", "y", "time"}
-        for name in sorted(names(parse(self.formula, where)) - known):
+        formula = parse(self.formula, where)
+        for name in sorted(names(formula) - known):
             raise UserError(
                 f"{where}: '{name}' means nothing in its formula; known: {', '.join(sorted(known))}"
             )
-        if self.amplitude not in names(parse(self.formula, where)):
+        if self.amplitude not in names(formula):
             raise UserError(f"{where}: the amplitude '{self.amplitude}' does not stand in the formula")
         formula = parse(self.formula, where)
         if self.place not in REPLACING and not _is_a_factor(self.amplitude, formula):
@@ -86,6 +90,12 @@ class EffectForm(Strict):
                 f"{where}: its usual size {self.plausible:g} is more than {self.most:g}, its most; "
                 "give a smaller one"
             )
+        own = self.place.endswith("of a recording")
+        shapes = {
+            name: Parameter(s.grid[0], s.unit, s.low, s.high, per_recording=own)
+            for name, s in self.shapes.items()
+        }
+        check_memory(formula, shapes, ("body", "other", "y"), where)
         return Effect(
             word=self.word,
             title=self.title or self.word.replace("_", " "),

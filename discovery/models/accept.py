@@ -1,0 +1,87 @@
+"""Whether a model file can be used with a campaign: names that are known, units that models count in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from discovery.errors import UserError
+from discovery.models.memory import check_before_fit
+from discovery.models.model import Model
+from discovery.models.units import atoms, dimension, known, of_atom, ratio
+from discovery.recordings.units import short
+from discovery.terms import Expression, names
+
+# Values are never converted: what stands in one of these can be compared with what a channel gives.
+_COUNTED = (("K",), ("W",), ("J",), ("s", "min", "h", "d"), ("um", "mm", "m"), ("l", "m**3"), ("kg",))
+
+
+def check_model(model: Model, channels: Mapping[str, str], path: Path | str) -> None:
+    """Refuse a model file that would be taken for something else than it says.
+
+    Args:
+        channels: of the campaign, each with the unit of its values.
+        path: the file, for the message.
+
+    Raises:
+        UserError: a name that is neither the model's own nor a channel, or a parameter that is also one; a
+        delay that a fit may make negative; a unit that models do not count in (kW, degF), unless a channel
+        does.
+    """
+    _check_names(model, channels, path)
+    for place, expression in _formulas(model):
+        check_before_fit(expression, model.parameters, f"{path}, {place}")
+    for key, unit in _units(model):
+        _check_unit(unit, channels, f"{path}, key {key}.unit")
+
+
+def _check_names(model: Model, channels: Mapping[str, str], path: Path | str) -> None:
+    for name in sorted(channels.keys() & model.parameters.keys()):
+        raise UserError(
+            f"{path}, key parameters.{name}: '{name}' is also a channel of the campaign; rename the parameter"
+        )
+    own = set(model.states) | set(model.parameters) | {"time"} | set(channels)
+    places = _formulas(model)
+    places += [(f"start of '{s.name}'", s.start) for s in model.states.values() if s.start is not None]
+    for place, expression in places:
+        for name in sorted(names(expression) - own):
+            raise UserError(
+                f"{path}, {place}: '{name}' is neither a state or parameter of the model "
+                "nor a channel of the campaign "
+                f"({', '.join(sorted(channels))}); mend the name or add the channel"
+            )
+
+
+def _formulas(model: Model) -> list[tuple[str, Expression]]:
+    terms = [(f"term '{term.name}'", term.expression) for term in model.terms]
+    return terms + [(f"output '{name}'", expression) for name, expression in model.outputs.items()]
+
+
+def _units(model: Model) -> Iterator[tuple[str, str]]:
+    for name, parameter in model.parameters.items():
+        yield f"parameters.{name}", parameter.unit
+    for name, state in model.states.items():
+        yield f"states.{name}", state.unit
+
+
+def _check_unit(unit: str, channels: Mapping[str, str], where: str) -> None:
+    if unit == "" or not known(unit):  # the dimensions are checked elsewhere
+        return
+    recorded = {atom for of in channels.values() if of and known(of) for atom in atoms(of)}
+    for atom in atoms(unit):
+        if {atom, atom.removeprefix("delta_")} & recorded:
+            continue
+        for counted in _COUNTED:
+            ratios = [ratio(of_atom(atom), _of(other)) for other in counted]
+            if None not in ratios and 1.0 not in ratios:
+                wanted = "degC, in differences K" if counted == ("K",) else " or ".join(counted)
+                raise UserError(
+                    f"{where}: '{unit}' counts in {short(atom)}, and nothing is converted inside a model; "
+                    f"write unit, value and bounds in {wanted}"
+                )
+
+
+def _of(unit: str) -> dict[str, float]:
+    found = dimension(unit)
+    assert found is not None
+    return dict(found)

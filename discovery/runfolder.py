@@ -1,0 +1,134 @@
+"""The folder of a run: which entries a run owns in it, how they are replaced at once, and read back."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from discovery.errors import UserError
+from discovery.files import read_text
+
+RESULTS, DIAGNOSIS = "results.json", "diagnosis.json"
+OWNED = frozenset({RESULTS, DIAGNOSIS, "report.html", "models", "predictions"})
+_KEYS: dict[str, dict[str, type]] = {
+    RESULTS: {"experiment": str, "fit": list, "held_out": list, "models": dict},
+    DIAGNOSIS: {"model": str, "verdict": str, "physics": list},
+}
+
+
+def default_folder(experiment: str) -> Path:
+    """Where results go unless the user says otherwise."""
+    return Path("runs") / experiment
+
+
+def read_results(folder: Path) -> dict[str, Any]:
+    """Content of a run's results.json. Raises UserError where there is none, or a broken one."""
+    return _read(folder, RESULTS)
+
+
+def read_diagnosis(folder: Path) -> dict[str, Any]:
+    """Content of a run's diagnosis.json. Raises UserError where there is none, or a broken one."""
+    return _read(folder, DIAGNOSIS)
+
+
+def _read(folder: Path, name: str) -> dict[str, Any]:
+    path = Path(folder) / name
+    if not path.is_file():
+        verb = "run" if name == RESULTS else "diagnose"
+        raise UserError(f"{folder}: no {name} there; name the folder of a finished `discovery {verb}`")
+    try:
+        content = json.loads(read_text(path))
+    except (ValueError, RecursionError) as error:
+        line = f", line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
+        what = error.msg if isinstance(error, json.JSONDecodeError) else str(error)
+        raise UserError(f"{path}{line}: not valid JSON ({what}); make the run again") from None
+    found: dict[str, Any] = content if isinstance(content, dict) else {}
+    for key, kind in _KEYS[name].items():
+        if not isinstance(found.get(key), kind):
+            raise UserError(f"{path}: the key '{key}' is missing or wrong; make the run again")
+    return found
+
+
+@contextmanager
+def staged(folder: Path) -> Iterator[Path]:
+    """A temporary folder beside `folder` that takes its place when the block ends well, and vanishes when
+    not.
+
+    What a run owns in `folder` is replaced as a whole; everything else there (exports, figures, notes) is
+    taken along.
+
+    Raises UserError: `folder` holds something else than the results of a run, or cannot be written.
+    """
+    _refuse_foreign(folder)
+    place = folder.resolve()  # behind a link the results change, not the link
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(dir=place.parent, prefix=f".{place.name}."))
+    except OSError as error:
+        raise UserError(
+            f"{folder}: cannot be written ({error.strerror}); choose another place with --out"
+        ) from None
+    try:
+        temporary.chmod(0o755)
+        yield temporary
+        if place.exists():
+            _take_along(place, temporary)
+        _take_place(temporary, place)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _refuse_foreign(folder: Path) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise UserError(f"{folder}: this is a file; name a folder with --out")
+    content = {entry.name for entry in folder.iterdir()}
+    if content and not content & {RESULTS, DIAGNOSIS}:
+        raise UserError(
+            f"{folder}: this folder holds something else than results; name another one with --out"
+        )
+
+
+def _take_along(old: Path, new: Path) -> None:
+    """What a run does not own, as hard links: nothing in `old` is touched before `new` is whole."""
+    try:
+        for entry in old.iterdir():
+            if entry.name in OWNED:
+                continue
+            if entry.is_dir() and not entry.is_symlink():
+                shutil.copytree(entry, new / entry.name, symlinks=True, copy_function=_link)
+            else:
+                _link(entry, new / entry.name)
+    except OSError as error:
+        raise UserError(
+            f"{old}: what stands there beside the results cannot be taken along ({error}); "
+            "nothing was changed, choose another place with --out"
+        ) from None
+
+
+def _link(source: str | Path, target: str | Path) -> None:
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except OSError:  # a file system without hard links, or somebody else's file
+        shutil.copy2(source, target, follow_symlinks=False)
+
+
+def _take_place(new: Path, place: Path) -> None:
+    """`new` instead of what stands at `place`, which comes back if that fails."""
+    old = new.with_name(f"{new.name}.old")
+    try:
+        if place.exists():
+            place.replace(old)
+        new.replace(place)
+    except BaseException:
+        if old.exists() and not place.exists():
+            old.replace(place)
+        raise
+    shutil.rmtree(old, ignore_errors=True)

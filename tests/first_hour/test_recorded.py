@@ -1,0 +1,137 @@
+"""What `discovery new` takes, what it leaves out, and that nothing of it comes from the unseen recording."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from discovery.cli import app
+
+Row = Callable[[int], str]
+
+
+def _made(folder: Path, header: str, *files: Row, rows: int = 60) -> tuple[str, Path]:
+    """What `discovery new` prints on files of such rows, and the folder that it made."""
+    command = ["new", str(folder / "rig")]
+    for number, row in enumerate(files):
+        lines = [header, *(row(k) for k in range(rows))]
+        (folder / f"run{number}.csv").write_text("\n".join(lines), "utf-8")
+        command += ["--from", str(folder / f"run{number}.csv")]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    return result.output, folder / "rig"
+
+
+def _campaign(rig: Path) -> dict[str, Any]:
+    return tomllib.loads((rig / "campaign.toml").read_text("utf-8"))
+
+
+SEEN: Row = lambda k: f"{k},{40 * (k // 9 % 2)},{25 + k % 20 / 9},{k % 7 // 6},21"  # noqa: E731
+UNSEEN: tuple[Row, ...] = (
+    lambda k: f"{k},{40 * (k // 9 % 2)},{24 + k % 20 / 9},0,21",
+    lambda k: f"{k},{900 * (k // 9 % 2)},{5 + k % 30 / 9},7,{k}",
+    lambda k: f"{k},-3,{320 + k % 20 / 9},{'' if k % 50 else 3},{80 - k % 5}",
+)
+
+
+def test_nothing_is_guessed_from_the_unseen_recording(tmp_path: Path) -> None:
+    made = []
+    for number, unseen in enumerate(UNSEEN):
+        (tmp_path / str(number)).mkdir()
+        _, rig = _made(tmp_path / str(number), "time,P,T1,fault,T2", SEEN, unseen)
+        made.append(
+            [(rig / f"{name}.toml").read_text("utf-8") for name in ("campaign", "model", "experiment")]
+        )
+    assert made[0] == made[1] == made[2]
+
+
+def test_nothing_is_guessed_from_the_unseen_last_third(tmp_path: Path) -> None:
+    made = []
+    for number, unseen in enumerate(UNSEEN):
+        (tmp_path / str(number)).mkdir()
+        row = lambda k, unseen=unseen: SEEN(k) if k < 40 else unseen(k)  # noqa: E731
+        _, rig = _made(tmp_path / str(number), "time,P,T1,fault,T2", row)
+        made.append(
+            [(rig / f"{name}.toml").read_text("utf-8") for name in ("campaign", "model", "experiment")]
+        )
+    assert made[0] == made[1] == made[2]
+
+
+@pytest.mark.parametrize("name", ["t", "hour", "T9", "whatever"])
+def test_a_column_in_proportion_to_the_time_is_a_clock(tmp_path: Path, name: str) -> None:
+    said, rig = _made(
+        tmp_path,
+        f"date,{name},T1",
+        lambda k: f"2026-03-{1 + k // 24:02d} {k % 24:02d}:00,{1233 + k},{20 + k % 7}",
+    )
+    assert f"column '{name}' is a clock, in exact proportion to the time: left out" in said
+    assert set(_campaign(rig)["channels"]) == {"T1", "T_env"}
+
+
+def test_a_ramp_is_no_clock(tmp_path: Path) -> None:
+    row: Row = lambda k: f"{k},{k},{k / 9},{20 + k % 7}"  # noqa: E731
+    _, rig = _made(tmp_path, "time,P [W],heater,T1", row)
+    assert {"P", "heater"} <= set(_campaign(rig)["channels"])
+
+
+def test_a_ramp_in_one_recording_of_several_is_no_clock(tmp_path: Path) -> None:
+    ramp: Row = lambda k: f"{k},{k},{20 + k % 7}"  # noqa: E731
+    steps: Row = lambda k: f"{k},{k // 9 % 2},{20 + k % 7}"  # noqa: E731
+    _, rig = _made(tmp_path, "time,heater,T1", ramp, steps, steps)
+    assert "heater" in _campaign(rig)["channels"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["Setpoint [C]", "Target", "SP", "T_set", "Sollwert", "T_room_set", "temp setpoint", "T_soll [°C]"],
+)
+def test_a_set_point_is_neither_room_nor_output(tmp_path: Path, name: str) -> None:
+    said, rig = _made(
+        tmp_path, f"time,heater,T1,{name}", lambda k: f"{k},{k % 3},{20 + k % 7},{50 + k // 30}"
+    )
+    assert f"column '{name}' is a set point, no measurement: left out" in said
+    assert set(_campaign(rig)["channels"]) == {"heater", "T1", "T_env"}
+
+
+@pytest.mark.parametrize("name", ["speed_set", "Setpoint [%]", "P_target [W]", "offset", "T_settled"])
+def test_other_set_points_stay(tmp_path: Path, name: str) -> None:
+    said, _ = _made(tmp_path, f"time,{name},T1", lambda k: f"{k},{k % 3},{20 + k % 7}")
+    assert "left out" not in said
+
+
+@pytest.mark.parametrize(
+    ("first", "room", "spread"), [(25.0, 25.0, 1.0), (69.8, 22.0, 5.0), (-4.0, 22.0, 5.0), (34.0, 34.0, 1.0)]
+)
+def test_a_recording_that_starts_hot_shows_no_room(
+    tmp_path: Path, first: float, room: float, spread: float
+) -> None:
+    said, rig = _made(tmp_path, "time,P,T1 [C]", lambda k: f"{k},{k % 3},{first + k // 5}")
+    made = _campaign(rig)
+    assert made["recordings"]["first_part"]["set"] == {"T_env": room}
+    assert made["channels"]["T_env"]["spread"] == spread
+    [line] = [one for one in said.splitlines() if "T_env" in one]
+    assert "? no ambient temperature" in line
+    assert f"known within {spread:g} K" in line
+    assert ("are no room" in line) is (room != first)
+    assert "# guessed: no ambient temperature" in (rig / "campaign.toml").read_text("utf-8")
+
+
+def test_rooms_beside_the_air_outside_are_outputs(tmp_path: Path) -> None:
+    _, rig = _made(
+        tmp_path,
+        "time,T_room1 [degC],T_room2 [degC],T_ambient [degC],heating [kW]",
+        lambda k: f"{k},{20 + k % 7},{21 + k % 5},{5 + k % 3},{k % 4}",
+    )
+    assert tomllib.loads((rig / "experiment.toml").read_text("utf-8"))["outputs"] == ["T_room1", "T_room2"]
+    assert "T_ambient - T_room1" in (rig / "model.toml").read_text("utf-8")
+
+
+def test_a_column_that_is_empty_where_models_are_fitted_stays_out(tmp_path: Path) -> None:
+    said, rig = _made(tmp_path, "time,P,T1,T2", lambda k: f"{k},{k % 3},{20 + k % 7},{'' if k < 40 else 20}")
+    assert "column 'T2' holds nothing in what is fitted: left out" in said
+    assert "T2" not in _campaign(rig)["channels"]
