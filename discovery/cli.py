@@ -1,7 +1,10 @@
 """The command line: which verbs there are (each stands in `commands`), and how a failure is said."""
 
+import signal
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
@@ -9,10 +12,27 @@ from typer.core import TyperGroup
 
 from discovery import __version__
 from discovery.commands import machine, proof, recordings, runs, words
-from discovery.errors import UserError
+from discovery.errors import UsageError, UserError
 from discovery.threads import say_one_thread
 
 say_one_thread()  # nothing above imports numpy
+
+
+@contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    """SIGTERM unwinds as Ctrl-C does, so that what stands half-written beside its place is taken away."""
+    if threading.current_thread() is not threading.main_thread():  # signals cannot be caught elsewhere
+        yield
+        return
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 class _Sentences(TyperGroup):
@@ -20,10 +40,11 @@ class _Sentences(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            return super().invoke(ctx)
+            with _terminated_like_interrupted():
+                return super().invoke(ctx)
         except UserError as error:
             typer.echo(f"error: {error}", err=True)
-            raise typer.Exit(1) from None
+            raise typer.Exit(2 if isinstance(error, UsageError) else 1) from None
         except KeyboardInterrupt:
             typer.echo("\nstopped; nothing half-written is left, the command can be run again", err=True)
             raise typer.Exit(130) from None

@@ -1,4 +1,4 @@
-"""The one exception that a user sees, and the kind of it that is a finding about a model."""
+"""The one exception that a user sees, and two kinds of it that somebody has to tell apart."""
 
 
 class UserError(Exception):
@@ -7,6 +7,10 @@ class UserError(Exception):
     The text is one clear sentence: what is wrong, where (file, line, column, key) and what to do.
     The command line prints it as ``error: ...`` and ends with status 1.
     """
+
+
+class UsageError(UserError):
+    """Words or options of a command that no file could make right; the command line ends with status 2."""
 
 
 class RunsAwayError(UserError):

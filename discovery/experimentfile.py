@@ -18,9 +18,11 @@ from discovery.files import dotted, locate, read_text, read_toml
 from discovery.fitting.fit import Loss
 from discovery.mismatch.catalogue.form import EffectForm
 from discovery.models import Model, check_model, read_model
+from discovery.models.check import check_outputs
 from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, campaign_path
 from discovery.recordings.roles import CORRECTION
+from discovery.recordings.twins import twins
 from discovery.schema import Strict, suggest
 from discovery.sparse.options import SparseOptions
 from discovery.targets import Target
@@ -186,9 +188,16 @@ class Experiment:
 
     def model_file(self, name: str) -> Model:
         """The model that entry `name` reads from its file, checked against the campaign. Raises UserError."""
-        path = self.path.parent / cast(FileEntry, self.form.models[name]).file
+        entry = cast(FileEntry, self.form.models[name])
+        path = self.path.parent / entry.file
         model = read_model(path)
         check_model(model, {n: c.unit for n, c in self.campaign.channels.items()}, path)
+        check_outputs(model, self.campaign.channels, path)
+        given = [*model.outputs, *model.states]
+        for output in entry.outputs or []:
+            if output not in given:
+                what = f"{entry.file} gives no '{output}'; {suggest(output, list(model.outputs))}"
+                raise _mistake(self.path, ("models", name), what)
         return model
 
 
@@ -259,6 +268,8 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
         for name in [*(getattr(entry, "inputs", None) or []), *separate(entry)]:
             if name not in channels:
                 raise _mistake(path, key, f"no channel '{name}'; {suggest(name, channels)}")
+            if entry.kind != "sindy" and name in (entry.outputs or outputs):
+                raise _mistake(path, key, f"inputs: '{name}' is an output of this model; take it out of one")
         for name in getattr(entry, "outputs", None) or []:
             if name not in outputs:
                 raise _mistake(
@@ -266,6 +277,10 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
                 )
         for name in {name for names in separate(entry).values() for name in names} & set(form.held_out):
             raise _mistake(path, key, f"separate: '{name}' is held out; a fit must not see it")
+    alone = [name for entry in form.models.values() for names in separate(entry).values() for name in names]
+    for one, other in twins(campaign, form.held_out, [*form.fit, *alone]):
+        what = f"'{one}' holds the same readings as '{other}', which is fitted; hold out another recording"
+        raise _mistake(path, ("held_out",), what)
     for section in ("mismatch", "export"):
         chosen = getattr(form, section)
         if chosen and chosen.model not in form.models:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -90,10 +91,31 @@ def judged(
             predictions[recording] = predict(fit, experiment, recording)
         except RunsAwayError as error:
             lost.append(str(error))
-    notes = [*lost, *fit.unidentified, *check_dimensions(model, experiment.campaign.channels)]
+    notes = [
+        *missing_outputs(experiment, name, model),
+        *lost,
+        *fit.unidentified,
+        *check_dimensions(model, experiment.campaign.channels),
+    ]
     notes += offset_notes(fit, experiment.campaign.channels)
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
     return Fitted(name, kind, model, fit, predictions, validation, report or {}, tuple(notes), seconds)
+
+
+def missing_outputs(experiment: Experiment, name: str, model: Model) -> list[str]:
+    """A sentence where a model of the experiment lacks outputs that the experiment asks for.
+
+    That may be meant (a model of the temperatures alone), or a slip in the name of an output.
+    """
+    entry = experiment.form.models.get(name)
+    given = {*model.outputs, *model.states}
+    missing = [output for output in (experiment.outputs_of(entry) if entry else ()) if output not in given]
+    if not missing:
+        return []
+    spare = [output for output in model.outputs if output not in experiment.campaign.channels]
+    near = [(output, hit) for output in missing for hit in get_close_matches(output, spare, n=1)]
+    hint = "".join(f"; is its output '{hit}' meant to be '{output}'?" for output, hit in near)
+    return [f"gives no {', '.join(missing)}, which the experiment asks for, and is not compared there{hint}"]
 
 
 def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:

@@ -8,12 +8,18 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 Key = tuple[str | int, ...]
+_TABLE, _LIST = "a table, as { key = value }", 'a list, as ["a", "b"]'
+_SHAPES = {"model_type": _TABLE, "dict_type": _TABLE, "list_type": _LIST, "tuple_type": _LIST}
 
 
 class Strict(BaseModel):
-    """The base of every file form: unknown keys are refused, nothing changes after reading."""
+    """The base of every file form: unknown keys are refused, numbers are finite and no texts, nothing changes
+    after reading.
+    """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", populate_by_name=True, strict=True, allow_inf_nan=False
+    )
 
 
 def sentences(schema: type[BaseModel], data: Any, error: ValidationError) -> list[tuple[Key, str]]:
@@ -47,7 +53,7 @@ def _explain(schema: type[BaseModel], mistake: ErrorDetails, key: Key) -> str:
     kind, given = mistake["type"], mistake["input"]
     context = mistake.get("ctx", {})
     if kind == "extra_forbidden":
-        return f"unknown key; {suggest(str(key[-1]), _known_keys(schema, key[:-1]))}"
+        return f"unknown key; {suggest(str(key[-1]), _known_keys(schema, mistake['loc'][:-1]))}"
     if kind == "missing":
         return f"the key '{mistake['loc'][-1]}' is missing"
     if kind in ("literal_error", "enum"):
@@ -55,6 +61,10 @@ def _explain(schema: type[BaseModel], mistake: ErrorDetails, key: Key) -> str:
     if kind == "union_tag_invalid":
         known = suggest(context["tag"], _quoted(context["expected_tags"]))
         return f"kind {context['tag']!r} is not known; {known}"
+    if kind in _SHAPES:
+        return f"should be {_SHAPES[kind]}, not {_short(given)}"
+    if kind == "too_short":
+        return f"is empty; it needs at least {context['min_length']}"
     if kind in ("value_error", "assertion_error"):
         return str(context["error"])
     what = mistake["msg"].replace("Input should be", "should be").removesuffix(".")
@@ -70,23 +80,33 @@ def suggest(word: str, allowed: list[str]) -> str:
 
     >>> suggest("unitt", ["role", "unit"])
     "did you mean 'unit'? Allowed are: role, unit"
+    >>> suggest("T_enf", ["T_env", "E_Y0C"])
+    "did you mean 'T_env'? Allowed are: T_env, E_Y0C"
     """
-    near = get_close_matches(word.lower(), allowed, n=1, cutoff=0.6)
-    hint = f"did you mean '{near[0]}'? " if near else ""
+    plain = {name.lower(): name for name in allowed}
+    near = get_close_matches(word.lower(), plain, n=1, cutoff=0.6)
+    hint = f"did you mean '{plain[near[0]]}'? " if near else ""
     text = f"{hint}allowed are: {', '.join(allowed)}" if allowed else "none is allowed here"
     return text.replace("? allowed", "? Allowed")
 
 
-def _known_keys(schema: Any, key: Key) -> list[str]:
-    """The keys that a table at `key` may hold."""
+def _known_keys(schema: Any, place: Key) -> list[str]:
+    """The keys that a table may hold at a place as pydantic names it, with the kind chosen among several."""
     found = [schema]
-    for part in key:
-        found = [inner for one in found for inner in _step(one, part)]
+    for part in place:
+        chosen = [one for one in found if _kind(one) == part]
+        found = chosen or [inner for one in found for inner in _step(one, part)]
     names: dict[str, None] = {}
     for one in found:
         if _is_model(one):
             names |= dict.fromkeys(field.alias or name for name, field in one.model_fields.items())
     return list(names)
+
+
+def _kind(annotation: Any) -> Any:
+    """What a table has to say as its kind; None where it has none."""
+    field = annotation.model_fields.get("kind") if _is_model(annotation) else None
+    return field and next(iter(get_args(field.annotation)), None)
 
 
 def _step(annotation: Any, part: str | int) -> list[Any]:

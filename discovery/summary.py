@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from discovery.errors import UserError
+from discovery.errors import UsageError
 from discovery.evaluation.tables import Table, as_text
 from discovery.runfolder import read_results
 
@@ -19,21 +20,32 @@ def summary(folder: Path) -> Iterator[str]:
     for recording in (*results["fit"], *results["held_out"]):
         yield as_text(rms_table({"": results}, recording))
         yield ""
+    yield from remarks(folder)
+    yield f"{results['seconds']:.0f} s; the report: {folder / 'report.html'}"
+
+
+def remarks(folder: Path) -> Iterator[str]:
+    """The notes of each model, and that something is wrong with the recordings."""
+    results = read_results(folder)
     for name, model in results["models"].items():
         notes = model["notes"]
         yield from (f"note, {name}: {note}" for note in notes[:MOST_NOTES])
         if len(notes) > MOST_NOTES:
             yield f"note, {name}: {len(notes) - MOST_NOTES} more in results.json"
-    yield f"{results['seconds']:.0f} s; the report: {folder / 'report.html'}"
+    if findings := results["findings"]:
+        worst = min(findings, key=lambda one: not one.startswith("error"))
+        many = f"{len(findings)} findings in the recordings, the first: " if findings[1:] else ""
+        check = f"`discovery check {shlex.quote(results['campaign_file'])}`"
+        yield f"{many}{worst}; {check} lists what is wrong with the recordings"
 
 
 def comparison(folders: Sequence[Path]) -> Iterator[str]:
     """Models of several runs side by side, one table for each recording that any of them predicted.
 
-    Raises UserError: fewer than two runs, or a folder without results.
+    Raises UsageError: fewer than two runs; UserError: a folder without results.
     """
     if len(folders) < 2:
-        raise UserError("compare takes two or more runs, as in `discovery compare runs/one runs/two`")
+        raise UsageError("compare takes two or more runs, as in `discovery compare runs/one runs/two`")
     runs = {str(folder): read_results(folder) for folder in folders}
     recordings = dict.fromkeys(name for one in runs.values() for name in (*one["fit"], *one["held_out"]))
     for recording in recordings:

@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Sequence
 from typing import Literal, get_args
 
-from discovery.errors import UserError
+from discovery.errors import UsageError, UserError
 from discovery.extras import need
 
 Target = Literal["json", "c", "fmu", "fmu3", "st"]
@@ -18,13 +18,14 @@ def check_targets(targets: Sequence[str]) -> None:
     """Can these be written on this computer?
 
     Raises:
-        UserError: an unknown target, or a package or compiler that is not installed.
+        UsageError: an unknown target.
+        UserError: a package or compiler that is not installed.
     """
     from discovery.schema import suggest  # pydantic, which `--help` does without
 
     for target in targets:
         if target not in TARGETS:
-            raise UserError(f"unknown export target '{target}'; {suggest(target, list(TARGETS))}")
+            raise UsageError(f"unknown export target '{target}'; {suggest(target, list(TARGETS))}")
     need("jsonschema", "export", "exported models need")
     compiled = [target for target in targets if target in _COMPILED]
     if compiled and shutil.which("gcc") is None:

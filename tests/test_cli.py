@@ -1,6 +1,7 @@
 """The command line: quick help, failures as sentences, exit statuses."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -12,7 +13,7 @@ from typer.testing import CliRunner
 
 import discovery
 from discovery.cli import app
-from discovery.errors import UserError
+from discovery.errors import UsageError, UserError
 
 runner = CliRunner()
 
@@ -37,7 +38,7 @@ def test_version() -> None:
     assert result.stdout == f"discovery {discovery.__version__}\n"
 
 
-@pytest.mark.parametrize("arguments", [["chekc"], ["check"], ["check", "--loud", "x"]])
+@pytest.mark.parametrize("arguments", [["chekc"], ["check"], ["check", "--loud", "x"], ["compare", "one"]])
 def test_wrong_usage_is_2(arguments: list[str]) -> None:
     assert runner.invoke(app, arguments).exit_code == 2
 
@@ -53,6 +54,7 @@ def test_a_mistake_is_a_sentence_and_1(tmp_path: Path) -> None:
     ("failure", "status", "said"),
     [
         (UserError("this is wrong; do that"), 1, "error: this is wrong; do that"),
+        (UsageError("say one of them"), 2, "error: say one of them"),
         (KeyboardInterrupt(), 130, "stopped"),
         (PermissionError(13, "Permission denied", "runs/x"), 1, "error: runs/x: Permission denied"),
     ],
@@ -71,6 +73,27 @@ def test_failures(failure: BaseException, status: int, said: str) -> None:
     result = runner.invoke(small, ["fail"])
     assert result.exit_code == status
     assert result.stderr.strip().startswith(said)
+
+
+def test_a_terminated_verb_unwinds() -> None:
+    small = typer.Typer(cls=app.info.cls, pretty_exceptions_enable=False)
+    unwound = []
+
+    @small.callback()
+    def main() -> None: ...
+
+    @small.command()
+    def work() -> None:
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        finally:
+            unwound.append(True)
+
+    before = signal.getsignal(signal.SIGTERM)
+    result = runner.invoke(small, ["work"])
+    assert (result.exit_code, unwound) == (130, [True])
+    assert result.stderr.strip().startswith("stopped")
+    assert signal.getsignal(signal.SIGTERM) == before
 
 
 @pytest.mark.parametrize(("given", "seen"), [(None, "1"), ("3", "3")])

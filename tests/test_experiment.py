@@ -201,14 +201,20 @@ def test_one_influence_after_the_other(folder: Path) -> None:
         ('held_out = ["c"]', 'held_out = ["b"]', ["line 5", "'b' stands in fit too"]),
         ('held_out = ["c"]', 'held_out = ["d"]', ["line 5", "no recording 'd'"]),
         ('fit = ["a", "b"]', "fit = []", ["line 4", "at least 1"]),
+        ('fit = ["a", "b"]', 'fit = "a"', ["line 4", "fit: should be a list", "not 'a'"]),
+        ('{ kind = "reduced" }', '"model.toml"', ["line 8", "should be a table", "not 'model.toml'"]),
+        ('kind = "reduced"', 'kind = "sindy", inputs = "P"', ["line 8", "inputs: should be a list"]),
+        ('kind = "reduced"', 'kind = "sindy", seed = "1"', ["line 8", "seed: should be a valid integer"]),
         ('fit = ["a", "b"]\n', "", ["the key 'fit' is missing"]),
         ('fit = ["a", "b"]', 'fits = ["a", "b"]', ["line 4", "unknown key", "did you mean 'fit'"]),
         ('kind = "reduced"', 'kind = "redced"', ["line 8", "is not known", "mean 'reduced'"]),
         ('kind = "reduced"', 'kind = "reduced", file = "x"', ["line 8", "unknown key"]),
+        ('kind = "reduced"', 'kind = "sindy", file = "x"', ["line 8", "kind, inputs, baseline"]),
         ('kind = "reduced"', 'kind = "reduced", input = ["P"]', ["line 8", "did you mean 'inputs'"]),
         ('inputs = ["T_env", "P"]', 'inputs = ["T_env", "Q"]', ["line 9", "no channel 'Q'"]),
         ('inputs = ["T_env", "P"]', 'separate = { P = ["c"] }', ["line 9", "'c' is held out"]),
         ('inputs = ["T_env", "P"]', 'separate = { P = ["z"] }', ["line 9", "no recording 'z'"]),
+        ('inputs = ["T_env", "P"]', 'inputs = ["T_env", "E_R0T"]', ["line 9", "is an output of this"]),
         ('file = "model.toml"', 'file = "modell.toml"', ["modell.toml", "no such file"]),
         ('campaign = "campaign.toml"', 'campaign = "c.toml"', ["c.toml", "no such file"]),
         ('name = "small"', 'name = "../small"', ["line 2", "name of a file"]),
@@ -235,6 +241,58 @@ def test_a_model_without_the_outputs_is_refused(folder: Path) -> None:
     (folder / "model.toml").write_text(MODEL.split("[outputs]")[0])
     with pytest.raises(UserError, match=r"'one_body' gives none of the outputs E_Y0C, E_R0T"):
         run(folder / "experiment.toml", folder / "out")
+
+
+def test_an_output_that_a_model_lacks_is_told_with_the_nearest_name(folder: Path) -> None:
+    (folder / "model.toml").write_text(MODEL.replace("E_R0T", "E_R0TT"))
+    done = CliRunner().invoke(app, ["run", str(folder / "experiment.toml"), "--out", str(folder / "out")])
+    assert "note, one_body: gives no E_R0T, which the experiment asks for" in done.output
+    assert "is its output 'E_R0TT' meant to be 'E_R0T'?" in done.output
+    assert results_of(folder / "out")["models"]["reduced"]["notes"] == []
+    (folder / "model.toml").write_text("\n".join(line for line in MODEL.splitlines() if "E_R0T" not in line))
+    done = CliRunner().invoke(
+        app, ["diagnose", str(folder / "experiment.toml"), "--out", str(folder / "two")]
+    )
+    assert "gives no" not in done.output  # the first model is diagnosed, and gives them all
+
+
+def test_an_output_that_is_demanded_of_a_model_has_to_be_there(folder: Path) -> None:
+    (folder / "model.toml").write_text(MODEL.replace("E_R0T", "E_R1T"))
+    text = EXPERIMENT.replace('"model.toml"', '"model.toml", outputs = ["E_R0T"]')
+    (folder / "experiment.toml").write_text(text)
+    with pytest.raises(UserError, match=r"line 10: .* model\.toml gives no 'E_R0T'; did you mean 'E_R1T'"):
+        run(folder / "experiment.toml", folder / "out")
+
+
+def test_an_output_that_is_an_input_is_refused(folder: Path) -> None:
+    (folder / "model.toml").write_text(MODEL + 'P = "G"\n')
+    with pytest.raises(UserError, match=r"model\.toml, line 22: outputs\.P: 'P' is an input of the campaign"):
+        run(folder / "experiment.toml", folder / "out")
+
+
+@pytest.mark.parametrize("shift", [0, 1000])
+def test_what_is_fitted_cannot_be_held_out_under_another_name(folder: Path, shift: int) -> None:
+    """The same readings in another file, on another clock, and with another constant for an input."""
+    lines = [line.split(",") for line in (folder / "a.csv").read_text().splitlines()]
+    moved = [[str(int(line[0]) + shift), line[1], "9", *line[3:]] for line in lines[1:]]
+    (folder / "c.csv").write_text("\n".join(",".join(line) for line in [lines[0], *moved]))
+    with pytest.raises(
+        UserError, match=r"line 5: held_out: 'c' holds the same readings as 'a', which is fitted"
+    ):
+        run(folder / "experiment.toml", folder / "out")
+
+
+def test_what_is_wrong_with_the_recordings_is_said_at_the_end(folder: Path) -> None:
+    clean = CliRunner().invoke(app, ["run", str(folder / "experiment.toml"), "--out", str(folder / "one")])
+    assert "discovery check" not in clean.output
+    text = (folder / "b.csv").read_text().splitlines()
+    (folder / "b.csv").write_text("\n".join([*text, "9999999,22,0,,"]))
+    for verb in ("run", "diagnose"):
+        command = [verb, str(folder / "experiment.toml"), "--out", str(folder / verb)]
+        told = [line for line in CliRunner().invoke(app, command).output.splitlines() if "check" in line]
+        assert len(told) == 1
+        assert "b.csv, line 291: time jumps by" in told[0]
+        assert f"`discovery check {folder / 'campaign.toml'}`" in told[0]
 
 
 def test_an_interrupted_run_leaves_what_was_there(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from discovery.errors import UserError
+from discovery.errors import UsageError
 from discovery.targets import TARGETS
 
 
@@ -71,16 +71,22 @@ def compensate(
     discovery compensate model.json --trust machine.pem.pub --inputs in.csv --out offsets.csv --state memory
     discovery compensate model.json --allow-unsigned --opcua-demo --seconds 60
     """
-    from discovery.runtime.command import compensate_rows, go_back, trusted_model
+    from discovery.runtime.command import compensate_rows, go_back, one_source, trusted_model
 
     def say(text: str) -> None:
         typer.echo(text, err=True)
 
     if back:
         if state is None:
-            raise UserError("--back needs --state, the folder that keeps the models")
+            raise UsageError("--back needs --state, the folder that keeps the models")
         go_back(state, say)
         return
+    one_source(
+        {"--inputs": inputs, "--opcua": opcua, "--opcua-demo": opcua_demo or None},
+        only_inputs={"--out": out},
+        only_opcua={"--seconds": seconds},
+        shadow_hours=shadow_hours,
+    )
     exported, key = trusted_model(model, trust, allow_unsigned=allow_unsigned)
     if opcua is not None or opcua_demo:
         from discovery.runtime.opcua import compensate_opcua
@@ -95,13 +101,10 @@ def compensate(
             shadow_hours=shadow_hours,
             say=say,
         )
-    elif inputs is not None:
+    else:
+        assert inputs is not None
         compensate_rows(
             exported, inputs, out, model=model, folder=state, trusted=key, shadow_hours=shadow_hours, say=say
-        )
-    else:
-        raise UserError(
-            "say where the readings come from: --inputs FILE, --inputs -, --opcua FILE or --opcua-demo"
         )
 
 

@@ -19,15 +19,16 @@ def check(
     """
     from discovery.recordings.check import check_campaign, summary
 
-    findings = check_campaign(campaign)
+    findings, misfits = check_campaign(campaign), []
     for finding in findings:
         typer.echo(str(finding))
-    typer.echo(summary(findings))
     if models:
         from discovery.models.check import check_models
 
-        for warning in check_models(campaign, models):
-            typer.echo(f"warning: {warning}")
+        for misfit in check_models(campaign, models):
+            typer.echo(f"warning: {misfit}")
+            misfits.append(misfit)
+    typer.echo(summary(findings, misfits))
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(1)
 
@@ -44,6 +45,16 @@ def new(
 
     for line in make(folder, sources):
         typer.echo(line)
+
+
+def _list_effects(given: list[str] | None) -> list[str] | None:
+    """Of --effect and --fault: `help` lists them, whatever else is said or missing."""
+    if any(text.strip() == "help" or text.endswith("=help") for text in given or []):
+        from discovery.virtual.command import effect_list
+
+        typer.echo(effect_list())
+        raise typer.Exit
+    return given
 
 
 def record(
@@ -64,13 +75,23 @@ def record(
     nozzle_height: Annotated[float, typer.Option(help="Nozzle above the table, mm.")] = 50.0,
     effect: Annotated[
         list[str] | None,
-        typer.Option(help="NAME[@BODY[+BODY]]=SIZE, may be repeated; --effect help lists them."),
+        typer.Option(
+            callback=_list_effects,
+            is_eager=True,
+            help="NAME[@BODY[+BODY]]=SIZE, may be repeated; --effect help lists them.",
+        ),
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="NAME[@CHANNEL]=SIZE: a fault of measuring, in the first recording."),
+        typer.Option(
+            callback=_list_effects,
+            is_eager=True,
+            help="NAME[@CHANNEL]=SIZE: a fault of measuring, in the first recording; help lists them.",
+        ),
     ] = None,
-    conceal: Annotated[bool, typer.Option("--conceal", help="Hide an effect drawn by seed.")] = False,
+    conceal: Annotated[
+        bool, typer.Option("--conceal", help="Hide an effect drawn by seed, without --effect.")
+    ] = False,
     reveal: Annotated[bool, typer.Option("--reveal", help="Put the answer into OUT, too.")] = False,
 ) -> None:
     """Record the virtual machine: a rotary table of five bodies under cutting fluid, with R-Test readings.

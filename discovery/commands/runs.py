@@ -43,10 +43,13 @@ def diagnose(
     from discovery.experiment import diagnose as find
     from discovery.mismatch.summary import summary
     from discovery.progress import shown
+    from discovery.summary import remarks
 
     with shown() as progress:
         folder = find(experiment, out, progress)
     for line in summary(folder):
+        typer.echo(line)
+    for line in remarks(folder):
         typer.echo(line)
     typer.echo(f"report: {folder / 'report.html'}")
 

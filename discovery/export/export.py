@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from discovery.errors import UserError
+from discovery.errors import UsageError, UserError
 from discovery.export.agreement import agreement
 from discovery.export.c import c_files
 from discovery.export.document import Exported, from_document, render
@@ -79,11 +79,15 @@ def export_model(
         provenance: what else should be known about where the model comes from.
 
     Raises:
-        UserError: an unknown target, a model that cannot be exported, or a target that is not equal; then
-        nothing is written.
+        UsageError: an unknown target, or a step that is none.
+        UserError: a model that cannot be exported, or a target that is not equal; then nothing is written.
     """
     targets = (to,) if isinstance(to, str) else tuple(to)
     check_targets(targets)
+    if not 0.001 <= step_s <= 3600.0:
+        raise UsageError(
+            f"a step of {step_s:g} s is not possible; give one between 0.001 and 3600, usually 1 to 10"
+        )
     if not recordings:
         raise UserError(
             f"model '{model.name}': name at least one recording of the fit; ranges and reference come from it"

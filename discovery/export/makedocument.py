@@ -86,10 +86,6 @@ def make_document(
         UserError: a model that cannot be exported (with the reason), or inputs that the recordings do not
         hold.
     """
-    if not 0.001 <= step_s <= 3600.0:
-        raise UserError(
-            f"a step of {step_s:g} s is not possible; give one between 0.001 and 3600, usually 1 to 10"
-        )
     model = exportable(model, campaign)
     known = set(campaign.channels) | set(model.states) | set(model.parameters) | {"time"}
     for expression in model.expressions():

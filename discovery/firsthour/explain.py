@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from discovery.errors import UserError
+from discovery.errors import UsageError
 from discovery.schema import suggest
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ def list_words(what: str) -> Iterator[str]:
     """Lines on all effects, models or roles.
 
     Raises:
-        UserError: another word.
+        UsageError: another word.
     """
     if what == "effects":
         yield from _effects()
@@ -32,7 +32,7 @@ def list_words(what: str) -> Iterator[str]:
     elif what == "roles":
         yield from _roles()
     else:
-        raise UserError(f"'{what}' cannot be listed; {suggest(what, ['effects', 'models', 'roles'])}")
+        raise UsageError(f"'{what}' cannot be listed; {suggest(what, ['effects', 'models', 'roles'])}")
 
 
 def _effects() -> Iterator[str]:
@@ -73,13 +73,13 @@ def explain(word: str) -> Iterator[str]:
     """What the catalogue knows of an effect: formula, size, signature, what it is confused with, source.
 
     Raises:
-        UserError: no such effect.
+        UsageError: no such effect.
     """
     from discovery.mismatch.catalogue import catalogue
 
     known = catalogue()
     if word not in known:
-        raise UserError(f"there is no effect '{word}'; {suggest(word, sorted(known))}")
+        raise UsageError(f"there is no effect '{word}'; {suggest(word, sorted(known))}")
     for k, effect in enumerate(e for e in known.values() if e.word == known[word].word):
         yield from [""] * bool(k)
         yield from _entry(effect)

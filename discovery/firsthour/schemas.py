@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from discovery.errors import UserError
+from discovery.errors import UsageError
 from discovery.schema import suggest
 
 FILES = ("campaign", "model", "experiment")
@@ -15,7 +15,7 @@ def schema(file: str) -> str:
     """JSON schema (draft 2020-12) of a campaign, model or experiment file.
 
     Raises:
-        UserError: another word.
+        UsageError: another word.
     """
     from pydantic import BaseModel
 
@@ -29,7 +29,7 @@ def schema(file: str) -> str:
         "experiment": ExperimentForm,
     }
     if file not in forms:
-        raise UserError(f"there is no schema of '{file}'; {suggest(file, list(FILES))}")
+        raise UsageError(f"there is no schema of '{file}'; {suggest(file, list(FILES))}")
     document: dict[str, Any] = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     document |= forms[file].model_json_schema(by_alias=True)
     document["title"] = f"{file} file of the discovery workbench"

@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 import math
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from discovery.errors import UserError
 from discovery.files import dotted, locate, read_toml, write_toml
 from discovery.models.memory import check_memory, check_start
 from discovery.models.model import TIME_UNITS, Model, Parameter, State, in_time_unit
 from discovery.naming import is_taken, is_word
+from discovery.schema import Strict
 from discovery.terms import Expression, Term, parse, text
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
-
-
-class ParameterForm(_Strict):
+class ParameterForm(Strict):
     """One line of [parameters]."""
 
     start: float = Field(1.0, description="start value; in a fitted model the value found")
     unit: str = Field("1", description="unit that pint knows")
-    min: float = Field(-math.inf, description="smallest value that a fit may give")
-    max: float = Field(math.inf, description="largest value that a fit may give")
+    min: float = Field(-math.inf, allow_inf_nan=True, description="smallest value that a fit may give")
+    max: float = Field(math.inf, allow_inf_nan=True, description="largest value that a fit may give")
     fixed: bool = Field(False, description="true: given, not fitted")
     per: Literal["recording"] | None = Field(
         None, description='"recording": a value of its own in each recording'
@@ -38,7 +36,7 @@ class ParameterForm(_Strict):
     )
 
 
-class StateForm(_Strict):
+class StateForm(Strict):
     """One line of [states]."""
 
     unit: str = Field("degC", description="unit of the state")
@@ -52,7 +50,7 @@ class StateForm(_Strict):
     memory: bool = Field(False, description="true: what a lag() remembers, no body (written by a fit)")
 
 
-class TermForm(_Strict):
+class TermForm(Strict):
     """One [[terms]] entry."""
 
     name: str = Field("", description="how reports call it")
@@ -62,7 +60,7 @@ class TermForm(_Strict):
     effect: str = Field("", description="word of the catalogue (written by a diagnosis)")
 
 
-class ModelForm(_Strict):
+class ModelForm(Strict):
     """A model file."""
 
     name: str = ""
@@ -130,8 +128,15 @@ def read_model(path: Path) -> Model:
         )
         scale = 1.0 / state.capacity if state.capacity else per_unit
         states[name] = State(name, state.unit, state.capacity, start, spread, scale, state.memory)
-    terms = []
+    terms: list[Term] = []
     for i, term in enumerate(form.terms):
+        if term.source == term.into:
+            raise UserError(
+                f"{at('terms', i, 'from')}: '{term.into}' is also into; what leaves it enters another"
+            )
+        name = term.name or f"term {i + 1}"
+        if name in [other.name for other in terms]:
+            raise UserError(f"{at('terms', i, 'name')}: another term is named '{name}'; name it differently")
         for key, state_name in (("into", term.into), ("from", term.source)):
             if state_name is not None and state_name not in states:
                 raise UserError(
@@ -139,7 +144,7 @@ def read_model(path: Path) -> Model:
                 )
         expression = parse(term.expression, place := at("terms", i, "expression"))
         check_memory(expression, parameters, states, place)
-        terms.append(Term(term.name or f"term {i + 1}", term.into, expression, term.source, term.effect))
+        terms.append(Term(name, term.into, expression, term.source, term.effect))
     outputs = {}
     for name, formula in form.outputs.items():
         outputs[name] = parse(formula, place := at("outputs", name))
@@ -158,7 +163,7 @@ def model_document(model: Model) -> dict[str, Any]:
         return {
             key: value
             for key, value in entries.items()
-            if value is not None and value not in (math.inf, -math.inf)
+            if value is not None and not (isinstance(value, float) and not math.isfinite(value))
         }
 
     parameters = {}
@@ -183,13 +188,13 @@ def model_document(model: Model) -> dict[str, Any]:
     }
     terms = [
         {
-            "name": term.name,
+            "name": name,
             "into": term.into,
             **({"from": term.source} if term.source else {}),
             "expression": text(term.expression),
             **({"effect": term.effect} if term.effect else {}),
         }
-        for term in model.terms
+        for name, term in zip(_told_apart([term.name for term in model.terms]), model.terms, strict=True)
     ]
     outputs = {name: text(expression) for name, expression in model.outputs.items()}
     return {
@@ -200,6 +205,19 @@ def model_document(model: Model) -> dict[str, Any]:
         "terms": terms,
         "outputs": outputs,
     }
+
+
+def _told_apart(names: list[str]) -> list[str]:
+    """Names with a number behind those that came before: an effect may be found twice at one body.
+
+    >>> _told_apart(["air", "radiation", "air"])
+    ['air', 'radiation', 'air (2)']
+    """
+    found: list[str] = []
+    for name in names:
+        tries = (name if k == 1 else f"{name} ({k})" for k in count(1))
+        found.append(next(one for one in tries if one not in found))
+    return found
 
 
 def write_model(path: Path, model: Model) -> None:

@@ -37,7 +37,6 @@ class ChannelForm(Strict):
     spread: float | None = Field(
         None,
         gt=0,
-        allow_inf_nan=False,
         description="of an input: in each recording its values are off by one unknown constant with this "
         "standard deviation, in the unit (a difference); a fit finds it",
     )

@@ -1,7 +1,7 @@
 """Everything that is wrong with a campaign: the campaign file first, then recording by recording."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from discovery.recordings.correctioncheck import correction_findings
 from discovery.recordings.finding import Finding
 from discovery.recordings.inputcheck import input_findings
 from discovery.recordings.reading import read_columns
+from discovery.recordings.twins import fingerprint
 from discovery.recordings.units import Conversion, UnitError, conversion
 from discovery.recordings.valuecheck import few_findings, frozen_findings, lone_findings, range_findings
 from discovery.schema import sentences, suggest
@@ -41,20 +42,28 @@ def check_campaign(path: str | os.PathLike[str]) -> list[Finding]:
             findings.append(_in_campaign(path, text, ("channels", name, "unit"), str(error)))
     pairs, wrong = pair_corrections(form.channels, {name: to.unit for name, to in conversions.items()})
     findings.extend(_in_campaign(path, text, key, what) for key, what in wrong)
+    seen: dict[str, str] = {}
     for name, recording in form.recordings.items():
         for constant in recording.set:
             if constant not in data["channels"]:
                 what = f"no such channel; {suggest(constant, list(form.channels))}"
                 findings.append(_in_campaign(path, text, ("recordings", name, "set", constant), what))
-        findings.extend(_recording_findings(path, form, recording, conversions, pairs))
+        found, readings = _recording_findings(path, form, recording, conversions, pairs)
+        findings.extend(found)
+        if readings is not None and (twin := seen.setdefault(readings, name)) != name:
+            line = locate(text, ("recordings", name))
+            what = f"recordings.{name} holds the same readings as {twin}"
+            findings.append(
+                Finding("warning", path, line, what, "name another file, or take one of them out")
+            )
     return findings
 
 
-def summary(findings: list[Finding]) -> str:
-    """One line about all findings."""
+def summary(findings: Sequence[Finding], misfits: Sequence[str] = ()) -> str:
+    """One line about all findings, and about the places where models do not fit the campaign."""
     errors = sum(finding.severity == "error" for finding in findings)
-    warnings = len(findings) - errors
-    if not findings:
+    warnings = len(findings) - errors + len(misfits)
+    if not findings and not misfits:
         return "nothing is wrong with these recordings"
     return f"{errors} error{'s' * (errors != 1)}, {warnings} warning{'s' * (warnings != 1)}"
 
@@ -94,12 +103,13 @@ def _recording_findings(
     recording: RecordingForm,
     conversions: Mapping[str, Conversion],
     pairs: Mapping[str, str],
-) -> list[Finding]:
+) -> tuple[list[Finding], str | None]:
+    """Findings, and what tells whether another recording holds the same readings."""
     file = path.parent / recording.file
     wanted = wanted_columns(recording, form.channels)
     columns, findings = read_columns(file, list(wanted.values()))
     if columns is None:
-        return findings
+        return findings, None
     findings.extend(_header_findings(file, columns, form, recording))
     findings.extend(clock_findings(file, columns))
     channels = {
@@ -110,7 +120,7 @@ def _recording_findings(
     values = channel_values(columns, recording, form.channels, conversions)
     findings.extend(_content_findings(file, columns, channels, recording, values))
     findings.extend(correction_findings(file, columns, values, pairs))
-    return findings
+    return findings, fingerprint(columns.time, [v for name, v in values.items() if channels[name].measured])
 
 
 def _header_findings(

@@ -1,4 +1,4 @@
-"""Stamps: does time run forward, step by step."""
+"""Stamps: does time run forward, step by step, and in seconds."""
 
 from pathlib import Path
 
@@ -9,10 +9,14 @@ from discovery.recordings.finding import Finding, more
 
 _JUMP = 20.0  # a step of so many usual steps is no irregular stamp any more
 _SHORTEST = 3  # rows
+_LONG = 60 * 86400.0  # s: no thermal recording in one piece; 8 h in milliseconds are 333 days
+_SHORT = 1.0  # s: no thermal recording either; 12 h in days are 0.5
 
 
 def clock_findings(file: Path, columns: Columns) -> list[Finding]:
-    """Stamps that run backwards or come twice (errors), jumps (a warning), too few rows (an error)."""
+    """Stamps that run backwards or come twice (errors), too few rows (an error), jumps, and stamps that are
+    hardly seconds (warnings).
+    """
     steps = np.diff(columns.time)
     findings = []
     if columns.time.size < _SHORTEST:
@@ -32,4 +36,22 @@ def clock_findings(file: Path, columns: Columns) -> list[Finding]:
         what = f"time jumps by {steps[jumps[0]]:g} s where steps are {usual:g} s{more(jumps.size)}"
         do = "inputs are held over the gap: split the recording there if the machine did not stand still"
         findings.append(Finding("warning", file, int(columns.lines[jumps[0] + 1]), what, do))
+    if columns.origin is None and usual > 0:
+        findings += _unit_findings(file, columns, usual)
     return findings
+
+
+def _unit_findings(file: Path, columns: Columns, usual: float) -> list[Finding]:
+    """Numbers of another unit than seconds, by their length and usual step (an instant has none)."""
+    length = float(np.max(columns.time) - np.min(columns.time))
+    first = int(columns.lines[0])
+    whole = abs(usual / 1000.0 - round(usual / 1000.0)) < 0.02 and usual > 500.0  # hourly stamps are not
+    if length > _LONG and (whole or usual > 10e3):
+        what = f"a stamp every {usual:g} s over {length / 86400:.3g} days: perhaps these are milliseconds"
+        return [Finding("warning", file, first, what, "write the time in seconds: divide it by 1000")]
+    if length < _SHORT or usual < 1e-3:
+        what = (
+            f"{columns.time.size} rows within {length:.3g} s: perhaps these are days, as spreadsheets count"
+        )
+        return [Finding("warning", file, first, what, "write the time in seconds: multiply it by 86400")]
+    return []

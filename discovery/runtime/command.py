@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import gzip
+import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Literal, TextIO
 
-from discovery.errors import UserError
+from discovery.errors import UsageError, UserError
 from discovery.export.document import Exported, read_document
 from discovery.export.seal import public_key, require_trusted
 from discovery.runtime.compensator import Compensator, Settings, Tick
@@ -44,6 +45,32 @@ def trusted_model(
     return exported, None
 
 
+def one_source(
+    sources: Mapping[str, object],
+    *,
+    only_inputs: Mapping[str, object],
+    only_opcua: Mapping[str, object],
+    shadow_hours: float,
+) -> None:
+    """Refuse options of `discovery compensate` that do not go together; None: an option was not given.
+
+    Raises:
+        UsageError: no source of readings or two, an option of the other source, a time that is none.
+    """
+    given = [name for name, value in sources.items() if value is not None]
+    if not given:
+        raise UsageError(
+            "say where the readings come from: --inputs FILE, --inputs -, --opcua FILE or --opcua-demo"
+        )
+    if len(given) > 1:
+        raise UsageError(f"{' and '.join(given)}: the readings come from one of them; leave the other out")
+    for name, value in (only_opcua if given == ["--inputs"] else only_inputs).items():
+        if value is not None:
+            raise UsageError(f"{name} does not go with {given[0]}; leave it out")
+    if not 0.0 <= shadow_hours < math.inf:
+        raise UsageError(f"--shadow-hours {shadow_hours:g} is no length of time; give 0 or more hours")
+
+
 def compensate_rows(
     exported: Exported,
     source: str,
@@ -59,7 +86,15 @@ def compensate_rows(
 
     With `folder` the state is kept there: a restart goes on after the last state saved, and ticks done again
     stand twice in `out`; the later ones count.
+
+    `out` is opened with the first tick: inputs that cannot be read leave an older one as it was.
+
+    Raises:
+        UserError: `out` is the file of the inputs or of the model, or inputs that cannot be read.
     """
+    for option, used in (("--inputs", Path(source)), ("the model", model)):
+        if out is not None and out.exists() and used.exists() and out.samefile(used):
+            raise UserError(f"{out}: --out names the same file as {option}; name another file")
     step = exported.compiled.step_s
     settings, rule = Settings(tick_s=step), Rule(hours=shadow_hours)
     session = Session(
@@ -68,21 +103,20 @@ def compensate_rows(
     with ExitStack() as stack:
         lines: Iterable[str] = sys.stdin if source == "-" else stack.enter_context(_open(Path(source)))
         goes_on = out is not None and out.exists() and session.resumed is not None
-        stream: TextIO = sys.stdout
-        if out is not None:
-            out.parent.mkdir(parents=True, exist_ok=True)
-            stream = stack.enter_context(out.open("a" if goes_on else "w", encoding="utf-8"))
-        if not goes_on:
-            stream.write(header(session.compensator))
+        stream: TextIO | None = None
         last = None
         for now, newest in ticks(csv_rows(lines), step, session.resumed):
             found = session.tick(newest, now)
+            if stream is None:
+                stream = _output(out, stack, "a" if goes_on else "w")
+                stream.write("" if goes_on else header(session.compensator))
             stream.write(line(session.compensator, found))
             if source == "-":
                 stream.flush()
             last = now
         if last is None:
-            say("no row came after the saved state; nothing was done")
+            after = " after the saved state" if session.resumed is not None else ""
+            say(f"no row with a time came{after}; nothing was done")
         else:
             session.close(last)
 
@@ -110,7 +144,16 @@ def go_back(folder: Path, say: Say) -> None:
     )
 
 
+def _output(out: Path | None, stack: ExitStack, mode: Literal["a", "w"]) -> TextIO:
+    if out is None:
+        return sys.stdout
+    out.parent.mkdir(parents=True, exist_ok=True)
+    return stack.enter_context(out.open(mode, encoding="utf-8"))
+
+
 def _open(path: Path) -> TextIO:
+    if path.is_dir():
+        raise UserError(f"{path}: this is a folder; name a CSV file in it")
     if not path.is_file():
         raise UserError(
             f"{path}: there is no such file; name a CSV file with the columns time and the inputs of the "

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
+
+from discovery.schema import Strict
 
 FAMILIES = ("linear", "wet", "rotation", "coupling", "radiation", "natural", "load", "second mass")
 
+FROM_LIST = Field(strict=False)  # a file has lists where options have tuples
+Words = Annotated[tuple[str, ...], FROM_LIST]
+Numbers = Annotated[tuple[float, ...], FROM_LIST]
+Bound = Annotated[float, Field(allow_inf_nan=True)]
 
-class SparseOptions(BaseModel):
+
+class SparseOptions(Strict):
     """Options of one discovered model; the defaults serve a machine tool and two heaters alike."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     kind: Literal["sindy"] = "sindy"
-    inputs: tuple[str, ...] | None = Field(
+    inputs: Words | None = Field(
         None,
         description="channels that terms may use; default every input that moves in the recordings to fit",
     )
@@ -31,27 +36,27 @@ class SparseOptions(BaseModel):
         'the outputs (or of the states of a baseline file); "auto": masses for errors, rates for '
         "anything else",
     )
-    library: tuple[str, ...] | None = Field(
+    library: Words | None = Field(
         None,
         description=f"families ({', '.join(FAMILIES)}) or expressions of channels and states; y is the "
         "output itself",
     )
-    into: tuple[str, ...] | None = Field(
+    into: Words | None = Field(
         None, description="states of a baseline file that candidates may enter; default all"
     )
     max_terms: int = Field(15, ge=1, le=60, description="most terms of one output")
     max_masses: int = Field(4, ge=1, le=12, description="most hidden masses of one error")
-    time_constants: tuple[float, ...] = Field(
+    time_constants: Numbers = Field(
         (900.0, 1800.0, 3600.0, 7200.0, 14400.0, 28800.0, 57600.0),
         description="grid of time constants of the hidden masses [s]",
         min_length=1,
     )
-    pump_ratios: tuple[float, ...] = Field(
+    pump_ratios: Numbers = Field(
         (1.0, 2.0, 4.0, 8.0),
         description="how many times quicker a hidden mass may answer while the pump runs",
         min_length=1,
     )
-    bounds: dict[str, tuple[float, float]] = Field(
+    bounds: dict[str, Annotated[tuple[Bound, Bound], FROM_LIST]] = Field(
         default_factory=dict,
         description="smallest and largest coefficient of a term, by its expression; [0, inf] is a sign",
     )

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from discovery.errors import UserError
+from discovery.errors import UsageError, UserError
+from discovery.files import read_toml
+from discovery.recordings.campaignfile import CampaignForm
 from discovery.virtual.effects import EFFECTS, parse_request
 from discovery.virtual.faults import FAULTS, parse_fault
 from discovery.virtual.nmv5000 import CAMPAIGNS
-from discovery.virtual.record import Order, draw_effect, write_answers, write_campaign
+from discovery.virtual.record import Order, draw_effect, file_name, write_answers, write_campaign
 
 
 def orders_of(
@@ -25,16 +27,15 @@ def orders_of(
 ) -> tuple[str, tuple[Order, ...]]:
     """Title and orders of a campaign.
 
-    Raises UserError: an unknown campaign, effect, fault, body or channel.
+    Raises UsageError: an unknown campaign, effect, fault, body or channel.
     """
     if campaign is not None:
         if campaign not in CAMPAIGNS:
             known = ", ".join(CAMPAIGNS)
-            raise UserError(f"There is no campaign '{campaign}' to record; choose one of: {known}.")
+            raise UsageError(f"There is no campaign '{campaign}' to record; choose one of: {known}.")
         return CAMPAIGNS[campaign]
-    for text in (*effects, *faults):
-        if text.partition("=")[0].strip() == "help" or text.endswith("=help"):
-            raise UserError(effect_list())
+    if conceal and effects:
+        raise UsageError("--conceal draws the effect that it hides; leave out --effect, or --conceal")
     requests = tuple(parse_request(text) for text in effects)
     if conceal:
         requests += (draw_effect(seed),)
@@ -58,18 +59,41 @@ def orders_of(
 def record_orders(
     out: Path, title: str, orders: Sequence[Order], *, reveal: bool, envelope: bool
 ) -> Iterator[str]:
-    """Write the campaign and, with `envelope`, the answers beside it; yields what was done, line by line."""
+    """Write the campaign and, with `envelope`, the answers beside it; yields what was done, line by line.
+
+    Raises UserError: `out` holds a campaign of other recordings, or cannot be written.
+    """
+    _refuse_another_campaign(out, orders)
     answers = write_campaign(out, title, orders)
     yield f"{len(orders)} recording{'s' if len(orders) > 1 else ''} and campaign.toml in {out}"
+    beside = out.resolve().parent / f"{out.resolve().name}.answer.json"
     if not any(a["effects"] or a["faults"] for a in answers):
+        if envelope:  # an answer to recordings that were just replaced would be a lie
+            beside.unlink(missing_ok=True)
+            (out / "answer.json").unlink(missing_ok=True)
         return
     if envelope:
-        beside = out.resolve().parent / f"{out.resolve().name}.answer.json"
         write_answers(beside, answers)
         yield f"what is concealed stands in {beside}"
     if reveal:
         write_answers(out / "answer.json", answers)
         yield f"the answer stands in {out / 'answer.json'}"
+
+
+def _refuse_another_campaign(out: Path, orders: Sequence[Order]) -> None:
+    """The same recordings may be taken again; beside others, the campaign file would be theirs no more."""
+    there = out / "campaign.toml"
+    if not there.exists():
+        return
+    try:
+        files = {one.file for one in read_toml(there, CampaignForm).recordings.values()}
+    except UserError:
+        files = {there.name}
+    others = sorted(files - {file_name(order) for order in orders})
+    if others:
+        raise UserError(
+            f"{out}: this folder holds another campaign (with {others[0]}); name another folder with --out"
+        )
 
 
 def effect_list() -> str:

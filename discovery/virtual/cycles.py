@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.errors import UserError
+from discovery.errors import UsageError
 
 Array = NDArray[np.float64]
 STEP_S = 10.0
@@ -40,14 +40,14 @@ Draw = np.random.Generator
 def make_cycle(kind: str, seed: int, hours: float = 72.0, nozzle_height_mm: float = 50.0) -> Cycle:
     """A test cycle of `kind` (one of KINDS). The same arguments give the same cycle.
 
-    Raises UserError for an unknown kind or a duration that is not between 1 h and 2000 h.
+    Raises UsageError for an unknown kind or a duration that is not between 1 h and 2000 h.
     """
     if kind not in KINDS:
-        raise UserError(f"There is no test cycle '{kind}'; choose one of: {', '.join(KINDS)}.")
+        raise UsageError(f"There is no test cycle '{kind}'; choose one of: {', '.join(KINDS)}.")
     if not 1.0 <= hours <= 2000.0:
-        raise UserError(f"A cycle of {hours:g} h is not possible; give --hours between 1 and 2000.")
+        raise UsageError(f"A cycle of {hours:g} h is not possible; give --hours between 1 and 2000.")
     if not 5.0 <= nozzle_height_mm <= 500.0:
-        raise UserError(f"A nozzle at {nozzle_height_mm:g} mm is not possible; give 5 to 500 mm.")
+        raise UsageError(f"A nozzle at {nozzle_height_mm:g} mm is not possible; give 5 to 500 mm.")
     rng = np.random.default_rng([seed, list(KINDS).index(kind)])
     n = round(hours * HOUR / STEP_S)
     pattern = KINDS[kind](rng, n)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.errors import UserError
+from discovery.errors import UsageError
 from discovery.virtual.machine import BODIES
 
 Array = NDArray[np.float64]
@@ -27,6 +27,7 @@ class Effect(NamedTuple):
     law: str
 
 
+MOST = 10.0  # times the largest realistic size: what the plant still computes
 WET = ("table", "c_body_1")
 EFFECTS: dict[str, Effect] = {
     # cutting fluid
@@ -128,25 +129,29 @@ class Request(NamedTuple):
 def parse_request(text: str) -> Request:
     """Read `name[@body[+body]]=size`.
 
-    Raises UserError: an unknown name or body, a size that is no number.
+    Raises UsageError: an unknown name or body, a size that is no number or far from any machine.
     """
     head, equals, size_text = text.partition("=")
     name, at, places = head.strip().partition("@")
     if name not in EFFECTS:
-        raise UserError(f"There is no effect '{name}' in '{text}'; choose one of: {', '.join(EFFECTS)}.")
+        raise UsageError(f"There is no effect '{name}' in '{text}'; choose one of: {', '.join(EFFECTS)}.")
     try:
         size = float(size_text)
     except ValueError:
         size = float("nan")
     if not equals or not np.isfinite(size):
         unit, example = EFFECTS[name].unit, EFFECTS[name].low
-        raise UserError(f"The effect '{text}' needs a size in {unit}, for example {name}={example:g}.")
+        raise UsageError(f"The effect '{text}' needs a size in {unit}, for example {name}={example:g}.")
+    if not 0.0 <= size <= MOST * EFFECTS[name].high:
+        unit, low, high = EFFECTS[name][:3]
+        usual = f"usual is {low:g} to {high:g} {unit}"
+        raise UsageError(f"The size in '{text}' is not possible; give 0 to {MOST * high:g} ({usual}).")
     states = tuple(places.split("+")) if at else EFFECTS[name].at
     unknown = [state for state in states if state not in BODIES]
     if unknown:
-        raise UserError(f"There is no body '{unknown[0]}' in '{text}'; choose from: {', '.join(BODIES)}.")
+        raise UsageError(f"There is no body '{unknown[0]}' in '{text}'; choose from: {', '.join(BODIES)}.")
     if name in PAIRS and len(set(states)) != 2:
-        raise UserError(f"'{text}' acts between two bodies; write {name}@c_body_1+b_body_1={size:g}.")
+        raise UsageError(f"'{text}' acts between two bodies; write {name}@c_body_1+b_body_1={size:g}.")
     return Request(name, size, states)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from discovery.errors import UserError
+from discovery.errors import UsageError
 from discovery.virtual.machine import ERRORS
 from discovery.virtual.measurement import CHANNELS, Columns
 
@@ -91,20 +91,20 @@ FAULTS: dict[str, tuple[Fault, str, str, float]] = {
 def parse_fault(text: str) -> tuple[str, str, float]:
     """Read `name[@channel]=size`.
 
-    Raises UserError: an unknown name or channel, a size that is no number.
+    Raises UsageError: an unknown name or channel, a size that is no number.
     """
     head, _, size_text = text.partition("=")
     name, _, channel = head.strip().partition("@")
     if name not in FAULTS:
-        raise UserError(f"There is no fault '{name}' in '{text}'; choose one of: {', '.join(FAULTS)}.")
+        raise UsageError(f"There is no fault '{name}' in '{text}'; choose one of: {', '.join(FAULTS)}.")
     channel = channel or FAULTS[name][1]
     if channel and channel not in CHANNELS:
-        raise UserError(f"There is no channel '{channel}' in '{text}'; choose from: {', '.join(CHANNELS)}.")
+        raise UsageError(f"There is no channel '{channel}' in '{text}'; choose from: {', '.join(CHANNELS)}.")
     try:
         size = float(size_text)
     except ValueError:
         size = float("nan")
     if not np.isfinite(size):
         _, _, unit, example = FAULTS[name]
-        raise UserError(f"The fault '{text}' needs a size in {unit}, for example {name}={example:g}.")
+        raise UsageError(f"The fault '{text}' needs a size in {unit}, for example {name}={example:g}.")
     return name, channel, size

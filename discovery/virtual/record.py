@@ -129,6 +129,11 @@ def csv_gz(columns: Columns, decimals: Mapping[str, int]) -> bytes:
 DECIMALS = {"time": 0} | {name: decimals for name, (_, _, decimals) in CHANNELS.items()}
 
 
+def file_name(order: Order) -> str:
+    """The file of a recording, in the folder of its campaign."""
+    return f"{order.name}.csv.gz"
+
+
 def write_campaign(out: Path, title: str, orders: Sequence[Order]) -> list[dict[str, Any]]:
     """Record every order into `out`, its `campaign.toml` last. Returns the answers, one for each recording.
 
@@ -137,7 +142,7 @@ def write_campaign(out: Path, title: str, orders: Sequence[Order]) -> list[dict[
     answers = []
     for order in orders:
         taken = take(order)
-        write_atomic(out / f"{order.name}.csv.gz", csv_gz(taken.columns, DECIMALS))
+        write_atomic(out / file_name(order), csv_gz(taken.columns, DECIMALS))
         answers.append(answer(order, taken))
     write_atomic(out / "campaign.toml", campaign_toml(title, orders))
     return answers
@@ -175,5 +180,5 @@ def campaign_toml(title: str, orders: Sequence[Order]) -> str:
     width = max(len(order.name) for order in orders)
     for order in orders:
         note = f", note = {json.dumps(order.note)}" if order.note else ""
-        lines.append(f'{order.name:{width}s} = {{ file = "{order.name}.csv.gz"{note} }}')
+        lines.append(f'{order.name:{width}s} = {{ file = "{file_name(order)}"{note} }}')
     return "\n".join(lines) + "\n"

@@ -247,13 +247,17 @@ def test_the_command_exports_a_run(model: Model, tmp_path: Path, monkeypatch: py
     assert done.exit_code == 0, done.output
     assert "C double" in done.output
     assert (run / "export" / "everything" / "Everything_a_model.json").exists()
-    for words, sentence in (
-        (["run", "--model", "nobody", "--to", "c"], "no model 'nobody'"),
-        (["run", "--model", "everything", "--to", "pickle"], "unknown export target 'pickle'"),
-        (["elsewhere", "--model", "everything", "--to", "c"], "no results.json there"),
+    everything = ["run", "--model", "everything", "--to"]
+    for words, sentence, status in (
+        (["run", "--model", "nobody", "--to", "c"], "no model 'nobody'", 1),
+        (["elsewhere", "--model", "everything", "--to", "c"], "no results.json there", 1),
+        ([*everything, "pickle"], "unknown export target 'pickle'", 2),
+        ([*everything, "json", "--step", "0"], "a step of 0 s is not possible", 2),
+        ([*everything, "json", "--step", "-5"], "a step of -5 s is not possible", 2),
+        ([*everything, "json", "--step", "nan"], "a step of nan s is not possible", 2),
     ):
         done = runner.invoke(app, ["export", *words])
-        assert done.exit_code == 1
+        assert done.exit_code == status
         assert sentence in done.output
 
 

@@ -35,8 +35,17 @@ def test_every_effect_is_explained(word: str) -> None:
 
 def test_a_mistaken_word_is_told_the_nearest() -> None:
     result = CliRunner().invoke(app, ["explain", "floded_gap"])
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert "did you mean 'flooded_gap'?" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("verb", "said"),
+    [("list", "'foo' cannot be listed"), ("schema", "there is no schema of 'foo'"), ("explain", "no effect")],
+)
+def test_a_word_that_no_verb_knows_is_wrong_usage(verb: str, said: str) -> None:
+    result = CliRunner().invoke(app, [verb, "foo"])
+    assert (result.exit_code, said in result.stderr) == (2, True)
 
 
 @pytest.mark.parametrize(

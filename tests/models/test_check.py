@@ -24,6 +24,7 @@ def test_a_unit_that_does_not_fit_is_a_warning(tmp_path: Path) -> None:
     )
     done = CliRunner().invoke(app, ["check", str(DATA), "--model", str(bad)])
     assert "warning: model 'dry thermobalance, five bodies', term 'air around table'" in done.output
+    assert "nothing is wrong" not in done.output
 
 
 def test_a_name_that_the_campaign_does_not_have(tmp_path: Path) -> None:
@@ -31,4 +32,13 @@ def test_a_name_that_the_campaign_does_not_have(tmp_path: Path) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text(text.replace("T_cool", "T_jacket"))
     with pytest.raises(UserError, match="'T_jacket' is neither"):
+        list(check_models(DATA, [bad]))
+    done = CliRunner().invoke(app, ["check", str(DATA), "--model", str(bad)])
+    assert (done.exit_code, "nothing is wrong" in done.output) == (1, False)
+
+
+def test_an_output_that_is_an_input(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.toml"
+    bad.write_text((DATA / "dry_thermobalance.toml").read_text().replace("E_R0T", "P_drive"))
+    with pytest.raises(UserError, match=r"outputs\.P_drive: 'P_drive' is an input of the campaign"):
         list(check_models(DATA, [bad]))

@@ -118,6 +118,14 @@ def test_a_value_on_its_bound_is_read_back(tmp_path: Path) -> None:
     assert read_model(tmp_path / "m.toml").parameters["G_b1_b2"].value == pytest.approx(1 / 48)
 
 
+def test_terms_of_one_name_are_told_apart_in_a_file(tmp_path: Path) -> None:
+    model = thermobalance()
+    write_model(tmp_path / "m.toml", model.with_terms(model.terms[0], model.terms[0]))
+    again = [term.name for term in read_model(tmp_path / "m.toml").terms]
+    first = model.terms[0].name
+    assert again == [*(term.name for term in model.terms), f"{first} (2)", f"{first} (3)"]
+
+
 def test_a_lag_becomes_a_hidden_state(tmp_path: Path) -> None:
     model = expanded(read_model(written(tmp_path, GOOD)))
     assert text(model.terms[-1].expression) == "(P - lag_1)/tau"
@@ -172,6 +180,10 @@ def test_a_memory_of_memories_starts_settled(tmp_path: Path) -> None:
         ("y = {", '"ÿ" = {', ["line 13", "cannot name a state"]),
         ("G    =", "a =", ["line 6", "also a state"]),
         ('per = "recording"', 'per = "day"', ["line 7", "recording"]),
+        ("start = 24.0", 'start = "24"', ["line 6", "should be a valid number"]),
+        ("start = 24.0", "start = nan", ["line 6", "should be a finite number"]),
+        ('from = "b"', 'from = "a"', ["line 18", "'a' is also into"]),
+        ("[outputs]", '[[terms]]\nname = "link"\ninto = "a"\nexpression = "G"\n[outputs]', ["named 'link'"]),
         ('start = "T_env"', 'start = "lag(T_env, 600)"', ["line 11", "before the recording"]),
         ('start = "T_env"', 'start = "22 + delay(T_env, 600)"', ["line 11", "before the recording"]),
         ("lag(P, tau)", "delay(b, 600)", ["line 23", "'delay(b, 600)'", "only a channel can be delayed"]),

@@ -143,6 +143,30 @@ def test_a_spread_is_a_positive_number(write: Write, given: str, said: str) -> N
     ), told
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("noise = 0.5", "noise = inf", "channels.E_Y0C.noise: should be a finite number, not inf"),
+        ("noise = 0.5", "noise = nan", "channels.E_Y0C.noise: should be a finite number, not nan"),
+        ("noise = 0.5", 'noise = "0.5"', "channels.E_Y0C.noise: should be a valid number, not '0.5'"),
+        (
+            '"fit.csv"',
+            '"fit.csv", set = { speed = "1" }',
+            "recordings.fit.set.speed: should be a valid number",
+        ),
+        (
+            '"fit.csv"',
+            '"fit.csv", set = { speed = nan }',
+            "recordings.fit.set.speed: should be a finite number",
+        ),
+        ('fit = { file = "fit.csv" }', "", "recordings: is empty; it needs at least 1"),
+    ],
+)
+def test_numbers_are_finite_and_no_texts(write: Write, old: str, new: str, said: str) -> None:
+    told = found(write(campaign=CAMPAIGN.replace(old, new)))
+    assert any(line.startswith("error: campaign.toml") and said in line for line in told), told
+
+
 def test_a_spread_belongs_to_inputs(write: Write) -> None:
     told = found(write(campaign=CAMPAIGN.replace("noise = 0.5", "spread = 0.5")))
     wanted = "error: campaign.toml, line 6: channels.E_Y0C: spread belongs to inputs of models, not to"
@@ -174,6 +198,28 @@ def test_a_clock_that_is_put_back(write: Write) -> None:
     assert "UTC" in told
 
 
+@pytest.mark.parametrize(
+    ("stamps", "said"),
+    [
+        (
+            [60e3 * k for k in range(480)],
+            "a stamp every 60000 s over 333 days: perhaps these are milliseconds",
+        ),
+        ([1.7e12 + 1000 * k for k in range(9000)], "a stamp every 1000 s over 104 days: perhaps these are"),
+        ([45000 + k / 1440 for k in range(361)], "361 rows within 0.25 s: perhaps these are days"),
+        ([k / 17280 for k in range(20000)], "20000 rows within 1.16 s: perhaps these are days"),
+        ([3600.0 * k for k in range(3000)], ""),  # hourly for four months
+        ([60.0 * k for k in range(4000)], ""),
+        ([0.1 * k for k in range(361)], ""),
+    ],
+)
+def test_stamps_that_are_hardly_seconds(write: Write, stamps: list[float], said: str) -> None:
+    told = found(write(with_column(0, [f"{stamp:.10g}" for stamp in stamps])))
+    clock = [line for line in told if "time in seconds" in line]
+    assert bool(clock) == bool(said)
+    assert all(line.startswith(f"warning: fit.csv, line 2: {said}") for line in clock), clock
+
+
 def test_a_trouble_of_many_cells_is_told_once(write: Write) -> None:
     told = found(write(with_column(1, ["bad"] * 60)))
     assert [line for line in told if "not a number" in line] == [
@@ -196,6 +242,15 @@ def test_all_mistakes_of_the_campaign_file_are_told_and_the_rest_is_checked(writ
     ]
     for beginning in beginnings:
         assert any(line.startswith(beginning) for line in told), (beginning, told)
+
+
+def test_one_recording_under_two_names(write: Write) -> None:
+    text = CAMPAIGN + 'again = { file = "fit.csv", set = { speed = 3 } }\n'
+    told = [line for line in found(write(campaign=text)) if "same readings" in line]
+    assert told == [
+        "warning: campaign.toml, line 10: recordings.again holds the same readings as fit; "
+        "name another file, or take one of them out"
+    ]
 
 
 def test_parquet_troubles(write: Write) -> None:

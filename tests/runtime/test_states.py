@@ -195,15 +195,47 @@ def test_instants_do_not_depend_on_the_clock_of_the_computer(
 
 def test_the_command_says_what_is_missing(model_file: Path, tmp_path: Path) -> None:
     runner = CliRunner()
-    for words, sentence in (
-        ([str(model_file)], "no key is trusted"),
-        ([str(model_file), "--allow-unsigned"], "say where the readings come from"),
-        ([str(model_file), "--allow-unsigned", "--inputs", "none.csv"], "there is no such file"),
-        ([str(tmp_path / "none.json")], "there is no such file"),
-        ([str(model_file), "--back"], "--back needs --state"),
-        ([str(model_file), "--back", "--state", str(tmp_path)], "no step back"),
-        ([str(model_file), "--trust", str(tmp_path / "no.pub")], "there is no such key"),
+    model, inputs = str(model_file), ["--inputs", "-"]
+    for words, sentence, status in (
+        ([model, *inputs], "no key is trusted", 1),
+        ([model, "--allow-unsigned", "--inputs", "none.csv"], "there is no such file", 1),
+        ([model, "--allow-unsigned", "--inputs", str(tmp_path)], "this is a folder", 1),
+        ([str(tmp_path / "none.json"), *inputs], "there is no such file", 1),
+        ([model, "--back", "--state", str(tmp_path)], "no step back", 1),
+        ([model, *inputs, "--trust", str(tmp_path / "no.pub")], "there is no such key", 1),
+        ([model, "--allow-unsigned"], "say where the readings come from", 2),
+        ([model, "--back"], "--back needs --state", 2),
+        ([model, *inputs, "--opcua-demo"], "--inputs and --opcua-demo: the readings come from one", 2),
+        ([model, *inputs, "--seconds", "5"], "--seconds does not go with --inputs", 2),
+        ([model, "--opcua-demo", "--out", "o.csv"], "--out does not go with --opcua-demo", 2),
+        ([model, *inputs, "--shadow-hours", "-1"], "--shadow-hours -1 is no length of time", 2),
+        ([model, *inputs, "--shadow-hours", "nan"], "--shadow-hours nan is no length of time", 2),
     ):
         done = runner.invoke(app, ["compensate", *words])
-        assert done.exit_code == 1
+        assert done.exit_code == status
         assert sentence in done.output
+
+
+def test_the_output_may_not_be_what_is_read(model_file: Path, tmp_path: Path) -> None:
+    inputs = tmp_path / "in.csv"
+    inputs.write_text("time,T_env\n0,20\n")
+    for used in (inputs, model_file):
+        before = used.read_bytes()
+        command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", str(inputs)]
+        done = CliRunner().invoke(app, [*command, "--out", str(used)])
+        assert (done.exit_code, "--out names the same file" in done.output) == (1, True)
+        assert used.read_bytes() == before
+
+
+def test_inputs_that_cannot_be_read_leave_an_older_output(model_file: Path, tmp_path: Path) -> None:
+    inputs, out = tmp_path / "in.csv", tmp_path / "offsets.csv"
+    inputs.write_text("time;T_env\n0;20\n")
+    command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", str(inputs), "--out", str(out)]
+    assert CliRunner().invoke(app, command).exit_code == 1
+    assert not out.exists()
+    out.write_text("what was there")
+    assert CliRunner().invoke(app, command).exit_code == 1
+    assert out.read_text() == "what was there"
+    inputs.write_text("time,T_env\n0,20\n")
+    assert CliRunner().invoke(app, command).exit_code == 0
+    assert out.read_text().startswith("time,state,status")

@@ -74,6 +74,8 @@ def test_command_conceals_and_reveals(tmp_path: Path) -> None:
         ("radiatio=1", "no effect 'radiatio'"),
         ("radiation", "needs a size in m2"),
         ("radiation=much", "needs a size in m2"),
+        ("radiation=-1e9", "give 0 to 15 \\(usual is 0.2 to 1.5 m2\\)"),
+        ("radiation=16", "is not possible"),
         ("radiation@leg=1", "no body 'leg'"),
         ("flooded_gap@table=1", "between two bodies"),
     ],
@@ -89,12 +91,42 @@ def test_mistakes_elsewhere(tmp_path: Path) -> None:
         (["--hours", "0"], "not possible"),
         (["--fault", "rezro=1"], "no fault 'rezro'"),
         (["--campaign", "nmv"], "no campaign 'nmv'"),
-        (["--effect", "help"], "choose an effect"),
+        (["--conceal", "--effect", "radiation=0.5"], "leave out --effect, or --conceal"),
     ):
         result = CliRunner().invoke(app, ["record", "--out", str(tmp_path / "x"), *option])
-        assert result.exit_code == 1
+        assert result.exit_code == 2
         assert part in result.output
     assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize("words", [["--effect", "help"], ["--fault", "help"], ["--effect", "radiation=help"]])
+def test_help_lists_effects_and_faults(words: list[str]) -> None:
+    result = CliRunner().invoke(app, ["record", *words])
+    assert result.exit_code == 0
+    assert "radiation" in result.stdout
+    assert "clock_shift" in result.stdout
+
+
+def test_a_folder_with_other_recordings_is_left_alone(tmp_path: Path) -> None:
+    def record(*words: str) -> tuple[int, str]:
+        result = CliRunner().invoke(app, ["record", "--hours", "2", "--out", str(tmp_path / "x"), *words])
+        return result.exit_code, result.output
+
+    assert record("--recordings", "2")[0] == 0
+    before = {path: path.read_bytes() for path in (tmp_path / "x").iterdir()}
+    status, said = record()
+    assert (status, "another campaign (with recording_1.csv.gz)" in said) == (1, True)
+    assert {path: path.read_bytes() for path in (tmp_path / "x").iterdir()} == before
+    assert record("--recordings", "2", "--seed", "2")[0] == 0  # the same names: all is replaced
+
+
+def test_an_answer_goes_with_its_recordings(tmp_path: Path) -> None:
+    command = ["record", "--hours", "2", "--out", str(tmp_path / "x")]
+    assert CliRunner().invoke(app, [*command, "--effect", "radiation=0.5", "--reveal"]).exit_code == 0
+    answers = [tmp_path / "x.answer.json", tmp_path / "x" / "answer.json"]
+    assert all(path.exists() for path in answers)
+    assert CliRunner().invoke(app, command).exit_code == 0
+    assert not any(path.exists() for path in answers)
 
 
 def test_faults_do_what_they_say() -> None:

@@ -54,7 +54,10 @@ class EffectForm(Strict):
     unit: str = Field("W", description="unit of the amplitude")
     plausible: float = Field(gt=0, description="usual size of the amplitude")
     most: float = Field(
-        inf, gt=0, description="largest size that is physical, 1 for a share; default no limit"
+        inf,
+        gt=0,
+        allow_inf_nan=True,
+        description="largest size that is physical, 1 for a share; default no limit",
     )
     sign: Literal[-1, 0, 1] = Field(1, description="sign of the amplitude, 0 where physics leaves it open")
     shapes: dict[str, ShapeForm] = {}
