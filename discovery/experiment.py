@@ -9,16 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from discovery.errors import UserError
-from discovery.experimentfile import (
-    Experiment,
+from discovery.experimentfile import Experiment, load_experiment, only
+from discovery.experimentform import (
     ExportForm,
     FileEntry,
     MismatchForm,
     ModelEntry,
     ReducedEntry,
     SuperpositionEntry,
-    load_experiment,
-    only,
     separate,
 )
 from discovery.fitted import Fitted, judged

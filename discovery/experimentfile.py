@@ -1,31 +1,26 @@
-"""The experiment file: which recordings are fitted, which stay unseen, which models compete."""
+"""The experiment: its file with its recordings loaded, and what no form can say of it checked."""
 
 from __future__ import annotations
 
 import os
-import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import cast
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Tag
 
 from discovery.errors import UserError
+from discovery.experimentform import ExperimentForm, FileEntry, ModelEntry, separate
 from discovery.files import dotted, locate, read_text, read_toml
-from discovery.fitting.fit import Loss
-from discovery.mismatch.catalogue.form import EffectForm
 from discovery.models import Model, check_model, read_model
 from discovery.models.check import check_outputs
 from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, campaign_path
 from discovery.recordings.roles import CORRECTION
 from discovery.recordings.twins import twins
-from discovery.schema import Strict, suggest
-from discovery.sparse.options import SparseOptions
-from discovery.targets import Target
+from discovery.schema import suggest
 
 _INPUT_ROLES = (
     "ambient temperature",
@@ -33,98 +28,6 @@ _INPUT_ROLES = (
     "fluid temperature",
 )  # of eqs. (8) and (9), in the paper's order
 _ELSE = ("rotation speed", "other input")
-
-
-def _file_name(name: str) -> str:
-    if not re.fullmatch(r"\w[\w .+-]*", name):
-        raise ValueError(f"'{name}' becomes the name of a file: use letters, digits, space, _ . + -")
-    return name
-
-
-# What several kinds of models may say
-Inputs = Annotated[list[str] | None, Field(min_length=1, description="default by role, as in the paper")]
-Outputs = Annotated[list[str] | None, Field(min_length=1, description="default: those of the experiment")]
-Pull = Annotated[Loss, Field(description="how outliers pull")]
-
-
-class FileEntry(Strict):
-    """A model that somebody wrote down."""
-
-    kind: Literal["file"] = "file"
-    file: str = Field(min_length=1, description="model file, relative to the experiment file")
-    outputs: Outputs = None
-    loss: Pull = "linear"
-
-
-class ReducedEntry(Strict):
-    """Equation (9)."""
-
-    kind: Literal["reduced"]
-    inputs: Inputs = None
-    outputs: Outputs = None
-    loss: Pull = "linear"
-
-
-class SuperpositionEntry(Strict):
-    """Equation (8), all influences together, or one after the other from recordings of their own."""
-
-    kind: Literal["superposition"]
-    inputs: Inputs = None
-    outputs: Outputs = None
-    separate: dict[str, Annotated[list[str], Field(min_length=1)]] | None = Field(
-        None,
-        min_length=1,
-        description="input -> its recordings; fitted in this order, one input after the other",
-    )
-    loss: Pull = "linear"
-
-
-def _kind(entry: Any) -> str:
-    return str(entry.get("kind", "file") if isinstance(entry, Mapping) else getattr(entry, "kind", "file"))
-
-
-ModelEntry = FileEntry | ReducedEntry | SuperpositionEntry | SparseOptions
-TaggedEntry = Annotated[
-    Annotated[FileEntry, Tag("file")]
-    | Annotated[ReducedEntry, Tag("reduced")]
-    | Annotated[SuperpositionEntry, Tag("superposition")]
-    | Annotated[SparseOptions, Tag("sindy")],
-    Discriminator(_kind),
-]
-
-
-class MismatchForm(Strict):
-    """[mismatch]: the model whose missing physics is looked for."""
-
-    model: str
-    effects: list[EffectForm] = Field([], description="effects of your own, beside the catalogue's")
-
-
-class ExportForm(Strict):
-    """[export]: the model that goes to the machine, and the forms it takes."""
-
-    model: str
-    to: list[Target] = Field(["json"], min_length=1)
-
-
-class ExperimentForm(Strict):
-    """The whole file."""
-
-    name: Annotated[str, AfterValidator(_file_name)]
-    campaign: str = Field(description="campaign file or its folder, relative to the experiment file")
-    outputs: list[str] | None = Field(
-        None,
-        min_length=1,
-        description="default: every channel of role error, else of role temperature",
-    )
-    fit: list[str] = Field(min_length=1, description="recordings that fits may see")
-    held_out: list[str] = Field([], description="recordings that nothing sees before the end")
-    cross_validate: bool = Field(
-        True, description="leave recordings and blocks out of the fit, one after the other"
-    )
-    models: dict[Annotated[str, AfterValidator(_file_name)], TaggedEntry] = Field(min_length=1)
-    mismatch: MismatchForm | None = None
-    export: ExportForm | None = None
 
 
 @dataclass(frozen=True)
@@ -240,11 +143,6 @@ def _recordings(path: Path, form: ExperimentForm) -> list[str]:
         if name not in known:
             raise _mistake(path, key, f"no recording '{name}'; {suggest(name, known)}")
     return list(named)
-
-
-def separate(entry: ModelEntry) -> Mapping[str, list[str]]:
-    """Input -> recordings of its own, where a superposition names them."""
-    return (isinstance(entry, SuperpositionEntry) and entry.separate) or {}
 
 
 def _of_role(campaign: Campaign, role: str) -> list[str]:

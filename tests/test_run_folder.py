@@ -16,7 +16,8 @@ from typer.testing import CliRunner
 from discovery.cli import app
 from discovery.errors import UserError
 from discovery.experiment import diagnose, run
-from discovery.experimentfile import ExportForm, load_experiment
+from discovery.experimentfile import load_experiment
+from discovery.experimentform import ExportForm
 from discovery.export import export_run, replay
 from discovery.inputfiles import input_files
 from discovery.mismatch.summary import summary as diagnosis_summary

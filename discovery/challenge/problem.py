@@ -15,7 +15,7 @@ from discovery.experimentfile import Experiment, load_experiment
 from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.prove import explained, improvements
 from discovery.models import Model
 

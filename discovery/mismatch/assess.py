@@ -9,7 +9,7 @@ import numpy as np
 
 from discovery.fitting import Fit, Noise, fit_model
 from discovery.mismatch.context import Context
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.lens import Lens, View, log_mean_exp
 from discovery.models import Model
 

@@ -12,7 +12,7 @@ from discovery.dynamics import Grid, make_grid
 from discovery.fitting import Fit, Noise, fit_model
 from discovery.fitting.noise import resolution
 from discovery.mismatch.catalogue.effect import Effect
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.lens import Lens
 from discovery.mismatch.outliers import Outlier, find_outliers, without
 from discovery.mismatch.scales import scaled

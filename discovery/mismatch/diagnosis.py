@@ -18,7 +18,7 @@ from discovery.mismatch.deliver import delivered, written
 from discovery.mismatch.describe import Curve, Description, curves, describe
 from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.locate import Location, locate
 from discovery.mismatch.prove import Improvement, compare, explained, improvements
 from discovery.mismatch.search import Search, search
@@ -116,7 +116,6 @@ def diagnose(
     before = free_forcing(context, found.baseline)
     after = free_forcing(context, found.best) if found.best is not found.baseline else before
     verdict = decide(context, found, before, after)
-    shown = verdict.named or verdict.candidates
     location = locate(context, found.baseline, found.best, verdict.named, before)
     tell("fitting what was found for free runs")
     old = delivered(context, found.baseline)
@@ -128,39 +127,44 @@ def diagnose(
     if lost := ", ".join(r for r in held_out if r not in proof):
         reason = f"the model itself runs away on unseen recording {lost}: nothing can be proved there"
         verdict = replace(verdict, reasons=(*verdict.reasons, reason))
-    unexplained = verdict.word == UNEXPLAINED and bool(before)
     tell("asking for the next experiment")
-    white = np.array(noise.white)
-    rivals = [r for n in shown for r in n.rivals if r.below <= RIVAL]
-    rival_model = _rival_model(found, rivals[0].hypothesis) if rivals else None
-    if verdict.word == NO_MISMATCH:
-        question = _smallest(found)
-    elif verdict.word == FAULT:
-        question = (
-            "check the device and repeat the recording; a fault of the measuring chain needs no new physics"
-        )
-    else:
-        question = next_experiment(context, found.best.fit.model, rival_model, white)
+    question = _question(context, found, verdict)
     levels = [v.level for v in found.baseline.views]
     top = found.looks[0][0].gain if found.looks[0] else 0.0
+    unexplained = verdict.word == UNEXPLAINED and bool(before)
     return Diagnosis(
-        context,
-        found,
-        old,
-        new,
-        verdict,
-        location,
-        tuple(before),
-        _on_fit(old, new),
-        proof,
-        false_alarm(found.board, int(np.argmax(levels)), top),
-        repaired,
-        describe(context, found.baseline, before[0]) if unexplained else None,
-        tuple(curves(found.baseline, before[0])) if before and verdict.word != NO_MISMATCH else (),
-        tuple(named_again(found, n.hypothesis) for n in verdict.named),
-        question,
-        clock.perf_counter() - began,
+        context=context,
+        search=found,
+        before=old,
+        after=new,
+        verdict=verdict,
+        location=location,
+        forcings=tuple(before),
+        fit=_on_fit(old, new),
+        held_out=proof,
+        p_value=false_alarm(found.board, int(np.argmax(levels)), top),
+        repaired=repaired,
+        description=describe(context, found.baseline, before[0]) if unexplained else None,
+        curves=tuple(curves(found.baseline, before[0])) if before and verdict.word != NO_MISMATCH else (),
+        checked=tuple(named_again(found, n.hypothesis) for n in verdict.named),
+        question=question,
+        seconds=clock.perf_counter() - began,
     )
+
+
+def _question(context: Context, found: Search, verdict: Verdict) -> str:
+    """What to do next."""
+    if verdict.word == NO_MISMATCH:
+        return _smallest(found)
+    if verdict.word == FAULT:
+        return (
+            "check the device and repeat the recording; a fault of the measuring chain needs no new physics"
+        )
+    shown = verdict.named or verdict.candidates
+    rivals = [r for n in shown for r in n.rivals if r.below <= RIVAL]
+    rival = _rival_model(found, rivals[0].hypothesis) if rivals else None
+    white = np.array(found.best.best_view.noise.white)
+    return next_experiment(context, found.best.fit.model, rival, white)
 
 
 def _on_fit(before: Assessment, after: Assessment) -> Improvement:

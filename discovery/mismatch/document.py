@@ -9,7 +9,7 @@ import numpy as np
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.describe import heat_over_time
 from discovery.mismatch.forcing import alike
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.verdict import FAULT, UNEXPLAINED, Named
 from discovery.terms import text
 
@@ -28,56 +28,16 @@ def _number(value: float | None, digits: int = 5) -> float | None:
 
 def document(d: Diagnosis) -> dict[str, Any]:
     """diagnosis.json of a diagnosis."""
-    baseline, best, context = d.search.baseline, d.search.best, d.context
-    outputs = context.outputs
-    white = dict(zip(baseline.views[0].noise.outputs, baseline.views[0].noise.white, strict=True))
-    rms = {
-        name: _number(
-            float(np.sqrt(np.nanmean(np.concatenate([r[:, y] for r in baseline.lens.residuals]) ** 2)))
-        )
-        for y, name in enumerate(outputs)
-    }
-    noise = best.best_view.noise
-    top = d.search.looks[0][:12]
-    states = context.fit_states
-    rate = not any(s.capacity for s in context.model.states.values())
+    rate = not any(s.capacity for s in d.context.model.states.values())
     return {
-        "model": context.model.name,
+        "model": d.context.model.name,
         "verdict": d.verdict.word,
         "reasons": list(d.verdict.reasons),
         "about": "the states of this model are the errors themselves: effects act on their rates"
         if rate
         else "heat flows in W",
-        "detection": {
-            "p_value": _number(d.p_value, 3),
-            "log_evidence": _number(d.search.gain),
-            "free_forcing_log_evidence": _number(d.forcings[0].gain) if d.forcings else None,
-            "noise": {name: _number(v) for name, v in white.items()},
-            "slow_noise": {n: _number(v) for n, v in zip(noise.outputs, noise.slow, strict=True)},
-            "everyday_heat_W": {n: _number(v) for n, v in (noise.heat or {}).items()},
-            "residual_rms": rms,
-        },
-        "location": {
-            "outputs": dict(d.location.outputs),
-            "states": dict(d.location.states),
-            "alike": [list(group) for group in alike(list(d.forcings)) if len(group) > 1],
-            "windows": [
-                {
-                    "recording": w.recording,
-                    "start_s": _number(w.start_s, 7),
-                    "end_s": _number(w.end_s, 7),
-                    "state": w.state,
-                    "heat_W": _number(w.heat, 4),
-                }
-                for w in d.location.windows
-            ],
-            "regime": d.location.regime,
-            "unmodelled_heat_W": {
-                f.state: _number(float(np.sqrt(np.mean(np.concatenate(list(f.heat.values())) ** 2))), 3)
-                for f in d.forcings
-                if f.state in states
-            },
-        },
+        "detection": _detection(d),
+        "location": _location(d),
         "physics": [_physics(d, n, c) for n, c in zip(d.verdict.named, d.checked, strict=True)]
         or _outliers(d),
         "alternatives": _alternatives(d.verdict.named),
@@ -90,29 +50,10 @@ def document(d: Diagnosis) -> dict[str, Any]:
                 "share_that_a_refit_leaves": _number(c.share, 3),
                 "decidable": c.decidable,
             }
-            for c in top
+            for c in d.search.looks[0][:12]
         ],
         "closest": [_claim(n.hypothesis) for n in d.verdict.candidates],
-        "improvement": {
-            "fit": {
-                "rms_before": _number(d.fit.before),
-                "rms_after": _number(d.fit.after),
-                "noise_floor": _number(d.fit.floor),
-            },
-            "held_out": {
-                run: {
-                    "rms_before": _number(i.before),
-                    "rms_after": _number(i.after),
-                    "noise_floor": _number(i.floor),
-                    "gain_low": _number(i.low),
-                    "gain_high": _number(i.high),
-                    **({"runs_away": True} if np.isinf(i.after) else {}),
-                }
-                for run, i in d.held_out.items()
-            },
-            "contradicted_by": [run for run, i in d.held_out.items() if d.repaired and i.contradicts],
-            "explained": _number(d.explained, 4),
-        },
+        "improvement": _improvement(d),
         "set_aside": [
             {
                 "output": o.output,
@@ -135,6 +76,74 @@ def document(d: Diagnosis) -> dict[str, Any]:
         ),
         "next_experiment": d.question,
         "seconds": round(d.seconds, 2),
+    }
+
+
+def _detection(d: Diagnosis) -> dict[str, Any]:
+    """What is left and what noise it is held against."""
+    baseline, noise = d.search.baseline, d.search.best.best_view.noise
+    known = baseline.views[0].noise
+    left = {
+        name: float(np.sqrt(np.nanmean(np.concatenate([r[:, y] for r in baseline.lens.residuals]) ** 2)))
+        for y, name in enumerate(d.context.outputs)
+    }
+    return {
+        "p_value": _number(d.p_value, 3),
+        "log_evidence": _number(d.search.gain),
+        "free_forcing_log_evidence": _number(d.forcings[0].gain) if d.forcings else None,
+        "noise": {name: _number(v) for name, v in zip(known.outputs, known.white, strict=True)},
+        "slow_noise": {n: _number(v) for n, v in zip(noise.outputs, noise.slow, strict=True)},
+        "everyday_heat_W": {n: _number(v) for n, v in (noise.heat or {}).items()},
+        "residual_rms": {name: _number(rms) for name, rms in left.items()},
+    }
+
+
+def _location(d: Diagnosis) -> dict[str, Any]:
+    """Where and when."""
+    return {
+        "outputs": dict(d.location.outputs),
+        "states": dict(d.location.states),
+        "alike": [list(group) for group in alike(list(d.forcings)) if len(group) > 1],
+        "windows": [
+            {
+                "recording": w.recording,
+                "start_s": _number(w.start_s, 7),
+                "end_s": _number(w.end_s, 7),
+                "state": w.state,
+                "heat_W": _number(w.heat, 4),
+            }
+            for w in d.location.windows
+        ],
+        "regime": d.location.regime,
+        "unmodelled_heat_W": {
+            f.state: _number(float(np.sqrt(np.mean(np.concatenate(list(f.heat.values())) ** 2))), 3)
+            for f in d.forcings
+            if f.state in d.context.fit_states
+        },
+    }
+
+
+def _improvement(d: Diagnosis) -> dict[str, Any]:
+    """The proof."""
+    return {
+        "fit": {
+            "rms_before": _number(d.fit.before),
+            "rms_after": _number(d.fit.after),
+            "noise_floor": _number(d.fit.floor),
+        },
+        "held_out": {
+            run: {
+                "rms_before": _number(i.before),
+                "rms_after": _number(i.after),
+                "noise_floor": _number(i.floor),
+                "gain_low": _number(i.low),
+                "gain_high": _number(i.high),
+                **({"runs_away": True} if np.isinf(i.after) else {}),
+            }
+            for run, i in d.held_out.items()
+        },
+        "contradicted_by": [run for run, i in d.held_out.items() if d.repaired and i.contradicts],
+        "explained": _number(d.explained, 4),
     }
 
 

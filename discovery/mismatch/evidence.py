@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.lens import Lens, View, log_mean_exp
 from discovery.mismatch.signatures import signatures
 

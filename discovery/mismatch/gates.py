@@ -6,7 +6,7 @@ import numpy as np
 
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.signatures import block_signatures
 
 BLOCKS = 12  # per recording, in which an effect is asked for its size

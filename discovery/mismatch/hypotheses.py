@@ -3,110 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from itertools import product
 
 from discovery.mismatch.catalogue.effect import ROLE_OF, Effect
+from discovery.mismatch.hypothesis import BEFORE, Hypothesis
 from discovery.mismatch.places import places
-from discovery.models import Model, Parameter
+from discovery.models import Model
 from discovery.models.units import differences, same_dimension
 from discovery.recordings import Channel
 from discovery.terms import Apply, Expression, Name, Term, names, parse, substitute
-
-BEFORE = Name("what the output showed before")  # no channel has such a name
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """An effect at a place with its shape parameters at given values.
-
-    `terms` enter states; `shown` is what outputs show in addition, in terms of what they showed before
-    (`BEFORE`), or by how much they see the body of `states` moved. Both hold the amplitudes and shapes as
-    parameters.
-    """
-
-    effect: Effect
-    states: tuple[str, ...]
-    amplitudes: tuple[str, ...]
-    terms: tuple[Term, ...] = ()
-    shown: Mapping[str, Expression] = field(default_factory=dict)
-    output: str | None = None
-    recording: str | None = None
-    shapes: Mapping[str, float] = field(default_factory=dict)  # parameter name -> value
-    channels: tuple[str, ...] = ()
-    units: Mapping[str, str] = field(default_factory=dict)  # parameter name -> unit at this place
-    cost: float = 0.0  # log of the number of instants that were searched for it
-    spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # 95 % range of such an instant
-
-    @property
-    def key(self) -> tuple[str, tuple[str, ...], str | None, str | None, tuple[str, ...]]:
-        """What the hypothesis claims, whatever its shape values."""
-        return (self.effect.word, self.states, self.output, self.recording, self.channels)
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        """States, or outputs for what happens in the measuring chain."""
-        return self.states or ((self.output,) if self.output else tuple(self.shown))
-
-    @property
-    def where(self) -> str:
-        """The places, or the recording of what concerns all of it."""
-        return ", ".join(self.places) or self.recording or "all recordings"
-
-    @property
-    def shifts_the_zero(self) -> bool:
-        """Whether outputs are shifted by something that does not depend on what they showed before."""
-        return any(BEFORE.id not in names(change) for change in self.shown.values()) and not self.states
-
-    def at(self, shapes: Mapping[str, float]) -> Hypothesis:
-        """The same claim with other shape values."""
-        return replace(self, shapes={**self.shapes, **shapes})
-
-    def added_to(self, model: Model, start: Mapping[str, float] | None = None) -> Model:
-        """The model with the effect, its amplitudes starting at `start` (default: a tenth of plausible)."""
-        start = start or {}
-        amplitude = self.effect.amplitude
-        parameters = {}
-        for name in self.amplitudes:
-            low = 0.0 if amplitude.sign > 0 else -amplitude.most
-            high = 0.0 if amplitude.sign < 0 else amplitude.most
-            value = start.get(
-                name,
-                amplitude.fixed
-                if amplitude.fixed is not None
-                else 0.1 * amplitude.plausible * (amplitude.sign or 1),
-            )
-            parameters[name] = self._parameter(name, value, low, high, amplitude.fixed is not None)
-        for (name, value), shape in zip(self.shapes.items(), self.effect.shapes, strict=True):
-            parameters[name] = self._parameter(
-                name, start.get(name, value), shape.low, shape.high, shape.fixed
-            )
-        outputs = {
-            name: Apply("+", (model.outputs.get(name, Name(name)), extra))
-            for name, extra in self.shows(model).items()
-        }
-        return model.with_terms(*self.terms, parameters=parameters, outputs=outputs)
-
-    def shows(self, model: Model) -> dict[str, Expression]:
-        """What outputs show in addition where the effect comes to a model: whatever else that one has."""
-        found: dict[str, Expression] = {}
-        for name, change in self.shown.items():
-            y = model.outputs.get(name, Name(name))
-            if self.states:
-                moved = Apply("+", (Name(self.states[0]), change))
-                found[name] = Apply("-", (substitute(y, {self.states[0]: moved}), y))
-            else:
-                found[name] = substitute(change, {BEFORE.id: y})
-        return found
-
-    def _parameter(self, name: str, value: float, low: float, high: float, fixed: bool) -> Parameter:
-        unit = self.units.get(name, "1")
-        if self.recording is None:
-            return Parameter(value, unit, low, high, fixed)
-        # An event of one recording: the common value 0 keeps it out of every other one.
-        return Parameter(
-            0.0, unit, min(low, 0.0), max(high, 0.0), fixed, True, values={self.recording: value}
-        )
 
 
 def hypotheses(
@@ -156,26 +62,10 @@ def _claims(
         runs = recordings[1:]  # what is common to all recordings is the model's own parameter
     for chosen in product(*choices):
         binding: dict[str, Expression] = {v: Name(c) for v, c in zip(wanted, chosen, strict=True)}
-        for states, source_terms, shown in places(effect, model, outputs, channels):
+        for states, replaced, shown in places(effect, model, outputs, channels):
             for run in runs:
-                tag = [
-                    *(chosen if several else ()),
-                    *(states or shown[:1] if len(shown) == 1 or states else ()),
-                    *((run,) if run else ()),
-                ]
-                yield _claim(
-                    effect,
-                    model,
-                    formula,
-                    binding,
-                    states,
-                    source_terms,
-                    shown,
-                    run,
-                    tag,
-                    channels,
-                    chosen if several else (),
-                )
+                place = _Place(states, replaced, shown, run, chosen if several else (), binding)
+                yield _claim(effect, model, place, channels)
 
 
 def _drives(name: str, model: Model) -> bool:
@@ -190,20 +80,22 @@ def _is_heat(variable: str, channel: Channel, effect: Effect) -> bool:
     return same_dimension(channel.unit, "W")
 
 
-def _claim(
-    effect: Effect,
-    model: Model,
-    formula: Expression,
-    binding: dict[str, Expression],
-    states: tuple[str, ...],
-    replaced: tuple[Term, ...],
-    shown: tuple[str, ...],
-    run: str | None,
-    tag: list[str],
-    channels: Mapping[str, Channel],
-    chosen: tuple[str, ...],
-) -> Hypothesis:
-    suffix = "_".join(tag)
+@dataclass(frozen=True)
+class _Place:
+    """Where a claim acts, and what its formula stands for there."""
+
+    states: tuple[str, ...]
+    replaced: tuple[Term, ...]  # terms in which a channel becomes another
+    shown: tuple[str, ...]  # outputs
+    run: str | None
+    chosen: tuple[str, ...]  # channels, where several have the role
+    binding: Mapping[str, Expression]  # variable of the formula -> channel
+
+
+def _claim(effect: Effect, model: Model, place: _Place, channels: Mapping[str, Channel]) -> Hypothesis:
+    states, shown = place.states, place.shown
+    at = states or (shown if len(shown) == 1 else ())
+    suffix = "_".join([*place.chosen, *at, *((place.run,) if place.run else ())])
 
     def own(name: str, extra: str = "") -> str:
         full = "_".join(part for part in (name, extra, suffix) if part)
@@ -212,51 +104,27 @@ def _claim(
         return full
 
     shape_names = {shape.name: own(shape.name) for shape in effect.shapes}
-    rename: dict[str, Expression] = {short: Name(full) for short, full in shape_names.items()}
     shapes = {full: effect.shapes[i].grid[0] for i, full in enumerate(shape_names.values())}
-    base = {**binding, **rename}
     several = len(shown) > 1 and not states  # a body has one size for all errors
-    amplitudes = (
-        [own(effect.amplitude.name, output) for output in shown] if several else [own(effect.amplitude.name)]
-    )
-    amplitude = Name(amplitudes[0])
-    terms: list[Term] = []
-    extra: dict[str, Expression] = {}
-    if replaced:  # a channel is replaced in terms of the model: the term with the new channel less the term
-        fresh = substitute(formula, {**base, effect.amplitude.name: amplitude})
-        for term in replaced:
-            if effect.place == "inputs of a recording":
-                swaps = {
-                    c: substitute(formula, {**base, "input": Name(c)})
-                    for c in names(term.expression) & set(channels) - set(model.states)
-                }
-            else:
-                variable = next(v for v in ("fluid", "cooling", "flow") if v in binding)
-                swaps = {n: fresh for n in names(term.expression) if Name(n) == binding[variable]}
-            changed = substitute(term.expression, swaps)
-            difference = Apply("-", (changed, term.expression))
-            if effect.amplitude.name not in names(formula):  # then it switches the replacement on
-                difference = Apply("*", (amplitude, difference))
-            terms.append(
-                Term(f"{effect.title}: {term.name}", term.into, difference, term.source, effect.word)
-            )
+    extras = shown if several else ("",)
+    amplitudes = tuple(own(effect.amplitude.name, extra) for extra in extras)
+    rename: dict[str, Expression] = {short: Name(full) for short, full in shape_names.items()}
+    known = {**place.binding, **rename, effect.amplitude.name: Name(amplitudes[0])}
+    formula = parse(effect.formula, f"effect {effect.word}")
+    terms: tuple[Term, ...] = ()
+    changes: dict[str, Expression] = {}
+    if place.replaced:
+        inputs = set(channels) - set(model.states)
+        terms = tuple(_replacing(effect, formula, known, place, term, inputs) for term in place.replaced)
     elif shown:
-        for name, size in zip(shown, amplitudes if several else amplitudes * len(shown), strict=True):
-            at = {"body": Name(states[0])} if states else {"y": BEFORE}
-            extra[name] = substitute(formula, {**base, **at, effect.amplitude.name: Name(size)})
+        body = {"body": Name(states[0])} if states else {"y": BEFORE}
+        sizes = amplitudes if several else amplitudes * len(shown)
+        changes = {
+            name: substitute(formula, {**known, **body, effect.amplitude.name: Name(size)})
+            for name, size in zip(shown, sizes, strict=True)
+        }
     else:
-        bodies = {"body": Name(states[0]), **({"other": Name(states[1])} if len(states) > 1 else {})}
-        expression = substitute(formula, {**base, **bodies, effect.amplitude.name: amplitude})
-        exchange = len(states) > 1 and effect.place != "neighbour"
-        terms.append(
-            Term(
-                f"{effect.title}, {' and '.join(states)}",
-                states[0],
-                expression,
-                states[1] if exchange else None,
-                effect.word,
-            )
-        )
+        terms = (_flow(effect, formula, known, states),)
     units = {
         name: _unit(effect.amplitude.unit, model, states, output, channels)
         for name, output in zip(amplitudes, shown if several else shown[:1] or ("",), strict=True)
@@ -267,15 +135,52 @@ def _claim(
     return Hypothesis(
         effect,
         states,
-        tuple(amplitudes),
-        tuple(terms),
-        extra,
+        amplitudes,
+        terms,
+        changes,
         shown[0] if len(shown) == 1 else None,
-        run,
+        place.run,
         shapes,
-        chosen,
+        place.chosen,
         units,
     )
+
+
+def _flow(
+    effect: Effect, formula: Expression, known: Mapping[str, Expression], states: tuple[str, ...]
+) -> Term:
+    """A heat flow into a body, out of another where the effect is an exchange."""
+    bodies = {"body": Name(states[0]), **({"other": Name(states[1])} if len(states) > 1 else {})}
+    exchange = len(states) > 1 and effect.place != "neighbour"
+    return Term(
+        f"{effect.title}, {' and '.join(states)}",
+        states[0],
+        substitute(formula, {**known, **bodies}),
+        states[1] if exchange else None,
+        effect.word,
+    )
+
+
+def _replacing(
+    effect: Effect,
+    formula: Expression,
+    known: Mapping[str, Expression],
+    place: _Place,
+    term: Term,
+    inputs: set[str],
+) -> Term:
+    """A term with its channel replaced by the formula, less the term."""
+    if effect.place == "inputs of a recording":
+        used = names(term.expression) & inputs
+        swaps = {c: substitute(formula, {**known, "input": Name(c)}) for c in used}
+    else:
+        variable = next(v for v in ("fluid", "cooling", "flow") if v in place.binding)
+        fresh = substitute(formula, known)
+        swaps = {n: fresh for n in names(term.expression) if Name(n) == place.binding[variable]}
+    difference = Apply("-", (substitute(term.expression, swaps), term.expression))
+    if effect.amplitude.name not in names(formula):  # then it switches the replacement on
+        difference = Apply("*", (known[effect.amplitude.name], difference))
+    return Term(f"{effect.title}: {term.name}", term.into, difference, term.source, effect.word)
 
 
 def _unit(

@@ -14,7 +14,7 @@ from discovery.evaluation.crossvalidation import folds
 from discovery.fitting import Noise, predict_recording
 from discovery.mismatch.assess import Assessment, assess, misfits, refit
 from discovery.mismatch.context import Context
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 
 
 def left_out(context: Context, answer: Assessment, noise: Noise) -> float:

@@ -12,7 +12,8 @@ from discovery.mismatch.assess import WIDE, Assessment, assess
 from discovery.mismatch.context import Context
 from discovery.mismatch.events import place_events
 from discovery.mismatch.evidence import Board, Score, by_claim, make_board, scores
-from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.hypothesis import Hypothesis
 
 
 @dataclass(frozen=True)

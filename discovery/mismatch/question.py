@@ -11,7 +11,8 @@ from discovery.fitting import Noise
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.gates import bent, matters, objections
-from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.leftout import least_added, least_taken, left_out
 from discovery.mismatch.look import attempt, look
 

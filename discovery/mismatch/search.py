@@ -9,7 +9,7 @@ from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.context import Context
 from discovery.mismatch.evidence import Board, Score
 from discovery.mismatch.gates import bent, matters, unseen_lag
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.lens import Lens
 from discovery.mismatch.look import again, attempt, look
 from discovery.mismatch.question import BLUNT, NAMED, prune, question, recurs, supported, trace

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.mismatch.evidence import Board
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.search import Search
 
 Array = NDArray[np.float64]
@@ -29,9 +29,8 @@ def named_again(found: Search, h: Hypothesis, seed: int = 0) -> float | None:
     view = int(np.argmax([v.level for v in found.best.views]))
     z = board.projected[view]
     shapes = {name: found.best.model.parameters[name].value for name in h.shapes}
-    mine = [k for k in index if board.hypotheses[board.owners[k]].key == h.key]
     nearest = min(
-        mine,
+        index,
         key=lambda k: sum(
             abs(np.log(max(v, 1e-9) / max(shapes.get(n, v), 1e-9)))
             for n, v in board.hypotheses[board.owners[k]].shapes.items()

@@ -14,7 +14,7 @@ from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.forcing import Forcing
 from discovery.mismatch.gates import bent, objections, unseen_lag
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.question import BLUNT, NAMED, recurs, trace
 from discovery.mismatch.search import Search
 

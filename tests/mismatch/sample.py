@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
 from discovery.mismatch.catalogue import Effect
-from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, names, parse

@@ -15,7 +15,7 @@ from discovery.dynamics.system import predict
 from discovery.mismatch.catalogue import Effect, catalogue
 from discovery.mismatch.catalogue.effect import ROLE_OF
 from discovery.mismatch.catalogue.worked import worked
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.scales import scaled
 from discovery.models import Model, read_model, write_model
 from discovery.models.dimensions import check_dimensions

@@ -14,7 +14,8 @@ from discovery.fitting import Noise
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import make_context
 from discovery.mismatch.evidence import Board, by_claim, make_board, scores
-from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.lens import Lens, View
 from discovery.mismatch.signatures import signatures
 from tests.mismatch import machine

@@ -11,7 +11,8 @@ from discovery.mismatch.assess import assess, refit
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
 from discovery.mismatch.gates import objections
-from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.look import look
 from discovery.terms import Apply, Expression, names
 from tests.mismatch.machine import SEEN, campaign, changed, model, simulated

@@ -9,7 +9,8 @@ from discovery.dynamics import make_grid, make_system, simulate
 from discovery.dynamics.system import predict
 from discovery.mismatch.catalogue import Effect, catalogue
 from discovery.mismatch.events import heat_steps
-from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.signatures import signatures
 from tests.mismatch import machine
 from tests.mismatch.sample import expand, inside, sample, trajectory

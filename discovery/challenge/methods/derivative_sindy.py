@@ -17,7 +17,8 @@ from discovery.dynamics import Trajectory
 from discovery.dynamics.system import output_matrix
 from discovery.errors import UserError
 from discovery.mismatch.assess import Assessment, assess
-from discovery.mismatch.hypotheses import Hypothesis, hypotheses
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.sparse.derivative import discrepancy_terms, smoothed_derivative
 from discovery.terms import evaluate
 

@@ -17,7 +17,7 @@ from discovery.errors import UserError
 from discovery.fitting.noise import white_noise
 from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.context import Context
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.look import look
 
 MOST = 3  # effects that may be added

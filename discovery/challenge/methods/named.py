@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from discovery.mismatch.assess import Assessment
-from discovery.mismatch.hypotheses import Hypothesis
+from discovery.mismatch.hypothesis import Hypothesis
 
 
 def named_entry(found: Assessment, h: Hypothesis, probability: float) -> dict[str, Any]:

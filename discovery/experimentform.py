@@ -1,0 +1,112 @@
+"""The form of an experiment file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, Tag
+
+from discovery.fitting.fit import Loss
+from discovery.mismatch.catalogue.form import EffectForm
+from discovery.schema import Strict
+from discovery.sparse.options import SparseOptions
+from discovery.targets import Target
+
+
+def _file_name(name: str) -> str:
+    if not re.fullmatch(r"\w[\w .+-]*", name):
+        raise ValueError(f"'{name}' becomes the name of a file: use letters, digits, space, _ . + -")
+    return name
+
+
+# What several kinds of models may say
+Inputs = Annotated[list[str] | None, Field(min_length=1, description="default by role, as in the paper")]
+Outputs = Annotated[list[str] | None, Field(min_length=1, description="default: those of the experiment")]
+Pull = Annotated[Loss, Field(description="how outliers pull")]
+
+
+class FileEntry(Strict):
+    """A model that somebody wrote down."""
+
+    kind: Literal["file"] = "file"
+    file: str = Field(min_length=1, description="model file, relative to the experiment file")
+    outputs: Outputs = None
+    loss: Pull = "linear"
+
+
+class ReducedEntry(Strict):
+    """Equation (9)."""
+
+    kind: Literal["reduced"]
+    inputs: Inputs = None
+    outputs: Outputs = None
+    loss: Pull = "linear"
+
+
+class SuperpositionEntry(Strict):
+    """Equation (8), all influences together, or one after the other from recordings of their own."""
+
+    kind: Literal["superposition"]
+    inputs: Inputs = None
+    outputs: Outputs = None
+    separate: dict[str, Annotated[list[str], Field(min_length=1)]] | None = Field(
+        None,
+        min_length=1,
+        description="input -> its recordings; fitted in this order, one input after the other",
+    )
+    loss: Pull = "linear"
+
+
+def _kind(entry: Any) -> str:
+    return str(entry.get("kind", "file") if isinstance(entry, Mapping) else getattr(entry, "kind", "file"))
+
+
+ModelEntry = FileEntry | ReducedEntry | SuperpositionEntry | SparseOptions
+TaggedEntry = Annotated[
+    Annotated[FileEntry, Tag("file")]
+    | Annotated[ReducedEntry, Tag("reduced")]
+    | Annotated[SuperpositionEntry, Tag("superposition")]
+    | Annotated[SparseOptions, Tag("sindy")],
+    Discriminator(_kind),
+]
+
+
+class MismatchForm(Strict):
+    """[mismatch]: the model whose missing physics is looked for."""
+
+    model: str
+    effects: list[EffectForm] = Field([], description="effects of your own, beside the catalogue's")
+
+
+class ExportForm(Strict):
+    """[export]: the model that goes to the machine, and the forms it takes."""
+
+    model: str
+    to: list[Target] = Field(["json"], min_length=1)
+
+
+class ExperimentForm(Strict):
+    """The whole file."""
+
+    name: Annotated[str, AfterValidator(_file_name)]
+    campaign: str = Field(description="campaign file or its folder, relative to the experiment file")
+    outputs: list[str] | None = Field(
+        None,
+        min_length=1,
+        description="default: every channel of role error, else of role temperature",
+    )
+    fit: list[str] = Field(min_length=1, description="recordings that fits may see")
+    held_out: list[str] = Field([], description="recordings that nothing sees before the end")
+    cross_validate: bool = Field(
+        True, description="leave recordings and blocks out of the fit, one after the other"
+    )
+    models: dict[Annotated[str, AfterValidator(_file_name)], TaggedEntry] = Field(min_length=1)
+    mismatch: MismatchForm | None = None
+    export: ExportForm | None = None
+
+
+def separate(entry: ModelEntry) -> Mapping[str, list[str]]:
+    """Input -> recordings of its own, where a superposition names them."""
+    return (isinstance(entry, SuperpositionEntry) and entry.separate) or {}
