@@ -25,6 +25,7 @@ RIVAL = 3.0  # log evidence within which a rival stays in the answer
 TRUST = 0.6  # evidence ratios are tempered: models are never exact
 DOUBT = 0.02  # share of the answer that stays with causes outside the catalogue
 
+AGAIN = 2.0  # log evidence of heat at the same body in another recording, from which heat is no event
 MUCH = 3.0  # times the reading noise: a machine that leaves so much in no pattern is not well modelled
 
 NO_MISMATCH, MISSING, FAULT, UNEXPLAINED = (
@@ -90,6 +91,8 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     reasons = []
     if recurs(context, best.hypotheses):
         reasons.append("unrecorded events come again and again: a cause, not an event")
+    if where := _comes_again(found):
+        reasons.append(f"unrecorded heat at {where} shows in another recording, too: a cause, not an event")
     heated = any(h.recording and h.effect.word == "unmeasured_heat" for h in best.hypotheses)
     if len(context.recordings) == 1 and heated and any(h.recording is None for h in best.hypotheses):
         reasons.append(
@@ -117,6 +120,23 @@ def _much(best: Assessment) -> tuple[str, ...]:
     return (
         f"what is left is {times:.1f} times the reading noise, in no pattern: it is taken for everyday heat",
     )
+
+
+def _comes_again(found: Search) -> str | None:
+    """The body at which heat is named as an event of one recording, while another recording speaks for such
+    heat there, too, if faintly.
+    """
+    named = {
+        (h.states, h.recording)
+        for h in found.best.hypotheses
+        if h.effect.word == "unmeasured_heat" and h.recording
+    }
+    for c in found.looks[-1]:
+        h = c.hypothesis
+        elsewhere = any(states == h.states and run != h.recording for states, run in named)
+        if h.effect.word == "unmeasured_heat" and elsewhere and c.gain > AGAIN:
+            return h.where
+    return None
 
 
 def _dropped(found: Search) -> tuple[str, ...]:

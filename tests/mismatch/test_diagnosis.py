@@ -327,3 +327,16 @@ def test_unseen_recordings_contradict_a_repair_and_change_no_verdict() -> None:
         assert worse["improvement"]["contradicted_by"] == ["r3"]
         assert worse["improvement"]["held_out"]["r3"]["rms_after"] == shown
         assert worse["improvement"]["explained"] == -1.0
+
+
+def test_heat_that_comes_again_is_no_event() -> None:
+    """A clear hour in one recording and a faint one in the other, at the same body: no window is named."""
+
+    def hours(size: float) -> Callable[[float, Array, Inputs], tuple[float, float, float]]:
+        return lambda t, _, __: (0.0, 0.0, size * (30000 <= t < 52000))
+
+    for faint, word in ((0.0, "missing physics"), (8.0, "unexplained")):
+        runs = campaign(simulated(1, concealed=hours(faint)), simulated(2, concealed=hours(120.0)))
+        answer = diagnose(model(), runs, ["r1", "r2"]).document()
+        assert answer["verdict"] == word
+        assert any("shows in another recording" in text for text in answer["reasons"]) == (faint > 0)
