@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 
 BELIEF = 0.5  # a hand-built model's start values are believed within a factor of about two
 EVERYDAY_HEAT = 4.0  # W rms at a body that no machine is free of
+LEAST_HEAT = 0.1  # of that, below which no model of a few bodies is exact
 BUSY_FLOW = 100.0  # W; a model whose largest heat flow is smaller has a smaller everyday heat
 MOST_READINGS = 6000  # instants, over all recordings
 SLOW_LIMIT = 0.55  # everyday slow sensor noise, as a share of the reading noise
@@ -158,8 +159,9 @@ def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:
 
 
 def everyday(white: Noise, limit: Mapping[str, float]) -> tuple[Noise, ...]:
-    """The noise settings that evidence is integrated over: slow noise and heat from none to the everyday
-    limit.
+    """The noise settings that evidence is integrated over: slow noise from none and heat from next to none
+    to the everyday limit. None at all there is not: a few bodies never stand for a machine to the last
+    fraction of a watt, and readings without other noise would call what is left an effect.
     """
     return tuple(
         replace(
@@ -168,7 +170,7 @@ def everyday(white: Noise, limit: Mapping[str, float]) -> tuple[Noise, ...]:
             heat={name: level * value for name, value in limit.items()},
         )
         for share in (0.0, 0.5 * SLOW_LIMIT, SLOW_LIMIT)
-        for level in (0.0, 0.35, 0.9)
+        for level in (LEAST_HEAT, 0.35, 0.9)
     )
 
 
