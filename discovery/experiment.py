@@ -169,7 +169,7 @@ def repaired_of(
 ) -> Fitted:
     """The repaired model of a diagnosis with the very numbers that the diagnosis found and proved."""
     fit = written_with(found.after.fit, repaired, experiment.fitting)
-    return judged(experiment, name, "repaired", repaired, fit, None, 0.0, progress)
+    return judged(experiment, name, "repaired", repaired, fit, None, found.seconds, progress)
 
 
 def starting_model(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError
 from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.noise import (
     Noise,
@@ -240,7 +240,7 @@ def _solve(
     def residual(x: Array) -> Array:
         try:
             return run(x)[0]
-        except UserError:  # a trial step at which the model runs away: the solver takes a shorter one
+        except RunsAwayError:  # a trial step: the solver takes a shorter one
             return np.full(rows, np.inf)
 
     # scipy refuses a start on the bound's wrong side by rounding, and moves one that lies on it inside

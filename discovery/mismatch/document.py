@@ -80,11 +80,11 @@ def document(d: Diagnosis) -> dict[str, Any]:
 
 
 def _detection(d: Diagnosis) -> dict[str, Any]:
-    """What is left and what noise it is held against."""
-    baseline, noise = d.search.baseline, d.search.best.best_view.noise
-    known = baseline.views[0].noise
+    """What the baseline leaves, fitted as in the proof, and what noise it is held against."""
+    noise = d.search.best.best_view.noise
+    known = d.search.baseline.views[0].noise
     left = {
-        name: float(np.sqrt(np.nanmean(np.concatenate([r[:, y] for r in baseline.lens.residuals]) ** 2)))
+        name: float(np.sqrt(np.nanmean(np.concatenate([r[:, y] for r in d.before.lens.residuals]) ** 2)))
         for y, name in enumerate(d.context.outputs)
     }
     return {

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid
 from discovery.dynamics.system import predict
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError
 from discovery.fitting import Fit, Noise, predict_recording
 from discovery.fitting.noise import white_noise
 from discovery.models import Model
@@ -227,7 +227,7 @@ def _left_out(data: RateData, model: Model, seen: Evidence, support: Support, no
                 for b in mine:
                     here = left[blocks.of[i] == b] ** 2
                     errors[b] = np.nanmean(here) if np.isfinite(here).any() else np.nan
-        except UserError:  # a sparse model that runs away is a bad model, not a mistake of the user
+        except RunsAwayError:  # a sparse model that runs away is a bad model
             errors[fold] = np.inf
     # a block without a reading says nothing: it must not tell the sizes apart
     silent = np.array([not has_reading(data, b) for b in range(blocks.count)])

@@ -9,7 +9,7 @@ import numpy as np
 
 from discovery.dynamics import Grid, make_grid
 from discovery.dynamics.system import predict
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError
 from discovery.fitting import Noise, predict_recording
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -105,7 +105,7 @@ def _missed(data: RateData, model: Model) -> float:
         try:
             run = predict_recording(model, data.campaign, r, data.outputs, noise, data.grids[r])
             squares.append((((data.grids[r].readings - predict(run)) / noise) ** 2).ravel())
-        except UserError:
+        except RunsAwayError:
             return float("inf")
     missed = float(np.nanmean(np.concatenate(squares)))
     return missed if np.isfinite(missed) else float("inf")

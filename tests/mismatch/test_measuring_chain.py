@@ -10,6 +10,7 @@ import pytest
 from discovery.mismatch.assess import assess, refit
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
+from discovery.mismatch.diagnosis import diagnose
 from discovery.mismatch.gates import objections
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.hypothesis import Hypothesis
@@ -93,3 +94,15 @@ def test_a_lag_of_any_length_has_no_size() -> None:
     assert p.high is not None
     assert p.high - p.low > 2 * p.value
     assert any("do not tell" in text for text in objections(best, lag, 1000.0))
+
+
+def test_a_drift_in_every_recording_is_a_drift() -> None:
+    """Also on a recording that no fit saw; a slow body would show in the other errors, too."""
+    runs = [simulated(seed) for seed in (1, 2, 3)]
+    drifting = campaign(*(changed(r, E_Z=r.values["E_Z"] + 12.0 * r.time / 86400.0) for r in runs))
+    answer = diagnose(model(), drifting, ["r1", "r2"], ["r3"])
+    (named,) = answer.verdict.named
+    assert (named.hypothesis.effect.word, named.hypothesis.places) == ("sensor_drift", ("E_Z",))
+    assert named.hypothesis.recording is None
+    assert answer.after.model.parameters["drift_E_Z"].value == pytest.approx(12.0, abs=0.6)
+    assert answer.held_out["r3"].after < 1.1 * answer.held_out["r3"].floor < answer.held_out["r3"].before
