@@ -22,6 +22,7 @@ TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the m
 EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
 BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
 CLEAR = 60.0  # of log-likelihood in every recording of the fit: what takes that off each one carries over
+EACH = 20.0  # log evidence that each recording left out adds: ghosts reached 15, true effects 10 to 58
 CARRIED = 0.65  # of the mean square that an effect takes off the fit, to show on recordings left out
 TOLD = 0.02  # of the mean square: what an effect takes off the fit below which its share elsewhere is noise
 HOPELESS = 0.3  # of the best claim's gain: places where nothing sees more are not tried
@@ -129,7 +130,7 @@ def supported(
             break
         shares = [_carried(context, current, without, noise, whole) for without in unclear]
         weakest = unclear[int(np.argmin(shares))]
-        if min(shares) >= CARRIED or least_added(context, current, weakest, noise) > BLUNT:
+        if min(shares) >= CARRIED or least_added(context, current, weakest, noise) > EACH:
             break
         dropped += [h for h in current.hypotheses if h not in weakest.hypotheses]
         current = weakest
