@@ -54,6 +54,15 @@ def misfits(answer: Assessment, noise: Noise) -> dict[str, float]:
     return found
 
 
+def with_effects(context: Context, chosen: Sequence[Hypothesis]) -> Model:
+    """The model with effects added, nothing fitted."""
+    model = context.model
+    # what moves the zero of a sensor comes behind what smooths it: no lag makes a slope of a jump
+    for h in sorted(chosen, key=lambda h: h.shifts_the_zero):
+        model = h.added_to(model)
+    return model
+
+
 def refit(
     context: Context,
     chosen: Sequence[Hypothesis],
@@ -69,10 +78,8 @@ def refit(
         start: a fit to take start values from.
         sizes: amplitudes to start from.
     """
-    model, priors = context.model, {}
-    # what moves the zero of a sensor comes behind what smooths it: no lag makes a slope of a jump
-    for h in sorted(chosen, key=lambda h: h.shifts_the_zero):
-        model = h.added_to(model)
+    priors = {}
+    for h in chosen:
         for name, sd in zip(h.amplitudes, context.spread(h), strict=True):
             if h.effect.amplitude.fixed is None:
                 priors[name] = (0.0, WIDE * sd)
@@ -82,7 +89,7 @@ def refit(
                 centre, width = 0.5 * (low + high), max(high - low, 0.3 * abs(high))
                 priors[name] = (centre, width)
     return fit_model(
-        model,
+        with_effects(context, chosen),
         context.campaign,
         context.recordings,
         context.outputs,

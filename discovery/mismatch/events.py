@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 COARSE = 60  # steps per recording in the first look
 LEAST = 4  # readings before and after a jump, after the start of heat: fewer may be single wrong readings
-FINE = 8  # steps on each side of an edge in the second
+FINE = 8  # steps on each side of an edge in the second, and in a third, closer one
 
 
 def place_events(
@@ -84,28 +84,47 @@ def _windows(
         return []
     latest = float(read_time[-2 * LEAST])
     coarse = np.linspace(time[0], time[-1], COARSE + 1)
-    found = []
+    width, found = coarse[1] - coarse[0], []
+
     for h in group:
-        body, sd = h.states[0], spread[h.amplitudes[0]]
-        gains = _window_gains(lens, view, run, heat_steps(trajectory, body, coarse), coarse <= latest, sd)
-        i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
-        width = coarse[1] - coarse[0]
-        fine = np.unique(
-            np.concatenate(
-                [
-                    np.clip(c + np.linspace(-width, width, 2 * FINE + 1), time[0], time[-1])
-                    for c in (coarse[i], coarse[j])
-                ]
-            )
-        )
-        gains = _window_gains(lens, view, run, heat_steps(trajectory, body, fine), fine <= latest, sd)
-        i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
-        edges = dict(zip(h.shapes, (float(fine[i]), float(fine[j])), strict=True))
+
+        def seen(instants: Array, h: Hypothesis = h) -> Array:
+            steps, sd = heat_steps(trajectory, h.states[0], instants), spread[h.amplitudes[0]]
+            return _window_gains(lens, view, run, steps, instants <= latest, sd)
+
+        on, off = _best(seen(coarse), coarse)
+        near = _around(on, off, width, time[0], time[-1])
+        gains = seen(near)
+        on, off = _best(gains, near)
+        closer = _around(on, off, width / FINE, time[0], time[-1])
+        edges = dict(zip(h.shapes, _best(seen(closer), closer), strict=True))
         with np.errstate(over="ignore"):
-            ranges = [_span(np.logaddexp.reduce(gains, axis=axis), fine) for axis in (1, 0)]
+            ranges = [_span(np.logaddexp.reduce(gains, axis=axis), near) for axis in (1, 0)]
         claim = replace(h.at(edges), spans=dict(zip(h.shapes, ranges, strict=True)))
         found.append(replace(claim, cost=float(2 * np.log(COARSE))))  # two edges were searched
     return found
+
+
+def _best(gains: Array, instants: Array) -> tuple[float, float]:
+    """The two edges for which most speaks."""
+    i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
+    return float(instants[i]), float(instants[j])
+
+
+def _around(on: float, off: float, width: float, first: float, last: float) -> Array:
+    """Instants within a width of two edges, in a recording from the first instant to the last."""
+    steps = np.linspace(-width, width, 2 * FINE + 1)
+    return np.unique(np.clip(np.concatenate([on + steps, off + steps]), first, last))
+
+
+def meets(one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether two claims of heat without a record speak of the same hours of a recording, or of hours that
+    follow each other.
+    """
+    if one.recording != other.recording:
+        return False
+    (on, off), (start, end) = one.shapes.values(), other.shapes.values()
+    return on <= end and start <= off
 
 
 def _span(gains: Array, instants: Array) -> tuple[float, float]:

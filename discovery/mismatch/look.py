@@ -8,12 +8,16 @@ import numpy as np
 
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise
-from discovery.mismatch.assess import WIDE, Assessment, assess
+from discovery.fitting.fit import written_with
+from discovery.mismatch.assess import WIDE, Assessment, assess, with_effects
 from discovery.mismatch.context import Context
 from discovery.mismatch.events import place_events
 from discovery.mismatch.evidence import Board, Score, by_claim, make_board, scores
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.hypothesis import Hypothesis
+from discovery.mismatch.lens import Lens
+
+SHARPER = 1.0  # log evidence that other instants of an event have to add
 
 
 @dataclass(frozen=True)
@@ -82,3 +86,21 @@ def again(
         return assess(context, chosen, noise, start, sizes)
     except RunsAwayError:
         return None
+
+
+def sharpened(context: Context, current: Assessment, event: Hypothesis) -> Assessment:
+    """The model with the instants of an event sought anew, where that makes the readings more likely.
+
+    They were found before anything else was fitted beside the event; a large one bends the whole model, and
+    what an edge in the wrong place leaves looks like another event.
+    """
+    others = tuple(h for h in current.hypotheses if h is not event)
+    noise = current.best_view.noise
+    spread = dict(zip(event.amplitudes, (WIDE * s for s in context.spread(event)), strict=True))
+    while True:
+        rest = Lens(written_with(current.fit, with_effects(context, others), context.campaign))
+        moved = place_events(rest, rest.view(noise), [event], spread)
+        better = again(context, current, (*others, *moved), noise) if moved else None
+        if better is None or better.evidence < current.evidence + SHARPER:
+            return current
+        current = better

@@ -10,6 +10,7 @@ import numpy as np
 from discovery.fitting import Noise
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
+from discovery.mismatch.events import meets
 from discovery.mismatch.gates import bent, matters, objections
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.hypothesis import Hypothesis
@@ -32,9 +33,14 @@ RIVALS = 3  # claims that are tried in the place of another
 def recurs(context: Context, chosen: Sequence[Hypothesis]) -> bool:
     """Whether what was taken up for events is none, and looking for a further one is idle: heat without a
     record came twice, or there are more events (two at least) than recordings.
+
+    What meets in time is one event: a model of few bodies shows it at a neighbour, too.
     """
-    words = [h.effect.word for h in chosen if h.effect.word in EVENTS]
-    return words.count("unmeasured_heat") > 1 or len(words) > max(2, len(context.recordings))
+    events = [h for h in chosen if h.effect.word in EVENTS]
+    heats = [h for h in events if h.effect.word == "unmeasured_heat"]
+    again = [h for k, h in enumerate(heats) if any(meets(h, other) for other in heats[:k])]
+    number = len(events) - len(again)
+    return len(heats) - len(again) > 1 or number > max(2, len(context.recordings))
 
 
 def trace(gain: float) -> float:

@@ -11,8 +11,8 @@ from discovery.mismatch.evidence import Board, Score
 from discovery.mismatch.gates import bent, matters, unseen_lag
 from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.lens import Lens
-from discovery.mismatch.look import again, attempt, look
-from discovery.mismatch.question import BLUNT, NAMED, prune, question, recurs, supported, trace
+from discovery.mismatch.look import again, attempt, look, sharpened
+from discovery.mismatch.question import BLUNT, EVENTS, NAMED, prune, question, recurs, supported, trace
 
 REFITS = 6  # claims that are refitted at each step
 QUESTIONED = 3  # with more effects than this the machine is far from its model, and each one is large
@@ -131,6 +131,8 @@ def _grow(
         if step.evidence - current.evidence < bar:
             break
         tell(f"{step.hypotheses[-1].effect.title} at {step.hypotheses[-1].where}")
+        if step.hypotheses[-1].effect.word in EVENTS and step.hypotheses[-1].recording:
+            step = sharpened(context, step, step.hypotheses[-1])
         current = step
         claims = look(context, current).claims
         looks.append(claims)
