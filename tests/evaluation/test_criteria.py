@@ -65,6 +65,12 @@ def test_nothing_read_is_no_number() -> None:
     assert math.isnan(entry["improvement"]["rms"])
 
 
+def test_where_nothing_was_wrong_no_percentage_improves() -> None:
+    found = improvement(Criteria(2.0, 4.0, 0.0, 4.0), Criteria(1.0, 5.0, 1.0, 1.0))
+    assert math.isnan(found.pop("mean"))
+    assert found == pytest.approx({"rms": 50.0, "peak": -25.0, "variance": 75.0})
+
+
 def results() -> dict[str, Any]:
     reading = np.array([-49.0, -30.0, -26.0])
     entry = evaluate(reading, reading * 0.9)
@@ -85,6 +91,14 @@ def test_table_3_has_the_papers_figures_beside_ours() -> None:
     assert list(rows["E_Y0C", "improvement reduced [%]"][:2]) == pytest.approx([90.0, 69])
     assert rows["E_Y0C", "mine"][1] is None
     assert rows["T1", "uncompensated"][1] is None
+
+
+def test_a_table_names_only_the_models_that_ran_on_a_recording() -> None:
+    assert {row[1] for row in table_3(results(), "fit").rows} == {
+        "uncompensated",
+        "reduced",
+        "improvement reduced [%]",
+    }
 
 
 def test_table_1_has_a_column_for_each_part() -> None:

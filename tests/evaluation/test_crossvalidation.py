@@ -12,6 +12,7 @@ from discovery.evaluation.crossvalidation import cross_validate, folds, parts_of
 from discovery.models import Model
 from discovery.models.reduced import reduced
 from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import parse
 
 CHANNELS = {
     "u": Channel("u", "heat load", "W", None, "held"),
@@ -54,6 +55,23 @@ def test_a_right_model_leaves_the_noise(model: Model) -> None:
 def test_a_recording_that_is_different_shows_when_it_is_left_out(model: Model) -> None:
     found = cross_validate(model, campaign(a=2.0, b=2.0, c=6.0), ["a", "b", "c"], ["E"])
     assert found["recordings"]["E"] > 0.8
+
+
+def test_what_the_blocks_leave_is_what_stands_in_them() -> None:
+    """Nothing is left to fit: what is left of all readings is what the model leaves of them."""
+    nothing = reduced(["u"], ["E"], CHANNELS).with_values({"p1_E": -0.4})
+    still = replace(
+        nothing,
+        parameters={name: replace(p, fixed=True) for name, p in nothing.parameters.items()},
+        states={
+            name: replace(state, start=parse("0"), start_sd=0.0) for name, state in nothing.states.items()
+        },
+    )
+    readings = np.linspace(0.0, 3.0, 97) ** 2  # most of it at the end
+    c = campaign(a=2.0)
+    data = replace(c.recordings["a"], values={**c.recordings["a"].values, "E": readings})
+    found = cross_validate(still, replace(c, recordings={"a": data}), ["a"], ["E"])
+    assert found["blocks"]["E"] == pytest.approx(np.sqrt(np.mean(readings**2)))
 
 
 def test_one_recording_is_left_out_in_blocks_alone(model: Model) -> None:
