@@ -184,3 +184,25 @@ def test_slow_masses_are_those_of_what_was_recorded_for_weeks() -> None:
     assert shape.high == 3 * mass.shapes[0].high
     assert max(shape.grid) == shape.high / 3
     assert scaled(lag, 12 * 86400.0) == lag
+
+
+def test_short_recordings_have_short_masses_and_no_late_clocks() -> None:
+    """Ten minutes: a mass of 10 s may be what was recorded, a clock is off by no more than a minute."""
+    (plain,) = catalogue()["second_thermal_mass"].shapes
+    (mass,) = scaled(catalogue()["second_thermal_mass"], 600.0).shapes
+    assert (mass.low, mass.high, mass.grid) == (10.0, plain.high, (30.0, *plain.grid))
+    (clock,) = scaled(catalogue()["clock_shift"], 600.0).shapes
+    assert (clock.low, clock.high, clock.grid) == (-60.0, 60.0, (-30.0, 30.0))
+
+
+def test_of_a_clock_only_the_shifts_are_tried_that_fit_a_recording() -> None:
+    (clock,) = scaled(catalogue()["clock_shift"], 9000.0).shapes
+    assert (clock.low, clock.high, clock.grid) == (-900.0, 900.0, (-900.0, -300.0, 300.0, 900.0))
+    (plain,) = catalogue()["clock_shift"].shapes
+    assert scaled(catalogue()["clock_shift"], 72 * 3600.0).shapes == (plain,)
+
+
+@entries
+def test_what_is_no_time_does_not_depend_on_how_long_was_recorded(effect: Effect) -> None:
+    for shape, other in zip(effect.shapes, scaled(effect, 60.0).shapes, strict=True):
+        assert (shape == other) == (shape.unit != "s" or shape.fixed or 0 <= shape.low <= 1.0)
