@@ -16,9 +16,11 @@ from discovery.export.compiled import compile_model
 from discovery.export.document import Exported, Input, Output
 from discovery.export.ranges import InputRange, OutputRange
 from discovery.export.seal import Seal
+from discovery.export.stepper import Stepper
 from discovery.models import Model, State
 from discovery.runtime.compensator import Compensator, Settings
 from discovery.runtime.compensator import State as Mode
+from discovery.runtime.fastforward import fast_forward
 from discovery.runtime.guards import Fault, InputGuard, Reading
 from discovery.runtime.rows import csv_rows, ticks
 from discovery.terms import Term, parse
@@ -137,6 +139,116 @@ def test_before_any_good_value_nothing_is_given_out() -> None:
     compensator = Compensator(small())
     assert set(feed(compensator, "no number", 0, 20)) == {0.0}
     assert compensator.state.name == Mode.OFF.name
+
+
+def test_the_gain_falls_straight_from_half_a_span_to_two() -> None:
+    """A span is that of the training, of a temperature at least 5 K, of anything else at least its size."""
+    speed = Input("n", "rotation speed", "rpm", "held", InputRange(990, 1000, 0, 9000, None, None, 300.0))
+    for spec, values in (
+        (TEMPERATURE, (26.5, 29.0, 15.0)),
+        (POWER, (1200, 1600, -800)),
+        (speed, (1500, 2000)),
+    ):
+        expected = [1.0, 2 / 3, 2 / 3][: len(values)]
+        assert [InputGuard(spec).gain(v) for v in values] == pytest.approx(expected)
+
+
+def test_the_input_furthest_from_its_training_decides_on_the_gain() -> None:
+    found = []
+    for temperature in (22.0, 29.0):
+        compensator = Compensator(small("P/1000 - y/600 + 0*T", (POWER, TEMPERATURE)))
+        for t in map(float, range(60)):
+            tick = compensator.tick({"P": Reading(100.0, t), "T": Reading(temperature, t)}, t)
+        found.append(tick.offsets["E"])
+    assert found[0] < -5.0
+    assert found[1] == pytest.approx(2 / 3 * found[0])
+    assert tick.faults == {"P": Fault.NONE, "T": Fault.UNTRAINED}
+
+
+@pytest.mark.parametrize(("gap", "fault"), [(500.0, Fault.JUMP), (700.0, Fault.NONE)])
+def test_after_a_gap_a_value_is_not_compared_with_one_from_before(gap: float, fault: Fault) -> None:
+    """1.9 K in 500 s is more than 0.5 K and 0.001 K/s; what was 700 s ago says nothing."""
+    compensator = Compensator(small("0*T", (TEMPERATURE,)), Settings(catch_up_s=600.0))
+    compensator.tick({"T": Reading(22.0, 0.0)}, 0.0)
+    assert compensator.tick({"T": Reading(23.9, gap)}, gap).faults["T"] is fault
+
+
+def bits(
+    compensator: Compensator, now: float, value: object = 100.0, **options: bool
+) -> tuple[int, set[int]]:
+    """The low byte of the status word, and the numbers of the higher bits that are set."""
+    status = compensator.tick({"P": Reading(value, now)}, now, **options).status
+    return status & 0xFF, {k for k in range(8, 32) if status >> k & 1}
+
+
+def test_the_status_word_tells_a_late_tick_and_a_clock_that_goes_back() -> None:
+    compensator = Compensator(small())
+    bits(compensator, 0.0)
+    assert [bits(compensator, t) for t in (1.0, 2.0)] == [(Mode.COLD.value, set())] * 2
+    assert bits(compensator, 7.0) == (Mode.COLD.value, {17})
+    for now in (3.0, math.nan, math.inf):
+        assert bits(compensator, now)[1] & {20} == {20}
+        assert compensator.last == 7.0
+    assert bits(compensator, 8.0) == (Mode.COLD.value, set())
+    assert bits(compensator, 800.0) == (Mode.WARM.value, {17})  # too long to make up for
+    assert bits(compensator, 801.0, None) == (Mode.DEGRADED.value, {8})
+    assert bits(Compensator(small()), math.nan)[1] >= {20}
+
+
+def test_the_status_word_tells_what_an_offset_was_kept_from() -> None:
+    compensator = Compensator(small())
+    seen = [bits(compensator, float(t), 800.0)[1] for t in range(200)]
+    free = seen.index({18})
+    assert seen[10:] == [set()] * (free - 10) + [{18}] * (200 - free)
+    assert 480.0 * (1 - math.exp(-free / 600)) == pytest.approx(100.0, abs=1.5)
+    off = [bits(compensator, 200.0 + t, 800.0, enabled=False) for t in range(110)]
+    assert off[:99] == [(Mode.OFF.value, {19})] * 99
+    assert off[-1] == (Mode.OFF.value, set())
+
+
+def test_the_difference_at_a_change_of_model_fades() -> None:
+    """The new model says 50 um where 20 um were compensated: 30 um, fading with 100 s."""
+    compensator = Compensator(small("0*P"), Settings(bump_s=100.0))
+    compensator.succeed({"y": 50.0}, {"E": -20.0})
+    ticks_ = [compensator.tick({"P": Reading(1.0, float(t))}, float(t)) for t in range(1200)]
+    expected = -50.0 + 30.0 * np.exp(-np.arange(1200) / 100.0)
+    assert [tick.offsets["E"] for tick in ticks_] == pytest.approx(expected.tolist())
+    flagged = [bool(tick.status >> 16 & 1) for tick in ticks_]
+    assert flagged == (30.0 * np.exp(-np.arange(1200) / 100.0) > 1e-3).tolist()
+
+
+def test_through_a_gap_temperatures_run_straight_and_switches_are_off() -> None:
+    """The integral of each input over 25 000 s, in which the room goes from 20 to 24 degC."""
+    pump = Input("F", "fluid flow", "1", "held", InputRange(0, 1, 0, 1, None, None, 300.0))
+    nozzle = Input("h", "nozzle height", "mm", "held", InputRange(0, 100, 0, 200, None, None, 300.0))
+    for spec, before, after, mean in (
+        (TEMPERATURE, 20.0, 24.0, 22.0),
+        (pump, 1, 1, 0.0),
+        (nozzle, 50, 90, 50.0),
+    ):
+        exported = small(spec.name, (spec,))
+        stepper = Stepper(exported.compiled)
+        stepper.start(np.array([before], dtype=float))
+        fast_forward(exported, stepper, np.array([float(before)]), np.array([float(after)]), 25_000)
+        assert stepper.count == 25_000
+        assert stepper.x[0] == pytest.approx(25_000 * mean)
+
+
+def test_trouble_lasts_as_long_as_it_is_said() -> None:
+    """Settled after 20 s, an input replaced for 30 s, outputs held for 40 s, and not a tick longer."""
+
+    def modes(value: object, count: int) -> list[str]:
+        times = Settings(settle_s=20.0, hold_limit_s=30.0, freeze_limit_s=40.0)
+        compensator = Compensator(small("log(1500 - P)/10 - y/600"), times)
+        names = []
+        for t in range(50 + count):
+            compensator.tick({"P": Reading(100.0 if t < 50 else value, float(t))}, float(t))
+            names.append(compensator.state.name)
+        assert names[:50] == ["COLD"] * 20 + ["ACTIVE"] * 30
+        return names[50:]
+
+    assert modes(None, 40) == ["DEGRADED"] * 31 + ["FAULT"] * 9
+    assert modes(1600.0, 50) == ["FROZEN"] * 41 + ["FAULT"] * 9
 
 
 def test_rows_are_read_whatever_stands_in_them() -> None:

@@ -62,7 +62,7 @@ def test_a_machine_that_has_not_changed_keeps_its_model(machine: Campaign, at_wo
     campaign = days(machine, 3, Machine())
     found = update_file(at_work, campaign, list(campaign.recordings), at_work.with_name("new.json"))
     assert {f.verdict for f in found.findings} == {"noise"}
-    assert found.path is None
+    assert (found.path, found.diagnosis) == (None, None)
     assert not at_work.with_name("new.json").exists()
 
 
@@ -71,6 +71,8 @@ def test_a_drift_is_followed_and_written_with_its_history(machine: Campaign, at_
     out = at_work.with_name("new.json")
     found = update_file(at_work, campaign, list(campaign.recordings), out)
     assert found.findings[-1].verdict == "drift"
+    assert (found.path, found.diagnosis) == (out, None)
+    assert f"{out}: the next revision" in found.lines()[-1]
     old, new = read_document(at_work), read_document(out)
     assert new.revision == 2
     assert new.changelog[-1]["of"] == old.seal.sha256
@@ -114,8 +116,10 @@ def test_a_new_effect_is_handed_to_the_mismatch_method(
 
     monkeypatch.setattr(module, "_diagnosis", diagnosis)
     campaign = days(machine, 1, Machine(), (Request("swarf_heat", 900.0, ("table",)),), readings=60)
-    found = update_file(at_work, campaign, ["d0"], at_work.with_name("new.json"))
-    assert found.findings[0].verdict == "new effect"
+    usual = days(machine, 2, Machine()).recordings["d1"]
+    campaign = replace(campaign, recordings={**campaign.recordings, "d1": usual})
+    found = update_file(at_work, campaign, ["d0", "d1"], at_work.with_name("new.json"))
+    assert [f.verdict for f in found.findings] == ["new effect", "noise"]
     assert asked == [["d0"]]
     assert found.path is None
     assert "swarf_heat at table" in found.lines()[-2]
