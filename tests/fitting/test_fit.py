@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from discovery.fitting import fit_model, predict_recording
+from discovery.fitting import fit_model, make_problem, predict_recording
+from discovery.fitting.covariance import covariance_of
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Number, Term, parse
@@ -128,6 +129,39 @@ def test_two_parameters_that_do_the_same_are_named() -> None:
     fit = fit_model(twice, campaign(recording(0)), ["r0"])
     assert any("g2 cannot be told apart" in sentence for sentence in fit.unidentified)
     assert fit.model.parameters["g"].value + fit.model.parameters["g2"].value == pytest.approx(0.02, rel=0.05)
+
+
+def told(theta: list[float], columns: list[list[float]]) -> tuple[Array, list[str]]:
+    """Covariance and sentences for `a` (not below 0), `g` and `k` at theta, of a start that plays no part."""
+    problem = make_problem(model(), campaign(recording(0)), ["r0"])
+    assert [u.name for u in problem.unknowns] == ["a", "g", "k", "y"]
+    return covariance_of(problem, np.column_stack([*columns, [0.0] * 4]), np.array([*theta, 0.0]))
+
+
+def test_a_number_that_its_interval_drowns_is_named_unless_it_lies_at_its_bound() -> None:
+    """Standard errors of 1, 1/2 and 1/4: 1.96 of them are more than the value, or less."""
+    columns = [[1.0, 0, 0, 0], [0, 2.0, 0, 0], [0, 0, 4.0, 0]]
+    covariance, sentences = told([1.97, -0.99, 0.5], columns)
+    assert np.diag(covariance)[:3] == pytest.approx([1.0, 1 / 4, 1 / 16])
+    assert sentences == []
+    _, sentences = told([1.95, -0.97, 0.48], columns)
+    assert [text.split()[0] for text in sentences] == ["a", "g", "k"]
+    assert all("95 % interval is wider than its value" in text for text in sentences)
+    _, sentences = told([0.0, 0.0, 0.5], columns)  # nothing is lost at zero, which is where `a` ends
+    assert [text.split()[0] for text in sentences] == ["g"]
+
+
+@pytest.mark.parametrize(("angle", "apart"), [(2e-4, True), (0.5e-4, False), (0.0, False)])
+def test_parameters_that_do_nearly_the_same_are_named(angle: float, apart: bool) -> None:
+    """Two columns at an angle: the share that is their own is its sine."""
+    size = 1e6
+    a, g = [size, 0.0, 0, 0], [size * np.cos(angle), size * np.sin(angle), 0, 0]
+    covariance, sentences = told([1.0, 1.0, 1.0], [a, g, [0, 0, 9.0, 0]])
+    assert [text.split()[0] for text in sentences if "told apart" in text] == ([] if apart else ["a", "g"])
+    for i in (0, 1):
+        own = (size * np.sin(angle)) ** -2.0 if angle else np.inf
+        assert covariance[i, i] == pytest.approx(own, rel=1e-2)
+    assert covariance[2, 2] == pytest.approx(1 / 81)
 
 
 def test_a_parameter_of_each_recording() -> None:
