@@ -13,6 +13,7 @@ from discovery.fitting.starts import warm_start
 from discovery.models.reduced import reduced
 from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.check import check_campaign
+from discovery.recordings.correction import uncompensated
 from discovery.virtual.measurement import CHANNELS
 from discovery.virtual.record import Order, csv_gz, take
 from tests.recordings.conftest import CAMPAIGN, Write, rows
@@ -155,6 +156,33 @@ def test_what_the_check_says_of_its_values(write: Write, cells: list[str], said:
     found = [str(one) for one in check_campaign(write(with_correction(cells), ONE))]
     assert len(found) == 1
     assert said in found[0]
+
+
+@pytest.mark.parametrize(
+    ("data", "text", "said"),
+    [
+        (
+            CONSTANT,
+            ONE.replace('correction", unit = "um"', 'correction", unit = "umm"'),
+            "the unit 'umm' is not",
+        ),
+        (rows(), ONE, "fit.csv, line 1: no column 'corr'"),
+        ([line.replace("E_Y0C", "E_Y") for line in CONSTANT], ONE, "fit.csv, line 1: no column 'E_Y0C'"),
+    ],
+)
+def test_of_half_a_pair_only_what_is_missing_is_told(
+    write: Write, data: list[str], text: str, said: str
+) -> None:
+    found = [str(one) for one in check_campaign(write(data, text)) if one.severity == "error"]
+    assert len(found) == 1
+    assert said in found[0]
+
+
+def test_half_a_pair_stays_as_it_is() -> None:
+    """A recording that lacks the error, or what was applied, as one of other channels does."""
+    time, series = np.arange(3.0), np.array([1.0, 2.0, 3.0])
+    for name in ("corr", "E_Y0C"):
+        assert uncompensated("r", time, {name: series}, {}, {"corr": "E_Y0C"}) == {name: series}
 
 
 def test_known_nowhere_it_cannot_be_added(write: Write) -> None:
