@@ -11,7 +11,9 @@ from scipy.signal import lfilter
 
 from discovery.fitting import fit_model, make_problem, predict_recording
 from discovery.fitting.covariance import covariance_of
+from discovery.fitting.starts import warm_start
 from discovery.models import Model, Parameter, State
+from discovery.models.reduced import reduced
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Number, Term, parse
 
@@ -204,6 +206,36 @@ def test_a_prediction_uses_the_first_reading_and_no_later_one() -> None:
     assert np.array_equal(a.x, b.x)
     moved = replace(r, values={**r.values, "y": np.concatenate([r.values["y"][:1] + 1.0, r.values["y"][1:]])})
     assert predict_recording(fitted, campaign(moved), "r0", ["y"], [0.5]).x[0, 0] > a.x[0, 0] + 0.5
+
+
+def test_a_recording_without_readings_runs_from_its_declared_start() -> None:
+    blind = recording(0)
+    blind = replace(blind, values={**blind.values, "y": np.full(200, np.nan)})
+    found = predict_recording(model().with_values(TRUTH), campaign(blind), "r0", ["y"])
+    exact = truth(blind.values["u"], blind.values["v"], 0.25)
+    assert np.interp(blind.time, found.system.grid.time, found.x[:, 0]) == pytest.approx(
+        exact.tolist(), abs=1e-6
+    )
+
+
+@pytest.mark.parametrize("a", [0.5, 4.0])
+def test_start_values_alone_are_near(a: float) -> None:
+    """Time constants of 2 h and 15 min within a step of the grid; what they settle at, within a fifth."""
+    data = recording(0, noise=0.01, a=a, g=0.04 * a, k=-1.6 * a)
+    begun = warm_start(reduced(["u", "v"], ["y"], CHANNELS), campaign(data), ["r0"], ["y"])
+    p = {name: parameter.value for name, parameter in begun.parameters.items()}
+    assert -1.5 * a < p["p1_y"] < -a / 1.5
+    assert [p["p2_y"] / -p["p1_y"], p["p3_y"] / -p["p1_y"]] == pytest.approx([0.04, -1.6], rel=0.2)
+
+
+def test_start_values_come_from_the_recordings_that_hold_the_error() -> None:
+    one, blind = recording(0), recording(1)
+    blind = replace(blind, values={n: series for n, series in blind.values.items() if n != "y"})
+    nothing = reduced(["u", "v"], ["y"], CHANNELS)
+    alone = warm_start(nothing, campaign(one), ["r0"], ["y"])
+    both = warm_start(nothing, campaign(one, blind), ["r0", "r1"], ["y"])
+    for name, parameter in alone.parameters.items():
+        assert both.parameters[name].value == pytest.approx(parameter.value, rel=1e-4)
 
 
 def test_a_start_that_a_formula_sets_moves_with_its_parameters() -> None:
