@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
 
 from discovery.errors import UserError
+from discovery.export.compiled import compile_model
 from discovery.export.document import from_document, read_document, render, write_document
 from discovery.export.makedocument import make_document
 from discovery.export.ranges import sampled_inputs
 from discovery.export.seal import Seal, open_seal, private_key, public_key, require_trusted
 from discovery.export.stepper import Stepper
-from discovery.models import Model, expanded
+from discovery.models import Model, Parameter, State, expanded
 from discovery.recordings import Campaign
+from discovery.terms import Term, parse
 
 
 @pytest.fixture
@@ -29,8 +32,6 @@ def document(model: Model, campaign: Campaign) -> dict[str, Any]:
 def test_what_is_written_is_read_back_and_steps_the_same(
     document: dict[str, Any], model: Model, campaign: Campaign, tmp_path: Path
 ) -> None:
-    from discovery.export.compiled import compile_model
-
     write_document(tmp_path / "model.json", document)
     back = read_document(tmp_path / "model.json")
     u = sampled_inputs(campaign, "fit", back.compiled.inputs, 10.0)
@@ -46,6 +47,36 @@ def test_what_is_written_is_read_back_and_steps_the_same(
         ("P_drive", "heat load", "W"),
         ("T_env", "ambient temperature", "degC"),
     ]
+
+
+def test_parameters_come_back_with_their_bounds(model: Model, campaign: Campaign) -> None:
+    given = {
+        "G": Parameter(24.0, "W/K", 1.0, 50.0, low=20.0, high=28.0),
+        "hA": Parameter(4.0, "W/K", 0.0, fixed=True),
+        "m": Parameter(0.3, max=2.0),
+    }
+    model = replace(model, parameters={**model.parameters, **given})
+    back = from_document(make_document(model, campaign, ["fit"]), Seal("", None, None), "m").model
+    assert {name: back.parameters[name] for name in given} == given
+
+
+def test_a_channel_that_only_a_start_names_is_an_input() -> None:
+    states = {"y": State("y", "um", None, parse("T_env + T_fluid"), 0.0, 1.0)}
+    model = Model("m", {}, states, (Term("t", "y", parse("T_env - y")),), {"E_Z0T": parse("y")})
+    compiled = compile_model(model, 10.0)
+    assert compiled.inputs == ("T_env", "T_fluid")
+    stepper = Stepper(compiled)
+    stepper.start(np.array([20.0, 3.0]))
+    assert stepper.x[0] == 23.0
+
+
+def test_a_play_begins_where_its_body_does() -> None:
+    """At rest the joint shows what the body is at, 10, not what is left of its way there from zero."""
+    states = {"y": State("y", "um", None, parse("T_env/2"), 0.0, 1.0)}
+    model = Model("m", {}, states, (Term("t", "y", parse("0*T_env")),), {"E_Z0T": parse("play(y, 2)")})
+    stepper = Stepper(compile_model(model, 10.0))
+    stepper.start(np.array([20.0]))
+    assert stepper.run(np.full((3, 1), 20.0)).tolist() == [[10.0]] * 3
 
 
 def test_ranges_and_limits_come_from_the_recordings(document: dict[str, Any], campaign: Campaign) -> None:
