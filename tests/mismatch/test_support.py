@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discovery.mismatch.assess import Assessment, assess
+from discovery.mismatch.assess import Assessment, assess, misfits
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
 from discovery.mismatch.gates import unseen_lag
@@ -58,6 +58,22 @@ def test_every_recording_speaks_for_a_cause_and_none_for_a_ghost() -> None:
     noise, without = ghost.best_view.noise, assess(context, ())
     assert least_taken(context, ghost, without, noise) < CLEAR
     assert least_added(context, ghost, without, noise) < BLUNT
+
+
+def test_the_recording_that_is_told_least_counts() -> None:
+    """Heat for six hours of r1 alone: what r2 gains by it is the least, however much r1 does."""
+    seen = campaign(
+        simulated(1, concealed=lambda t, _, __: (0.0, 0.0, 120.0 * (30000 <= t < 52000))), simulated(2)
+    )
+    runs, effect = ("r1", "r2"), catalogue()["unmeasured_heat"]
+    context = make_context(seen, model(), runs, tuple(SEEN), [effect])
+    found = hypotheses(context.baseline.problem.model, seen.channels, tuple(SEEN), runs, [effect])
+    heat = next(h for h in found if (h.states, h.recording) == (("bed",), "r1"))
+    answer = assess(context, (heat.at(dict(zip(heat.shapes, (30000.0, 52000.0), strict=True))),))
+    noise, without = answer.best_view.noise, assess(context, ())
+    before, after = misfits(without, noise), misfits(answer, noise)
+    assert before["r1"] - after["r1"] > before["r2"] - after["r2"] + 20.0
+    assert least_taken(context, answer, without, noise) == pytest.approx(before["r2"] - after["r2"])
 
 
 def test_a_refit_that_is_known_is_not_made_again() -> None:
