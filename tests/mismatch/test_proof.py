@@ -37,8 +37,8 @@ def says(readings: dict[str, Array], **formulas: str) -> Trajectory:
 
 def test_each_output_counts_in_units_of_its_noise() -> None:
     """Two noises off before the repair and one after it, in every reading: each draw is the same."""
-    readings = {"E": np.full(240, 2.0), "F": np.where(np.arange(240) % 3 == 0, 6.0, np.nan)}
-    found = compare(says(readings, E="x", F="x"), says(readings, E="x + 1", F="x + 3"), WHITE)
+    readings = {"E": np.full(240, 3.0), "F": np.where(np.arange(240) % 3 == 0, 9.0, np.nan)}
+    found = compare(says(readings, E="x + 1", F="x + 3"), says(readings, E="x + 2", F="x + 6"), WHITE)
     unit = sqrt((1.0**2 + 3.0**2) / 2)
     assert (found.before, found.after, found.floor) == pytest.approx((2 * unit, unit, unit))
     assert (found.low, found.high) == pytest.approx((unit, unit))
