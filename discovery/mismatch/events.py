@@ -19,7 +19,7 @@ from discovery.mismatch.lens import Lens, View
 Array = NDArray[np.float64]
 
 COARSE = 60  # steps per recording in the first look
-LEAST = 4  # readings before and after a jump, after the start of heat: fewer may be single wrong readings
+LEAST = 4  # readings before and after a jump, while heat acts and after it began: fewer may be wrong ones
 FINE = 8  # steps on each side of an edge in the second, and in a third, closer one
 
 
@@ -84,13 +84,15 @@ def _windows(
         return []
     latest = float(read_time[-2 * LEAST])
     coarse = np.linspace(time[0], time[-1], COARSE + 1)
+    shortest = LEAST * float(np.median(np.diff(read_time)))
     width, found = coarse[1] - coarse[0], []
-
     for h in group:
 
         def seen(instants: Array, h: Hypothesis = h) -> Array:
             steps, sd = heat_steps(trajectory, h.states[0], instants), spread[h.amplitudes[0]]
-            return _window_gains(lens, view, run, steps, instants <= latest, sd)
+            gains = _window_gains(lens, view, run, steps, instants <= latest, sd)
+            gains[instants[None, :] - instants[:, None] < shortest] = -np.inf
+            return gains
 
         on, off = _best(seen(coarse), coarse)
         near = _around(on, off, width, time[0], time[-1])

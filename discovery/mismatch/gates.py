@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from discovery.mismatch.assess import Assessment
+from discovery.mismatch.catalogue import Shape
 from discovery.mismatch.context import Context
 from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.signatures import block_signatures
@@ -16,6 +17,7 @@ ALIKE = 0.8  # squared correlation of a window with an input from which the two 
 AROUND = 8  # readings on each side in which a jump has to show
 JUMPS = ("sensor_offset", "rezero")
 PRESSED = 0.03  # relative distance from the end of a physical range
+ASKED = 2.0  # log-likelihood beyond the end of an exponent's range from which another law is at work
 
 
 def objections(best: Assessment, h: Hypothesis, gain: float) -> list[str]:
@@ -52,10 +54,23 @@ def bent(attempt: Assessment, h: Hypothesis) -> str | None:
         inside = shape.low * (1 + PRESSED) < value if shape.low > 0 else True
         if shape.low < 0:
             inside = value > shape.low * (1 - PRESSED)
-        if not (shape.fixed or p.fixed) and not (inside and value < shape.high * (1 - PRESSED)):
-            size = f"{shape.name} = {value:.3g} {shape.unit}"
+        free = not (shape.fixed or p.fixed)
+        if free and not (inside and value < shape.high * (1 - PRESSED)) and _asked(attempt, name, shape):
+            size = f"{shape.name} = {value:.3g} {shape.unit}".removesuffix(" 1")
             return f"{h.effect.word} would need {size}, at the end of what is physical"
     return None
+
+
+def _asked(attempt: Assessment, name: str, shape: Shape) -> bool:
+    """Whether the data ask for more than the end of a range. The ends of times and widths are those of other
+    laws; those of an exponent are a custom, and a value a little inside may do as well.
+    """
+    if shape.unit != "1":
+        return True
+    lens = attempt.lens
+    view = attempt.best_view if attempt.views else lens.view(attempt.fit.noise)
+    places = [k for k, u in enumerate(attempt.fit.problem.unknowns) if u.name == name]
+    return any(lens.beyond(view, k) > ASKED for k in places)
 
 
 def _untold(best: Assessment, h: Hypothesis) -> str | None:
@@ -168,7 +183,7 @@ def _unsteady(best: Assessment, h: Hypothesis, blocks: int, limit: float, text: 
     and counts only when it is a large share of the amplitude itself: a law that is slightly off in form may
     stand.
     """
-    if h.effect.amplitude.fixed is not None or h.shown or h.recording is not None:
+    if h.effect.amplitude.fixed is not None or h.shown or h.recording is not None or len(h.amplitudes) > 1:
         return None
     total = blocks * len(best.fit.trajectories)
     if total < 2:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 from discovery.mismatch.catalogue.effect import ROLE_OF, Effect
@@ -106,7 +106,10 @@ def _claim(effect: Effect, model: Model, place: _Place, channels: Mapping[str, C
     shape_names = {shape.name: own(shape.name) for shape in effect.shapes}
     shapes = {full: effect.shapes[i].grid[0] for i, full in enumerate(shape_names.values())}
     several = len(shown) > 1 and not states  # a body has one size for all errors
-    extras = shown if several else ("",)
+    exchange = len(states) > 1 and effect.place != "neighbour"
+    # without capacities what leaves one body in K/h is not what enters the other: a size of its own for each
+    apart = exchange and not model.states[states[0]].capacity
+    extras = shown if several else tuple(f"into_{body}" for body in states) if apart else ("",)
     amplitudes = tuple(own(effect.amplitude.name, extra) for extra in extras)
     rename: dict[str, Expression] = {short: Name(full) for short, full in shape_names.items()}
     known = {**place.binding, **rename, effect.amplitude.name: Name(amplitudes[0])}
@@ -118,16 +121,25 @@ def _claim(effect: Effect, model: Model, place: _Place, channels: Mapping[str, C
         terms = tuple(_replacing(effect, formula, known, place, term, inputs) for term in place.replaced)
     elif shown:
         body = {"body": Name(states[0])} if states else {"y": BEFORE}
-        sizes = amplitudes if several else amplitudes * len(shown)
+        each = amplitudes if several else amplitudes * len(shown)
         changes = {
             name: substitute(formula, {**known, **body, effect.amplitude.name: Name(size)})
-            for name, size in zip(shown, sizes, strict=True)
+            for name, size in zip(shown, each, strict=True)
         }
+    elif apart:
+        sizes = ({**known, effect.amplitude.name: Name(size)} for size in amplitudes)
+        ways = (states, states[::-1])
+        terms = tuple(
+            replace(_flow(effect, formula, size, way), source=None)
+            for size, way in zip(sizes, ways, strict=True)
+        )
     else:
         terms = (_flow(effect, formula, known, states),)
     units = {
         name: _unit(effect.amplitude.unit, model, states, output, channels)
-        for name, output in zip(amplitudes, shown if several else shown[:1] or ("",), strict=True)
+        for name, output in zip(
+            amplitudes, shown if several else (shown[:1] or ("",)) * len(amplitudes), strict=True
+        )
     } | {
         name: _unit(shape.unit, model, states, shown[0] if shown else "", channels)
         for name, shape in zip(shapes, effect.shapes, strict=True)

@@ -85,6 +85,15 @@ class Lens:
         parts.append(np.zeros((len(self.priors[0]), columns[0].shape[2])))
         return np.concatenate(parts), logdet
 
+    def beyond(self, view: View, unknown: int) -> float:
+        """Log-likelihood that an unknown at its bound would add if it could leave it, to second order."""
+        column = self.whiten(view.noise, [j[:, :, [unknown]] for j in self.jacobians])[0]
+        slope = self.priors[1]
+        if len(slope):
+            column[-len(slope) :, 0] = slope[:, unknown]
+        x = view.project(column)[:, 0]
+        return 0.5 * float(x @ view.residual) ** 2 / max(float(x @ x), 1e-30)
+
     def view(self, noise: Noise) -> View:
         """The fit under one noise setting."""
         joined = [

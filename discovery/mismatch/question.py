@@ -11,6 +11,7 @@ from discovery.fitting import Noise
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.events import meets
+from discovery.mismatch.evidence import Score
 from discovery.mismatch.gates import bent, matters, objections
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.hypothesis import Hypothesis
@@ -18,8 +19,9 @@ from discovery.mismatch.leftout import least_added, least_taken, left_out
 from discovery.mismatch.look import attempt, look
 
 NAMED = 8.0  # log evidence that a claim has to add to be taken up
-SMALL = 0.1  # share of the whole gain below which an objectionable effect is dropped and not the answer
+SMALL = 0.1  # share of the whole gain below which what is doubtful is dropped and not the answer
 TRACE = 0.6  # log evidence of a law's traces, times the root of what adds the most beside it
+AGAIN = 2.0  # log evidence of heat at the same body in another recording, from which heat is no event
 EVENTS = ("unmeasured_heat", "rezero", "sensor_offset")
 BLUNT = 30.0  # log evidence that the coarseness of a model with few bodies does not reach
 CLEAR = 60.0  # of log-likelihood in every recording of the fit: what takes that off each one carries over
@@ -43,6 +45,16 @@ def recurs(context: Context, chosen: Sequence[Hypothesis]) -> bool:
     return len(heats) - len(again) > 1 or number > max(2, len(context.recordings))
 
 
+def echoes(event: Hypothesis, claims: Sequence[Score]) -> bool:
+    """Whether another recording speaks for heat at the same body, too, if faintly: then it is no event."""
+    if event.effect.word != "unmeasured_heat" or event.recording is None:
+        return False
+    others = (c for c in claims if c.hypothesis.effect.word == event.effect.word and c.gain > AGAIN)
+    return any(
+        c.hypothesis.states == event.states and c.hypothesis.recording != event.recording for c in others
+    )
+
+
 def trace(gain: float) -> float:
     """Log evidence that the traces of something may have that adds `gain`: its law is never exact in form."""
     return TRACE * float(np.sqrt(max(gain, 0.0)))
@@ -54,7 +66,7 @@ def prune(context: Context, baseline: Assessment, current: Assessment) -> tuple[
     """
     tried: list[Assessment] = []
     while len(current.hypotheses) > 1:
-        gain = current.evidence - baseline.evidence
+        gain, again = current.evidence - baseline.evidence, recurs(context, current.hypotheses)
         lost: list[tuple[Hypothesis, float, Assessment]] = []
         for h in current.hypotheses:
             others = tuple(o for o in current.hypotheses if o.key != h.key)
@@ -66,8 +78,10 @@ def prune(context: Context, baseline: Assessment, current: Assessment) -> tuple[
             beside = max((s for o, s, _ in lost if o is not h and o.effect.is_physics), default=0.0)
             largest = min(beside, gain)  # alone, h may be worse than nothing
             # heat that comes again and again is a sign of its own: the verdict needs to see it
-            bar = NAMED + (0.0 if recurs(context, current.hypotheses) else trace(largest))
-            if share < bar or (share < SMALL * gain and objections(current, h, gain)):
+            bar = NAMED + (0.0 if again else trace(largest))
+            # one of several small events is what a law slightly off in form leaves here and there
+            doubtful = (again and h.effect.word in EVENTS) or objections(current, h, gain)
+            if share < bar or (share < SMALL * gain and doubtful):
                 shorter.append((bent(current, h) is None, share, without))
         if not shorter:
             break

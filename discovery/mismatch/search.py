@@ -12,8 +12,20 @@ from discovery.mismatch.gates import bent, matters, unseen_lag
 from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.lens import Lens
 from discovery.mismatch.look import again, attempt, look, sharpened
-from discovery.mismatch.question import BLUNT, EVENTS, NAMED, prune, question, recurs, supported, trace
+from discovery.mismatch.question import (
+    BLUNT,
+    EVENTS,
+    NAMED,
+    SMALL,
+    echoes,
+    prune,
+    question,
+    recurs,
+    supported,
+    trace,
+)
 
+MOST = 6  # effects at once
 REFITS = 6  # claims that are refitted at each step
 QUESTIONED = 3  # with more effects than this the machine is far from its model, and each one is large
 FAR_BELOW = 12.0  # log evidence below the best from which an attempt is no rival under another noise either
@@ -38,7 +50,7 @@ class Search:
 
 def search(
     context: Context,
-    most: int = 6,
+    most: int = MOST,
     tell: Callable[[str], None] = lambda _: None,
     begun: Search | None = None,
 ) -> Search:
@@ -76,8 +88,12 @@ def search(
         tried += more
         questioned = grown != before and 1 < len(current.hypotheses) <= QUESTIONED
         if questioned and not recurs(context, current.hypotheses):
+            stands = _keys(current)
             current, more = question(context, current, tried)
             tried += more
+            if _keys(current) != stands:  # what came in another's place has to be needed, too
+                current, more = prune(context, baseline, current)
+                tried += more
         if _keys(current) != stood:  # what carried over once carries over again
             current, more, dropped = supported(context, current, tried)
             tried, stood = tried + more, _keys(current)
@@ -86,6 +102,8 @@ def search(
         looks.append(look(context, current).claims)
         if _keys(current) == grown or dropped:
             break
+    current, more, claims = _without_echoes(context, baseline, current, looks[-1])
+    tried, looks = tried + more, looks + claims
     light = tuple(_light(a) for a in tried)
     return Search(baseline, current, light, whole.board, tuple(looks), tuple(dropped))
 
@@ -136,6 +154,23 @@ def _grow(
         current = step
         claims = look(context, current).claims
         looks.append(claims)
+    return current, tried, looks
+
+
+def _without_echoes(
+    context: Context, baseline: Assessment, current: Assessment, claims: tuple[Score, ...]
+) -> tuple[Assessment, list[Assessment], list[tuple[Score, ...]]]:
+    """Drop small heat for some hours that shows in another recording, too: a law slightly off in form leaves
+    it, and it must not hide the law's name. The last of `looks` is on what is left.
+    """
+    tried: list[Assessment] = []
+    looks: list[tuple[Score, ...]] = []
+    for h in [h for h in current.hypotheses if echoes(h, claims)]:
+        rest = attempt(context, current, tuple(o for o in current.hypotheses if o is not h))
+        if rest and current.evidence - rest.evidence < SMALL * (current.evidence - baseline.evidence):
+            current = rest
+            tried.append(rest)
+            looks.append(look(context, current).claims)
     return current, tried, looks
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, sensitivities
 from discovery.mismatch.hypothesis import Hypothesis
-from discovery.terms import Expression, evaluate
+from discovery.terms import Expression, evaluate, names
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,10 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
         values = {**h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
         for term in h.terms:
             series = evaluate(term.expression, {**ends, **values}, memory=system.ends).value
-            columns.append(Column(owner, term.into, np.asarray(series, dtype=float), term.source))
+            mine = owner + next(
+                (k for k, name in enumerate(h.amplitudes) if name in names(term.expression)), 0
+            )
+            columns.append(Column(mine, term.into, np.asarray(series, dtype=float), term.source))
         if h.shown:
             nodes = nodes if nodes is not None else trajectory.at_nodes()
             for k, (name, expression) in enumerate(h.shows(system.model).items()):

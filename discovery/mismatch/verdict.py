@@ -15,8 +15,8 @@ from discovery.mismatch.context import Context
 from discovery.mismatch.forcing import Forcing
 from discovery.mismatch.gates import bent, objections, unseen_lag
 from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.question import BLUNT, NAMED, recurs, trace
-from discovery.mismatch.search import Search
+from discovery.mismatch.question import BLUNT, NAMED, SMALL, echoes, recurs, trace
+from discovery.mismatch.search import MOST, Search
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,6 @@ RIVAL = 3.0  # log evidence within which a rival stays in the answer
 TRUST = 0.6  # evidence ratios are tempered: models are never exact
 DOUBT = 0.02  # share of the answer that stays with causes outside the catalogue
 
-AGAIN = 2.0  # log evidence of heat at the same body in another recording, from which heat is no event
 MUCH = 3.0  # times the reading noise: a machine that leaves so much in no pattern is not well modelled
 
 NO_MISMATCH, MISSING, FAULT, UNEXPLAINED = (
@@ -91,13 +90,26 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     reasons = []
     if recurs(context, best.hypotheses):
         reasons.append("unrecorded events come again and again: a cause, not an event")
-    if where := _comes_again(found):
-        reasons.append(f"unrecorded heat at {where} shows in another recording, too: a cause, not an event")
+    reasons += [
+        f"unrecorded heat at {where} shows in another recording, too: a cause, not an event"
+        for where in dict.fromkeys(h.where for h in best.hypotheses if echoes(h, found.looks[-1]))
+    ]
     heated = any(h.recording and h.effect.word == "unmeasured_heat" for h in best.hypotheses)
-    if len(context.recordings) == 1 and heated and any(h.recording is None for h in best.hypotheses):
+    if len(context.recordings) == 1 and heated:
         reasons.append(
             "in the only recording an event cannot be told from what a law slightly off in form leaves; "
             "a second recording to fit would tell"
+        )
+    late = {h.recording for h in best.hypotheses if h.effect.word == "clock_shift"}
+    if late >= set(context.recordings):
+        reasons.append(
+            "every recording would need its clock shifted: that may as well be a dead time between what "
+            "drives the machine and what is read"
+        )
+    if len(best.hypotheses) >= MOST and best.rms() > MUCH:
+        reasons.append(
+            f"{len(best.hypotheses)} effects leave {best.rms():.1f} times the reading noise: the model is "
+            "too far from this machine to say what is missing"
         )
     if other := _left(context, found):
         reasons.append(f"{other.effect.word} at {other.where} is still significant after the repair")
@@ -120,23 +132,6 @@ def _much(best: Assessment) -> tuple[str, ...]:
     return (
         f"what is left is {times:.1f} times the reading noise, in no pattern: it is taken for everyday heat",
     )
-
-
-def _comes_again(found: Search) -> str | None:
-    """The body at which heat is named as an event of one recording, while another recording speaks for such
-    heat there, too, if faintly.
-    """
-    named = {
-        (h.states, h.recording)
-        for h in found.best.hypotheses
-        if h.effect.word == "unmeasured_heat" and h.recording
-    }
-    for c in found.looks[-1]:
-        h = c.hypothesis
-        elsewhere = any(states == h.states and run != h.recording for states, run in named)
-        if h.effect.word == "unmeasured_heat" and elsewhere and c.gain > AGAIN:
-            return h.where
-    return None
 
 
 def _dropped(found: Search) -> tuple[str, ...]:
@@ -165,7 +160,9 @@ def _left(context: Context, found: Search) -> Hypothesis | None:
         more = refit.evidence - found.best.evidence if refit else c.gain
         bar = max(NAMED + trace(found.gain + more), 0.05 * found.gain)
         if refit and any(bent(refit, o) for o in refit.hypotheses if o.key == h.key):
-            bar = max(bar, BLUNT)
+            bar = max(bar, BLUNT, SMALL * found.gain)  # with less it would be dropped, were it in the model
+        if echoes(h, found.looks[-1]):
+            bar = max(bar, SMALL * found.gain)
         if more > bar:
             significant.append((more, h))
     return max(significant, key=lambda item: item[0])[1] if significant else None

@@ -27,7 +27,8 @@ def check_dimensions(model: Model, channels: Mapping[str, Channel]) -> list[str]
     """A sentence for each term and output whose units do not fit; empty when all do.
 
     A literal is a wildcard, and so is whatever it is multiplied with: its unit is not written down. Nothing
-    is converted inside, so that units of one dimension have to be the same ones (s, min and h are not).
+    is converted inside, so that units of one dimension have to be the same ones (s, min and h are not). Terms
+    of the catalogue take a flow for a share, in whatever unit it comes: their sizes carry the rest.
     """
     units = {name: p.unit for name, p in model.parameters.items()}
     units |= {name: s.unit for name, s in model.states.items()}
@@ -36,7 +37,7 @@ def check_dimensions(model: Model, channels: Mapping[str, Channel]) -> list[str]
         f"model '{model.name}': the unit '{u}' of {n} is not known" for n, u in units.items() if not known(u)
     ]
     dimensions = {name: dimension(unit) for name, unit in units.items()}
-    for term in model.terms:
+    for term in (t for t in model.terms if not t.effect):
         found = _compare(term.expression, dimensions, *_entering(model, model.states[term.into]))
         if found:
             sentences.append(f"model '{model.name}', term '{term.name}': {found}")

@@ -15,6 +15,7 @@ from discovery.mismatch.gates import objections
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.look import look
+from discovery.recordings import Recording
 from discovery.terms import Apply, Expression, names
 from tests.mismatch.machine import SEEN, campaign, changed, model, simulated
 
@@ -106,3 +107,20 @@ def test_a_drift_in_every_recording_is_a_drift() -> None:
     assert named.hypothesis.recording is None
     assert answer.after.model.parameters["drift_E_Z"].value == pytest.approx(12.0, abs=0.6)
     assert answer.held_out["r3"].after < 1.1 * answer.held_out["r3"].floor < answer.held_out["r3"].before
+
+
+def test_clocks_that_are_all_late_may_be_a_dead_time() -> None:
+    """Readings that come 40 minutes late in every recording: heat may take as long."""
+    late = [_late(simulated(seed), 2400.0) for seed in (1, 2)]
+    answer = diagnose(model(), campaign(*late), ["r1", "r2"])
+    assert answer.verdict.word == "unexplained"
+    assert any("dead time" in reason for reason in answer.verdict.reasons)
+
+
+def _late(recording: Recording, by: float) -> Recording:
+    """The recording with its readings `by` seconds late."""
+    steps = round(by / (recording.time[1] - recording.time[0]))
+    moved = {name: np.roll(recording.values[name], steps) for name in SEEN}
+    for values in moved.values():
+        values[:steps] = np.nan
+    return changed(recording, **moved)
