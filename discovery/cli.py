@@ -35,6 +35,15 @@ def _terminated_like_interrupted() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
+def _interrupted(error: BaseException | None) -> bool:
+    """Whether an interrupt is behind a failure: one that comes while a compiled kernel hands back its result
+    is told by Python as a SystemError.
+    """
+    while isinstance(error, SystemError):
+        error = error.__cause__ or error.__context__
+    return isinstance(error, KeyboardInterrupt)
+
+
 class _Sentences(TyperGroup):
     """The one place where a failure becomes a sentence and an exit status."""
 
@@ -45,7 +54,9 @@ class _Sentences(TyperGroup):
         except UserError as error:
             typer.echo(f"error: {error}", err=True)
             raise typer.Exit(2 if isinstance(error, UsageError) else 1) from None
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemError) as error:
+            if not _interrupted(error):
+                raise
             typer.echo("\nstopped; nothing half-written is left, the command can be run again", err=True)
             raise typer.Exit(130) from None
         except OSError as error:

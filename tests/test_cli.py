@@ -75,6 +75,25 @@ def test_failures(failure: BaseException, status: int, said: str) -> None:
     assert result.stderr.strip().startswith(said)
 
 
+@pytest.mark.parametrize("cause", [KeyboardInterrupt(), ValueError("broken")])
+def test_an_interrupt_inside_a_kernel_is_an_interrupt(cause: BaseException) -> None:
+    """What numba says when Ctrl-C comes while its kernel runs; any other SystemError stays what it is."""
+    small = typer.Typer(cls=app.info.cls, pretty_exceptions_enable=False)
+
+    @small.callback()
+    def main() -> None: ...
+
+    @small.command()
+    def work() -> None:
+        raise SystemError("CPUDispatcher(...) returned a result with an exception set") from cause
+
+    result = runner.invoke(small, ["work"])
+    stopped = isinstance(cause, KeyboardInterrupt)
+    assert result.exit_code == (130 if stopped else 1)
+    assert result.stderr.strip().startswith("stopped") == stopped
+    assert isinstance(result.exception, SystemExit if stopped else SystemError)
+
+
 def test_a_terminated_verb_unwinds() -> None:
     small = typer.Typer(cls=app.info.cls, pretty_exceptions_enable=False)
     unwound = []
