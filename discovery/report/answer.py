@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from discovery.report.mismatch import NEAR, sizes
-from discovery.report.ranking import astray, cells, is_error, mean_improvement, origin, ranked, ratio
+from discovery.report.ranking import (
+    astray,
+    cells,
+    is_error,
+    mean_improvement,
+    origin,
+    ranked,
+    ratio,
+    rms_by_unit,
+)
 from discovery.report.run import Run
 from discovery.report.text import counted, listed, number, percent, words
 
@@ -87,13 +96,15 @@ def _removed(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
 
 def _left(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
     """How far off a prediction of temperatures is: without a model there is nothing to compare with."""
-    scored = [score["rms"] for score in cells(run, best).values() if score.get("rms") is not None]
+    scored = rms_by_unit(run, best)
     if not scored:
         return [], []
-    middle, unit = float(np.median(scored)), run.unit(run.outputs[0]).replace("°C", "K")
-    worst = f"at worst {number(max(scored), 2)} {unit}"
-    point = f"It is off by {number(middle, 2)} {unit} (median rms over {_count(run, best)}, {worst})."
-    return [point], [(f"{number(middle, 2)} {unit}", f"left by {best}, {_seen(run)}")]
+    middle = [f"{number(float(np.median(rms)), 2)} {unit}".strip() for unit, rms in scored.items()]
+    worst = listed([f"{number(max(rms), 2)} {unit}".strip() for unit, rms in scored.items()])
+    over = f"median rms over {_count(run, best)}, at worst {worst}"
+    return [f"It is off by {listed(middle)} ({over})."], [
+        (", ".join(middle), f"left by {best}, {_seen(run)}")
+    ]
 
 
 def _seen(run: Run) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from discovery.report.heat import heat_charts, heat_unit
 from discovery.report.printed import Line, Printed
+from discovery.report.ranking import rms_unit
 from discovery.report.run import Run, pretty_unit
 from discovery.report.text import listed, number, percent, with_unit, words
 
@@ -120,7 +121,7 @@ def _outputs(run: Run, d: Mapping[str, Any]) -> Printed:
     rows = [
         Line(
             (
-                with_unit(name, run.unit(name)),
+                with_unit(name, rms_unit(run, name)),
                 number(noise.get(name)),
                 number(rms.get(name)),
                 percent(shares.get(name)),

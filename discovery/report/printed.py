@@ -7,9 +7,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from discovery.evaluation import tables
-from discovery.report.ranking import cells, is_error, kind, mean_improvement, mean_rms, origin, ranked, ratio
+from discovery.report.ranking import (
+    cells,
+    is_error,
+    kind,
+    mean_improvement,
+    mean_rms,
+    origin,
+    ranked,
+    ratio,
+    rms_unit,
+    rms_units,
+)
 from discovery.report.run import Run
-from discovery.report.text import number
+from discovery.report.text import number, with_unit
 
 _MOST_RECORDINGS = 4  # columns of the summary; the tables below have all
 
@@ -52,7 +63,8 @@ def summary(run: Run) -> Printed | None:
     recordings = list(dict.fromkeys(r for model in order for r, _ in cells(run, model)))
     shown = recordings[:_MOST_RECORDINGS]
     removed = is_error(run)
-    what = "rms removed [%]" if removed else f"rms left [{run.unit(run.outputs[0]).replace('°C', 'K')}]"
+    units = rms_units(run)
+    what = "rms removed [%]" if removed else f"rms left [{', '.join(units)}]"
     header = (
         "Model",
         "Kind",
@@ -66,11 +78,15 @@ def summary(run: Run) -> Printed | None:
     for model in order:
         entry = run.results["models"][model]
         share = ratio(run, model, order[0])
-        scores = [mean_improvement(run, model, r) if removed else mean_rms(run, model, r) for r in shown]
+        figures = [
+            number(mean_improvement(run, model, r), 2)
+            if removed
+            else ", ".join(number(mean_rms(run, model, r).get(unit)) for unit in units)
+            for r in shown
+        ]
         made = dict.fromkeys([origin(run, model), kind(run, model)])
         size = [number(entry.get("terms")), number(entry.get("parameters"))]
         times = "–" if not math.isfinite(share) else f"× {number(share, 3)}"
-        figures = [number(score, 2 if removed else 3) for score in scores]
         look = "best" if model == order[0] else ""
         rows.append(
             Line((model, ", ".join(made), *size, *figures, times, number(entry.get("seconds"), 2)), look)
@@ -111,7 +127,7 @@ def _parts(run: Run) -> dict[str, str]:
 def rms_tables(run: Run) -> list[Printed]:
     """What each model leaves of temperatures: a row for each recording and output, unseen ones first."""
     order, found = ranked(run), run.results.get("models", {})
-    rows = []
+    rows, units = [], rms_units(run)
     for recording in dict.fromkeys([*run.held_out, *run.results.get("fit", [])]):
         for index, output in enumerate(run.outputs):
             scores = [
@@ -119,10 +135,11 @@ def rms_tables(run: Run) -> list[Printed]:
                 for model in order
             ]
             seen = "unseen" if recording in run.held_out else "fitted"
-            first = Line((recording, seen, output, *map(number, scores)), "first")
+            named = output if len(units) == 1 else with_unit(output, rms_unit(run, output))
+            first = Line((recording, seen, named, *map(number, scores)), "first")
             rows.append(
-                first if index == 0 else Line(("", "", output, *map(number, scores)), repeated=recording)
+                first if index == 0 else Line(("", "", named, *map(number, scores)), repeated=recording)
             )
-    unit = run.unit(run.outputs[0]).replace("°C", "K") if run.outputs else ""
-    header = ("Recording", "", "Output", *(f"{model} [{unit}]" for model in order))
+    said = [with_unit(model, units[0]) if len(units) == 1 else model for model in order]
+    header = ("Recording", "", "Output", *said)
     return [Printed("rms left over", header, tuple(rows), frozenset({1, 2}))] if rows else []

@@ -102,13 +102,30 @@ def is_error(run: Run) -> bool:
     return not any(run.unit(output) in ("°C", "K", "°F") for output in run.outputs)
 
 
-def mean_rms(run: Run, model: str, recording: str) -> float:
-    """Quadratic mean over outputs of what a model leaves on a recording; NaN: units differ, or no score."""
-    if len({run.unit(output) for output in run.outputs}) > 1:
-        return math.nan
-    found = [
-        score["rms"]
-        for (name, _), score in cells(run, model).items()
-        if name == recording and _is_number(score["rms"])
-    ]
-    return math.sqrt(sum(rms**2 for rms in found) / len(found)) if found else math.nan
+def rms_by_unit(run: Run, model: str, recording: str | None = None) -> dict[str, list[float]]:
+    """What a model leaves of each output (on a recording), by the unit it is said in: micrometres and kelvins
+    are not to be mixed.
+    """
+    found: dict[str, list[float]] = {}
+    for (name, output), score in cells(run, model).items():
+        if recording in (None, name) and _is_number(score.get("rms")):
+            found.setdefault(rms_unit(run, output), []).append(float(score["rms"]))
+    return found
+
+
+def rms_units(run: Run) -> list[str]:
+    """Units in which the rms of the outputs are said, in their order."""
+    return list(dict.fromkeys(rms_unit(run, output) for output in run.outputs))
+
+
+def rms_unit(run: Run, output: str) -> str:
+    """Unit of an rms: a difference of temperatures is one of kelvins."""
+    return run.unit(output).replace("°C", "K")
+
+
+def mean_rms(run: Run, model: str, recording: str) -> dict[str, float]:
+    """Quadratic mean over the outputs of each unit of what a model leaves on a recording."""
+    return {
+        unit: math.sqrt(sum(rms**2 for rms in found) / len(found))
+        for unit, found in rms_by_unit(run, model, recording).items()
+    }

@@ -122,6 +122,34 @@ def test_the_answer_agrees_with_an_independent_count(folder: Path, page: str) ->
     assert f"It removes {float(f'{removed:.2g}'):.0f} % of the thermal error" in page
 
 
+@pytest.mark.parametrize("together", [False, True])
+def test_kelvins_and_micrometres_are_not_mixed(tmp_path: Path, together: bool) -> None:
+    """Temperatures beside a displacement: each figure with its own unit, in a comparison of runs, too."""
+    rms = {"T_head": 0.2, "dZ": 0.64, "T_brg": 0.4}
+    units = {"T_head": "degC", "dZ": "um", "T_brg": "degC"}
+    folders = []
+    for name, times in (("one", 1.0), ("two", 2.0)):
+        scores = {output: {"rms": times * value} for output, value in rms.items()}
+        entry = {"terms": 1, "parameters": 1, "seconds": 1.0, "recordings": {"sun": scores}, "notes": []}
+        content = {
+            "experiment": name,
+            "fit": [],
+            "held_out": ["sun"],
+            "units": units,
+            "models": {name: entry},
+        }
+        folders.append(tmp_path / name)
+        folders[-1].mkdir()
+        (folders[-1] / "results.json").write_text(json.dumps(content))
+    written = write_comparison(folders, tmp_path) if together else write_report(folders[0])
+    page = written.read_text("utf-8")
+    assert "off by 0.3 K and 0.64 µm (median rms over 3 outputs and 1 recording, at worst 0.4 K and" in page
+    assert "sun: rms left [K, µm]" in page
+    assert f"{float(np.sqrt((0.2**2 + 0.4**2) / 2)):.3f}, 0.64<" in page
+    assert "T_head [K]" in page
+    assert "dZ [µm]" in page
+
+
 def test_a_recording_that_was_fitted_decides_nothing(folder: Path) -> None:
     run = load_run(folder)
     before = ratio(run, "discovered", "reduced")
