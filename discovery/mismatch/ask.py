@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,10 @@ from discovery.dynamics.grid import Grid, Samples
 from discovery.dynamics.system import predict
 from discovery.errors import RunsAwayError
 from discovery.mismatch.context import Context
+from discovery.mismatch.hypothesis import Hypothesis
+from discovery.mismatch.when import instants, told
 from discovery.models import Model
+from discovery.terms import Name
 
 Array = NDArray[np.float64]
 
@@ -22,11 +26,67 @@ STEPS, READINGS = 720, 72  # of inputs and readings in a pattern
 HOPELESS = 16  # times the pattern would have to be repeated
 
 
-def next_experiment(context: Context, answer: Model, rival: Model | None, white: Array) -> str:
+NOTHING_CLOSE = (
+    "look at what happened in the windows in which heat is missing, and record what nothing records at that "
+    "body: its temperature, and whatever else heats or cools it"
+)
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What an experiment is for: what a pattern does, and what it is that differs at a body."""
+
+    does: str
+    differ: str
+
+
+APART = Aim("tells the rivals apart", "the two answers differ there")
+CONFIRM = Aim("would confirm the answer", "the model with and without it differs there")
+
+
+def aim(shown: Sequence[Hypothesis], rival: Hypothesis | None, answered: bool) -> Aim:
+    """What can be asked about what was named, or, where nothing was, about what came closest.
+
+    An event of one recording does not act in another one: there, only the laws beside it can be confirmed.
+    """
+    if answered and rival:
+        return APART
+    laws = _called([h for h in shown if h.recording is None])
+    if answered:
+        does = CONFIRM.does if all(h.recording is None for h in shown) else f"would confirm {laws}"
+        return Aim(does, CONFIRM.differ)
+    if rival:
+        what = f"would tell apart what came closest ({_called(shown)}, or {_called([rival])})"
+        return Aim(what, "the two differ there")
+    return Aim(f"would put to the test what came closest ({laws})", CONFIRM.differ)
+
+
+def look_back(context: Context, events: Sequence[Hypothesis]) -> str:
+    """What to do about events, which no pattern brings back: look at what happened, and wait for it again."""
+    what = " and ".join(_happened(context, h) for h in events)
+    runs = " and ".join(dict.fromkeys(str(h.recording) for h in events))
+    return f"look at {what}; repeat {runs} and see whether it comes again"
+
+
+def _happened(context: Context, h: Hypothesis) -> str:
+    """Heat and jumps have their hours; a loss that is another in a whole recording was changed before it."""
+    if h.effect.is_physics and not instants(context.campaign, h):
+        return f"what was changed at {h.where} before {h.recording}"
+    return f"what happened {told(context.campaign, h)}"
+
+
+def _called(shown: Sequence[Hypothesis]) -> str:
+    return " and ".join(f"{h.effect.word} at {h.where}" for h in shown)
+
+
+def next_experiment(
+    context: Context, answer: Model, rival: Model | None, white: Array, purpose: Aim | None = None
+) -> str:
     """A sentence: the inputs that separate two fitted models most, for how long, and the best new sensor.
 
     Without a rival the answer is compared with the refitted baseline, as a confirmation.
     """
+    purpose = purpose or (APART if rival else CONFIRM)
     other = rival or context.baseline.model
     length = min(LONGEST, max(float(g.time[-1] - g.time[0]) for g in context.grids.values()))
     results: list[tuple[float, str, Trajectory, Trajectory]] = []
@@ -41,28 +101,33 @@ def next_experiment(context: Context, answer: Model, rival: Model | None, white:
         return "record the machine longer, with every input moving on its own"
     separation, text, a, b = max(results, key=lambda r: r[0])
     needed = length * DECISIVE / max(separation, 1e-9)
+    read = _read(context)
     shared = [
         s
         for s in a.system.states
-        if s in b.system.states and s not in a.system.grid.outputs and not a.system.model.states[s].memory
+        if s in b.system.states and s not in read and not a.system.model.states[s].memory
     ]
     spread = {
         s: float(np.sqrt(np.mean((a.x[:, a.system.states.index(s)] - b.x[:, b.system.states.index(s)]) ** 2)))
         for s in shared
     }
     sensor = max(spread, key=lambda s: spread[s]) if spread else None
-    purpose = "tells the rivals apart" if rival else "would confirm the answer"
     every = length / READINGS
     if needed > HOPELESS * length:
-        sentence = f"no input pattern of {_told(length)} {purpose} with these outputs alone"
+        sentence = f"no input pattern of {_told(length)} {purpose.does} with these outputs alone"
     else:
-        sentence = (
-            f"{text}: {purpose} within about {_told(max(needed, every))} of readings every {_told(every)}"
-        )
+        soon = f"within about {_told(max(needed, every))} of readings every {_told(every)}"
+        sentence = f"{text}: {purpose.does} {soon}"
     if sensor and spread[sensor] > 0.02:
-        apart = f"the two answers differ there by {spread[sensor]:.2f} K rms"
+        apart = f"{purpose.differ} by {spread[sensor]:.2f} K rms"
         sentence += f"; a temperature sensor on {sensor} helps most ({apart})"
     return sentence
+
+
+def _read(context: Context) -> set[str]:
+    """States that a measured output shows as they are: they have their sensor."""
+    shown = {n: context.model.outputs.get(n, Name(n)) for n in context.outputs}
+    return {y.id for y in shown.values() if isinstance(y, Name)}
 
 
 def _told(seconds: float) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from discovery.errors import UserError
-from discovery.mismatch.ask import next_experiment
+from discovery.mismatch.ask import NOTHING_CLOSE, aim, look_back, next_experiment
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.catalogue import Effect, catalogue
 from discovery.mismatch.context import Context, make_context, seen_beside
@@ -161,10 +161,21 @@ def _question(context: Context, found: Search, verdict: Verdict) -> str:
             "check the device and repeat the recording; a fault of the measuring chain needs no new physics"
         )
     shown = verdict.named or verdict.candidates
-    rivals = [r for n in shown for r in n.rivals if r.below <= RIVAL]
-    rival = _rival_model(found, rivals[0].hypothesis) if rivals else None
+    if not shown:
+        return NOTHING_CLOSE
+    rivals = [
+        r.hypothesis
+        for n in shown
+        for r in n.rivals
+        if r.below <= RIVAL and not (r.hypothesis.recording and n.hypothesis.recording)
+    ]  # no pattern tells two events of the past apart
+    rival = _rival_model(found, rivals[0]) if rivals else None
+    claims = [n.hypothesis for n in shown]
+    if rival is None and all(h.recording for h in claims):
+        return look_back(context, claims)
     white = np.array(found.best.best_view.noise.white)
-    return next_experiment(context, found.best.fit.model, rival, white)
+    purpose = aim(claims, rivals[0] if rival else None, bool(verdict.named))
+    return next_experiment(context, found.best.fit.model, rival, white, purpose)
 
 
 def _on_fit(before: Assessment, after: Assessment) -> Improvement:

@@ -7,12 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discovery.mismatch.ask import next_experiment
-from discovery.mismatch.context import make_context
+from discovery.mismatch.ask import aim, look_back, next_experiment
+from discovery.mismatch.catalogue import catalogue
+from discovery.mismatch.context import Context, make_context
+from discovery.mismatch.diagnosis import diagnose
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.hypothesis import Hypothesis
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
-from tests.mismatch.machine import NOISE, SEEN, campaign, model, simulated
+from tests.mismatch.machine import NOISE, SEEN, Array, Inputs, campaign, model, simulated
 
 PLATE = {
     "T_env": Channel("T_env", "ambient temperature", "degC", None, "linear"),
@@ -83,3 +87,69 @@ def test_a_machine_with_a_pump_is_asked_to_run_it_or_to_stay_dry(wet: bool) -> N
     said = next_experiment(where, other, None, np.full(3, NOISE))
     assert ("pump" in said) == wet
     assert ("dry" in said) != wet
+
+
+@pytest.mark.parametrize("shown", [False, True])
+def test_no_sensor_is_asked_for_where_one_is(shown: bool) -> None:
+    """A thermometer on the plate is called T_top, and not as the state is."""
+    two = Model(
+        "plate",
+        {
+            "loss": Parameter(0.01, "1/s", 0.0),
+            "gain": Parameter(0.04, "K/W/s", 0.0),
+            "link": Parameter(0.01, "1/s", 0.0),
+        },
+        {"plate": State("plate", start=parse("60")), "foot": State("foot", start=parse("60"))},
+        (
+            Term("loss", "plate", parse("loss*(T_env - plate)")),
+            Term("gain", "plate", parse("gain*heater")),
+            Term("link", "foot", parse("link*(plate - foot)")),
+        ),
+        {"T": parse("plate" if shown else "0.5*plate + 0.5*foot")},
+    )
+    where = make_context(ten_minutes(), two, ["a"], ["T"], [])
+    fitted = where.baseline.model
+    other = fitted.with_values({"gain": 1.3 * fitted.parameters["gain"].value})
+    said = next_experiment(where, other, None, np.array([0.1]))
+    assert ("sensor on plate" in said) != shown
+    assert ("sensor on foot" in said) == shown
+
+
+def claims(where: Context) -> dict[str, Hypothesis]:
+    found = hypotheses(where.model, where.campaign.channels, tuple(SEEN), where.recordings, where.effects)
+    return {f"{h.effect.word} {h.where} {h.recording}": h for h in found}
+
+
+def test_what_has_no_answer_is_not_confirmed() -> None:
+    effects = [catalogue()[word] for word in ("friction_speed", "unmeasured_heat", "film_drag")]
+    where = make_context(campaign(simulated(1)), model(), ["r1"], tuple(SEEN), effects)
+    found = claims(where)
+    law, event = found["friction_speed motor None"], found["unmeasured_heat bed r1"]
+    drag = found["film_drag motor None"]
+    said = aim([law, event], None, answered=False)
+    assert said.does == "would put to the test what came closest (friction_speed at motor)"
+    said = aim([law], drag, answered=False)
+    assert said.does == "would tell apart what came closest (friction_speed at motor, or film_drag at motor)"
+    assert "answer" not in said.does + said.differ
+    assert aim([law, event], None, answered=True).does == "would confirm friction_speed at motor"
+    assert aim([law], None, answered=True).does == "would confirm the answer"
+
+
+def test_an_event_is_looked_at_where_it_was() -> None:
+    """No pattern brings a window of the past back."""
+
+    def sun(t: float, _: Array, __: Inputs) -> tuple[float, float, float]:
+        return (0.0, 0.0, 120.0 * (30000 <= t < 52000))
+
+    said = diagnose(model(), campaign(simulated(1), simulated(2, concealed=sun)), ["r1", "r2"]).question
+    assert "confirm" not in said
+    assert said.startswith("look at what happened at bed in r2 from 8.")
+    assert said.endswith(" h; repeat r2 and see whether it comes again")
+
+
+def test_a_loss_that_is_another_was_changed_before() -> None:
+    where = make_context(
+        campaign(simulated(1), simulated(2)), model(), ["r1", "r2"], tuple(SEEN), [catalogue()["wear"]]
+    )
+    said = look_back(where, [claims(where)["wear motor r2"]])
+    assert said.startswith("look at what was changed at motor before r2; repeat r2")
