@@ -205,13 +205,7 @@ def _rival_model(found: Search, rival: Hypothesis) -> Model | None:
 
 
 def _smallest(found: Search) -> str:
-    """What would have been seen: the size at which usual effects reach the threshold."""
-    seen: list[tuple[float, Score]] = []
-    for claim in found.looks[0]:
-        h = claim.hypothesis
-        if h.effect.amplitude.fixed is None and h.recording is None and claim.t and claim.share > INVISIBLE:
-            error = abs(claim.size[0] / claim.t)
-            seen.append((4.5 * error, claim))
+    """What would have been seen: the size at which usual effects reach the threshold, and where."""
     texts = []
     for word in (
         "fluid_convection",
@@ -220,12 +214,33 @@ def _smallest(found: Search) -> str:
         "flooded_gap",
         "second_thermal_mass",
     ):
-        sizes = [(size, c) for size, c in seen if c.hypothesis.effect.word == word]
-        if sizes:
-            size, c = max(sizes, key=lambda item: item[0])
-            texts.append(f"{word} of {size:.2g} {c.hypothesis.effect.amplitude.unit} at any body")
+        claims = [c for c in found.looks[0] if c.hypothesis.effect.word == word]
+        seen = [c for c in claims if _size_is_told(c)]
+        if not seen:
+            continue
+        size, c = max(((4.5 * abs(c.size[0] / c.t), c) for c in seen), key=lambda item: item[0])
+        h = c.hypothesis
+        speed = f" at {h.effect.at}" if h.effect.at else ""
+        places = list(dict.fromkeys(" and ".join(c.hypothesis.places) for c in seen))
+        everywhere = len(seen) == len(claims) and len(places) > 1 and h.effect.place in _ANYWHERE
+        where = _ANYWHERE[h.effect.place] if everywhere else f"at {'; '.join(places)}"
+        texts.append(f"{word} of {size:.2g} {h.units.get(h.amplitudes[0], '')}{speed} {where}")
     return (
         "these recordings would have shown " + ", ".join(texts)
         if texts
         else "nothing is missing that these recordings could show"
     )
+
+
+def _size_is_told(claim: Score) -> bool:
+    h = claim.hypothesis
+    is_size = h.effect.amplitude.fixed is None and h.recording is None
+    return is_size and claim.t != 0 and claim.share > INVISIBLE
+
+
+_ANYWHERE = {
+    "body": "at any body",
+    "fluid-free body": "at any body without fluid",
+    "driven body": "at any driven body",
+    "any pair": "between any two bodies",
+}

@@ -186,6 +186,7 @@ def _physics(d: Diagnosis, n: Named, checked: float | None) -> dict[str, Any]:
             "low": _number(h.spans[name][0] if name in h.spans else value if p.fixed else low),
             "high": _number(h.spans[name][1] if name in h.spans else value if p.fixed else high),
             "unit": p.unit,
+            **({"at": h.effect.at} if h.effect.at and name in h.amplitudes else {}),
         }
     expressions = [text(t.expression) for t in h.terms] or [
         text(e) for e in h.shows(d.context.model).values()

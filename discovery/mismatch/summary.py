@@ -47,7 +47,8 @@ def _is_told(q: dict[str, Any]) -> bool:
 
 
 def _size(name: str, q: dict[str, Any]) -> str:
-    """A number with its unit and its 95 % interval."""
+    """A number with its unit, the speed it is a size at, and its 95 % interval."""
     unit = "" if q["unit"] == "1" else f" {q['unit']}"
+    unit += f" at {q['at']}" if q.get("at") else ""
     interval = f" ({q['low']:.4g} to {q['high']:.4g})" if q["low"] != q["high"] else ""
     return f"{name} = {q['value']:.4g}{unit}{interval}"

@@ -51,11 +51,15 @@ def _about(d: Mapping[str, Any]) -> str:
 def sizes(one: Mapping[str, Any]) -> list[str]:
     """The parameters of an effect that was found, each with its interval; a switch that is on is no size."""
     return [
-        f"{name} = {number(p.get('value'))} {pretty_unit(str(p.get('unit', '')))} "
+        f"{name} = {number(p.get('value'))} {pretty_unit(str(p.get('unit', '')))} {_speed(p)}"
         f"(95 %: {number(p.get('low'))} to {number(p.get('high'))})"
         for name, p in (one.get("parameters") or {}).items()
         if p.get("low") != p.get("high")
     ]
+
+
+def _speed(size: Mapping[str, Any]) -> str:
+    return f"at {size['at']} " if size.get("at") else ""
 
 
 def _place(one: Mapping[str, Any]) -> str:

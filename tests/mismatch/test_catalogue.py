@@ -83,6 +83,7 @@ def test_an_entry_is_complete(effect: Effect) -> None:
     said = import_module(f"discovery.mismatch.catalogue.{file}").__doc__ or ""
     assert "Source:" in said
     assert "Limits:" in said
+    assert ("at 1000 rpm" in said) == (effect.at == "1000 rpm")  # what the formula divides the speed by
 
 
 @entries

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -108,6 +109,8 @@ def test_what_is_concealed_is_named(name: str) -> None:
     assert physics.get("recording") == case.recording
     assert physics["probability"] > 0.9
     assert answer["detection"]["p_value"] < 0.01
+    if case.effect == "friction_speed":
+        assert next(iter(physics["parameters"].values()))["at"] == "1000 rpm"
     if case.size:
         size = next(iter(physics["parameters"].values()))
         width = size["high"] - size["low"]
@@ -217,7 +220,11 @@ def test_nothing_is_named_where_nothing_is_missing(seed: int, everyday: bool) ->
     assert answer["verdict"] == "no mismatch"
     assert answer["physics"] == []
     assert answer["improvement"]["explained"] is None
-    assert "would have shown" in answer["next_experiment"]
+    said = answer["next_experiment"]
+    assert "would have shown" in said
+    assert re.search(r"fluid_convection of [\d.]+ W/K at any body without fluid, ", said)
+    assert re.search(r"friction_speed of [\d.]+ W at 1000 rpm at motor, ", said)  # the only driven body
+    assert re.search(r"evaporation_drying of [\d.]+ W at any body, ", said)
 
 
 def without_proof(document: dict[str, Any]) -> dict[str, Any]:

@@ -21,6 +21,7 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
         named("sensor_lag", on_T1=number(1.0, 1.0, 1.0, "1"), t_lag_T1=number(18.0, 17.0, 19.0, "s")),
         named("cooling_hysteresis", on=number(1.0, 1.0, 1.0, "1")),
         named("thermal_preload", k=number(0.03, 0.02, 0.04, "1/K"), share=number(0.5, 0.4, 0.6, "1")),
+        named("friction_speed", P_f={**number(0.686, 0.487, 0.905, "W"), "at": "1000 rpm"}),
         named("radiation", area=number(0.4, None, None, "m2"), power=number(4.0, 4.0, 4.0, "1")),
     ]
     document: dict[str, Any] = {
@@ -38,5 +39,6 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
         "  sensor_lag at T1, probability 0.90: t_lag_T1 = 18 s (17 to 19)",
         "  cooling_hysteresis at T1, probability 0.90",
         "  thermal_preload at T1, probability 0.90: k = 0.03 1/K (0.02 to 0.04), share = 0.5 (0.4 to 0.6)",
+        "  friction_speed at T1, probability 0.90: P_f = 0.686 W at 1000 rpm (0.487 to 0.905)",
         "  radiation at T1, probability 0.90: power = 4",
     ]

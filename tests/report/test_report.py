@@ -19,7 +19,7 @@ from discovery.mismatch.verdict import RIVAL
 from discovery.models import Parameter
 from discovery.report import equations, write_comparison, write_figures, write_report
 from discovery.report.chart import thinned
-from discovery.report.mismatch import NEAR
+from discovery.report.mismatch import NEAR, sizes
 from discovery.report.ranking import ratio
 from discovery.report.run import load_run
 from discovery.report.series import autocorrelation
@@ -193,6 +193,11 @@ def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path
     page = write_report(folder).read_text("utf-8")
     assert "contradict" not in page
     assert "The repair closes nothing of the gap" in page
+
+
+def test_a_size_says_at_which_speed_it_is_one() -> None:
+    size = {"value": 0.686, "low": 0.487, "high": 0.905, "unit": "W", "at": "1000 rpm"}
+    assert sizes({"parameters": {"P_f": size}}) == ["P_f = 0.686 W at 1000 rpm (95 %: 0.487 to 0.905)"]
 
 
 def test_a_given_number_of_each_recording_is_printed_for_each() -> None:

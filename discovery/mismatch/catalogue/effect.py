@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
@@ -114,3 +115,9 @@ class Effect:
     def is_physics(self) -> bool:
         """False for faults of the measuring chain."""
         return self.group != "measuring chain"
+
+    @property
+    def at(self) -> str:
+        """The speed that the amplitude is a size at, "1000 rpm", where the formula divides by one."""
+        found = re.search(r"\bspeed\s*/\s*(\d+(?:\.\d+)?)", self.formula)
+        return f"{float(found[1]):g} rpm" if found else ""
