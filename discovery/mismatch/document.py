@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from discovery.fitting import Fit
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.describe import heat_over_time
 from discovery.mismatch.forcing import alike
 from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.verdict import FAULT, UNEXPLAINED, Named
+from discovery.mismatch.when import instants
+from discovery.models.units import differences
 from discovery.terms import text
 
 if TYPE_CHECKING:
@@ -43,8 +47,8 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "alternatives": _alternatives(d.verdict.named),
         "considered": [
             {
-                "effect": c.hypothesis.effect.word,
-                "states": list(c.hypothesis.places),
+                **_claim(c.hypothesis),
+                **_instants(d, c.hypothesis),
                 "log_evidence": _number(c.gain, 4),
                 "score": _number(c.t, 4),
                 "share_that_a_refit_leaves": _number(c.share, 3),
@@ -124,8 +128,10 @@ def _location(d: Diagnosis) -> dict[str, Any]:
 
 
 def _improvement(d: Diagnosis) -> dict[str, Any]:
-    """The proof."""
+    """The proof; `unit` of its figures, where all outputs have the same."""
+    units = {differences(d.context.campaign.channels[name].unit) for name in d.context.outputs}
     return {
+        "unit": units.pop() if len(units) == 1 else None,
         "fit": {
             "rms_before": _number(d.fit.before),
             "rms_after": _number(d.fit.after),
@@ -155,6 +161,12 @@ def _claim(h: Hypothesis) -> dict[str, Any]:
     }
 
 
+def _instants(d: Diagnosis, h: Hypothesis) -> dict[str, Any]:
+    """Begin and end of an event, or its one instant."""
+    found = instants(d.context.campaign, h)
+    return {"instants_s": [_number(t, 7) for t in found]} if found else {}
+
+
 def _alternatives(named: tuple[Named, ...]) -> list[dict[str, Any]]:
     rows = [
         {
@@ -171,30 +183,32 @@ def _alternatives(named: tuple[Named, ...]) -> list[dict[str, Any]]:
 def _physics(d: Diagnosis, n: Named, checked: float | None) -> dict[str, Any]:
     h = n.hypothesis
     parameters = {}
+    fits = (d.search.best.fit, d.after.fit)
+    output = dict(zip(h.amplitudes, h.shown, strict=True)) if len(h.amplitudes) > 1 else {}
     for name in (*h.amplitudes, *h.shapes):
-        p, q = (a.fit.model.parameters[name] for a in (d.search.best, d.after))
-        believed, value = (x.values.get(h.recording, x.value) if h.recording else x.value for x in (p, q))
-        low, high = (p.low, p.high) if not h.recording else _interval(d, name)
-        if low is not None and high is not None:
-            if h.effect.is_physics:
-                low = max(believed - float(np.hypot(believed - low, FORM * believed)), p.min)
-                high = min(believed + float(np.hypot(high - believed, FORM * believed)), p.max)
-            # two ways to fit that do not agree leave that much open
-            low, high = min(low, value), max(high, value)
+        p = d.after.fit.model.parameters[name]
+        value = p.values.get(h.recording, p.value) if h.recording else p.value
+        # two ways to fit that do not agree leave that much open
+        known = [span for span in (_interval(fit, h, name) for fit in fits) if span]
+        low = min((span[0] for span in known), default=None)
+        high = max((span[1] for span in known), default=None)
         parameters[name] = {
             "value": _number(value),
             "low": _number(h.spans[name][0] if name in h.spans else value if p.fixed else low),
             "high": _number(h.spans[name][1] if name in h.spans else value if p.fixed else high),
             "unit": p.unit,
             **({"at": h.effect.at} if h.effect.at and name in h.amplitudes else {}),
+            **({"output": output[name]} if name in output else {}),
         }
+    moved = _moved(parameters)
     expressions = [text(t.expression) for t in h.terms] or [
-        text(e) for e in h.shows(d.context.model).values()
+        text(e) for name, e in h.shows(d.context.model).items() if name in (moved or [name])
     ]
     return {
         "effect": h.effect.word,
         "title": h.effect.title,
         "states": list(h.places),
+        **({"moved": moved} if moved else {}),
         **({"recording": h.recording} if h.recording else {}),
         "probability": round(n.probability, 4),
         "named_again": _number(checked, 3),
@@ -204,6 +218,14 @@ def _physics(d: Diagnosis, n: Named, checked: float | None) -> dict[str, Any]:
         "source": h.effect.source,
         "confused_with": list(h.effect.confused_with),
     }
+
+
+def _moved(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Outputs that an effect of several sizes moves, beyond the interval of each; a device set to zero may
+    leave thermometers beside it as they are.
+    """
+    sizes = [p for p in parameters.values() if "output" in p and p["low"] is not None]
+    return [p["output"] for p in sizes if not p["low"] <= 0.0 <= p["high"]]
 
 
 def _outliers(d: Diagnosis) -> list[dict[str, Any]]:
@@ -239,8 +261,20 @@ def _outliers(d: Diagnosis) -> list[dict[str, Any]]:
     return rows
 
 
-def _interval(d: Diagnosis, name: str) -> tuple[float | None, float | None]:
-    fit = d.search.best.fit
+def _interval(fit: Fit, h: Hypothesis, name: str) -> tuple[float, float] | None:
+    """The 95 % interval of a size in one fit, about its own value there; None where it is not known."""
+    p = fit.model.parameters[name]
+    value = p.values.get(h.recording, p.value) if h.recording else p.value
+    low, high = _of_one_recording(fit, name) if h.recording else (p.low, p.high)
+    if low is None or high is None:
+        return None
+    if h.effect.is_physics:
+        low = max(value - float(np.hypot(value - low, FORM * value)), p.min)
+        high = min(value + float(np.hypot(high - value, FORM * value)), p.max)
+    return low, high
+
+
+def _of_one_recording(fit: Fit, name: str) -> tuple[float | None, float | None]:
     for i, u in enumerate(fit.problem.unknowns):
         if u.name == name and not u.is_start:
             half = 1.96 * float(fit.standard_errors[i])

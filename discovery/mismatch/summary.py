@@ -14,7 +14,7 @@ def summary(folder: Path) -> list[str]:
     d = read_diagnosis(folder)
     lines = [f"{d['verdict']} in '{d['model']}'"]
     for p in d["physics"]:
-        sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q))
+        sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q, p))
         said = f"  {p['effect']} {_place(p)}, probability {p['probability']:.2f}"
         lines.append(f"{said}: {sizes}" if sizes else said)
     near = [a for a in d["alternatives"] if a["log_evidence_below_best"] <= RIVAL]
@@ -23,10 +23,10 @@ def summary(folder: Path) -> list[str]:
     if about := d["description"]:
         what = f"the missing heat at {about['state']} follows {about['formula']}"
         lines.append(f"  {what} (a description, not a cause)")
-    worse = d["improvement"]["contradicted_by"]
+    worse, unit = d["improvement"]["contradicted_by"], _unit(d["improvement"])
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
         after = "runs away" if i["rms_after"] is None else f"{i['rms_after']:.3g}"
-        rms = f"rms {i['rms_before']:.3g} -> {after} (noise {i['noise_floor']:.3g})"
+        rms = f"rms {i['rms_before']:.3g} -> {after}{unit} (noise {i['noise_floor']:.3g})"
         lines.append(f"  unseen recording {run}: {rms}{', worse than without' if run in worse else ''}")
     if worse:
         lines.append("  do not use the repaired model: unseen recordings contradict it; fit more recordings")
@@ -34,14 +34,25 @@ def summary(folder: Path) -> list[str]:
     return lines
 
 
+def _unit(improvement: dict[str, Any]) -> str:
+    """The unit of the proof; outputs of several units count alike, as multiples of their noise."""
+    unit = improvement.get("unit")
+    return f" {unit}" if unit else ", weighed by their noise"
+
+
 def _place(claim: dict[str, Any]) -> str:
     """Where an effect acts, in which recording."""
-    places = [f"at {', '.join(claim['states'])}"] if claim["states"] else []
+    states = claim.get("moved") or claim["states"]
+    places = [f"at {', '.join(states)}"] if states else []
     return " ".join([*places, *([f"in {claim['recording']}"] if claim.get("recording") else [])])
 
 
-def _is_told(q: dict[str, Any]) -> bool:
-    """Whether a number says something: a switch that is fixed at 1 only says that its effect is there."""
+def _is_told(q: dict[str, Any], claim: dict[str, Any]) -> bool:
+    """Whether a number says something: a switch that is fixed at 1 only says that its effect is there, and a
+    jump that may be none says nothing.
+    """
+    if claim.get("moved") and q.get("output", claim["moved"][0]) not in claim["moved"]:
+        return False
     switch = q["unit"] == "1" and q["low"] == q["value"] == q["high"] == 1.0
     return q["low"] is not None and not switch
 

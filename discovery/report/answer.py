@@ -186,7 +186,7 @@ def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
 
 
 def _effect(one: Mapping[str, Any]) -> str:
-    states = listed([str(state) for state in one.get("states", [])])
+    states = listed([str(state) for state in one.get("moved") or one.get("states", [])])
     where = f" at {states}" if states else f" in {one['recording']}" if one.get("recording") else ""
     sure = one.get("probability")
     text = f"{words(str(one.get('effect', 'unknown')))}{where}"

@@ -49,12 +49,15 @@ def _about(d: Mapping[str, Any]) -> str:
 
 
 def sizes(one: Mapping[str, Any]) -> list[str]:
-    """The parameters of an effect that was found, each with its interval; a switch that is on is no size."""
+    """The parameters of an effect that was found, each with its interval; a switch that is on is no size, nor
+    is a jump that may be none.
+    """
+    moved = one.get("moved") or one.get("states") or []
     return [
         f"{name} = {number(p.get('value'))} {pretty_unit(str(p.get('unit', '')))} {_speed(p)}"
         f"(95 %: {number(p.get('low'))} to {number(p.get('high'))})"
         for name, p in (one.get("parameters") or {}).items()
-        if p.get("low") != p.get("high")
+        if p.get("low") != p.get("high") and p.get("output") in (None, *moved)
     ]
 
 
@@ -63,9 +66,20 @@ def _speed(size: Mapping[str, Any]) -> str:
 
 
 def _place(one: Mapping[str, Any]) -> str:
-    """Bodies and recording of an effect; a shifted clock has a recording alone."""
-    parts = [listed(one.get("states") or []), f"in {one['recording']}" if one.get("recording") else ""]
+    """Bodies, recording and hours of an effect; a shifted clock has a recording alone."""
+    places = listed(one.get("moved") or one.get("states") or [])
+    parts = [places, f"in {one['recording']}" if one.get("recording") else "", _hours(one)]
     return " ".join(part for part in parts if part) or "all inputs"
+
+
+def _hours(one: Mapping[str, Any]) -> str:
+    """When an event acts."""
+    times = one.get("instants_s") or []
+    if not times:
+        return ""
+    scale, unit = (3600.0, "h") if max(times) > 3600 else (60.0, "min")
+    said = " to ".join(number(t / scale) for t in times)
+    return f"({said} {unit})"
 
 
 def _physics(d: Mapping[str, Any]) -> Printed:
@@ -187,16 +201,12 @@ def _considered(d: Mapping[str, Any]) -> Printed:
     """What scored highest in the search; only where nothing was named, since else the rivals say more."""
     if d.get("physics") or d.get("verdict") == "no mismatch":
         return Printed("", (), ())
+    best: dict[tuple[str, str], Mapping[str, Any]] = {}
+    for c in d.get("considered") or []:  # best first
+        best.setdefault((words(c["effect"]), _place(c)), c)
     rows = [
-        Line(
-            (
-                words(c["effect"]),
-                _place(c),
-                number(c.get("log_evidence")),
-                "yes" if c.get("decidable") else "no",
-            )
-        )
-        for c in d.get("considered") or []
+        Line((*named, number(c.get("log_evidence")), "yes" if c.get("decidable") else "no"))
+        for named, c in best.items()
     ]
     header = ("Effect", "Where", "Log evidence", "Can these recordings decide it?")
     return Printed("What came closest", header, tuple(rows), frozenset({1, 3}))

@@ -118,6 +118,42 @@ def test_what_is_concealed_is_named(name: str) -> None:
         assert size["value"] == pytest.approx(case.size, rel=0.2)
 
 
+def shifted(found: Diagnosis, which: str, name: str, by: float) -> Diagnosis:
+    """The diagnosis with a size that one of its two fits, "best" or "after", sees elsewhere."""
+    assessment = found.after if which == "after" else found.search.best
+    (k,) = (i for i, u in enumerate(assessment.fit.problem.unknowns) if u.name == name and not u.is_start)
+    theta = assessment.fit.theta.copy()
+    theta[k] += by
+    changed = replace(assessment, fit=replace(assessment.fit, theta=theta))
+    if which == "after":
+        return replace(found, after=changed)
+    return replace(found, search=replace(found.search, best=changed))
+
+
+@pytest.mark.parametrize("name", ["a drift", "a flooded gap"])
+@pytest.mark.parametrize("by", [-1.5, 1.5])
+def test_a_size_lies_within_its_interval(name: str, by: float) -> None:
+    """Two fits that do not agree: the interval holds both, each with its own width."""
+    (size,) = solved(name).search.best.hypotheses[0].amplitudes
+    (physics,) = shifted(solved(name), "after", size, by).document()["physics"]
+    told = physics["parameters"][size]
+    least = 0.02 * (told["high"] - told["low"])
+    assert told["low"] + least < told["value"] < told["high"] - least
+
+
+def test_a_device_set_to_zero_is_named_where_it_jumps() -> None:
+    found = solved("a device set to zero")
+    size = found.search.best.hypotheses[0].amplitudes[2]
+    (physics,) = found.document()["physics"]
+    assert physics["moved"] == physics["states"] == list(SEEN)
+    for which in ("best", "after"):
+        found = shifted(found, which, size, -physics["parameters"][size]["value"])
+    (physics,) = found.document()["physics"]
+    assert physics["states"] == list(SEEN)
+    assert physics["moved"] == list(SEEN)[:2]
+    assert [p.get("output") for p in physics["parameters"].values()] == [*SEEN, None]
+
+
 def test_the_instant_of_a_jump_has_an_interval() -> None:
     """Between two readings nobody knows; this one came at 50000 s."""
     (physics,) = solved("an offset").document()["physics"]
@@ -155,6 +191,9 @@ def test_a_window_of_heat_is_found_with_its_body_and_hours() -> None:
     _, on, off = physics["parameters"].values()
     assert 30000 - 3600 < on["low"] < 30000 < on["high"] < 30000 + 3600
     assert 52000 - 3600 < off["low"] < 52000 < off["high"] < 52000 + 3600
+    first_look = [c for c in answer.document()["considered"] if c["effect"] == "unmeasured_heat"]
+    assert first_look[0]["recording"] == "r2"
+    assert first_look[0]["instants_s"] == pytest.approx([30000, 52000], abs=3600)
     (window,) = answer.location.windows
     assert (window.state, window.recording) == ("bed", "r2")
     assert abs(window.start_s - 30000) < 1800

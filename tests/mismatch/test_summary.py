@@ -42,3 +42,31 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
         "  friction_speed at T1, probability 0.90: P_f = 0.686 W at 1000 rpm (0.487 to 0.905)",
         "  radiation at T1, probability 0.90: power = 4",
     ]
+
+
+def test_the_proof_has_a_unit_or_is_weighed_and_a_jump_that_may_be_none_is_not_told(tmp_path: Path) -> None:
+    jumps = {
+        "zero_T": {**number(-0.01, -0.03, 0.01, "K"), "output": "T"},
+        "zero_dZ": {**number(2.1, 2.0, 2.2, "um"), "output": "dZ"},
+        "t_zero": number(60.0, 50.0, 70.0, "s"),
+    }
+    device = {"effect": "rezero", "states": ["T", "dZ"], "moved": ["dZ"], "recording": "fri"}
+    held_out = {"sun": {"rms_before": 0.861, "rms_after": 0.412, "noise_floor": 0.421}}
+    document: dict[str, Any] = {
+        "verdict": "measurement fault",
+        "model": "m",
+        "physics": [{**device, "probability": 0.98, "parameters": jumps}],
+        "alternatives": [],
+        "reasons": [],
+        "description": None,
+        "next_experiment": "none",
+    }
+    for unit, said in (("K", "0.861 -> 0.412 K ("), (None, "0.861 -> 0.412, weighed by their noise (")):
+        improvement: dict[str, Any] = {"unit": unit, "held_out": held_out, "contradicted_by": []}
+        (tmp_path / "diagnosis.json").write_text(
+            json.dumps({**document, "improvement": improvement}), "utf-8"
+        )
+        assert summary(tmp_path)[1:-1] == [
+            "  rezero at dZ in fri, probability 0.98: zero_dZ = 2.1 um (2 to 2.2), t_zero = 60 s (50 to 70)",
+            f"  unseen recording sun: rms {said}noise 0.421)",
+        ]

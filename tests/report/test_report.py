@@ -19,7 +19,7 @@ from discovery.mismatch.verdict import RIVAL
 from discovery.models import Parameter
 from discovery.report import equations, write_comparison, write_figures, write_report
 from discovery.report.chart import thinned
-from discovery.report.mismatch import NEAR, sizes
+from discovery.report.mismatch import NEAR, section, sizes
 from discovery.report.ranking import ratio
 from discovery.report.run import load_run
 from discovery.report.series import autocorrelation
@@ -193,6 +193,36 @@ def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path
     page = write_report(folder).read_text("utf-8")
     assert "contradict" not in page
     assert "The repair closes nothing of the gap" in page
+
+
+def test_what_came_closest_has_its_recording_and_hours_and_stands_once(tmp_path: Path) -> None:
+    heat = {"effect": "unmeasured_heat", "states": ["head"], "decidable": True}
+    considered = [
+        {**heat, "recording": "mon", "instants_s": [36000, 50400], "log_evidence": 60.0},
+        {**heat, "recording": "fri", "instants_s": [600, 1800], "log_evidence": 50.0},
+        {"effect": "film_drag", "states": ["head"], "log_evidence": 20.0, "decidable": False},
+        {"effect": "film_drag", "states": ["head"], "log_evidence": 10.0, "decidable": False},
+    ]
+    document = {**sample.diagnosed(24.0), "verdict": "unexplained", "physics": [], "considered": considered}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(document))
+    found = section(load_run(tmp_path))
+    assert found
+    (table,) = (t for t in found["tables"] if t.title == "What came closest")
+    assert [row.cells for row in table.rows] == [
+        ("unmeasured heat", "head in mon (10 to 14 h)", "60", "yes"),
+        ("unmeasured heat", "head in fri (10 to 30 min)", "50", "yes"),
+        ("film drag", "head", "20", "no"),
+    ]
+
+
+def test_a_jump_that_may_be_none_is_not_told() -> None:
+    known = {
+        "zero_T": {"value": -0.01, "low": -0.03, "high": 0.01, "unit": "K", "output": "T"},
+        "zero_dZ": {"value": 2.1, "low": 2.0, "high": 2.2, "unit": "um", "output": "dZ"},
+        "t_zero": {"value": 60.0, "low": 50.0, "high": 70.0, "unit": "s"},
+    }
+    told = sizes({"states": ["T", "dZ"], "moved": ["dZ"], "parameters": known})
+    assert told == ["zero_dZ = 2.1 µm (95 %: 2 to 2.2)", "t_zero = 60 s (95 %: 50 to 70)"]
 
 
 def test_a_size_says_at_which_speed_it_is_one() -> None:
