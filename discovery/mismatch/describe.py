@@ -16,6 +16,7 @@ from discovery.dynamics import Column, sensitivities
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.forcing import Forcing
+from discovery.mismatch.scales import lags
 from discovery.terms import Expression, evaluate, parse
 
 Array = NDArray[np.float64]
@@ -100,6 +101,8 @@ def _library(context: Context, current: Assessment, state: str) -> list[tuple[st
     channels = [n for n in current.fit.trajectories[0].system.grid.samples if n in context.campaign.channels]
     nodes = current.fit.trajectories[0].at_nodes()
     moving = [n for n in channels if np.ptp(np.asarray(nodes[n])) > 1e-9]
+    duration = max(float(grid.time[-1] - grid.time[0]) for grid in context.grids.values())
+    slow = [f"{lag:.4g}" for lag in lags(duration)]
     texts: list[str] = []
     for name in moving:
         series = np.concatenate(
@@ -108,7 +111,7 @@ def _library(context: Context, current: Assessment, state: str) -> list[tuple[st
         low, middle, high = (float(np.quantile(series, q)) for q in (0.25, 0.5, 0.75))
         temperature = "temperature" in context.campaign.channels[name].role
         base = f"({name} - {state})" if temperature else name
-        texts += [base, f"{base}*abs({base})", f"lag({name}, 1800)", f"lag({name}, 7200)"]
+        texts += [base, f"{base}*abs({base})", *(f"lag({name}, {lag})" for lag in slow)]
         if high > low:
             texts += [
                 f"max({name} - {middle:.4g}, 0)",
@@ -134,8 +137,7 @@ def _library(context: Context, current: Assessment, state: str) -> list[tuple[st
     texts += [
         f"max({state} - {middle:.4g}, 0)",
         f"abs({state} - {middle:.4g})*({state} - {middle:.4g})",
-        f"(lag({state}, 1800) - {state})",
-        f"(lag({state}, 7200) - {state})",
+        *(f"(lag({state}, {lag}) - {state})" for lag in slow),
     ]
     return [(text, parse(text)) for text in dict.fromkeys(texts)]
 

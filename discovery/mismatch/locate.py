@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,8 @@ from discovery.mismatch.verdict import Named
 from discovery.terms import evaluate
 
 Array = NDArray[np.float64]
+
+Bounds = dict[str, tuple[float, float]]  # of a variable: above, and up to
 
 MOST_WINDOWS = 8
 
@@ -157,6 +159,7 @@ def regime(baseline: Assessment, f: Forcing, seed: int = 0) -> str | None:
     from sklearn.tree import DecisionTreeRegressor
 
     features: list[Array] = []
+    values: list[Mapping[str, Array | float]] = []
     names: list[str] = []
     heat: list[Array] = []
     for trajectory in baseline.fit.trajectories:
@@ -164,6 +167,7 @@ def regime(baseline: Assessment, f: Forcing, seed: int = 0) -> str | None:
         nodes = {k: v for k, v in trajectory.at_nodes().items() if np.ndim(v) and k != "time"}
         time, edges = trajectory.system.grid.time, f.edges[run]
         names = list(nodes)
+        values.append(nodes)
         block = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2)
         counts = np.maximum(np.bincount(block, minlength=len(edges) - 1), 1)
         features.append(
@@ -173,6 +177,7 @@ def regime(baseline: Assessment, f: Forcing, seed: int = 0) -> str | None:
         )
         heat.append(f.heat[run])
     x, y = np.concatenate(features), np.concatenate(heat)
+    switches = {n for n in names if all(np.isin(nodes[n], (0.0, 1.0)).all() for nodes in values)}
     moving = np.ptp(x, axis=0) > 1e-9
     x, names = x[:, moving], [n for n, m in zip(names, moving, strict=True) if m]
     if not len(names) or np.ptp(y) == 0:
@@ -194,23 +199,43 @@ def regime(baseline: Assessment, f: Forcing, seed: int = 0) -> str | None:
         shuffled.append(float(grow(target).score(x, target)))
     if real < np.quantile(shuffled, 0.95):
         return None
-    return _rule(tree, names)
+    return _rule(tree, names, switches)
 
 
-def _rule(tree, names: Sequence[str]) -> str | None:  # type: ignore[no-untyped-def]
+def _rule(  # type: ignore[no-untyped-def]
+    tree, names: Sequence[str], switches: Collection[str]
+) -> str | None:
+    """The path to the leaf with most heat: for each variable the tightest bounds."""
     t = tree.tree_
-    best, path = 0.0, ""
+    best = 0.0
+    bounds: Bounds = {}
 
-    def walk(node: int, rule: list[str]) -> None:
-        nonlocal best, path
+    def walk(node: int, path: Bounds) -> None:
+        nonlocal best, bounds
         if t.children_left[node] < 0:
             value = abs(float(t.value[node].ravel()[0]))
             if value > best:
-                best, path = value, " and ".join(rule)
+                best, bounds = value, path
             return
-        name, edge = names[t.feature[node]], f"{t.threshold[node]:.4g}"
-        walk(t.children_left[node], [*rule, f"{name} <= {edge}"])
-        walk(t.children_right[node], [*rule, f"{name} > {edge}"])
+        name, edge = names[t.feature[node]], float(t.threshold[node])
+        low, high = path.get(name, (-np.inf, np.inf))
+        walk(t.children_left[node], {**path, name: (low, min(high, edge))})
+        walk(t.children_right[node], {**path, name: (max(low, edge), high)})
 
-    walk(0, [])
-    return path or None
+    walk(0, {})
+    return " and ".join(_said(name, *ends, name in switches) for name, ends in bounds.items()) or None
+
+
+def _said(name: str, low: float, high: float, is_switch: bool) -> str:
+    """One condition of a rule: low < name <= high. Of a switch the tree sees the share of a span that it was
+    on, which is not what one says of it.
+    """
+    if is_switch:
+        return (
+            f"{name} {'switching' if low > -np.inf and high < np.inf else 'on' if low > -np.inf else 'off'}"
+        )
+    if low == -np.inf:
+        return f"{name} <= {high:.4g}"
+    if high == np.inf:
+        return f"{name} > {low:.4g}"
+    return f"{low:.4g} < {name} <= {high:.4g}"

@@ -10,6 +10,14 @@ USUAL = 4 * 86400.0  # s, of recordings up to which the slowest mass is that of 
 SHORTEST = 1 / 60  # of the longest recording: a body that small may be what was recorded
 FURTHEST = 1 / 10  # of the longest recording, for a clock
 
+LAGS = (1800.0, 7200.0)  # s, of what follows an input slowly, in a formula that names no cause
+
+
+def lags(duration: float) -> tuple[float, ...]:
+    """Time constants of a description that recordings of `duration` [s] can show."""
+    share = min(1.0, FURTHEST * duration / LAGS[-1])
+    return tuple(share * lag for lag in LAGS)
+
 
 def scaled(effect: Effect, duration: float) -> Effect:
     """The effect with time constants that recordings of `duration` [s] can show.

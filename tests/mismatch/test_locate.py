@@ -1,0 +1,66 @@
+"""The rule that says when heat is missing, and the formula that it follows where nothing is named."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discovery.mismatch.assess import assess
+from discovery.mismatch.context import make_context
+from discovery.mismatch.describe import describe
+from discovery.mismatch.forcing import BLOCKS, Forcing, free_forcing
+from discovery.mismatch.locate import regime
+from discovery.mismatch.scales import lags
+from tests.mismatch.machine import SEEN, Array, campaign, model, simulated
+from tests.mismatch.test_ask import plate, ten_minutes
+
+
+def ruled(heat: Callable[[Array, Array], Array]) -> str:
+    """The rule for heat that follows speed and pump, in blocks of a recording."""
+    where = make_context(campaign(simulated(1)), model(), ["r1"], tuple(SEEN), [])
+    current = assess(where, ())
+    (trajectory,) = current.fit.trajectories
+    nodes, time = trajectory.at_nodes(), trajectory.system.grid.time
+    edges = np.linspace(time[0], time[-1], BLOCKS + 1)
+    block = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, BLOCKS - 1)
+    mean = [np.bincount(block, nodes[n]) / np.bincount(block) for n in ("speed", "pump")]
+    series = {"r1": heat(*mean)}
+    return regime(current, Forcing("bed", 50.0, {"r1": edges}, series, series, np.zeros(0))) or ""
+
+
+@pytest.mark.parametrize(
+    ("heat", "rule"),
+    [
+        (lambda speed, _: 90.0 * (speed > 250) + 50.0 * (speed > 900), r"speed > \d+"),
+        (lambda speed, _: 60.0 * ((speed > 250) & (speed < 650)), r"\d+ < speed <= \d+"),
+        (lambda _, pump: 60.0 * (pump > 0.5), r"pump on"),
+        (lambda _, pump: 60.0 * (pump < 0.5), r"pump off"),
+    ],
+    ids=["the tighter one", "between", "on", "off"],
+)
+def test_a_rule_says_each_variable_once(heat: Callable[[Array, Array], Array], rule: str) -> None:
+    first, *others = ruled(heat).split(" and ")
+    assert re.fullmatch(rule, first)
+    assert all(text.split()[0] not in first.split() for text in others)
+
+
+def test_lags_of_a_description_are_those_that_recordings_can_show() -> None:
+    assert lags(86400.0) == (1800.0, 7200.0)
+    assert lags(45.0) == pytest.approx((1.125, 4.5))
+    runs = ten_minutes()
+    heat, slow = runs.recordings["a"].values["heater"], [0.0]
+    for power in heat[:-1]:  # 5 s of a lag of a minute
+        slow.append(power + (slow[-1] - power) * float(np.exp(-5.0 / 60.0)))
+    values = {**runs.recordings["a"].values, "T": runs.recordings["a"].values["T"] + 0.8 * np.array(slow)}
+    runs = replace(runs, recordings={"a": replace(runs.recordings["a"], values=values)})
+    where = make_context(runs, plate(0.04), ["a"], ["T"], [])
+    current = assess(where, ())
+    found = describe(where, current, free_forcing(where, current)[0])
+    assert found
+    times = [float(t) for t in re.findall(r"lag\(\w+, ([\d.]+)\)", found.formula)]
+    assert times
+    assert max(times) <= 60.0
