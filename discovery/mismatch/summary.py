@@ -37,7 +37,7 @@ def summary(folder: Path) -> list[str]:
 def _unit(improvement: dict[str, Any]) -> str:
     """The unit of the proof; outputs of several units count alike, as multiples of their noise."""
     unit = improvement.get("unit")
-    return f" {unit}" if unit else ", weighed by their noise"
+    return ", weighed by their noise" if not unit else "" if unit == "1" else f" {unit}"
 
 
 def _place(claim: dict[str, Any]) -> str:

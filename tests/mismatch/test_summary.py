@@ -61,7 +61,11 @@ def test_the_proof_has_a_unit_or_is_weighed_and_a_jump_that_may_be_none_is_not_t
         "description": None,
         "next_experiment": "none",
     }
-    for unit, said in (("K", "0.861 -> 0.412 K ("), (None, "0.861 -> 0.412, weighed by their noise (")):
+    for unit, said in (
+        ("K", "0.861 -> 0.412 K ("),
+        ("1", "0.861 -> 0.412 ("),
+        (None, "0.861 -> 0.412, weighed by their noise ("),
+    ):
         improvement: dict[str, Any] = {"unit": unit, "held_out": held_out, "contradicted_by": []}
         (tmp_path / "diagnosis.json").write_text(
             json.dumps({**document, "improvement": improvement}), "utf-8"
