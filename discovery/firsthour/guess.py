@@ -47,7 +47,7 @@ def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
     for name, one in guesses.items():  # a load that is never on has the unit of its neighbour
         if told and _is_load(one) and not stated[name] and not on[name]:
             guesses[name] = replace(one, unit=told[0], why=f"{one.why}, in {told[0]} as the others")
-    guesses = _one_room(_one_unit(columns, guesses))
+    guesses = _the_fluid(_one_room(_one_unit(columns, guesses)))
     errors = [name for name, one in guesses.items() if one.role == "error"]
     corrections = [name for name, one in guesses.items() if one.role == "applied correction"]
     for name in corrections:
@@ -134,6 +134,23 @@ def _one_room(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
             found[name] = replace(one, role="temperature", why=f"{one.why}; {why}", sure=False)
         elif rank > 0:
             found[name] = replace(one, sure=one.sure and rank >= A_ROOM and not more_words)
+    return found
+
+
+def _the_fluid(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Where a flow is recorded and no temperature of a fluid, the one coolant is that fluid.
+
+    Apart, the two would never meet: no convection to the fluid could be offered.
+    """
+    found = dict(guesses)
+    flows, fluids, coolants = (
+        [name for name, one in guesses.items() if one.role == role]
+        for role in ("fluid flow", "fluid temperature", "coolant temperature")
+    )
+    if flows and not fluids and len(coolants) == 1:
+        [name] = coolants
+        why = f"{guesses[name].why}; taken for the fluid of {flows[0]}, since no other temperature is"
+        found[name] = replace(guesses[name], role="fluid temperature", why=why, sure=False)
     return found
 
 

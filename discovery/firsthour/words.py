@@ -22,6 +22,7 @@ _WORDS: tuple[tuple[str, str], ...] = (
     (r"nozzle.*(height|h)|h nozzle", "nozzle height"),
     (r"nozzle.*side|side.*nozzle", "nozzle side"),
     (r"(p|power|q|heat).*cool(ing|er)?|cool(ing|er)? *(power|p)|chiller *(power|p)", "cooling power"),
+    (r"pump|flow|volume stream", "fluid flow"),  # before the coolant that flows
     (r"(t|temp(erature)?)? *(coolant|chiller|cool(er|ing)?)", "coolant temperature"),
     (
         r"(t|temp(erature)?)? *(fluid|emulsion|kss|sump|tank|cutting fluid)( *t(emp(erature)?)?)?$",
@@ -33,7 +34,6 @@ _WORDS: tuple[tuple[str, str], ...] = (
         "ambient temperature",
     ),
     (r"ta|(t|temp(erature)?)? *(air|hall|room|raum)", "ambient temperature"),
-    (r"pump|flow|volume stream", "fluid flow"),
     (r"speed|rpm|spindle|n|rev(olution)?s?|drehzahl", "rotation speed"),
     (
         r"heater\w*|p|ph(?= ?\d)|power|load|drive|torque|loss(es)?|q|heat(ing)?|"

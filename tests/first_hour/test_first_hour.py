@@ -200,3 +200,18 @@ def test_body_temperatures_alone_drive_the_errors(tmp_path: Path) -> None:
     assert experiment.campaign.channels["T1"].role == "other input"
     assert experiment.campaign.channels["T1"].between == "linear"
     assert {"T1", "T2"} <= set(experiment.model_file("first_order").inputs)
+
+
+def test_a_coolant_with_a_flow_can_be_offered_as_convection(tmp_path: Path) -> None:
+    """What the flow and its temperature are for: the model has a path to the fluid, gated by the flow."""
+    from discovery.experimentfile import load_experiment
+
+    rows = [f"{k},21,{18 + k % 4 / 9},{8 * (k // 9 % 2)},{k % 3},{20 + k / 9}" for k in range(60)]
+    (tmp_path / "run.csv").write_text("\n".join(["time,T_room,T_coolant,flow_lpm,P_W,T_motor", *rows]))
+    result = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), "--from", str(tmp_path / "run.csv")])
+    assert result.exit_code == 0, result.output
+    [line] = [one for one in result.output.splitlines() if one.startswith("  T_coolant")]
+    assert "fluid temperature, degC ? " in line
+    assert "taken for the fluid of flow" in line
+    experiment = load_experiment(tmp_path / "rig" / "experiment.toml")
+    assert {"T_coolant", "flow"} <= set(experiment.model_file("first_order").inputs)

@@ -21,6 +21,8 @@ CASES = [
     ("cooling power", "W", np.linspace(0, 900, 50), "cooling power", "W"),
     ("emulsion temp", "C", np.linspace(18, 22, 50), "fluid temperature", "degC"),
     ("pump", "", np.arange(50) % 2, "fluid flow", "1"),
+    ("coolant_flow", "", np.linspace(6, 12, 50), "fluid flow", "l/min"),
+    ("T_coolant_flow", "", np.linspace(18, 22, 50), "coolant temperature", "degC"),
     ("pump flow", "", np.arange(50) % 3 * 6.0, "fluid flow", "l/min"),
     ("spindle speed", "", np.arange(50) * 100.0, "rotation speed", "rpm"),
     ("heater 1", "", np.arange(50) * 2.0, "heat load", "percent"),
@@ -120,6 +122,24 @@ def test_of_several_rooms_the_clearest_is_the_air_around(names: list[str], roles
     assert [one.role for one in found.values()] == [words[role] for role in roles]
     rooms = [one for name, one in found.items() if "room" in name and one.role == "temperature"]
     assert not any(one.sure for one in rooms)
+
+
+@pytest.mark.parametrize(
+    ("others", "role"),
+    [
+        (["coolant_flow"], "fluid temperature"),
+        (["pump"], "fluid temperature"),
+        ([], "coolant temperature"),
+        (["coolant_flow", "T_emulsion"], "coolant temperature"),
+        (["coolant_flow", "T_chiller"], "coolant temperature"),  # one of two: who knows
+    ],
+)
+def test_the_only_coolant_beside_a_flow_is_its_fluid(others: list[str], role: str) -> None:
+    found = _guessed(*((name, "", 18.0, 24.0) for name in ["T_coolant", *others, "T_motor"]))
+    assert found["T_coolant"].role == role
+    if role == "fluid temperature":
+        assert not found["T_coolant"].sure
+        assert f"the fluid of {others[0]}" in found["T_coolant"].why
 
 
 @pytest.mark.parametrize(
