@@ -53,9 +53,9 @@ def _temperature(
         unit = _canonical(guesses[load])
         # copper warms with the square of its current
         heat, per = (f"{load}**2", "A**2") if unit == "A" else (load, unit)
-        parameters.append(
-            f'gain_{output}_{load} = {{ start = {_start(per)}, unit = "K/{per}/s", min = 0.0 }}'
-        )
+        # a load that is counted below zero, as a discharge is, may warm all the same
+        least = "" if guesses[load].below_zero and heat == load else ", min = 0.0"
+        parameters.append(f'gain_{output}_{load} = {{ start = {_start(per)}, unit = "K/{per}/s"{least} }}')
         terms.append(_term(f"{load} warms {output}", output, f"gain_{output}_{load}*{heat}"))
     fluid, pump = _first(guesses, "fluid temperature"), _first(guesses, "fluid flow")
     if fluid:

@@ -13,6 +13,7 @@ from discovery.firsthour.table import Column
 from discovery.firsthour.words import A_ROOM, DEGREES, TEMPERATURES, Named, role_of, surroundings, unit_of
 from discovery.recordings.correction import corrected_by_name
 from discovery.recordings.units import UnitError, conversion
+from discovery.recordings.valuecheck import below_zero
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,7 @@ class Guess:
     why: str
     sure: bool = True
     corrects: str | None = None  # of an applied correction
+    below_zero: float = 0.0  # of a heat load: the share of its readings
 
 
 _USUAL = {
@@ -47,7 +49,7 @@ def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
     for name, one in guesses.items():  # a load that is never on has the unit of its neighbour
         if told and _is_load(one) and not stated[name] and not on[name]:
             guesses[name] = replace(one, unit=told[0], why=f"{one.why}, in {told[0]} as the others")
-    guesses = _the_fluid(_one_room(_one_unit(columns, guesses)))
+    guesses = _signed(columns, _the_fluid(_one_room(_one_unit(columns, guesses))))
     errors = [name for name, one in guesses.items() if one.role == "error"]
     corrections = [name for name, one in guesses.items() if one.role == "applied correction"]
     for name in corrections:
@@ -151,6 +153,17 @@ def _the_fluid(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
         [name] = coolants
         why = f"{guesses[name].why}; taken for the fluid of {flows[0]}, since no other temperature is"
         found[name] = replace(guesses[name], role="fluid temperature", why=why, sure=False)
+    return found
+
+
+def _signed(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Heat loads with readings below zero: a discharge, a brake, or heat that is taken away."""
+    found = dict(guesses)
+    for column in columns:
+        one, known = guesses[column.name], column.values[np.isfinite(column.values)]
+        if one.role == "heat load" and (rows := below_zero(known)).size:
+            share = rows.size / known.size
+            found[column.name] = replace(one, why=f"{one.why}; below zero", sure=False, below_zero=share)
     return found
 
 

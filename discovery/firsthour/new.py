@@ -83,6 +83,12 @@ def _said(
             "no column says what heats the machine: a model can only follow its surroundings; "
             "record a power, current, speed or switch as well"
         )
+    lines += [
+        f"'{name}' is below zero in {one.below_zero:.0%} of its readings, so its gain may have either sign; "
+        "a heat load below zero cools: where it is heat (a discharge, a brake), write its magnitude"
+        for name, one in guesses.items()
+        if one.below_zero
+    ]
     names = list(found.recordings)
     lines.append(f"recordings: fit {', '.join(names[:-1])}; unseen {names[-1]}")
     return lines

@@ -19,7 +19,13 @@ from discovery.recordings.inputcheck import input_findings
 from discovery.recordings.reading import read_columns
 from discovery.recordings.twins import fingerprint
 from discovery.recordings.units import Conversion, UnitError, conversion
-from discovery.recordings.valuecheck import few_findings, frozen_findings, lone_findings, range_findings
+from discovery.recordings.valuecheck import (
+    few_findings,
+    frozen_findings,
+    load_findings,
+    lone_findings,
+    range_findings,
+)
 from discovery.schema import sentences, suggest
 
 
@@ -152,6 +158,7 @@ def _content_findings(
 ) -> Iterator[Finding]:
     for name, column in values.items():
         yield from range_findings(file, columns.lines, channels[name], column)
+        yield from load_findings(file, columns.lines, channels[name], column)
         if name not in recording.set:
             yield from frozen_findings(file, columns.lines, channels[name], column)
             yield from lone_findings(file, columns.lines, channels[name], column)

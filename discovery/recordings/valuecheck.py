@@ -1,4 +1,4 @@
-"""Values: what the role can be, sensors that stand still, lone wrong readings, too few readings."""
+"""Values: what the role can be, loads below zero, sensors that stand still, lone or too few readings."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +12,7 @@ from discovery.recordings.roles import ROLES
 
 FEW = 20  # readings: fewer carry no model
 _STANDS = 5.0  # a sensor that stands still so many times longer than chance explains
+_NEAR_ZERO = 0.05  # of the largest magnitude of a load: so far below zero is noise
 _LONE = 20.0  # robust standard deviations of a step: a single reading so far from its neighbours is wrong
 _LEAST = {
     "degC": 30.0,
@@ -39,6 +40,26 @@ def range_findings(file: Path, lines: Lines, channel: Channel, column: FloatArra
             f"'{channel.name}' is {column[unusual[0]]:g}{unit}, unusual for a channel of role {channel.role}"
         )
         yield Finding("warning", file, int(lines[unusual[0]]), what + more(unusual.size), do)
+
+
+def below_zero(column: FloatArray) -> Lines:
+    """Rows of a heat load that takes heat away, beyond the noise around zero."""
+    largest = float(np.nanmax(np.abs(column), initial=0.0))
+    return np.flatnonzero(column < -_NEAR_ZERO * largest)
+
+
+def load_findings(file: Path, lines: Lines, channel: Channel, column: FloatArray) -> Iterator[Finding]:
+    """A heat load that is counted below zero: a discharge, a brake, a sign turned round.
+
+    What a controller sends, in percent or steps, may heat and cool in turn; watts of heat may not.
+    """
+    rows = below_zero(column) if channel.role == "heat load" else np.empty(0, dtype=np.intp)
+    if not rows.size or (channel.unit != "W" and np.nanmax(column) > 0.0):
+        return
+    unit = f" {channel.unit}" if channel.unit != "1" else ""
+    what = f"'{channel.name}' is {column[rows[0]]:g}{unit}, a heat load below zero"
+    do = "it cools there; if it is heat (a discharge, a brake), write its magnitude"
+    yield Finding("warning", file, int(lines[rows[0]]), what + more(rows.size), do)
 
 
 def _outside(column: FloatArray, limits: tuple[float, float]) -> Lines:

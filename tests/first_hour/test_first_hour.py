@@ -215,3 +215,31 @@ def test_a_coolant_with_a_flow_can_be_offered_as_convection(tmp_path: Path) -> N
     assert "taken for the fluid of flow" in line
     experiment = load_experiment(tmp_path / "rig" / "experiment.toml")
     assert {"T_coolant", "flow"} <= set(experiment.model_file("first_order").inputs)
+
+
+def test_a_discharge_warms_although_its_power_is_below_zero(tmp_path: Path) -> None:
+    """The gain that a plain least-squares fit of dT/dt on the power would find can be told by the model."""
+    from discovery.experimentfile import load_experiment
+
+    loads = [-3000 * (k // 9 % 2) for k in range(60)]
+    rows = [f"{k},{load},{20 - sum(loads[:k]) / 9000}" for k, load in enumerate(loads)]
+    (tmp_path / "run.csv").write_text("\n".join(["time,Power [W],T1", *rows]))
+    result = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), "--from", str(tmp_path / "run.csv")])
+    assert result.exit_code == 0, result.output
+    assert "'Power' is below zero in 45% of its readings" in result.output  # 18 of the first 40 rows
+    gain = (
+        load_experiment(tmp_path / "rig" / "experiment.toml")
+        .model_file("first_order")
+        .parameters["gain_T1_Power"]
+    )
+    assert gain.min < -1 / 9000
+    check = CliRunner().invoke(app, ["check", str(tmp_path / "rig")])
+    assert "'Power' is -3000 W, a heat load below zero" in check.output
+
+
+def test_noise_around_zero_is_no_load_below_zero(tmp_path: Path) -> None:
+    rows = [f"{k},{-1 if k % 9 == 0 else 100 * (k % 3)},{20 + k / 9}" for k in range(60)]
+    (tmp_path / "run.csv").write_text("\n".join(["time,Power [W],T1", *rows]))
+    result = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), "--from", str(tmp_path / "run.csv")])
+    assert "below zero" not in result.output
+    assert "min = 0.0 }" in (tmp_path / "rig" / "model.toml").read_text().split("gain_T1_Power")[1][:60]

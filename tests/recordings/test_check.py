@@ -348,3 +348,25 @@ def agree(path: Path) -> None:
         assert all(
             "can be" in error.what or "no value" in error.what or "set." in error.what for error in errors
         ), errors
+
+
+@pytest.mark.parametrize(
+    ("unit", "loads", "told"),
+    [
+        ("W", [0, -130, 0], True),
+        ("W", [500, -130, 0], True),  # a brake
+        ("W", [500, -3, 0], False),  # a zero that is a little off
+        ("percent", [0, -80, 0], True),
+        ("percent", [60, -80, 0], False),  # heats and cools in turn
+    ],
+)
+def test_a_heat_load_below_zero(write: Write, unit: str, loads: list[int], told: bool) -> None:
+    campaign = CAMPAIGN.replace(
+        'role = "rotation speed", unit = "rpm"', f'role = "heat load", unit = "{unit}"'
+    )
+    said = found(write(with_column(2, [str(load) for load in loads * 20]), campaign))
+    lines = [line for line in said if "a heat load below zero" in line]
+    assert len(lines) == told
+    if told:
+        assert "fit.csv, line 3: 'speed' is -" in lines[0]
+        assert "(and 19 more like it)" in lines[0]
