@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from discovery.firsthour.guess import Guess, drives
+from discovery.firsthour.words import CURRENTS, VOLTAGES
 from discovery.recordings.units import UnitError, conversion
 
 
@@ -51,8 +52,9 @@ def _temperature(
         terms.append(_term(f"{output} loses heat to the room", output, f"loss_{output}*({room} - {output})"))
     for load in _belonging(output, drives(guesses), outputs):
         unit = _canonical(guesses[load])
-        # copper warms with the square of its current
-        heat, per = (f"{load}**2", "A**2") if unit == "A" else (load, unit)
+        # copper warms with the square of its current, a resistor with that of its voltage
+        squared = unit in (*CURRENTS, *VOLTAGES)
+        heat, per = (f"{load}**2", f"{unit}**2") if squared else (load, unit)
         # a load that is counted below zero, as a discharge is, may warm all the same
         least = "" if guesses[load].below_zero and heat == load else ", min = 0.0"
         parameters.append(f'gain_{output}_{load} = {{ start = {_start(per)}, unit = "K/{per}/s"{least} }}')

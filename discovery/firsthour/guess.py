@@ -10,7 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.firsthour.table import Column
-from discovery.firsthour.words import A_ROOM, DEGREES, TEMPERATURES, Named, role_of, surroundings, unit_of
+from discovery.firsthour.words import (
+    A_ROOM,
+    CURRENTS,
+    DEGREES,
+    TEMPERATURES,
+    VOLTAGES,
+    Named,
+    electric,
+    role_of,
+    surroundings,
+    unit_of,
+)
 from discovery.recordings.correction import corrected_by_name
 from discovery.recordings.units import UnitError, conversion
 from discovery.recordings.valuecheck import below_zero
@@ -64,7 +75,7 @@ def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
             why = f"{one.why}; it is added to {error} (what was added to the position needs sign = -1)"
             unit = one.unit if stated[name] else guesses[error].unit
             guesses[name] = replace(one, unit=unit, why=why, sure=False, corrects=error)
-    if errors and not drives(guesses):
+    if errors and not _stated(guesses):
         for name, one in guesses.items():
             if one.role == "temperature" and one.unit in DEGREES:
                 why = f"{one.why}; an input of the errors, since nothing else says what heats the machine"
@@ -73,9 +84,13 @@ def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
 
 
 def drives(guesses: Mapping[str, Guess]) -> list[str]:
-    """What warms a machine: its heat loads; where none is recorded, its currents and speeds."""
+    """What warms a machine: its heat loads, else its currents and speeds, else its voltages."""
+    return _stated(guesses) or [name for name, one in guesses.items() if one.unit in VOLTAGES]
+
+
+def _stated(guesses: Mapping[str, Guess]) -> list[str]:
     loads = [name for name, one in guesses.items() if one.role == "heat load"]
-    likely = [n for n, one in guesses.items() if one.role == "rotation speed" or one.unit == "A"]
+    likely = [n for n, one in guesses.items() if one.role == "rotation speed" or one.unit in CURRENTS]
     return loads or likely
 
 
@@ -89,6 +104,11 @@ def guess(column: Column, *, fahrenheit: bool = False) -> Guess:
             role, why = "other input", f"the unit {column.unit} is none of a temperature"
         return Guess(
             role, named, f"{why}; the header says {column.unit}", name.sure and role != "other input"
+        )
+    if not spelled and role in ("heat load", "other input") and (unit := electric(column.name)):
+        word = {"A": "current", "V": "voltage"}[unit]
+        return Guess(
+            "other input", unit, f"a {word} by its name, taken in {unit}; its square warms", sure=False
         )
     if not spelled:
         return _by_values(name, column.values, fahrenheit=fahrenheit)

@@ -46,6 +46,11 @@ _WORDS: tuple[tuple[str, str], ...] = (
 # what a controller sends to a heater: a share of full power, or the steps of a pulse width
 _SHARE = r"duty( ?cycle)?|pwm|ssr|control(ler)?|valve|stell\w*|u"
 _STEPS = 255.0  # of a pulse width
+# what warms with its square; such a word at the end, "current step" is no current
+_ELECTRIC = (
+    (r"(current|strom)( ?\w{0,2} ?\d*)?$", "A"),
+    (r"(volts?|voltage|spannung)( ?\w{0,2} ?\d*)?$", "V"),
+)
 _SET_POINT = r"set ?points?|set|targets?|soll(wert)?"
 _SET_POINT_ALONE = r"sp( ?\d+)?|sp temp(erature)?|temp(erature)? sp"
 _TEMPERATURE = r"t(?![a-z])|(.* )?temp(erature)?s?( |$)"
@@ -105,6 +110,7 @@ _UNITS = {
     "1": "1",
 }
 _DEGREES = str.maketrans("º˚", "°°")  # what passes for the sign of degrees
+CURRENTS, VOLTAGES = ("A", "mA", "kA"), ("V", "mV", "kV")
 DEGREES = ("degC", "degF", "K")
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
 
@@ -146,6 +152,14 @@ def role_of(name: str, unit: str | None, values: Array) -> Named:
     if share := _share(words, limits, values):
         return Named("heat load", f"'{share}' in its name, as of what goes to a heater", sure=False)
     return Named("other input", "nothing in its name says what it is")
+
+
+def electric(name: str) -> str:
+    """A or V where the name is that of a current or a voltage, or ""."""
+    words = plain(name)
+    if re.fullmatch(r"v ?\d*", words):
+        return "V"
+    return next((unit for form, unit in _ELECTRIC if re.search(rf"(?<![a-z]){form}", words)), "")
 
 
 def is_set_point(name: str, unit: str | None, values: Array) -> bool:

@@ -166,7 +166,14 @@ def test_columns_that_say_nothing_stay_out(tmp_path: Path) -> None:
     ("header", "term", "hint"),
     [
         ("time,current [A],temperature", "gain_temperature_current*current**2", False),
+        ("time,motor current,temperature", "gain_temperature_motor_current*motor_current**2", False),
+        ("time,current (mA),temperature", "gain_temperature_current*current**2", False),
         ("time,speed [rpm],temperature", "gain_temperature_speed*speed", False),
+        ("time,voltage,temperature", "gain_temperature_voltage*voltage**2", False),
+        ("time,heater voltage,temperature", "gain_temperature_heater_voltage*heater_voltage**2", False),
+        ("time,V,temperature", "gain_temperature_V*V**2", False),
+        ("time,U1 [V],temperature", "gain_temperature_U1*U1**2", False),
+        ("time,valve,temperature", "gain_temperature_valve*valve", False),
         ("time,door,temperature", None, True),
     ],
 )

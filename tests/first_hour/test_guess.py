@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from discovery.errors import UserError
-from discovery.firsthour.guess import Guess, guess, guess_all
+from discovery.firsthour.guess import Guess, drives, guess, guess_all
 from discovery.firsthour.table import Column, read_own
 
 CASES = [
@@ -29,6 +29,10 @@ CASES = [
     ("P_drive", "kW", np.linspace(0, 2, 50), "heat load", "kW"),
     ("E_Z0T", "", np.linspace(0, 20, 50), "error", "um"),
     ("nozzle height", "mm", np.full(50, 50.0), "nozzle height", "mm"),
+    ("Current", "", np.linspace(-130, 0, 50), "other input", "A"),
+    ("current step", "", np.linspace(0, 7, 50), "heat load", "W"),
+    ("current temperature", "", np.linspace(20, 29, 50), "temperature", "degC"),
+    ("Cell Voltage A1", "", np.linspace(3, 4, 50), "other input", "V"),
     ("gizmo", "", np.linspace(0, 1, 50), "other input", "1"),
     ("T_ext", "", np.linspace(8, 31, 50), "ambient temperature", "degC"),
     ("extruder temp", "", np.linspace(20, 210, 50), "temperature", "degC"),
@@ -93,6 +97,12 @@ def _guessed(*columns: tuple[str, str, float, float]) -> dict[str, Guess]:
 def test_what_goes_to_a_heater_is_asked_about_and_a_heater_is_not() -> None:
     found = _guessed(("DutyCycle", "%", 0, 90), ("Heater", "%", 0, 90))
     assert [one.sure for one in found.values()] == [False, True]
+
+
+def test_a_voltage_drives_where_nothing_better_is_recorded() -> None:
+    for better in ("power", "Current", "spindle speed"):
+        assert drives(_guessed(("voltage", "", 0, 9), (better, "", 0, 9))) == [better.replace(" ", "_")]
+    assert drives(_guessed(("voltage", "", 0, 9), ("door", "", 0, 1))) == ["voltage"]
 
 
 def test_loads_of_one_kind_have_one_unit() -> None:
