@@ -1,4 +1,4 @@
-"""Columns that tell the time once more."""
+"""Columns that tell the time once more, or keep the books: counters, numbers of rows and devices."""
 
 from __future__ import annotations
 
@@ -11,6 +11,20 @@ from discovery.firsthour.words import plain
 
 _FEWEST = 5  # readings, to speak of a proportion
 _EXACT = 0.01  # of a step
+_STEADY = 0.999  # correlation with the time
+_NAMED = 0.99  # the same, where the name says that it is a clock: it may be rounded
+_MOSTLY = 0.8  # of the steps of a clock that starts anew
+# an integral of a current or power: it only rises, as the time does
+_COUNTER = re.compile(
+    r"\b((milli)?amp(ere)?s?|(kilo)?watts?) ?(hours?|h|seconds?)\b|"
+    r"\b(m?ah|[km]?wh|energy|capacity|odometer)\b"
+)
+_COUNTER_UNITS = {"ah", "mah", "wh", "kwh", "mwh", "j", "kj", "mj"}
+_ID = re.compile(
+    r"(.* )?u?u?id( ?\d+)?|"
+    r"(row|entry|record|sample|scan|sweep|point|data|line|reading|step|cycle|loop|test)s? ?(point )?"
+    r"(no|nr|num|number|idx|index|count|counter)( ?\d+)?"
+)
 
 
 def is_clock(name: str, values: Array, seconds: Array) -> bool:
@@ -55,3 +69,41 @@ def tells_time(name: str, unit: str, values: Array, seconds: Array, role: str) -
         return False
     counts = any(abs(slope * one - 1) < 1e-3 for one in TIME_UNITS.values()) or (steps == 1).all()
     return bool(unit or counts or role == "other input" or re.match("|".join(CLOCK_NAMES), plain(name)))
+
+
+def bookkeeping(name: str, unit: str, values: Array, seconds: Array, role: str) -> str:
+    """What a column does that is neither measured nor acts on a machine, or "". A temperature never is such.
+
+    A column whose header names another unit than that of a time or a counter is none.
+    """
+    known = np.isfinite(values)
+    unit, words = unit.strip().lower(), plain(name)
+    values, seconds = values[known], seconds[known]
+    if (
+        len(values) < _FEWEST
+        or np.ptp(values) == 0.0
+        or (unit and unit not in {*TIME_UNITS, *_COUNTER_UNITS})
+    ):
+        return ""
+    steps = np.diff(values)
+    only_one_way = bool((steps >= 0).all() or (steps <= 0).all())
+    counts = unit in _COUNTER_UNITS or (not unit and _COUNTER.search(words))
+    if counts and only_one_way and role in ("other input", "heat load", "cooling power"):
+        return "is a counter that only runs on"
+    if role != "other input" or unit in _COUNTER_UNITS:
+        return ""
+    if not unit and _ID.fullmatch(words) and (values == np.round(values)).all():
+        return "numbers rows or devices"
+    clock = unit in TIME_UNITS or any(re.match(form, words) for form in CLOCK_NAMES[:2])
+    steady = float(np.corrcoef(values, seconds)[0, 1])
+    if ((steps > 0).all() and steady > _STEADY) or (clock and (steps >= 0).all() and steady > _NAMED):
+        return "rises steadily with the time, as a second clock"
+    return "is a clock that starts anew" if clock and _starts_anew(steps, np.diff(seconds)) else ""
+
+
+def _starts_anew(steps: Array, seconds: Array) -> bool:
+    """Whether a column rises with the slope of a clock but for where it falls back."""
+    slopes = steps[steps > 0] / seconds[steps > 0]
+    return len(slopes) >= _MOSTLY * len(steps) and any(
+        np.mean(np.abs(slopes * one - 1) < _EXACT) >= _MOSTLY for one in TIME_UNITS.values()
+    )

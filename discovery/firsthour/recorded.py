@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discovery.errors import UserError
-from discovery.firsthour.clocks import tells_time
+from discovery.firsthour.clocks import bookkeeping, tells_time
 from discovery.firsthour.guess import guess_all
 from discovery.firsthour.table import Array, Column, OwnTable
-from discovery.firsthour.words import is_set_point, role_of, unit_of
+from discovery.firsthour.words import electric, is_set_point, role_of, unit_of
 
 _LAST_THIRD = 2 / 3
 
@@ -111,6 +111,10 @@ def _says_nothing(column: Column, role: str, of_runs: Sequence[tuple[Array, Arra
     named = role_of(column.name, known, column.values)
     if all(tells_time(column.name, column.unit, values, time, named.role) for time, values in of_runs):
         return "is a clock, in exact proportion to the time: left out (if not, name its unit in the header)"
+    unit = column.unit or electric(column.name)  # a ramp of a voltage is no clock
+    books = [bookkeeping(column.name, unit, values, time, named.role) for time, values in of_runs]
+    if all(books):
+        return f"{books[0]}: left out" + ("" if column.unit else " (if not, name its unit in the header)")
     if is_set_point(column.name, known, column.values):
         return "is a set point, no measurement: left out"
     if not np.isfinite(column.values).any():

@@ -73,6 +73,50 @@ def test_a_column_in_proportion_to_the_time_is_a_clock(tmp_path: Path, name: str
     assert set(_campaign(rig)["channels"]) == {"T1", "T_env"}
 
 
+@pytest.mark.parametrize(
+    ("name", "row", "said"),
+    [
+        ("Relative timestamp [s]", lambda k: k * 9 // 10, "rises steadily with the time, as a second clock"),
+        ("Step time", lambda k: k % 20, "is a clock that starts anew"),
+        ("ticks", lambda k: 3 * k + k % 2, "rises steadily with the time, as a second clock"),
+        ("Entry ID", lambda k: 7 + k + k % 2, "numbers rows or devices"),
+        ("NodeID", lambda k: 1 + k * k % 4, "numbers rows or devices"),
+        ("Cycle Index", lambda k: k // 9, "numbers rows or devices"),
+        ("Loop Counter #1", lambda k: k // 9, "numbers rows or devices"),
+        ("Amp-Hours", lambda k: -(k // 9) / 7, "is a counter that only runs on"),
+        ("Heating energy [kWh]", lambda k: k * k / 7, "is a counter that only runs on"),
+    ],
+)
+def test_what_keeps_the_books_is_no_input(
+    tmp_path: Path, name: str, row: Callable[[int], float], said: str
+) -> None:
+    out, rig = _made(tmp_path, f"time,{name},T1", lambda k: f"{k},{row(k)},{20 + k % 7}")
+    assert f"column '{name}' {said}: left out" in out
+    assert set(_campaign(rig)["channels"]) == {"T1", "T_env"}
+
+
+@pytest.mark.parametrize(
+    ("name", "row"),
+    [
+        ("T2", lambda k: 20 + k / 9 + k * k / 1e4),
+        ("Temperature ID 7", lambda k: 20 + k + k % 2),
+        ("T_row_number [°C]", lambda k: 20 + k),
+        ("voltage", lambda k: k / 9 + k % 2 / 20),
+        ("heater", lambda k: k + k % 2 / 9),
+        ("motor id", lambda k: k % 3),  # a current
+        ("Number of occupants", lambda k: k // 9 % 4),
+        ("valve [mm]", lambda k: k + k % 2 / 9),
+        ("charging energy [kWh]", lambda k: k % 9),  # falls: no counter
+        ("running time", lambda k: k % 2),
+    ],
+)
+def test_what_is_measured_or_acts_keeps_no_books(
+    tmp_path: Path, name: str, row: Callable[[int], float]
+) -> None:
+    out, _ = _made(tmp_path, f"time,{name},T1", lambda k: f"{k},{row(k)},{20 + k % 7}")
+    assert "left out" not in out
+
+
 def test_a_ramp_is_no_clock(tmp_path: Path) -> None:
     row: Row = lambda k: f"{k},{k},{k / 9},{20 + k % 7}"  # noqa: E731
     _, rig = _made(tmp_path, "time,P [W],heater,T1", row)
