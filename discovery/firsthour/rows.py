@@ -39,8 +39,8 @@ def read_sheet(path: Path) -> Sheet:
     Raises:
         UserError: no such file, no text, no header, fewer than ten rows, or a ragged row.
     """
-    rows = _cut(path, _text(path))
-    width = Counter(len(cells) for _, cells in rows[len(rows) // 2 :]).most_common(1)[0][0]
+    rows = _one_mark_less(_cut(path, _text(path)))
+    width = _width(rows)
     first = next((k for k, (_, cells) in enumerate(rows) if len(cells) == width and _is_data(cells)), None)
     if first == 0:
         raise UserError(
@@ -49,6 +49,7 @@ def read_sheet(path: Path) -> Sheet:
         )
     above = [k for k in range(len(rows) if first is None else first) if len(rows[k][1]) == width]
     if not above:
+        _compare(path, rows[: len(rows) if first is None else first], width)
         raise UserError(
             f"{path}: no header above the rows of {width} cells; write {width} names, starting with time"
         )
@@ -66,6 +67,33 @@ def read_sheet(path: Path) -> Sheet:
             )
     notes = (f"{at} lines above the header were passed over",) if at else ()
     return Sheet(rows[at][1], units if len(units) == width else [""] * width, body, notes)
+
+
+def _width(rows: Sequence[Row]) -> int:
+    """Cells of most rows; what stands above the header has its own."""
+    return Counter(len(cells) for _, cells in rows[len(rows) // 2 :]).most_common(1)[0][0]
+
+
+def _one_mark_less(rows: list[Row]) -> list[Row]:
+    """A mark behind the last name alone, or behind the last number alone, ends no column."""
+    width = _width(rows)
+    names = next((cells for _, cells in rows if len(cells) > 1 and all(map(is_word, cells))), [])
+    if len(names) == width - 1 and not any(cells[-1] for _, cells in rows if len(cells) == width):
+        return [(line, cells[: width - 1] if len(cells) == width else cells) for line, cells in rows]
+    ended = [
+        len(cells) == width + 1 and cells[-1] == "" and all(map(is_word, cells[:-1])) for _, cells in rows
+    ]
+    return [(line, cells[:-1] if cut else cells) for cut, (line, cells) in zip(ended, rows, strict=True)]
+
+
+def _compare(path: Path, above: Sequence[Row], width: int) -> None:
+    """Raise a UserError where the line above the rows is a header with more or fewer names than they have."""
+    line, names = above[-1] if above else (0, [])
+    if len(names) > 1 and all(is_word(name) for name in names):
+        raise UserError(
+            f"{path}, line {line}: the header has {len(names)} names, the rows {width} cells; "
+            f"{'add the missing names' if len(names) < width else 'a name too many or a column is missing'}"
+        )
 
 
 def is_number(cell: str) -> bool:

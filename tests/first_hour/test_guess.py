@@ -244,6 +244,14 @@ def test_what_a_logger_writes_above_and_between(tmp_path: Path) -> None:
         ([f"{k},0,{299.5 + k}" for k in range(12)], r"line 1: numbers where the names .* should stand"),
         (["T (a)", *(f"{k},{k}" for k in range(12))], "no header above the rows of 2 cells"),
         (["time,T1", "0,1", "1,2"], "only 2 rows"),
+        (
+            ["lab 3", "time,a,T1", *(f"{k},{k}" for k in range(12))],
+            "line 2: the header has 3 names, the rows 2 cells; a name too many",
+        ),
+        (
+            ["time,T1", *(f"{k},{k},{k}" for k in range(12))],
+            "line 1: the header has 2 names, the rows 3 cells; add the missing names",
+        ),
     ],
 )
 def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, lines: list[str], said: str) -> None:
@@ -268,6 +276,13 @@ def test_a_first_row_that_holds_nothing_is_no_row_of_units(tmp_path: Path, nothi
 def test_a_row_of_units_may_say_that_there_is_none(tmp_path: Path) -> None:
     table = read_own(_file(tmp_path, "time,T1,door", "s,-,n/a", *(f"{k},{k * k},{k % 2}" for k in range(15))))
     assert [(c.name, c.unit) for c in table.columns] == [("T1", "-"), ("door", "")]
+
+
+@pytest.mark.parametrize(("of_names", "of_rows"), [(",", ""), ("", ","), (",", ",")])
+def test_a_mark_at_the_end_of_a_line_ends_no_column(tmp_path: Path, of_names: str, of_rows: str) -> None:
+    rows = [f"{k},{20 + k * k}{of_rows}" for k in range(15)]
+    table = read_own(_file(tmp_path, "logger 7", f"time,T1{of_names}", *rows))
+    assert [(c.name, c.values[3]) for c in table.columns] == [("T1", 29.0)]
 
 
 def _stamped(first: datetime, form: str, minutes: float, count: int = 40) -> list[str]:
