@@ -25,6 +25,7 @@ from discovery.progress import Progress, silent
 from discovery.recordings import Channel
 
 Array = NDArray[np.float64]
+_NEGLIGIBLE = 0.01  # of the spread of an input: an offset so small is none
 
 
 @dataclass(frozen=True)
@@ -119,9 +120,11 @@ def missing_outputs(experiment: Experiment, name: str, model: Model) -> list[str
 
 
 def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
-    """One sentence for each input known only within a spread: what the fit makes of it."""
+    """One sentence for each input known only within a spread: what the fit makes of it, if anything."""
     notes = []
     for name, found in fit.offsets.items():
+        if max(abs(value) for value, _ in found.values()) < _NEGLIGIBLE * channels[name].spread:
+            continue  # no reading speaks against what was given
         low, high = (pick(found, key=lambda r: found[r][0]) for pick in (min, max))
         unit = differences(channels[name].unit)
         most = f" to {found[high][0]:+.2g} {unit} in '{high}'" if high != low else ""

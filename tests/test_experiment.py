@@ -66,6 +66,14 @@ def test_the_note_on_an_uncertain_room_names_each_recording_once() -> None:
     assert "-0.2 K in 'b' to +0.5 K in 'a'" in offset_notes(two, {"T_env": room})[0]
 
 
+def test_a_room_that_the_fit_leaves_where_it_was_is_no_note() -> None:
+    room = Channel("T_env", "ambient temperature", "degC", None, "linear", spread=1.0)
+    none = cast("Fit", SimpleNamespace(offsets={"T_env": {"a": (2.4e-12, 0.1), "b": (-3e-4, 0.1)}}))
+    one = cast("Fit", SimpleNamespace(offsets={"T_env": {"a": (2.4e-12, 0.1), "b": (-0.1, 0.1)}}))
+    assert offset_notes(none, {"T_env": room}) == []
+    assert "-0.1 K in 'b'" in offset_notes(one, {"T_env": room})[0]
+
+
 def test_a_run_writes_what_the_contract_says(folder: Path) -> None:
     out = run(folder / "experiment.toml", folder / "out")
     names = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
