@@ -25,12 +25,17 @@ _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 
 @dataclass(frozen=True)
 class Sheet:
-    """`header` and `units` (or empty words), the rows of data, and what a person should know."""
+    """`header` and `units` (or empty words), the rows of data, and what a person should know.
+
+    `line`: of the header. `mark`: what separates its cells, "" for blanks.
+    """
 
     header: list[str]
     units: list[str]
     body: list[Row]
     notes: tuple[str, ...]
+    line: int
+    mark: str
 
 
 def read_sheet(path: Path) -> Sheet:
@@ -39,7 +44,8 @@ def read_sheet(path: Path) -> Sheet:
     Raises:
         UserError: no such file, no text, no header, fewer than ten rows, or a ragged row.
     """
-    rows = _one_mark_less(_cut(path, _text(path)))
+    rows, mark = _cut(path, _text(path))
+    rows = _one_mark_less(rows)
     width = _width(rows)
     first = next((k for k, (_, cells) in enumerate(rows) if len(cells) == width and _is_data(cells)), None)
     if first == 0:
@@ -66,7 +72,8 @@ def read_sheet(path: Path) -> Sheet:
                 f"{path}, line {line}: {len(cells)} cells where the header has {width}; mend the row"
             )
     notes = (f"{at} lines above the header were passed over",) if at else ()
-    return Sheet(rows[at][1], units if len(units) == width else [""] * width, body, notes)
+    units = units if len(units) == width else [""] * width
+    return Sheet(rows[at][1], units, body, notes, rows[at][0], mark)
 
 
 def _width(rows: Sequence[Row]) -> int:
@@ -146,8 +153,8 @@ def _text(path: Path) -> str:
     return text
 
 
-def _cut(path: Path, text: str) -> list[Row]:
-    """Lines that hold something and are no remark, cut into cells."""
+def _cut(path: Path, text: str) -> tuple[list[Row], str]:
+    """Lines that hold something and are no remark, cut into cells, and the mark between these."""
     lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip(" \t;,")]
     lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
     if len(lines) < 2:
@@ -156,8 +163,9 @@ def _cut(path: Path, text: str) -> list[Row]:
     # a semicolon stands in no number, a comma may: the first mark that all lines have
     mark = next((m for m in ";\t,|" if sum(m in line for line in tail) > len(tail) / 2), None)
     if mark is None:
-        return [(k, line.split()) for k, line in lines]
-    return [(k, [cell.strip() for cell in next(csv.reader([line], delimiter=mark))]) for k, line in lines]
+        return [(k, line.split()) for k, line in lines], ""
+    rows = [(k, [cell.strip() for cell in next(csv.reader([line], delimiter=mark))]) for k, line in lines]
+    return rows, mark
 
 
 def _units(cells: Sequence[str]) -> list[str]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.firsthour.clocks import is_clock
+from discovery.firsthour.longform import long_notes
 from discovery.firsthour.rows import is_word, number, read_sheet
 from discovery.firsthour.stamps import find_clock
 
@@ -47,12 +48,13 @@ def read_own(path: Path) -> OwnTable:
     Columns without any number, and columns that count the rows or tell the time again, are left out.
 
     Raises:
-        UserError: no such file, no header, a ragged row, no column of time, or cells that are no numbers.
+        UserError: no such file, no header, a ragged row, no column of time, cells that are no numbers, or
+            a long table.
     """
     sheet = read_sheet(path)
     parts = [_split(name, unit) for name, unit in zip(sheet.header, sheet.units, strict=True)]
     clock = find_clock(path, [p[0] for p in parts], [p[1] for p in parts], sheet.body)
-    notes = [*sheet.notes, *clock.notes]
+    notes = [*sheet.notes, *clock.notes, *long_notes(path, sheet, clock.columns)]
     taken: set[str] = {"time"}
     columns = []
     for index, (words, unit) in enumerate(parts):

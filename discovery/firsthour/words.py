@@ -30,17 +30,17 @@ _WORDS: tuple[tuple[str, str], ...] = (
     ),
     (
         r"(t|temp(erature)?)? *"
-        r"(amb(ient)?|env(ironment)?|outside|outdoors?|ext(ern(al)?)?|surroundings?|umgebung)",
+        r"(amb(ient)?|env(ironment)?|outside|outdoors?|ext(ern(al)?)?|surroundings?|umgebung\w*|au(ss|ß)en\w*)",
         "ambient temperature",
     ),
-    (r"ta|(t|temp(erature)?)? *(air|hall|room|raum)", "ambient temperature"),
+    (r"ta|(t|temp(erature)?)? *(air|hall|room|raum(temperatur)?)", "ambient temperature"),
     (r"speed|rpm|spindle|n|rev(olution)?s?|drehzahl", "rotation speed"),
     (
         r"heater\w*|p|ph(?= ?\d)|power|load|drive|torque|loss(es)?|q|heat(ing)?|"
         r"heizung|current|motor|leistung",
         "heat load",
     ),
-    (r"t|ti|temp(erature)?s?|thermo(couple)?|pt\d*|tc\d*|indoors?", "temperature"),
+    (r"t|ti|temp(erature)?s?|\w*temperatur(en)?|thermo(couple)?|pt\d*|tc\d*|indoors?", "temperature"),
     (r"sensor|housing|bearing|plate|body|bed|table", "temperature"),
 )
 # what a controller sends to a heater: a share of full power, or the steps of a pulse width
@@ -53,13 +53,13 @@ _ELECTRIC = (
 )
 _SET_POINT = r"set ?points?|set|targets?|soll(wert)?"
 _SET_POINT_ALONE = r"sp( ?\d+)?|sp temp(erature)?|temp(erature)? sp"
-_TEMPERATURE = r"t(?![a-z])|(.* )?temp(erature)?s?( |$)"
+_TEMPERATURE = r"t(?![a-z])|(.* )?(temp(erature)?s?|\w*temperatur(en)?)( |$)"
 # how clearly a column is the temperature around the machine; a room may be what is measured
 _SURROUNDINGS = (
-    r"amb(ient)?|env(ironment)?|outside|outdoors?|ext(ern(al)?)?|surroundings?|umgebung",
+    r"amb(ient)?|env(ironment)?|outside|outdoors?|ext(ern(al)?)?|surroundings?|umgebung\w*|au(ss|ß)en\w*",
     r"ta",
     r"air|hall",
-    r"room|raum",
+    r"room|raum(temperatur)?",
 )
 _ROLE_OF_UNIT = {
     "degC": "temperature",
