@@ -61,7 +61,9 @@ def _temperature(
         terms.append(_term(f"{load} warms {output}", output, f"gain_{output}_{load}*{heat}"))
     fluid, pump = _first(guesses, "fluid temperature"), _first(guesses, "fluid flow")
     if fluid:
-        parameters.append(f'fluid_{output} = {{ start = 1e-4, unit = "1/s", min = 0.0 }}')
+        flow = _canonical(guesses[pump]) if pump else "1"
+        per = "" if flow == "1" else f"/({flow})"
+        parameters.append(f'fluid_{output} = {{ start = 1e-4, unit = "1/s{per}", min = 0.0 }}')
         terms.append(
             _term(
                 f"fluid on {output}",

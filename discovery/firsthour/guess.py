@@ -243,7 +243,8 @@ def _by_values(name: Named, values: Array, *, fahrenheit: bool) -> Guess:
             return Guess(role, "1", f"{why}; values {span} taken as steps or a switch", sure=False)
         return Guess(role, "W", f"{why}; values {span} taken as watts", sure=False)
     if role == "fluid flow":
-        return Guess(role, "1" if high <= 1 else "l/min", f"{why}; values {span}", sure=high <= 1)
+        on_off = bool(np.isin(known, (0.0, 1.0)).all())
+        return Guess(role, "1" if high <= 1 else "l/min", f"{why}; values {span}", sure=on_off)
     if role in _USUAL:
         return Guess(role, _USUAL[role], f"{why}; {_USUAL[role]} is usual", sure=False)
     return Guess(role, "1", why, sure=False)

@@ -51,7 +51,7 @@ def read_sheet(path: Path) -> Sheet:
     if first == 0:
         raise UserError(
             f"{path}, line {rows[0][0]}: numbers where the names of the columns should stand; "
-            "put a line of names above them, such as time,heater,T1"
+            f"put a line of {width} names above them, such as time,heater,T1"
         )
     above = [k for k in range(len(rows) if first is None else first) if len(rows[k][1]) == width]
     if not above:

@@ -111,6 +111,7 @@ def find_clock(path: Path, names: Sequence[str], units: Sequence[str], body: Seq
         )
     raise UserError(
         f"{path}: no column of time was found; call one 'time' (seconds, or instants as 2026-03-01T08:00:00)"
+        ", or add one if the file has none"
     )
 
 

@@ -212,6 +212,7 @@ def test_body_temperatures_alone_drive_the_errors(tmp_path: Path) -> None:
 def test_a_coolant_with_a_flow_can_be_offered_as_convection(tmp_path: Path) -> None:
     """What the flow and its temperature are for: the model has a path to the fluid, gated by the flow."""
     from discovery.experimentfile import load_experiment
+    from discovery.models.dimensions import check_dimensions
 
     rows = [f"{k},21,{18 + k % 4 / 9},{8 * (k // 9 % 2)},{k % 3},{20 + k / 9}" for k in range(60)]
     (tmp_path / "run.csv").write_text("\n".join(["time,T_room,T_coolant,flow_lpm,P_W,T_motor", *rows]))
@@ -221,7 +222,9 @@ def test_a_coolant_with_a_flow_can_be_offered_as_convection(tmp_path: Path) -> N
     assert "fluid temperature, degC ? " in line
     assert "taken for the fluid of flow" in line
     experiment = load_experiment(tmp_path / "rig" / "experiment.toml")
-    assert {"T_coolant", "flow"} <= set(experiment.model_file("first_order").inputs)
+    model = experiment.model_file("first_order")
+    assert {"T_coolant", "flow"} <= set(model.inputs)
+    assert check_dimensions(model, experiment.campaign.channels) == []  # in l/min, as with a pump that is on
 
 
 def test_a_discharge_warms_although_its_power_is_below_zero(tmp_path: Path) -> None:

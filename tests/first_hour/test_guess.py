@@ -109,6 +109,11 @@ def test_a_voltage_drives_where_nothing_better_is_recorded() -> None:
     assert drives(_guessed(("voltage", "", 0, 9), ("door", "", 0, 1))) == ["voltage"]
 
 
+def test_a_flow_below_one_that_is_no_switch_is_asked_about() -> None:
+    assert not _guessed(("flow", "", 0.1, 0.7))["flow"].sure  # a share, or litres a minute
+    assert guess(Column("pump", "pump", "", np.arange(50.0) % 2)).sure
+
+
 def test_loads_of_one_kind_have_one_unit() -> None:
     watts = _guessed(("Ph1", "", 0, 11), ("Ph2", "", -0.1, 14))
     assert [one.unit for one in watts.values()] == ["W", "W"]
@@ -244,8 +249,8 @@ def test_what_a_logger_writes_above_and_between(tmp_path: Path) -> None:
         (["time,T1", *(f"{k},{k}" for k in range(12)), "12,x"], r"line 14, column 'T1': 'x' is not a number"),
         (["time,T1", *(f"{k},{k}" for k in range(12)), "5,5"], r"line 14: the time does not run forward"),
         (["time,T1", *(f"{k},{k}" for k in range(12)), "12,5,6"], r"line 14: 3 cells where the header has 2"),
-        (["T1,T2", *("1,2" for _ in range(12))], "no column of time was found"),
-        ([f"{k},0,{299.5 + k}" for k in range(12)], r"line 1: numbers where the names .* should stand"),
+        (["T1,T2", *("1,2" for _ in range(12))], "no column of time was found.* or add one"),
+        ([f"{k},0,{299.5 + k}" for k in range(12)], r"line 1: numbers where the names .* line of 3 names"),
         (["T (a)", *(f"{k},{k}" for k in range(12))], "no header above the rows of 2 cells"),
         (["time,T1", "0,1", "1,2"], "only 2 rows"),
         (
