@@ -171,7 +171,7 @@ def _the_fluid(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
     )
     if flows and not fluids and len(coolants) == 1:
         [name] = coolants
-        why = f"{guesses[name].why}; taken for the fluid of {flows[0]}, since no other temperature is"
+        why = f"{guesses[name].why}; taken for the fluid of {flows[0]}, as the file has no other"
         found[name] = replace(guesses[name], role="fluid temperature", why=why, sure=False)
     return found
 

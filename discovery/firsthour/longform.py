@@ -47,7 +47,7 @@ def long_notes(path: Path, sheet: Sheet, clock: Sequence[int]) -> list[str]:
             f"all stand in '{values}'; {do}"
         )
     return [
-        f"column '{of}' takes {count} values in turn, as of {count} sensors in one column '{values}': {do}"
+        f"column '{of}' takes {count} values in turn: if so many sensors share the column '{values}', {do}"
     ]
 
 

@@ -30,7 +30,7 @@ _WORDS: tuple[tuple[str, str], ...] = (
     ),
     (
         r"(t|temp(erature)?)? *"
-        r"(amb(ient)?|env(ironment)?|outside|outdoors?|ext(ern(al)?)?|surroundings?|umgebung\w*|au(ss|ß)en\w*)",
+        r"(amb(ient)?|env(ironment)?|outside|outdoors?|ext(ern(al)?)?|surroundings?|(umgebung|au(ss|ß)en)(s?(luft)?temp(eratur)?)?)",
         "ambient temperature",
     ),
     (r"ta|(t|temp(erature)?)? *(air|hall|room|raum(temperatur)?)", "ambient temperature"),
@@ -48,15 +48,15 @@ _SHARE = r"duty( ?cycle)?|pwm|ssr|control(ler)?|valve|stell\w*|u"
 _STEPS = 255.0  # of a pulse width
 # what warms with its square; such a word at the end, "current step" is no current
 _ELECTRIC = (
-    (r"(current|strom)( ?\w{0,2} ?\d*)?$", "A"),
-    (r"(volts?|voltage|spannung)( ?\w{0,2} ?\d*)?$", "V"),
+    (r"(current|strom)( ?[a-z]? ?\d*)?$", "A"),
+    (r"(volts?|voltage|spannung)( ?[a-z]? ?\d*)?$", "V"),
 )
 _SET_POINT = r"set ?points?|set|targets?|soll(wert)?"
 _SET_POINT_ALONE = r"sp( ?\d+)?|sp temp(erature)?|temp(erature)? sp"
 _TEMPERATURE = r"t(?![a-z])|(.* )?(temp(erature)?s?|\w*temperatur(en)?)( |$)"
 # how clearly a column is the temperature around the machine; a room may be what is measured
 _SURROUNDINGS = (
-    r"amb(ient)?|env(ironment)?|outside|outdoors?|ext(ern(al)?)?|surroundings?|umgebung\w*|au(ss|ß)en\w*",
+    r"amb(ient)?|env(ironment)?|outside|outdoors?|ext(ern(al)?)?|surroundings?|(umgebung|au(ss|ß)en)(s?(luft)?temp(eratur)?)?",
     r"ta",
     r"air|hall",
     r"room|raum(temperatur)?",
@@ -210,4 +210,6 @@ def _fits(unit: str, role: str) -> bool:
         return unit in ("W", "kW", "percent", "1")
     if role == "rotation speed":
         return unit == "rpm"
+    if role == "fluid flow":
+        return unit in ("l/min", "percent", "1")
     return unit not in DEGREES

@@ -57,7 +57,7 @@ def test_sensors_in_turn_without_common_stamps_are_told(tmp_path: Path) -> None:
     rows = [f"{k},{1 + k % 4},{20 + k % 4 + k / 100},{40 + k % 3}" for k in range(40)]
     path = _log(tmp_path, "time,Node ID,Temperature [°C],Humidity", *rows)
     [note] = [one for one in read_own(path).notes if "in turn" in one]
-    assert "column 'Node ID' takes 4 values in turn, as of 4 sensors in one column 'Temperature" in note
+    assert "column 'Node ID' takes 4 values in turn: if so many sensors share the column 'Temperature" in note
     wide = _wide(tmp_path, note)
     assert [column.name for column in wide.columns] == [f"Temperature_{k}" for k in (1, 2, 3, 4)]
     assert wide.columns[2].values[2] == pytest.approx(22.02)
