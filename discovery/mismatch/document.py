@@ -184,7 +184,8 @@ def _physics(d: Diagnosis, n: Named, checked: float | None) -> dict[str, Any]:
     h = n.hypothesis
     parameters = {}
     fits = (d.search.best.fit, d.after.fit)
-    output = dict(zip(h.amplitudes, h.shown, strict=True)) if len(h.amplitudes) > 1 else {}
+    several = len(h.amplitudes) > 1 and h.shown  # else one size for all outputs, or one for each body
+    output = dict(zip(h.amplitudes, h.shown, strict=True)) if several else {}
     for name in (*h.amplitudes, *h.shapes):
         p = d.after.fit.model.parameters[name]
         value = p.values.get(h.recording, p.value) if h.recording else p.value

@@ -67,6 +67,8 @@ def test_a_path_between_two_readings_has_a_rate_for_each() -> None:
     into = {t.into: answer.after.model.parameters[n] for t, n in _ways(answer.repaired)}
     assert into["T_motor"].value == pytest.approx(INTO_MOTOR, rel=0.1)
     assert into["T_column"].value == pytest.approx(INTO_COLUMN, rel=0.1)
+    (told,) = answer.document()["physics"]
+    assert len(told["parameters"]) == len(told["expressions"]) == 2
     assert answer.held_out["r3"].after < 1.1 * answer.held_out["r3"].floor
 
 
