@@ -16,8 +16,10 @@ from discovery.dynamics import Grid, Trajectory
 from discovery.errors import RunsAwayError
 from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.noise import (
+    Filter,
     Noise,
     innovations,
+    make_filter,
     readings_as_one,
     resolution,
     white_noise,
@@ -220,21 +222,22 @@ def _solve(
 
     low, high = problem.bounds
     guesses: dict[str, Array] = {}
-    last: dict[bytes, tuple[Array, tuple[Trajectory, ...]]] = {}
+    last: dict[bytes, tuple[Array, tuple[tuple[Trajectory, Filter | None], ...]]] = {}
 
-    def run(x: Array) -> tuple[Array, tuple[Trajectory, ...]]:
+    def run(x: Array) -> tuple[Array, tuple[tuple[Trajectory, Filter | None], ...]]:
         key = x.tobytes()
         if key not in last:
             trajectories = tuple(problem.run(s, x, guesses.get(s.grid.recording)) for s in problem.systems)
             for t in trajectories:
                 guesses[t.system.grid.recording] = t.x
-            parts = [whiten(t, noise, problem.residual(t)[:, :, None])[:, 0] for t in trajectories]
+            runs = tuple((t, None if noise.is_white else make_filter(t)) for t in trajectories)
+            parts = [whiten(t, noise, problem.residual(t)[:, :, None], part)[:, 0] for t, part in runs]
             last.clear()
-            last[key] = (np.concatenate([*parts, problem.prior_rows(x, together)[0]]), trajectories)
+            last[key] = (np.concatenate([*parts, problem.prior_rows(x, together)[0]]), runs)
         return last[key]
 
     def jacobian(x: Array) -> Array:
-        parts = [whiten(t, noise, -problem.jacobian(t)) for t in run(x)[1]]
+        parts = [whiten(t, noise, -problem.jacobian(t), part) for t, part in run(x)[1]]
         return np.concatenate([*parts, problem.prior_rows(x, together)[1]])
 
     def residual(x: Array) -> Array:
@@ -260,5 +263,5 @@ def _solve(
             gtol=1e-12,
         )
         x0 = result.x
-    left, trajectories = run(x0)
-    return _Solution(x0, trajectories, jacobian(x0), 0.5 * float(left @ left))
+    left, runs = run(x0)
+    return _Solution(x0, tuple(t for t, _ in runs), jacobian(x0), 0.5 * float(left @ left))

@@ -14,7 +14,7 @@ readings: its time constant is hours, readings come in minutes.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
@@ -122,25 +122,25 @@ def _propagate(f, b, heat_decay, slow_decay, x, top):  # type: ignore[no-untyped
 
 
 @njit(cache=True)
-def _filter(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, data):  # type: ignore[no-untyped-def]
-    """Whitened data (R * Y rows in reading order, unmeasured rows zero) and half the log-determinant."""
+def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay):  # type: ignore[no-untyped-def]
+    """Kalman gains (R, Y, size) and standard deviations (R, Y) of the innovations, half the log-determinant.
+
+    They do not depend on the data: columns that are whitened later under the same noise share them.
+    """
     readings, outs, n = h.shape
-    m = data.shape[2]
     nh, nv = heat.shape[0], slow.shape[0]
     size = n + nh + nv
-    z = np.zeros((size, m))
     p = np.zeros((size, size))
     for i in range(nh):
         p[n + i, n + i] = heat[i] ** 2
     for j in range(nv):
         p[n + nh + j, n + nh + j] = slow[j] ** 2
-    out = np.zeros((readings, outs, m))
+    gains, roots = np.zeros((readings, outs, size)), np.ones((readings, outs))
     logdet = 0.0
     ph = np.zeros(size)
-    top_z, top_p = np.zeros((n, m)), np.zeros((n, size))
+    top_p = np.zeros((n, size))
     for r in range(readings):
         if r > 0:
-            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], z, top_z)
             _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], p, top_p)
             p = p.T.copy()  # symmetric: the other side is the same step on the transpose
             _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], p, top_p)
@@ -160,22 +160,46 @@ def _filter(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, data):
             s = white[y] ** 2 + (ph[own] if nv else 0.0)
             for j in range(n):
                 s += h[r, y, j] * ph[j]
-            root = np.sqrt(s)
-            logdet += np.log(root)
+            roots[r, y] = np.sqrt(s)
+            logdet += np.log(roots[r, y])
+            for i in range(size):
+                gain = ph[i] / s
+                gains[r, y, i] = gain
+                for j in range(size):
+                    p[i, j] -= gain * ph[j]
+    return gains, roots, logdet
+
+
+@njit(cache=True)
+def _whitened(f, b, h, measured, gains, roots, nv, slow_decay, heat_decay, data):  # type: ignore[no-untyped-def]
+    """Whitened data (R * Y rows in reading order, unmeasured rows zero) by gains from `_gains`.
+
+    `nv`: outputs with slow noise, all or none.
+    """
+    readings, outs, n = h.shape
+    m, size = data.shape[2], gains.shape[2]
+    z = np.zeros((size, m))
+    out = np.zeros((readings, outs, m))
+    top_z = np.zeros((n, m))
+    for r in range(readings):
+        if r > 0:
+            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], z, top_z)
+        for y in range(outs):
+            if not measured[r, y]:
+                continue
+            own = size - nv + y if nv else -1
             for c in range(m):
                 innovation = data[r, y, c] - (z[own, c] if nv else 0.0)
                 for j in range(n):
                     innovation -= h[r, y, j] * z[j, c]
                 out[r, y, c] = innovation
             for i in range(size):
-                gain = ph[i] / s
+                gain = gains[r, y, i]
                 for c in range(m):
                     z[i, c] += gain * out[r, y, c]
-                for j in range(size):
-                    p[i, j] -= gain * ph[j]
             for c in range(m):
-                out[r, y, c] /= root
-    return out, logdet
+                out[r, y, c] /= roots[r, y]
+    return out
 
 
 @dataclass(frozen=True)
@@ -188,29 +212,51 @@ class Filter:
     h: Array
     step: Array
     measured: NDArray[np.bool_]
+    last: dict[str, tuple[Noise, tuple[Array, Array, float]]] = field(default_factory=dict, repr=False)
+
+    def gains(self, noise: Noise) -> tuple[Array, Array, float]:
+        """What `_gains` gives under a noise. The last one is kept: a residual and its sensitivities, or the
+        columns of one search after another, are whitened alike.
+        """
+        if "gains" not in self.last or self.last["gains"][0] != noise:
+            heat, slow, response, decays = self._parts(noise)
+            found = _gains(
+                self.f, response, self.h, self.measured, np.array(noise.white), slow, heat, *decays
+            )
+            self.last["gains"] = (noise, found)
+        return self.last["gains"][1]
+
+    def _parts(self, noise: Noise) -> tuple[Array, Array, Array, tuple[Array, Array]]:
+        """Levels of the heats and slow noises that are not zero, responses to these heats, both decays."""
+        heat = np.array([(noise.heat or {}).get(name, 0.0) for name in self.states])
+        slow = np.array(noise.slow or ())
+        return (
+            heat[heat > 0],
+            slow if slow.any() else np.zeros(0),
+            np.ascontiguousarray(self.b[:, :, heat > 0]),
+            (np.exp(-self.step / noise.slow_time), np.exp(-self.step / noise.heat_time)),
+        )
 
     def apply(self, noise: Noise, data: Array) -> tuple[Array, float]:
         """Whitened columns (measured readings, M) of data (R, Y, M), and half the log-determinant of the
         covariance.
         """
-        heat = np.array([(noise.heat or {}).get(name, 0.0) for name in self.states])
-        slow = np.array(noise.slow or ())
         clean = np.where(self.measured[:, :, None], data, 0.0)
-        white = np.array(noise.white)
         if noise.is_white:
+            white = np.array(noise.white)
             flat = (clean / white[None, :, None])[self.measured]
             return flat, float(np.sum(np.log(white)[None, :] * self.measured))
-        active = heat > 0
-        out, logdet = _filter(
+        _, slow, response, decays = self._parts(noise)
+        gains, roots, logdet = self.gains(noise)
+        out = _whitened(
             self.f,
-            np.ascontiguousarray(self.b[:, :, active]),
+            response,
             self.h,
             self.measured,
-            white,
-            slow if slow.any() else np.zeros(0),
-            heat[active],
-            np.exp(-self.step / noise.slow_time),
-            np.exp(-self.step / noise.heat_time),
+            gains,
+            roots,
+            len(slow),
+            *decays,
             np.ascontiguousarray(clean),
         )
         return out[self.measured], float(logdet)
@@ -231,14 +277,16 @@ def make_filter(trajectory: Trajectory) -> Filter:
     )
 
 
-def whiten(trajectory: Trajectory, noise: Noise, data: Array) -> Array:
-    """Whitened columns (measured readings, M) of data (R, Y, M)."""
+def whiten(trajectory: Trajectory, noise: Noise, data: Array, part: Filter | None = None) -> Array:
+    """Whitened columns (measured readings, M) of data (R, Y, M); `part`: filter of the trajectory, where it
+    was made before.
+    """
     if noise.is_white:
         measured = trajectory.system.grid.measured
         return np.asarray(
             (np.where(measured[:, :, None], data, 0.0) / np.array(noise.white)[None, :, None])[measured]
         )
-    return make_filter(trajectory).apply(noise, data)[0]
+    return (part or make_filter(trajectory)).apply(noise, data)[0]
 
 
 def innovations(trajectory: Trajectory, noise: Noise, residual: Array) -> Array:
