@@ -26,15 +26,22 @@ _AT_BOUND = 1e-6
 class View:
     """One fit seen under one noise setting.
 
-    `basis` (N, U) is orthonormal and spans what a refit absorbs; `residual` (N,) has it projected out.
-    `level` is the log-likelihood of the fit with all unknowns integrated out.
+    `residual` (N,) has what a refit absorbs projected out. `level` is the log-likelihood of the fit with all
+    unknowns integrated out.
     """
 
+    lens: Lens
     noise: Noise
-    basis: Array
     residual: Array
     level: float
     information: Array  # (U, U) of the free unknowns, prior included
+
+    @cached_property
+    def basis(self) -> Array:
+        """Orthonormal basis (N, U) of what a refit absorbs; made where columns are projected, for a search
+        keeps many views of which it asks for no more than the level.
+        """
+        return self.lens.seen(self.noise)[1]
 
     def project(self, columns: Array) -> Array:
         """Columns (N, M) without what a refit absorbs."""
@@ -94,8 +101,10 @@ class Lens:
         x = view.project(column)[:, 0]
         return 0.5 * float(x @ view.residual) ** 2 / max(float(x @ x), 1e-30)
 
-    def view(self, noise: Noise) -> View:
-        """The fit under one noise setting."""
+    def seen(self, noise: Noise) -> tuple[Array, Array, Array, Array, float]:
+        """Whitened residual (N,) with the priors, an orthonormal basis (N, U) of what a refit absorbs, its
+        triangle (U, U) and scale (U,), and the log-determinant.
+        """
         joined = [
             np.concatenate([r[:, :, None], j], axis=2)
             for r, j in zip(self.residuals, self.jacobians, strict=True)
@@ -105,18 +114,23 @@ class Lens:
         residual, slope = self.priors
         if len(residual):
             r[-len(residual) :], x[-len(residual) :] = -residual, slope
-        logdet += sum(np.log(u.prior[1]) for u in self.fit.problem.unknowns if u.prior)
-        logdet -= 0.5 * np.log(self.fit.together) * sum(u.is_offset for u in self.fit.problem.unknowns)
         x = x[:, self.moving]
         scale = np.maximum(np.linalg.norm(x, axis=0), 1e-30)
         basis, triangle = np.linalg.qr(x / scale)
+        return r, basis, triangle, scale, logdet
+
+    def view(self, noise: Noise) -> View:
+        """The fit under one noise setting."""
+        r, basis, triangle, scale, logdet = self.seen(noise)
+        logdet += sum(np.log(u.prior[1]) for u in self.fit.problem.unknowns if u.prior)
+        logdet -= 0.5 * np.log(self.fit.together) * sum(u.is_offset for u in self.fit.problem.unknowns)
         diagonal = np.abs(np.diag(triangle))
         keep = diagonal > 1e-9
         projected = r - basis @ (basis.T @ r)
         volume = float(np.sum(np.log(diagonal[keep])) + np.sum(np.log(scale[keep])))
         level = -logdet - 0.5 * float(projected @ projected) - volume
         information = (triangle.T @ triangle) * np.outer(scale, scale)
-        return View(noise, basis, projected, level, information)
+        return View(self, noise, projected, level, information)
 
 
 def log_mean_exp(values: Array, axis: int = 0) -> Array:

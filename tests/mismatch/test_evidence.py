@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -30,8 +31,8 @@ RESIDUAL = Z @ [0.5, -0.2] + RNG.standard_normal(30)
 def board(word: str, amplitudes: int, spread: float, levels: tuple[float, ...] = (0.0,)) -> Board:
     """One hypothesis with the first columns of Z for signature, longer under each further noise level."""
     h = Hypothesis(catalogue()[word], (), tuple(f"a{k}" for k in range(amplitudes)))
-    noise, empty = Noise(("y",), (1.0,)), np.zeros((30, 0))
-    views = tuple(View(noise, empty, RESIDUAL, level, np.zeros((0, 0))) for level in levels)
+    noise, unused = Noise(("y",), (1.0,)), cast(Lens, None)
+    views = tuple(View(unused, noise, RESIDUAL, level, np.zeros((0, 0))) for level in levels)
     columns = tuple(Z[:, :amplitudes] * (1 + 0.3 * k) for k in range(len(levels)))
     lengths = tuple(np.linalg.norm(c, axis=0) for c in columns)
     return Board(
