@@ -94,6 +94,7 @@ def judged(
             lost.append(str(error))
     notes = [
         *missing_outputs(experiment, name, model),
+        *coarse_notes(fit),
         *lost,
         *fit.unidentified,
         *check_dimensions(model, experiment.campaign.channels),
@@ -117,6 +118,20 @@ def missing_outputs(experiment: Experiment, name: str, model: Model) -> list[str
     near = [(output, hit) for output in missing for hit in get_close_matches(output, spare, n=1)]
     hint = "".join(f"; is its output '{hit}' meant to be '{output}'?" for output, hit in near)
     return [f"gives no {', '.join(missing)}, which the experiment asks for, and is not compared there{hint}"]
+
+
+def coarse_notes(fit: Fit) -> list[str]:
+    """A sentence where recordings hold so many instants that the fit works on a coarser grid."""
+    grids = [s.grid for s in fit.problem.systems if s.grid.instants]
+    if not grids:
+        return []
+    largest = max(grids, key=lambda grid: grid.instants)
+    names = ", ".join(grid.recording for grid in grids)
+    return [
+        f"{names}: up to {largest.instants} instants, finer than needed; "
+        f"taken are {len(largest.read)} single readings and inputs as means over "
+        f"{float(np.median(largest.step)):.3g} s, their large steps where they are"
+    ]
 
 
 def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:

@@ -16,6 +16,10 @@ from discovery.recordings import Campaign
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+MOST_NODES = 30_000  # of a recording as it is; beyond, it is coarsened
+COARSE_NODES = 8_000  # of a coarsened one, about; as many at most for its inputs' switches
+MOVED = 0.1  # of its span: a held input that moves so far within an interval of a coarsened grid divides it
+
 
 @dataclass(frozen=True)
 class Samples:
@@ -33,10 +37,35 @@ class Samples:
         return self.value[np.clip(index, 0, None)]
 
     def integral(self, time: Array) -> Array:
-        """Integral of a held channel from its first stamp."""
-        sums = np.concatenate(([0.0], np.cumsum(self.value[:-1] * np.diff(self.time))))
+        """Integral of a channel from its first stamp."""
+        mean = 0.5 * (self.value[:-1] + self.value[1:]) if self.linear else self.value[:-1]
+        sums = np.concatenate(([0.0], np.cumsum(mean * np.diff(self.time))))
         index = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, None)
-        return np.asarray(sums[index] + self.value[index] * (time - self.time[index]))
+        last = 0.5 * (self.value[index] + self.at(time)) if self.linear else self.value[index]
+        return np.asarray(sums[index] + last * (time - self.time[index]))
+
+    def averaged(self, nodes: Array) -> Samples:
+        """The channel by its means: over each interval between nodes (T,) where it is held, around each node
+        where it runs straight. One that runs straight between fewer stamps than nodes is left as it is.
+        """
+        if self.linear:
+            if len(self.time) <= len(nodes):
+                return self
+            return Samples(
+                nodes, self._means(np.r_[nodes[0], 0.5 * (nodes[1:] + nodes[:-1]), nodes[-1]]), True
+            )
+        return Samples(nodes[:-1], self._means(nodes), False)
+
+    def _means(self, edges: Array) -> Array:
+        """Mean between each two edges; exactly the value where it stays one, so that what is constant in the
+        recording is constant to the last bit and equal intervals share their transition matrices.
+        """
+        changes = np.concatenate(([0], np.cumsum(np.diff(self.value) != 0)))
+        first = np.clip(np.searchsorted(self.time, edges[:-1], side="right") - 1, 0, None)
+        # straight lines reach to the stamp behind the edge
+        last = np.searchsorted(self.time, edges[1:], side="left") - (0 if self.linear else 1)
+        same = changes[first] == changes[np.clip(last, 0, len(changes) - 1)]
+        return np.where(same, self.value[first], np.diff(self.integral(edges)) / np.diff(edges))
 
 
 @dataclass(frozen=True)
@@ -55,6 +84,7 @@ class Grid:
     readings: Array  # (R, Y), NaN where an output was not read
     spread: Mapping[str, float] = field(default_factory=dict)  # of channels known only within one
     offset: Mapping[str, float] = field(default_factory=dict)  # what `ends` and `nodes` have on the samples
+    instants: int = 0  # nodes that there were before it was coarsened; 0: it was not
 
     def shifted(self, offset: Mapping[str, float]) -> Grid:
         """The grid with channels moved by constants from what was recorded (whatever moved them before)."""
@@ -145,13 +175,20 @@ def make_grid(
     inputs: Iterable[str],
     outputs: Iterable[str],
     max_step: float = 600.0,
+    coarse: int = COARSE_NODES,
 ) -> Grid:
     """Grid of a recording: every stamp of an input or a reading is a node, long intervals are divided.
+
+    With more than `MOST_NODES` it is coarsened: a body of minutes or hours answers to the mean of what
+    came within seconds. Every so many-th reading is taken, as a single reading still, so that stated
+    noise, steps of quantised numbers and wrong readings keep their meaning; nodes are these, every so
+    many-th stamp, and the stamps at which a held input has switched. Inputs are their means in between.
 
     Args:
         inputs: channels that the model uses.
         outputs: channels that were measured and are to be compared with the model.
         max_step: longest interval [s]; linear terms are exact whatever it is.
+        coarse: nodes, about, where there are more than `MOST_NODES`.
 
     Raises:
         UserError: an input without any value in the recording.
@@ -178,8 +215,13 @@ def make_grid(
     taken = np.isfinite(table).any(axis=1)
     stamps |= taken
     stamps[[0, -1]] = True
-    time = data.time[stamps]
-    read_time = data.time[taken]
+    read = np.flatnonzero(taken)
+    rows = np.flatnonzero(stamps)
+    instants = len(rows) if len(rows) > MOST_NODES else 0
+    if instants:
+        read = read[:: _every(len(read), coarse)]
+        rows = _coarse_rows(rows, read, data.time, samples.values(), coarse)
+    time = data.time[rows]
     gaps = np.diff(time)
     if (gaps > max_step).any():
         extra = [
@@ -188,5 +230,30 @@ def make_grid(
             if gap > max_step
         ]
         time = np.sort(np.concatenate([time, *extra]))
+    if instants:
+        samples = {name: s.averaged(time) for name, s in samples.items()}
     spread = {name: s for name in samples if (s := campaign.channels[name].spread) > 0}
-    return Grid(recording, time, samples, outputs, np.searchsorted(time, read_time), table[taken], spread)
+    index = np.searchsorted(time, data.time[read])
+    return Grid(recording, time, samples, outputs, index, table[read], spread, instants=instants)
+
+
+def _every(count: int, coarse: int) -> int:
+    """Of so many, every which one is taken in a grid coarsened to about `coarse` nodes."""
+    return -(-count // coarse) if count > MOST_NODES else 1
+
+
+def _coarse_rows(rows: Ints, read: Ints, stamps: Array, samples: Iterable[Samples], coarse: int) -> Ints:
+    """Rows of the stamps (N,) that stay nodes: the readings taken, every so many-th and the last of `rows`,
+    and those at which a held input is far from what it was at the node before.
+
+    What switches more often than the nodes allow (a heater on a pulsed supply) is averaged.
+    """
+    base = np.isin(rows, np.concatenate([rows[:: _every(len(rows), coarse)], rows[-1:], read]))
+    held = [s.at(stamps[rows]) for s in samples if not s.linear and np.ptp(s.value) > 0]
+    if not held:
+        return rows[base]
+    share = np.column_stack([values / np.ptp(values) for values in held])
+    far = MOVED
+    while (kept := kernel.moved(share, base, far)).sum() > base.sum() + coarse:
+        far *= 2
+    return np.asarray(rows[kept])

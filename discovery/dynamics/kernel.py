@@ -234,6 +234,22 @@ def between(which, e, w0, w1, read):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def moved(values, base, far):  # type: ignore[no-untyped-def]
+    """Which instants (T,) are kept: those of `base` (T,), and those at which any of the values (T, C) is
+    farther than `far` from what it was at the last one kept.
+    """
+    kept = base.copy()
+    last = values[0].copy()
+    for k in range(values.shape[0]):
+        for c in range(values.shape[1]):
+            if abs(values[k, c] - last[c]) > far:
+                kept[k] = True
+        if kept[k]:
+            last[:] = values[k]
+    return kept
+
+
+@njit(cache=True)
 def play(series, width):  # type: ignore[no-untyped-def]
     """Play operator y = max(x - w, min(x + w, y_before)), starting at rest in the middle.
 

@@ -28,6 +28,7 @@ EVERYDAY_HEAT = 4.0  # W rms at a body that no machine is free of
 LEAST_HEAT = 0.1  # of that, below which no model of a few bodies is exact
 BUSY_FLOW = 100.0  # W; a model whose largest heat flow is smaller has a smaller everyday heat
 MOST_READINGS = 6000  # instants, over all recordings
+COARSE_READINGS = 4000  # of them, and of nodes, where recordings are so fine that they are coarsened anyway
 SLOW_LIMIT = 0.55  # everyday slow sensor noise, as a share of the reading noise
 
 
@@ -108,7 +109,8 @@ def make_context(
             np.isfinite(campaign.recordings[r].values.get(name, np.array([np.nan]))).any() for r in recordings
         )
     ]
-    whole = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
+    coarse = COARSE_READINGS // len(recordings)
+    whole = {r: make_grid(campaign, r, inputs, outputs, coarse=coarse) for r in recordings}
     grids = thinned(whole)
     belief = BELIEF if physical and any(state.capacity for state in model.states.values()) else None
     fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)

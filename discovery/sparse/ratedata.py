@@ -35,7 +35,7 @@ def make_rate_data(
 ) -> RateData:
     """Grids of the recordings with all inputs that any candidate may use, dense readings thinned."""
     campaign = thinned(campaign, recordings, outputs, inputs)
-    grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
+    grids = {r: make_grid(campaign, r, inputs, outputs, coarse=8 * _READINGS) for r in recordings}
     times = [grids[r].time[grids[r].read] for r in recordings]
     return RateData(campaign, tuple(recordings), tuple(outputs), grids, make_blocks(times, blocks))
 
