@@ -227,15 +227,10 @@ def _rule(  # type: ignore[no-untyped-def]
 
 
 def _said(name: str, low: float, high: float, is_switch: bool) -> str:
-    """One condition of a rule: low < name <= high. Of a switch the tree sees the share of a span that it was
-    on, which is not what one says of it.
+    """One condition of a rule, as an expression of a model file would have it. Of a switch the tree sees the
+    share of a span that it was on: one says that it was on, or off.
     """
-    if is_switch:
-        return (
-            f"{name} {'switching' if low > -np.inf and high < np.inf else 'on' if low > -np.inf else 'off'}"
-        )
-    if low == -np.inf:
-        return f"{name} <= {high:.4g}"
-    if high == np.inf:
-        return f"{name} > {low:.4g}"
-    return f"{low:.4g} < {name} <= {high:.4g}"
+    if is_switch and not (low > -np.inf and high < np.inf):
+        low, high = (0.5, high) if low > -np.inf else (low, 0.5)
+    above = [f"{name} > {low:.4g}"] if low > -np.inf else []
+    return " and ".join([*above, *([f"{name} <= {high:.4g}"] if high < np.inf else [])])
