@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import kernel
+from discovery.dynamics import series
 from discovery.errors import UserError
 from discovery.recordings import Campaign
 
@@ -151,15 +151,15 @@ class Memory:
         step = self.grid.step
         if self.at_ends:
             ends = np.ascontiguousarray(np.broadcast_to(value, (2 * len(step),)), dtype=float)
-            return np.asarray(kernel.lag_ends(ends, step, time_constant))
+            return np.asarray(series.lag_ends(ends, step, time_constant))
         nodes = np.broadcast_to(value, (len(self.grid.time),)).astype(float)
-        lagged = kernel.lag_ends(_interleave(nodes[:-1], nodes[1:]), step, time_constant)
+        lagged = series.lag_ends(_interleave(nodes[:-1], nodes[1:]), step, time_constant)
         return np.concatenate((lagged[:1], lagged[1::2]))
 
     def play(self, value: Array, width: float) -> tuple[Array, Ints, Array]:
         """Play operator along the instants of this memory."""
         count = 2 * len(self.grid.step) if self.at_ends else len(self.grid.time)
-        y, follows, contact = kernel.play(np.ascontiguousarray(np.broadcast_to(value, (count,))), abs(width))
+        y, follows, contact = series.play(np.ascontiguousarray(np.broadcast_to(value, (count,))), abs(width))
         return y, follows, contact
 
 
@@ -254,6 +254,6 @@ def _coarse_rows(rows: Ints, read: Ints, stamps: Array, samples: Iterable[Sample
         return rows[base]
     share = np.column_stack([values / np.ptp(values) for values in held])
     far = MOVED
-    while (kept := kernel.moved(share, base, far)).sum() > base.sum() + coarse:
+    while (kept := series.moved(share, base, far)).sum() > base.sum() + coarse:
         far *= 2
     return np.asarray(rows[kept])

@@ -15,16 +15,8 @@ from numpy.typing import NDArray
 from discovery.dynamics import Grid, Trajectory
 from discovery.errors import RunsAwayError
 from discovery.fitting.covariance import covariance_of, with_intervals
-from discovery.fitting.noise import (
-    Filter,
-    Noise,
-    innovations,
-    make_filter,
-    readings_as_one,
-    resolution,
-    white_noise,
-    whiten,
-)
+from discovery.fitting.kalman import Filter, innovations, make_filter, whiten
+from discovery.fitting.noise import Noise, readings_as_one, resolution, white_noise
 from discovery.fitting.problem import Problem, make_problem
 from discovery.models import Model
 from discovery.recordings import Campaign

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.fitting import Fit, Noise
-from discovery.fitting.noise import Filter, make_filter
+from discovery.fitting.kalman import Filter, make_filter
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from discovery.dynamics import make_grid, make_system, simulate
-from discovery.dynamics.kernel import play
+from discovery.dynamics.series import play
 from discovery.dynamics.system import predict
 from discovery.errors import UserError
 from discovery.models import Model, Parameter

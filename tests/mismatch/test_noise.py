@@ -9,7 +9,8 @@ from scipy.linalg import expm
 
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
 from discovery.fitting import Noise
-from discovery.fitting.noise import make_filter, resolution, white_noise
+from discovery.fitting.kalman import make_filter
+from discovery.fitting.noise import resolution, white_noise
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse

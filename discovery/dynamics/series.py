@@ -1,0 +1,68 @@
+"""Compiled recursions along one series: play, lag, and which instants of a long one to keep."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def moved(values, base, far):  # type: ignore[no-untyped-def]
+    """Which instants (T,) are kept: those of `base` (T,), and those at which any of the values (T, C) is
+    farther than `far` from what it was at the last one kept.
+    """
+    kept = base.copy()
+    last = values[0].copy()
+    for k in range(values.shape[0]):
+        for c in range(values.shape[1]):
+            if abs(values[k, c] - last[c]) > far:
+                kept[k] = True
+        if kept[k]:
+            last[:] = values[k]
+    return kept
+
+
+@njit(cache=True)
+def play(series, width):  # type: ignore[no-untyped-def]
+    """Play operator y = max(x - w, min(x + w, y_before)), starting at rest in the middle.
+
+    Returns:
+        y (N,), index of the instant whose x it follows (N,), side of the contact (N,): 1, -1, or 0 before
+        any.
+    """
+    n = series.shape[0]
+    y = np.empty(n)
+    follows = np.zeros(n, np.int64)
+    contact = np.zeros(n)
+    y[0] = series[0]
+    for k in range(1, n):
+        y[k] = y[k - 1]
+        follows[k] = follows[k - 1]
+        contact[k] = contact[k - 1]
+        if series[k] - width > y[k]:
+            y[k] = series[k] - width
+            follows[k] = k
+            contact[k] = 1.0
+        elif series[k] + width < y[k]:
+            y[k] = series[k] + width
+            follows[k] = k
+            contact[k] = -1.0
+    return y, follows, contact
+
+
+@njit(cache=True)
+def lag_ends(series, step, tau):  # type: ignore[no-untyped-def]
+    """First-order lag of a series on interval ends (2K,) that runs straight within each interval; starts
+    settled.
+    """
+    out = np.empty_like(series)
+    y = series[0]
+    for k in range(step.shape[0]):
+        a, b = series[2 * k], series[2 * k + 1]
+        h = step[k] / tau
+        decay = np.exp(-h)
+        ramp = 1.0 - (1.0 - decay) / h if h > 1e-8 else 0.5 * h
+        out[2 * k] = y
+        y = decay * y + (1.0 - decay) * a + ramp * (b - a)
+        out[2 * k + 1] = y
+    return out

@@ -1,0 +1,220 @@
+"""The whitening filter of a trajectory: what each reading says beyond those before it.
+
+White reading noise, slow sensor noise and small random heat at the bodies are one linear Gaussian state-space
+model around a trajectory,
+
+    z = (dx, w, v):   dx' = A dx + w/C,   w_i and v_j first-order noise,   residual = H dx + v + white,
+
+so a Kalman filter whitens residuals and sensitivity columns alike in one pass (Sarkka & Solin, Applied
+Stochastic Differential Equations, 2019, ch. 10) and gives the likelihood of the variances. `w` is held
+between readings: its time constant is hours, readings come in minutes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from discovery.dynamics import Trajectory
+from discovery.dynamics.kernel import between
+from discovery.dynamics.system import output_matrix
+from discovery.fitting.noise import Noise
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True)
+def _propagate(f, b, heat_decay, slow_decay, x, top):  # type: ignore[no-untyped-def]
+    """Rows of x (states, heats, slow noises) one reading on, in place; `top` is room for the states' rows."""
+    n, nh = b.shape
+    m = x.shape[1]
+    for i in range(n):
+        for c in range(m):
+            top[i, c] = 0.0
+        for j in range(n):
+            for c in range(m):
+                top[i, c] += f[i, j] * x[j, c]
+        for j in range(nh):
+            for c in range(m):
+                top[i, c] += b[i, j] * x[n + j, c]
+    x[:n] = top
+    x[n : n + nh] *= heat_decay
+    x[n + nh :] *= slow_decay
+
+
+@njit(cache=True)
+def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay):  # type: ignore[no-untyped-def]
+    """Kalman gains (R, Y, size) and standard deviations (R, Y) of the innovations, half the log-determinant.
+
+    They do not depend on the data: columns that are whitened later under the same noise share them.
+    """
+    readings, outs, n = h.shape
+    nh, nv = heat.shape[0], slow.shape[0]
+    size = n + nh + nv
+    p = np.zeros((size, size))
+    for i in range(nh):
+        p[n + i, n + i] = heat[i] ** 2
+    for j in range(nv):
+        p[n + nh + j, n + nh + j] = slow[j] ** 2
+    gains, roots = np.zeros((readings, outs, size)), np.ones((readings, outs))
+    logdet = 0.0
+    ph = np.zeros(size)
+    top_p = np.zeros((n, size))
+    for r in range(readings):
+        if r > 0:
+            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], p, top_p)
+            p = p.T.copy()  # symmetric: the other side is the same step on the transpose
+            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], p, top_p)
+            for j in range(nh):
+                p[n + j, n + j] += heat[j] ** 2 * (1.0 - heat_decay[r - 1] ** 2)
+            for j in range(nv):
+                p[n + nh + j, n + nh + j] += slow[j] ** 2 * (1.0 - slow_decay[r - 1] ** 2)
+        for y in range(outs):  # white noise is independent by output: update one at a time
+            if not measured[r, y]:
+                continue
+            own = n + nh + y if nv else -1  # a reading shows the states and its own slow noise
+            for i in range(size):
+                ph[i] = p[own, i] if nv else 0.0
+            for j in range(n):
+                for i in range(size):
+                    ph[i] += h[r, y, j] * p[j, i]
+            s = white[y] ** 2 + (ph[own] if nv else 0.0)
+            for j in range(n):
+                s += h[r, y, j] * ph[j]
+            roots[r, y] = np.sqrt(s)
+            logdet += np.log(roots[r, y])
+            for i in range(size):
+                gain = ph[i] / s
+                gains[r, y, i] = gain
+                for j in range(size):
+                    p[i, j] -= gain * ph[j]
+    return gains, roots, logdet
+
+
+@njit(cache=True)
+def _whitened(f, b, h, measured, gains, roots, nv, slow_decay, heat_decay, data):  # type: ignore[no-untyped-def]
+    """Whitened data (R * Y rows in reading order, unmeasured rows zero) by gains from `_gains`.
+
+    `nv`: outputs with slow noise, all or none.
+    """
+    readings, outs, n = h.shape
+    m, size = data.shape[2], gains.shape[2]
+    z = np.zeros((size, m))
+    out = np.zeros((readings, outs, m))
+    top_z = np.zeros((n, m))
+    for r in range(readings):
+        if r > 0:
+            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], z, top_z)
+        for y in range(outs):
+            if not measured[r, y]:
+                continue
+            own = size - nv + y if nv else -1
+            for c in range(m):
+                innovation = data[r, y, c] - (z[own, c] if nv else 0.0)
+                for j in range(n):
+                    innovation -= h[r, y, j] * z[j, c]
+                out[r, y, c] = innovation
+            for i in range(size):
+                gain = gains[r, y, i]
+                for c in range(m):
+                    z[i, c] += gain * out[r, y, c]
+            for c in range(m):
+                out[r, y, c] /= roots[r, y]
+    return out
+
+
+@dataclass(frozen=True)
+class Filter:
+    """The parts of the whitening filter that do not depend on the variances, made once for a trajectory."""
+
+    states: tuple[str, ...]
+    f: Array
+    b: Array  # response to held heat in W
+    h: Array
+    step: Array
+    measured: NDArray[np.bool_]
+    last: dict[str, tuple[Noise, tuple[Array, Array, float]]] = field(default_factory=dict, repr=False)
+
+    def gains(self, noise: Noise) -> tuple[Array, Array, float]:
+        """What `_gains` gives under a noise. The last one is kept: a residual and its sensitivities, or the
+        columns of one search after another, are whitened alike.
+        """
+        if "gains" not in self.last or self.last["gains"][0] != noise:
+            heat, slow, response, decays = self._parts(noise)
+            found = _gains(
+                self.f, response, self.h, self.measured, np.array(noise.white), slow, heat, *decays
+            )
+            self.last["gains"] = (noise, found)
+        return self.last["gains"][1]
+
+    def _parts(self, noise: Noise) -> tuple[Array, Array, Array, tuple[Array, Array]]:
+        """Levels of the heats and slow noises that are not zero, responses to these heats, both decays."""
+        heat = np.array([(noise.heat or {}).get(name, 0.0) for name in self.states])
+        slow = np.array(noise.slow or ())
+        return (
+            heat[heat > 0],
+            slow if slow.any() else np.zeros(0),
+            np.ascontiguousarray(self.b[:, :, heat > 0]),
+            (np.exp(-self.step / noise.slow_time), np.exp(-self.step / noise.heat_time)),
+        )
+
+    def apply(self, noise: Noise, data: Array) -> tuple[Array, float]:
+        """Whitened columns (measured readings, M) of data (R, Y, M), and half the log-determinant of the
+        covariance.
+        """
+        clean = np.where(self.measured[:, :, None], data, 0.0)
+        if noise.is_white:
+            white = np.array(noise.white)
+            flat = (clean / white[None, :, None])[self.measured]
+            return flat, float(np.sum(np.log(white)[None, :] * self.measured))
+        _, slow, response, decays = self._parts(noise)
+        gains, roots, logdet = self.gains(noise)
+        out = _whitened(
+            self.f,
+            response,
+            self.h,
+            self.measured,
+            gains,
+            roots,
+            len(slow),
+            *decays,
+            np.ascontiguousarray(clean),
+        )
+        return out[self.measured], float(logdet)
+
+
+def make_filter(trajectory: Trajectory) -> Filter:
+    """Filter of a trajectory."""
+    system = trajectory.system
+    read = system.grid.read.astype(np.int64)
+    f, b = between(trajectory.which, trajectory.e, trajectory.w0, trajectory.w1, read)
+    return Filter(
+        system.states,
+        f,
+        b * system.scale[None, None, :],
+        output_matrix(trajectory),
+        np.diff(system.grid.time[read]),
+        system.grid.measured,
+    )
+
+
+def whiten(trajectory: Trajectory, noise: Noise, data: Array, part: Filter | None = None) -> Array:
+    """Whitened columns (measured readings, M) of data (R, Y, M); `part`: filter of the trajectory, where it
+    was made before.
+    """
+    if noise.is_white:
+        measured = trajectory.system.grid.measured
+        return np.asarray(
+            (np.where(measured[:, :, None], data, 0.0) / np.array(noise.white)[None, :, None])[measured]
+        )
+    return (part or make_filter(trajectory)).apply(noise, data)[0]
+
+
+def innovations(trajectory: Trajectory, noise: Noise, residual: Array) -> Array:
+    """What each reading (R, Y) says beyond those before it, in its standard deviations; NaN where none is."""
+    out = np.full(residual.shape, np.nan)
+    out[trajectory.system.grid.measured] = whiten(trajectory, noise, residual[:, :, None])[:, 0]
+    return out
