@@ -115,11 +115,12 @@ def diagnose(
     tell("locating")
     before = free_forcing(context, found.baseline)
     after = free_forcing(context, found.best) if found.best is not found.baseline else before
-    verdict = decide(context, found, before, after)
-    location = locate(context, found.baseline, found.best, verdict.named, before)
     tell("fitting what was found for free runs")
     old = delivered(context, found.baseline)
-    new = delivered(context, found.best) if verdict.named else old
+    new = delivered(context, found.best) if found.best.hypotheses else old
+    verdict = decide(context, found, before, after, new)
+    new = new if verdict.named else old
+    location = locate(context, found.baseline, found.best, verdict.named, before)
     noise = found.best.best_view.noise
     repaired = written(new) if verdict.named else None
     tell("proving on held-out recordings")

@@ -62,11 +62,18 @@ class Verdict:
     reasons: tuple[str, ...]
 
 
-def decide(context: Context, found: Search, before: Sequence[Forcing], after: Sequence[Forcing]) -> Verdict:
+def decide(
+    context: Context,
+    found: Search,
+    before: Sequence[Forcing],
+    after: Sequence[Forcing],
+    goes_out: Assessment,
+) -> Verdict:
     """Name only what passes every gate.
 
     Args:
         before, after: free forcing on what the baseline and the best model leave.
+        goes_out: the best model, fitted for free runs.
     """
     best = found.best
     free_before = before[0].gain if before else -np.inf
@@ -120,8 +127,25 @@ def decide(context: Context, found: Search, before: Sequence[Forcing], after: Se
     reasons += [text for h in best.hypotheses for text in objections(best, h, found.gain)]
     if reasons:
         return Verdict(UNEXPLAINED, (), named, tuple(reasons))
+    untold = tuple(text for n in named if (text := _may_be_nothing(goes_out, n.hypothesis)))
+    if len(untold) == len(named):
+        return Verdict(NO_MISMATCH, (), (), (*untold, *_much(best)))
     kinds = {n.hypothesis.effect.is_physics for n in named}
-    return Verdict(MISSING if True in kinds else FAULT, named, (), (*_dropped(found), *_much(best)))
+    word = MISSING if True in kinds else FAULT
+    return Verdict(word, named, (), (*_dropped(found), *untold, *_much(best)))
+
+
+def _may_be_nothing(goes_out: Assessment, h: Hypothesis) -> str | None:
+    """A sentence where free runs do not tell the size of a lasting effect from zero."""
+    if h.effect.amplitude.fixed is not None or h.recording is not None:
+        return None
+    sizes = [goes_out.model.parameters[name] for name in h.amplitudes]
+    if any(p.low is None or p.high is None or p.low > 0 or p.high < 0 for p in sizes):
+        return None
+    ranges = ", ".join(f"{p.low:.3g} to {p.high:.3g} {p.unit}" for p in sizes)
+    return (
+        f"{h.effect.word} at {h.where} helps the fit, but free runs do not tell its size from zero: {ranges}"
+    )
 
 
 def _much(best: Assessment) -> tuple[str, ...]:

@@ -98,10 +98,10 @@ def test_what_does_not_carry_over_is_told_and_not_held_against_the_answer() -> N
     whole = look(context, before)
     claim = replace(whole.claims[0], hypothesis=h, gain=100.0, size=(context.spread(h)[0],))
     found = Search(before, answer, (), whole.board, ((claim,), (claim,)))
-    open_ = decide(context, found, (), ())
+    open_ = decide(context, found, (), (), answer)
     assert open_.word == "unexplained"
     assert open_.reasons == ("bed_memory at bed is still significant after the repair",)
-    settled = decide(context, replace(found, dropped=(h,)), (), ())
+    settled = decide(context, replace(found, dropped=(h,)), (), (), answer)
     assert settled.word == "missing physics"
     assert [n.hypothesis.effect.word for n in settled.named] == ["fluid_convection"]
     (told,) = settled.reasons
@@ -121,7 +121,7 @@ def test_what_is_bent_to_its_limit_objects_less(
     both = replace(assess(context, (*answer.hypotheses, h)), evidence=answer.evidence + 28.0)
     found = Search(before, answer, (both,), whole.board, ((claim,), (claim,)))
     monkeypatch.setattr("discovery.mismatch.verdict.bent", lambda _, o: pressed and o.key == h.key)
-    assert decide(context, found, (), ()).word == word
+    assert decide(context, found, (), (), answer).word == word
 
 
 def test_the_same_readings_count_in_the_fit_and_outside() -> None:

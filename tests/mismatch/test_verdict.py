@@ -52,8 +52,10 @@ def free(gain: float) -> list[Forcing]:
     return [Forcing("motor", gain, {}, {}, {}, np.zeros(1))]
 
 
-def said(found: Search, before: float = 0.0, after: float = 0.0) -> Verdict:
-    return decide(fitted()[0], found, free(before), free(after))
+def said(
+    found: Search, before: float = 0.0, after: float = 0.0, goes_out: Assessment | None = None
+) -> Verdict:
+    return decide(fitted()[0], found, free(before), free(after), goes_out or found.best)
 
 
 @pytest.mark.parametrize(
@@ -75,6 +77,32 @@ def test_free_heat_may_not_explain_more_than_the_effect(
     assert verdict.word == ("unexplained" if reason else "missing physics")
     assert len(verdict.reasons) == (reason is not None)
     assert all(reason and reason in text for text in verdict.reasons)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "word"),
+    [(-5.0, 60.0, "no mismatch"), (0.5, 60.0, "missing physics"), (-60.0, -0.5, "missing physics")],
+)
+def test_a_size_that_free_runs_do_not_tell_from_zero_names_nothing(
+    low: float, high: float, word: str
+) -> None:
+    _, answer, found = fitted()
+    (size,) = answer.hypotheses[0].amplitudes
+    told = replace(answer.model.parameters[size], low=low, high=high)
+    goes_out = replace(
+        answer, model=replace(answer.model, parameters={**answer.model.parameters, size: told})
+    )
+    verdict = said(found, goes_out=goes_out)
+    assert verdict.word == word
+    assert len(verdict.named) == (word == "missing physics")
+    assert verdict.reasons == (
+        ()
+        if verdict.named
+        else (
+            "fluid_convection at table helps the fit, but free runs do not tell its size from zero: "
+            "-5 to 60 W/K",
+        )
+    )
 
 
 @pytest.mark.parametrize(
