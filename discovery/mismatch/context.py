@@ -29,6 +29,7 @@ LEAST_HEAT = 0.1  # of that, below which no model of a few bodies is exact
 BUSY_FLOW = 100.0  # W; a model whose largest heat flow is smaller has a smaller everyday heat
 MOST_READINGS = 6000  # instants, over all recordings
 COARSE_READINGS = 4000  # of them, and of nodes, where recordings are so fine that they are coarsened anyway
+COARSE_LINK = 0.5  # of what a link carries, below which another exchange beside it is its coarseness
 SLOW_LIMIT = 0.55  # everyday slow sensor noise, as a share of the reading noise
 
 
@@ -46,6 +47,7 @@ class Context:
     settings: tuple[Noise, ...]  # everyday noise, from none to the limit
     heat_limit: Mapping[str, float]
     flows: Mapping[str, float]  # largest heat flow (or rate) by state, rms
+    links: Mapping[frozenset[str], float]  # the same by pair of bodies that the model links
     belief: float | None
     outliers: tuple[Outlier, ...]  # set aside
 
@@ -63,6 +65,15 @@ class Context:
         usual = h.effect.amplitude.plausible
         return tuple((0.02 + 0.13 * min(1.0, 2 * sd / usual)) * sd for sd in self.spread(h))
 
+    def of_a_link(self, h: Hypothesis) -> tuple[float, ...]:
+        """Size of each amplitude of an exchange at which it carries half of what the model's own link between
+        the two bodies does; zero where there is none.
+
+        A body is not of one temperature: what its joints conduct differs from one way of heating to another.
+        """
+        carried = self.links.get(frozenset(h.states), 0.0) if any(t.source for t in h.terms) else 0.0
+        return (COARSE_LINK * carried / self._unit_flow(h) if carried else 0.0,) * len(h.amplitudes)
+
     def spread(self, h: Hypothesis) -> tuple[float, ...]:
         """Prior standard deviation of each amplitude: plausible, but no more than the model's own flows."""
         size = h.effect.amplitude.plausible
@@ -75,17 +86,20 @@ class Context:
                 size if u in ("um", "um/m") or h.effect.amplitude.unit == "1" else min(size, 10 * level[name])
                 for u, name in zip(unit, h.shown, strict=True)
             )[: len(h.amplitudes)]
-        runs = [
-            t for t in self.baseline.trajectories if h.recording in (None, t.system.grid.recording)
-        ]  # the largest counts: one recording may be dry, and which comes first says nothing
+        unit_flow, largest = self._unit_flow(h), max(self.flows.values())
+        return (min(size, largest / unit_flow) if unit_flow > 0 else size,) * len(h.amplitudes)
+
+    def _unit_flow(self, h: Hypothesis) -> float:
+        """rms of what an effect of size one makes flow along the baseline. The largest recording counts: one
+        may be dry, and which comes first says nothing.
+        """
         ones = {**h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
-        unit_flow = max(
+        return max(
             _rms(evaluate(t.expression, {**run.at_ends(), **ones}, memory=run.system.ends).value)
-            for run in runs
+            for run in self.baseline.trajectories
+            if h.recording in (None, run.system.grid.recording)
             for t in h.terms
         )
-        largest = max(self.flows.values())
-        return (min(size, largest / unit_flow) if unit_flow > 0 else size,) * len(h.amplitudes)
 
 
 def make_context(
@@ -142,6 +156,7 @@ def make_context(
         settings,
         limit,
         flows,
+        _links(fit),
         belief,
         tuple(outliers),
     )
@@ -196,6 +211,16 @@ def _flows(fit: Fit) -> dict[str, float]:
                 if state:
                     flows[state] = max(flows.get(state, 0.0), size)
     return flows
+
+
+def _links(fit: Fit) -> dict[frozenset[str], float]:
+    links: dict[frozenset[str], float] = {}
+    for trajectory in fit.trajectories:
+        for term in trajectory.system.model.terms:
+            if term.source:
+                pair, size = frozenset((term.into, term.source)), heat_rms(trajectory, term.expression)
+                links[pair] = max(links.get(pair, 0.0), size)
+    return links
 
 
 def reading_noise(

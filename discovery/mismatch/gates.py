@@ -146,18 +146,24 @@ def matters(context: Context, attempt: Assessment, h: Hypothesis) -> bool:
     """Whether an effect has a size that physics would give it.
 
     A model with few bodies is a little wrong everywhere; with enough readings that shows, as effects of a
-    few per cent of the usual size. They are not what is missing.
+    few per cent of the usual size. They are not what is missing. No body jumps, but a slow one drifts.
     """
     if unseen_lag(context, h, attempt):
         return False
-    if h.effect.amplitude.fixed is not None or not h.effect.is_physics:
+    if h.effect.amplitude.fixed is not None or h.effect.word in JUMPS:
         return True
-    model = attempt.fit.model
-    sizes = [
-        abs(model.parameters[n].values.get(h.recording or "", model.parameters[n].value))
-        for n in h.amplitudes
-    ]
-    return any(size >= least for size, least in zip(sizes, context.minor(h), strict=True))
+    return any(size >= least for size, least in zip(_sizes(attempt, h), context.minor(h), strict=True))
+
+
+def of_a_link(context: Context, attempt: Assessment, h: Hypothesis) -> bool:
+    """Whether an exchange carries less than half of what the model's own link does, as an attempt fits it."""
+    return all(size < half for size, half in zip(_sizes(attempt, h), context.of_a_link(h), strict=True))
+
+
+def _sizes(attempt: Assessment, h: Hypothesis) -> list[float]:
+    """Magnitudes of the amplitudes."""
+    parameters = (attempt.fit.model.parameters[name] for name in h.amplitudes)
+    return [abs(p.values.get(h.recording or "", p.value)) for p in parameters]
 
 
 def unseen_lag(context: Context, h: Hypothesis, attempt: Assessment | None = None) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.context import Context
 from discovery.mismatch.evidence import Board, Score
-from discovery.mismatch.gates import bent, matters, unseen_lag
+from discovery.mismatch.gates import bent, matters, of_a_link, unseen_lag
 from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.lens import Lens
 from discovery.mismatch.look import again, attempt, look, sharpened
@@ -146,6 +146,8 @@ def _grow(
             bar = max(bar, BLUNT)  # what is left has another law, and there is not much of it
         if not matters(context, step, step.hypotheses[-1]):
             bar = max(bar, BLUNT)  # small for its kind, but no coarse model shows it so clearly
+        if of_a_link(context, step, step.hypotheses[-1]):
+            bar = max(bar, BLUNT)  # nor this
         if step.evidence - current.evidence < bar:
             break
         tell(f"{step.hypotheses[-1].effect.title} at {step.hypotheses[-1].where}")

@@ -140,3 +140,19 @@ def test_which_recording_comes_first_says_nothing() -> None:
         found.append({h.states: (context.spread(h), context.minor(h)) for h in claims})
     for states, sizes in found[0].items():
         assert np.allclose(sizes, found[1][states], rtol=1e-3)
+
+
+def test_an_exchange_is_held_against_the_link_that_the_model_has() -> None:
+    """With the pump always on, a flooded gap is conductance beside conductance: half of that of the link."""
+    runs = [machine.simulated(seed) for seed in (1, 2)]
+    runs = [machine.changed(run, pump=np.ones(len(run.time))) for run in runs]
+    effects = [catalogue()[word] for word in ("flooded_gap", "fluid_convection")]
+    context = make_context(
+        machine.campaign(*runs), machine.model(), ["r1", "r2"], tuple(machine.SEEN), effects
+    )
+    claims = hypotheses(context.model, context.campaign.channels, tuple(machine.SEEN), ("r1", "r2"), effects)
+    half = {h.states: context.of_a_link(h) for h in claims}
+    fitted = context.baseline.model.parameters
+    assert half["motor", "table"] == pytest.approx((0.5 * fitted["G_mt"].value,))
+    assert half["table", "bed"] == pytest.approx((0.5 * fitted["G_tb"].value,))
+    assert half["motor", "bed"] == half["motor",] == (0.0,)

@@ -10,16 +10,16 @@ import pytest
 from discovery.mismatch.assess import Assessment, assess, misfits
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
-from discovery.mismatch.gates import unseen_lag
+from discovery.mismatch.gates import matters, unseen_lag
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.leftout import least_added, least_taken, left_out
 from discovery.mismatch.look import look
 from discovery.mismatch.question import BLUNT, CLEAR, supported
-from discovery.mismatch.search import Search
+from discovery.mismatch.search import Search, search
 from discovery.mismatch.verdict import decide
 from discovery.models import Model, expanded
 from discovery.terms import Term, parse
-from tests.mismatch.machine import SEEN, campaign, model, simulated
+from tests.mismatch.machine import CHANNELS, SEEN, Array, Inputs, campaign, changed, model, simulated
 
 
 def claimed(baseline: Model, word: str, state: str, runs: tuple[str, ...]) -> tuple[Context, Assessment]:
@@ -181,3 +181,40 @@ def test_a_lag_shorter_than_the_time_between_readings_is_not_seen(lag: float, un
     found = hypotheses(context.baseline.problem.model, seen.channels, tuple(SEEN), ("r1",), [effect])
     claim = next(h for h in found if h.output == "E_Z")
     assert unseen_lag(context, claim.at(dict.fromkeys(claim.shapes, lag))) is unseen
+
+
+@pytest.mark.parametrize(("share", "word"), [(0.1, "missing physics"), (0.5, "no mismatch")])
+def test_what_is_little_beside_a_link_has_to_add_more(
+    share: float, word: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A gap of 8 W/K adds 10 to 30: enough if it counts for itself, too little for the link's coarseness."""
+
+    def gap(_: float, bodies: Array, inputs: Inputs) -> tuple[float, float, float]:
+        heat = 8.0 * inputs["pump"] * (bodies[2] - bodies[1])
+        return 0.0, heat, -heat
+
+    noisy = {name: replace(c, noise=1.3) if c.role == "error" else c for name, c in CHANNELS.items()}
+    seen = campaign(*(simulated(seed, concealed=gap, noise=1.3) for seed in (1, 2)))
+    seen = replace(seen, channels=noisy)
+    context = make_context(seen, model(), ("r1", "r2"), tuple(SEEN), [catalogue()["flooded_gap"]])
+    monkeypatch.setattr("discovery.mismatch.context.COARSE_LINK", share)
+    found = search(context)
+    assert 0.0 < found.tried[0].evidence - found.baseline.evidence < BLUNT
+    assert decide(context, found, (), (), found.best).word == word
+
+
+@pytest.mark.parametrize(
+    ("word", "size", "large"),
+    [("sensor_drift", 0.2, False), ("sensor_drift", 0.4, True), ("sensor_offset", 0.2, True)],
+)
+def test_a_slow_body_drifts_a_little_and_never_jumps(word: str, size: float, large: bool) -> None:
+    """Of the usual 2 um a day a seventh is the coarseness of a model; a jump of any size is none of that."""
+    first = simulated(1, noise=0.05)
+    late = first.time / 86400.0 if word == "sensor_drift" else first.time > first.time[-1] / 2
+    seen = campaign(changed(first, E_Y=first.values["E_Y"] - size * late), simulated(2, noise=0.05))
+    effect, runs = catalogue()[word], ("r1", "r2")
+    context = make_context(seen, model(), runs, tuple(SEEN), [effect])
+    found = hypotheses(context.baseline.problem.model, seen.channels, tuple(SEEN), runs, [effect])
+    h = next(h for h in found if (h.output, h.recording) == ("E_Y", "r1"))
+    h = h.at(dict.fromkeys(h.shapes, first.time[-1] / 2))
+    assert matters(context, assess(context, (h,)), h) == large
