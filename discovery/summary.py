@@ -9,6 +9,7 @@ from typing import Any
 
 from discovery.errors import UsageError
 from discovery.evaluation.tables import Table, as_text
+from discovery.models.units import differences
 from discovery.runfolder import read_results
 
 MOST_NOTES = 5  # of a model, in the terminal
@@ -71,5 +72,5 @@ def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
             size = f"{results['models'][name]['terms']} terms"
             rows.append((label + name, size, *(entry[y]["rms"] if y in entry else None for y in outputs)))
     units = {y: unit for one in runs.values() for y, unit in one.get("units", {}).items()}
-    header = ("rms", "", *(f"{y} [{units.get(y, '')}]" for y in outputs))
+    header = ("rms", "", *(f"{y} [{differences(units.get(y, ''))}]" for y in outputs))
     return Table(f"Recording '{recording}' ({' / '.join(sorted(parts))})", header, tuple(rows))
