@@ -129,14 +129,7 @@ def make_context(
     belief = BELIEF if physical and any(state.capacity for state in model.states.values()) else None
     fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
     flows = _flows(fit)
-    largest = max(flows.values(), default=1.0)
-    limit = {
-        name: EVERYDAY_HEAT * min(1.0, largest / BUSY_FLOW)
-        if state.capacity
-        else 0.04 * max(flows.get(name, 0.0), 0.1 * largest)  # also where nothing drives it
-        for name, state in fit.problem.model.states.items()
-        if not state.memory
-    }
+    limit = _everyday_heat(fit.problem.model, flows)
     duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
     white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)
     outliers = find_outliers(fit, whole, np.array(white.white))
@@ -200,6 +193,23 @@ def seen_beside(context: Context, fit: Fit) -> Context:
     duration = max(float(g.time[-1] - g.time[0]) for g in context.grids.values())
     white = reading_noise(fit, stated, context.heat_limit, duration)
     return replace(context, settings=everyday(white, context.heat_limit))
+
+
+def _everyday_heat(model: Model, flows: Mapping[str, float]) -> dict[str, float]:
+    """What no state is free of: W at a body, a rate at a state without capacity, driven or not.
+
+    Heat flows and rates are never compared: the bed of a machine follows the room at 1e-5 K/s beside bodies
+    that take 300 W.
+    """
+    states = {name: state for name, state in model.states.items() if not state.memory}
+    busiest = max((flows.get(name, 0.0) for name, state in states.items() if state.capacity), default=1.0)
+    fastest = max((flows.get(name, 0.0) for name, state in states.items() if not state.capacity), default=0.0)
+    return {
+        name: EVERYDAY_HEAT * min(1.0, busiest / BUSY_FLOW)
+        if state.capacity
+        else 0.04 * max(flows.get(name, 0.0), 0.1 * fastest)
+        for name, state in states.items()
+    }
 
 
 def _flows(fit: Fit) -> dict[str, float]:

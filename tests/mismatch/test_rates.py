@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from discovery.mismatch.context import make_context
 from discovery.mismatch.diagnosis import diagnose
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
+from tests.mismatch import machine
 
 EVERY = 300.0  # s
 INTO_MOTOR, INTO_COLUMN = 6e-4, 1.2e-4  # 1/s: the column has five times the capacity of the motor
@@ -77,3 +81,23 @@ def _ways(model: Model | None) -> list[tuple[Term, str]]:
     assert model is not None
     paths = [t for t in model.terms if t.effect == "conduction_path"]
     return [(t, next(n for n in model.parameters if n.startswith(f"G_path_into_{t.into}"))) for t in paths]
+
+
+def test_everyday_rates_have_nothing_to_do_with_the_heat_of_the_bodies_beside_them() -> None:
+    """A foundation that follows the room within hours moves by 1e-4 K/s at most; heat flows are of 300 W."""
+    plain = machine.model()
+    followed = replace(
+        plain,
+        parameters={**plain.parameters, "tau": Parameter(2e4, "s", 5e3)},
+        states={**plain.states, "foundation": State("foundation", "degC", None, parse("T_env"), 0.5)},
+        terms=(
+            *plain.terms,
+            Term("foundation follows the room", "foundation", parse("(T_env - foundation)/tau")),
+            Term("bed to foundation", "bed", parse("4*(foundation - bed)")),
+        ),
+    )
+    runs = machine.campaign(machine.simulated(1), machine.simulated(2))
+    context = make_context(runs, followed, ["r1", "r2"], list(machine.SEEN), [])
+    fastest = 1.5 / 13751.0  # K/s, of the room: a follower is slower
+    assert 0 < context.heat_limit["foundation"] < 0.04 * fastest
+    assert context.heat_limit["bed"] == pytest.approx(4.0)
