@@ -13,6 +13,7 @@ from discovery.models.units import differences
 from discovery.runfolder import read_results
 
 MOST_NOTES = 5  # of a model, in the terminal
+_PARTS = {"fitted": "fit", "held out": "held_out"}
 
 
 def summary(folder: Path) -> Iterator[str]:
@@ -59,9 +60,9 @@ def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
     rows: list[tuple[str | float | None, ...]] = []
     models = [model for one in runs.values() for model in one["models"].values()]
     outputs = list(dict.fromkeys(y for m in models for scores in m["recordings"].values() for y in scores))
-    parts = set()
+    parts: set[str] = set()
     for run, results in runs.items():
-        parts.add("held out" if recording in results["held_out"] else "fitted")
+        parts |= {said for said, key in _PARTS.items() if recording in results[key]}
         entries = {name: m["recordings"].get(recording, {}) for name, m in results["models"].items()}
         if not any(entries.values()):
             continue

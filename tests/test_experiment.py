@@ -23,7 +23,7 @@ from discovery.models import read_model
 from discovery.recordings import Channel
 from discovery.report.ranking import ranked
 from discovery.report.run import load_run
-from discovery.summary import comparison
+from discovery.summary import comparison, rms_table
 from tests.small import CAMPAIGN, EXPERIMENT, MODEL, write_recording, write_small
 
 
@@ -345,6 +345,15 @@ def test_runs_side_by_side(folder: Path) -> None:
         list(comparison([first]))
     with pytest.raises(UserError, match=r"no results\.json"):
         list(comparison([first, folder]))
+
+
+def test_a_run_without_a_recording_has_no_say_in_what_it_was() -> None:
+    here = {"fit": ["a"], "held_out": ["b"], "models": {}}
+    elsewhere = {"fit": ["x"], "held_out": [], "models": {}}
+    assert rms_table({"one": here, "two": elsewhere}, "b").title == "Recording 'b' (held out)"
+    assert rms_table({"one": here, "two": {**elsewhere, "fit": ["b"]}}, "b").title.endswith(
+        "(fitted / held out)"
+    )
 
 
 def test_the_command_line(folder: Path) -> None:
