@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from discovery.evaluation import tables
 from discovery.report.ranking import (
@@ -101,13 +101,19 @@ def paper_tables(run: Run) -> list[Printed]:
     recordings = list(dict.fromkeys([*run.held_out, *run.results.get("fit", [])]))
     scored = [r for r in recordings if any(r in model.get("recordings", {}) for model in found.values())]
     order = ranked(run)
-    out = [printed(tables.table_3(run.results, r, order), left=[1]) for r in scored]
+    out = [printed(_in_units(run, tables.table_3(run.results, r, order)), left=[1]) for r in scored]
     parts = run.results.get("parts") or _parts(run)
     for model in order:
         if "thermobalance" in (model, kind(run, model)) and found[model].get("recordings") and parts:
             out.insert(0, printed(tables.table_1(run.results, model, parts)))
             break
     return out
+
+
+def _in_units(run: Run, table: tables.Table) -> tables.Table:
+    """The table with each error named in its unit."""
+    rows = ((with_unit(str(error), run.unit(str(error))), *cells) for error, *cells in table.rows)
+    return replace(table, rows=tuple(rows))
 
 
 def _parts(run: Run) -> dict[str, str]:

@@ -150,6 +150,13 @@ def test_kelvins_and_micrometres_are_not_mixed(tmp_path: Path, together: bool) -
     assert "dZ [µm]" in page
 
 
+def test_the_tables_beside_the_papers_name_units(page: str) -> None:
+    tables = page[page.index("The models compared") :]
+    assert re.search(r"E_Y0C \[µm\]\s*</t[hd]>", tables)
+    assert re.search(r"E_A0C \[µm/m\]\s*</t[hd]>", tables)
+    assert "mean square about the mean (in the square of the unit)" in tables
+
+
 def test_a_recording_that_was_fitted_decides_nothing(folder: Path) -> None:
     run = load_run(folder)
     before = ratio(run, "discovered", "reduced")
