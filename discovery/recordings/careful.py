@@ -126,6 +126,8 @@ def _columns(
         for line, text, cells in stamps
         if (stamp := _stamp(text, line, instants, troubles)) is not None
     ]
+    if not kept and stamps:
+        return None  # what is wrong with each stamp has been said
     if not kept:
         troubles.error(None, "no row with a stamp", "record again, or take the recording out of the campaign")
         return None

@@ -29,11 +29,19 @@ def read_columns(path: Path, wanted: Collection[str]) -> tuple[Columns | None, l
         if data[:2] == b"\x1f\x8b":
             data = gzip.decompress(data)
     except (OSError, EOFError, zlib.error, ValueError) as error:
-        what = (
-            "there is no such file" if isinstance(error, FileNotFoundError) else f"cannot be read ({error})"
-        )
-        return None, [Finding("error", path, None, what, "put it there or correct the campaign file")]
+        return None, [_unreadable(path, error)]
     columns = read_quick_csv(data, wanted)
     if columns is not None and columns.runs_forward and columns.is_finite:
         return columns, []
     return read_careful_csv(path, data, wanted)
+
+
+def _unreadable(path: Path, error: Exception) -> Finding:
+    if isinstance(error, FileNotFoundError):
+        do = "put it there or correct the campaign file"
+        return Finding("error", path, None, "there is no such file", do)
+    if isinstance(error, IsADirectoryError):
+        return Finding("error", path, None, "this is a folder", "name a file in it in the campaign file")
+    if isinstance(error, PermissionError):
+        return Finding("error", path, None, "may not be read", "allow it, or copy the file")
+    return Finding("error", path, None, f"cannot be read ({error})", "copy or compress the file again")

@@ -112,7 +112,11 @@ def test_nothing_is_wrong(write: Write) -> None:
             "error: fit.csv, line 5: not UTF-8 text (perhaps Latin-1, where the byte is '°'); save",
         ),
         (b"PK\x03\x04\0\0 no text", "error: fit.csv, line 1: a zero byte: not a text"),
-        (gzip.compress(b"time,T_env\n" * 99, mtime=0)[:-20], "error: fit.csv: cannot be read ("),
+        (
+            gzip.compress(b"time,T_env\n" * 99, mtime=0)[:-20],
+            "error: fit.csv: cannot be read (Compressed file ended before the end-of-stream marker was "
+            "reached); copy or compress the file again",
+        ),
         ("", "error: fit.csv: the file is empty"),
         ("time,T_env,speed,E_Y0C\n", "error: fit.csv: no row with a stamp"),
         (
@@ -124,6 +128,16 @@ def test_nothing_is_wrong(write: Write) -> None:
 def test_each_trouble_is_found_where_it_is(write: Write, data: str | bytes | list[str], said: str) -> None:
     told = found(write(data))
     assert any(line.startswith(said) for line in told), told
+
+
+def test_stamps_of_another_form_are_the_only_trouble(write: Write) -> None:
+    """Loading tells the first trouble alone: it has to be the one that can be mended."""
+    lines = [line.split(",", 1) for line in rows(30)]
+    stamps = [lines[0][0]] + [f"01.03.2026 08:{minute:02}:00" for minute in range(30)]
+    path = write([f"{stamp},{rest}" for stamp, (_, rest) in zip(stamps, lines, strict=True)])
+    assert len(found(path)) == 1
+    with pytest.raises(UserError, match=r"line 2: the stamp '01\.03\.2026 08:00:00' is no ISO 8601 instant"):
+        load_campaign(path)
 
 
 @pytest.mark.parametrize(
