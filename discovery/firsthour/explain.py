@@ -51,7 +51,6 @@ def _roles() -> Iterator[str]:
     from discovery.recordings.roles import CORRECTION, ROLES
 
     for role, facts in ROLES.items():
-        unit = " or ".join(facts.units) if facts.units else "any unit"
         kind = (
             "read now and then, compared with models"
             if facts.measured
@@ -59,7 +58,7 @@ def _roles() -> Iterator[str]:
         )
         if role == CORRECTION:
             kind = 'added to the readings of its error: corrects = "E_Y0C"'
-        yield f"{role:20} {unit:12} {kind}"
+        yield f"{role:20} {facts.said:12} {kind}"
 
 
 def _pairs(pairs: Iterable[tuple[str, str]]) -> Iterator[str]:

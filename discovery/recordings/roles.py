@@ -40,6 +40,11 @@ class RoleFacts:
     measured: bool = False  # an output: read now and then, never interpolated
     plain: bool = False  # a dimensionless value is kept as given (a heater in percent)
 
+    @property
+    def said(self) -> str:
+        """The units that its channels can have, in words."""
+        return " or ".join((*self.units, *(("percent",) if self.plain else ()))) or "any unit"
+
 
 def _temperature(low: float, high: float, *, measured: bool = False) -> RoleFacts:
     ranges = {"degC": Range((low, high), (-273.15, 2000.0))}

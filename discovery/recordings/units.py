@@ -115,8 +115,8 @@ def _pint(unit: str) -> str:
 
 
 def _allowed(unit: str, role: str) -> str:
-    units = ROLES[role].units
-    names = f"{' or '.join(units)}, or what converts to it" if units else "any unit that pint knows"
+    facts = ROLES[role]
+    names = f"{facts.said}, or what converts to it" if facts.units else "any unit that pint knows"
     if unit in _MISTAKEN:
         return f"did you mean '{_MISTAKEN[unit]}'? Allowed is {names}"
     return f"allowed is {names}"

@@ -58,6 +58,16 @@ def test_lists(what: str, word: str) -> None:
     assert word in result.output
 
 
+def test_no_two_lines_of_effects_are_the_same() -> None:
+    lines = CliRunner().invoke(app, ["list", "effects"]).output.splitlines()
+    assert len(set(lines)) == len(lines)
+
+
+def test_a_heat_load_may_be_in_percent() -> None:
+    lines = CliRunner().invoke(app, ["list", "roles"]).output.splitlines()
+    assert next(line for line in lines if line.startswith("heat load")).split()[2:5] == ["W", "or", "percent"]
+
+
 @pytest.mark.parametrize(("kind", "path"), FILES, ids=lambda value: getattr(value, "stem", value))
 def test_schemas_accept_our_files(kind: str, path: Path) -> None:
     document = json.loads(schema(kind))

@@ -53,7 +53,7 @@ def test_a_difference_takes_the_factor_alone() -> None:
         ("C", "temperature", "did you mean 'degC'?"),
         ("degC", "error", "allowed is um or um/m"),
         ("delta_degC", "temperature", "cannot be that"),
-        ("A", "heat load", "cannot be that"),
+        ("A", "heat load", "allowed is W or percent, or what converts to it"),
         ("foo", "other input", "not known"),
         ("", "error", "not known"),
         ("9**9**9**9", "other input", "not known"),

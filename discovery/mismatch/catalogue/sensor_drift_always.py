@@ -12,6 +12,7 @@ from discovery.mismatch.catalogue import sensor_drift
 
 EFFECT = replace(
     sensor_drift.EFFECT,
+    title="Drift of a sensor in every recording",
     place="output",
     one_recording=False,
     signature="one error runs away in a straight line in every recording alike, unrelated to any input",
