@@ -60,7 +60,7 @@ def results_document(
         "experiment": experiment.name,
         "command": shlex.join(["discovery", verb, str(experiment.path)]),
         "campaign": experiment.campaign.name,
-        "campaign_file": str(experiment.campaign.path),
+        "campaign_file": str(experiment.campaign.path.resolve()),  # an export may start elsewhere
         "fit": list(experiment.fit),
         "held_out": list(experiment.held_out),
         "outputs": list(experiment.outputs),

@@ -356,6 +356,15 @@ def test_a_run_without_a_recording_has_no_say_in_what_it_was() -> None:
     )
 
 
+def test_a_run_says_where_its_campaign_is(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An export may start in another folder than the run did."""
+    monkeypatch.chdir(folder)
+    out = run(Path("experiment.toml"), Path("out"))
+    named = json.loads((out / "results.json").read_text())["campaign_file"]
+    monkeypatch.chdir(folder.parent)
+    assert Path(named).samefile(folder / "campaign.toml")
+
+
 def test_the_command_line(folder: Path) -> None:
     runner = CliRunner()
     done = runner.invoke(app, ["run", str(folder / "experiment.toml"), "--out", str(folder / "out")])
