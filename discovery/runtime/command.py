@@ -105,7 +105,7 @@ def compensate_rows(
         goes_on = out is not None and out.exists() and session.resumed is not None
         stream: TextIO | None = None
         last = None
-        for now, newest in ticks(csv_rows(lines), step, session.resumed):
+        for now, newest in ticks(csv_rows(lines, exported.compiled.inputs, say), step, session.resumed):
             found = session.tick(newest, now)
             if stream is None:
                 stream = _output(out, stack, "a" if goes_on else "w")

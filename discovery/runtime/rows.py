@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from datetime import UTC
 
 from discovery.errors import UserError
@@ -15,19 +15,27 @@ LONGEST_SILENCE_S = 3600.0  # a longer gap in the rows: the machine, and its run
 LONGEST_JUMP_S = 400 * 24 * 3600.0  # a row that claims to be later than this is damaged
 
 
-def csv_rows(lines: Iterable[str]) -> Iterator[tuple[float, dict[str, Reading]]]:
+def csv_rows(
+    lines: Iterable[str], needed: Collection[str] = (), say: Callable[[str], None] = lambda _: None
+) -> Iterator[tuple[float, dict[str, Reading]]]:
     """Instant [s] and readings by name of each row; an empty cell is no reading, a damaged one is a bad
     reading.
 
-    A row whose time cannot be read or runs backwards is left out.
+    A row whose time cannot be read or runs backwards is left out. Where columns that are `needed` are missing
+    `say` is told.
 
     Raises:
-        UserError: no column `time`.
+        UserError: no column `time`, or none of those `needed`.
     """
     reader = csv.reader(lines)
     header = [cell.strip() for cell in next(reader, [])]
     if "time" not in header:
         raise UserError(f"the inputs have no column 'time'; their first line is {','.join(header)[:80]!r}")
+    if missing := [name for name in needed if name not in header]:
+        without = f"the inputs have no column {', '.join(missing)}, which the model needs"
+        if len(missing) == len(needed):
+            raise UserError(f"{without}; name a file with its inputs")
+        say(f"{without}; without a reading of each no offset is given out")
     place, last = header.index("time"), -math.inf
     while True:
         try:

@@ -328,6 +328,18 @@ def test_the_command_says_what_is_missing(model_file: Path, tmp_path: Path) -> N
         assert sentence in done.output
 
 
+def test_a_column_that_is_not_there_is_told(model_file: Path) -> None:
+    """A file of something else had been run, with exit status 0 and a table of zeros."""
+    command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", "-"]
+    some = CliRunner().invoke(app, command, input="time,T_env,speed\n0,20,0\n")
+    assert some.exit_code == 0
+    assert "the inputs have no column P_drive, T_cool, T_fluid" in some.stderr
+    none = CliRunner().invoke(app, command, input="time,a\n0,20\n")
+    assert none.exit_code == 1
+    assert "name a file with its inputs" in none.stderr
+    assert none.stdout == ""
+
+
 def test_the_output_may_not_be_what_is_read(model_file: Path, tmp_path: Path) -> None:
     inputs = tmp_path / "in.csv"
     inputs.write_text("time,T_env\n0,20\n")
