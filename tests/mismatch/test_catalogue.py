@@ -65,8 +65,9 @@ def switched(h: Hypothesis, size: float) -> Model:
     return inside(h).added_to(sample()[0], dict.fromkeys(h.amplitudes, size))
 
 
-def test_every_word_has_an_entry_in_its_group_and_no_other_is_there() -> None:
-    assert {e.word: e.group for e in catalogue().values()} == GROUP_OF
+def test_every_word_has_an_entry_in_its_group() -> None:
+    """Others may stand beside them: an effect is added with one file and nothing else."""
+    assert GROUP_OF.items() <= {e.word: e.group for e in catalogue().values()}.items()
     assert set(GROUP_OF) <= set(catalogue())
 
 
