@@ -140,6 +140,13 @@ def test_a_usual_size_above_the_most_is_a_mistake(tmp_path: Path) -> None:
         ("plausible = 0.1", "plausible = 0.1\nmost = 0", "most"),
         ('word = "rub"', 'word = "Rub it"', "word"),
         ('unit = "W/rpm"', 'colour = "red"', "colour"),
+        ('unit = "W/rpm"', 'unit = "W/rpmm"', "unit: the unit 'W/rpmm' is not known"),
+        ('unit = "s", grid', 'unit = "sec0nds", grid', "t_free.unit: the unit 'sec0nds' is not known"),
+        (
+            "grid = [10000, 30000], ",
+            "grid = [100], ",
+            "100 of its grid does not lie within low 2000 and high",
+        ),
         ("grid = [10000, 30000], ", "grid = [], ", "grid"),
     ],
 )

@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, Field, model_validator
 
 from discovery.errors import UserError
 from discovery.mismatch.catalogue.effect import ROLE_OF, Amplitude, Effect, Place, Shape
 from discovery.models import Parameter
 from discovery.models.memory import check_memory
+from discovery.models.units import known as known_unit
 from discovery.schema import Strict
 from discovery.terms import Expression, degree, evaluate, names, parse
 from discovery.terms.expression import rewrite
 
 # places where the formula is what a channel becomes, not a flow that comes in addition
 REPLACING = ("fluid terms", "cooling terms", "inputs of a recording")
+
+
+def _unit(text: str) -> str:
+    if not known_unit(text):
+        raise ValueError(f"the unit '{text}' is not known; write one that pint knows, as W/K")
+    return text
+
+
+Unit = Annotated[str, AfterValidator(_unit)]
 
 
 def _is_a_factor(amplitude: str, formula: Expression) -> bool:
@@ -32,10 +42,20 @@ def _is_a_factor(amplitude: str, formula: Expression) -> bool:
 class ShapeForm(Strict):
     """A parameter inside the formula."""
 
-    unit: str = "1"
+    unit: Unit = "1"
     grid: list[float] = Field(min_length=1, description="values that the search tries")
     low: float = Field(description="smallest value that the refit may give")
     high: float = Field(description="largest value that the refit may give")
+
+    @model_validator(mode="after")
+    def _grid_lies_within(self) -> Self:
+        outside = [value for value in self.grid if not self.low <= value <= self.high]
+        if outside:
+            raise ValueError(
+                f"{outside[0]:g} of its grid does not lie within low {self.low:g} and high {self.high:g}; "
+                "mend one of the three"
+            )
+        return self
 
 
 class EffectForm(Strict):
@@ -51,7 +71,7 @@ class EffectForm(Strict):
     place: Place = Field("body", description="where it can act")
     formula: str
     amplitude: str = Field(description="the name in the formula that switches it on")
-    unit: str = Field("W", description="unit of the amplitude")
+    unit: Unit = Field("W", description="unit of the amplitude")
     plausible: float = Field(gt=0, description="usual size of the amplitude")
     most: float = Field(
         inf,
