@@ -111,6 +111,7 @@ def parameter_values(model: Model) -> dict[str, dict[str, Any]]:
             entry
             | ({"fixed": True} if p.fixed else {})
             | ({"recordings": dict(p.values)} if p.values else {})
+            | ({"intervals": {run: list(ends) for run, ends in p.intervals.items()}} if p.intervals else {})
         )
     return found
 

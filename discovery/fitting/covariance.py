@@ -70,16 +70,20 @@ def with_intervals(problem: Problem, theta: Array, errors: Array) -> Model:
         if u.is_nuisance:
             continue
         p = parameters[u.name]
-        value = float(theta[i])
+        value, half = float(theta[i]), Z95 * float(errors[i])
+        interval = (max(value - half, p.min), min(value + half, p.max)) if np.isfinite(half) else None
         if u.recording is not None:
             values = {**p.values, u.recording: value}
             given = model.parameters[u.name].values
             # the common value of an event of one recording keeps it out of all others: it stays
             mean = not given or fitted <= given.keys()
             common = float(np.mean(list(values.values()))) if mean else p.value
-            parameters[u.name] = replace(p, values=values, value=common, low=None, high=None)
+            kept = {name: ends for name, ends in p.intervals.items() if name != u.recording}
+            intervals = kept | ({u.recording: interval} if interval else {})
+            parameters[u.name] = replace(
+                p, values=values, value=common, low=None, high=None, intervals=intervals
+            )
             continue
-        half = Z95 * float(errors[i])
-        interval = (max(value - half, p.min), min(value + half, p.max)) if np.isfinite(half) else (None, None)
-        parameters[u.name] = replace(p, value=value, low=interval[0], high=interval[1])
+        low, high = interval or (None, None)
+        parameters[u.name] = replace(p, value=value, low=low, high=high)
     return replace(model, parameters=parameters)

@@ -19,7 +19,7 @@ class Parameter:
     """A number of the model: given, bounded or found.
 
     `value` is the start value before a fit and the estimate after it, `low` and `high` its 95 % interval.
-    With `per_recording` every recording has its own, kept in `values`.
+    With `per_recording` every recording has its own, kept in `values`, with its interval in `intervals`.
     """
 
     value: float
@@ -31,6 +31,7 @@ class Parameter:
     low: float | None = None
     high: float | None = None
     values: Mapping[str, float] = field(default_factory=dict)
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def at(self, recording: str) -> float:
         """Value in a recording; the common value where the recording has none of its own."""
@@ -107,7 +108,7 @@ class Model:
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The model with other parameter values (intervals dropped)."""
         parameters = {
-            name: replace(parameter, value=float(values[name]), low=None, high=None)
+            name: replace(parameter, value=float(values[name]), low=None, high=None, intervals={})
             if name in values
             else parameter
             for name, parameter in self.parameters.items()

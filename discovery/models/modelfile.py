@@ -29,8 +29,12 @@ class ParameterForm(Strict):
     per: Literal["recording"] | None = Field(
         None, description='"recording": a value of its own in each recording'
     )
-    low: float | None = Field(None, description="lower end of the 95 % interval (written by a fit)")
-    high: float | None = Field(None, description="upper end of the 95 % interval (written by a fit)")
+    low: float | dict[str, float] | None = Field(
+        None, description="lower end of the 95 % interval, by recording where values are (written by a fit)"
+    )
+    high: float | dict[str, float] | None = Field(
+        None, description="upper end of the 95 % interval, by recording where values are (written by a fit)"
+    )
     values: dict[str, float] = Field(
         default_factory=dict, description="values by recording (written by a fit)"
     )
@@ -110,9 +114,10 @@ def read_model(path: Path) -> Model:
             entry.max,
             entry.fixed,
             entry.per == "recording",
-            entry.low,
-            entry.high,
+            None if isinstance(entry.low, dict) else entry.low,
+            None if isinstance(entry.high, dict) else entry.high,
             entry.values,
+            _intervals(entry),
         )
     states = {}
     per_unit = 1.0 / TIME_UNITS[form.time_unit]
@@ -152,6 +157,13 @@ def read_model(path: Path) -> Model:
     return Model(form.name or Path(path).stem, parameters, states, tuple(terms), outputs, form.time_unit)
 
 
+def _intervals(entry: ParameterForm) -> dict[str, tuple[float, float]]:
+    low, high = entry.low, entry.high
+    if not isinstance(low, dict) or not isinstance(high, dict):
+        return {}
+    return {recording: (low[recording], high[recording]) for recording in low if recording in high}
+
+
 def model_document(model: Model) -> dict[str, Any]:
     """The model as the nested mapping that its file holds."""
     model = in_time_unit(model)
@@ -173,6 +185,8 @@ def model_document(model: Model) -> dict[str, Any]:
         entry |= {"per": "recording"} if p.per_recording else {}
         entry |= finite({"low": p.low and number(p.low), "high": p.high and number(p.high)})
         entry |= {"values": {key: number(value) for key, value in p.values.items()}} if p.values else {}
+        for end, key in enumerate(("low", "high") if p.intervals else ()):
+            entry[key] = {recording: number(ends[end]) for recording, ends in p.intervals.items()}
         parameters[name] = entry
     states = {
         name: finite(

@@ -140,7 +140,10 @@ def value(name: str, parameter: Parameter) -> Value:
     """A parameter as it is printed: value, 95 % interval (or "given"), unit."""
     symbol, unit = mathml.math(mathml.symbol(name)), pretty_unit(parameter.unit)
     if parameter.values:
-        each = ", ".join(f"{recording}: {number(one)}" for recording, one in parameter.values.items())
+        each = ", ".join(
+            f"{recording}: {number(one)}{_between(parameter.intervals.get(recording))}"
+            for recording, one in parameter.values.items()
+        )
         return Value(name, symbol, each, "by recording", unit)
     if parameter.fixed:
         return Value(name, symbol, number(parameter.value), "given", unit)
@@ -150,6 +153,10 @@ def value(name: str, parameter: Parameter) -> Value:
     return Value(
         name, symbol, number(parameter.value), f"{number(low)} to {number(high)}", unit, low <= 0 <= high
     )
+
+
+def _between(interval: tuple[float, float] | None) -> str:
+    return f" ({number(interval[0])} to {number(interval[1])})" if interval else ""
 
 
 def capacities(model: Model) -> list[tuple[str, str]]:

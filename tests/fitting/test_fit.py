@@ -173,6 +173,8 @@ def test_a_parameter_of_each_recording() -> None:
     assert fitted.parameters["g"].values["r0"] == pytest.approx(0.02, rel=0.03)
     assert fitted.parameters["g"].values["r1"] == pytest.approx(0.03, rel=0.03)
     assert fitted.parameters["a"].value == pytest.approx(0.5, rel=0.03)
+    ends = fitted.parameters["g"].intervals
+    assert ends["r0"][0] < 0.02 < ends["r0"][1] < ends["r1"][0] < 0.03 < ends["r1"][1]
 
 
 def test_an_event_of_one_recording_stays_out_of_all_others() -> None:

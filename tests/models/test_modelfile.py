@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,18 @@ def test_a_file_becomes_what_it_says(tmp_path: Path) -> None:
     assert (model.states["a"].start_sd, model.states["y"].start_sd) == (0.5, 0.0)
     assert model.parameters["loss"].per_recording
     assert [term.name for term in model.terms] == ["link", "term 2", "term 3"]
+
+
+def test_the_intervals_of_each_recording_stand_in_the_file(tmp_path: Path) -> None:
+    model = read_model(written(tmp_path, GOOD))
+    own = dataclasses.replace(
+        model.parameters["loss"], values={"a": 0.2, "b": 0.4}, intervals={"a": (0.1, 0.3), "b": (0.35, 0.45)}
+    )
+    fitted = dataclasses.replace(model, parameters={**model.parameters, "loss": own})
+    write_model(tmp_path / "again.toml", fitted)
+    entry = tomllib.loads((tmp_path / "again.toml").read_text())["parameters"]["loss"]
+    assert (entry["low"], entry["high"]) == ({"a": 0.1, "b": 0.35}, {"a": 0.3, "b": 0.45})
+    assert read_model(tmp_path / "again.toml").parameters["loss"] == own
 
 
 def test_a_model_survives_its_file(tmp_path: Path) -> None:

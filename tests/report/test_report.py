@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import json
 import re
@@ -246,6 +247,8 @@ def test_a_given_number_of_each_recording_is_printed_for_each() -> None:
         "monday: 8.7",
         "2",
     )
+    found = dataclasses.replace(window, fixed=False, intervals={"monday": (8.1, 9.3)})
+    assert equations.value("t_on", found).value == "monday: 8.7 (8.1 to 9.3)"
 
 
 def test_names_of_a_user_stay_text(page: str) -> None:
