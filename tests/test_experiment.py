@@ -356,6 +356,18 @@ def test_a_run_without_a_recording_has_no_say_in_what_it_was() -> None:
     )
 
 
+def test_nothing_is_fitted_to_recordings_without_a_reading(folder: Path) -> None:
+    """A run had ended with 0 and a diagnosis with a traceback."""
+    import pandas as pd
+
+    for name in ("a", "b"):
+        frame = pd.read_csv(folder / f"{name}.csv")
+        frame[["E_Y0C", "E_R0T"]] = np.nan
+        frame.to_csv(folder / f"{name}.csv", index=False)
+    with pytest.raises(UserError, match=r"line \d+: fit: no reading of E_.* in a, b; name recordings"):
+        load_experiment(folder / "experiment.toml")
+
+
 def test_a_run_says_where_its_campaign_is(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An export may start in another folder than the run did."""
     monkeypatch.chdir(folder)
