@@ -126,3 +126,21 @@ def test_one_thread_a_process_unless_the_user_says_otherwise(given: str | None, 
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
     )
     assert done.stdout.split() == [seen, "1"]
+
+
+@pytest.mark.parametrize(
+    ("verb", "words"),
+    [
+        ("run", "EXPERIMENT"),
+        ("diagnose", "EXPERIMENT"),
+        ("compare", "RUN RUN"),
+        ("export", "RUN"),
+        ("compensate", "MODEL"),
+        ("check", "CAMPAIGN"),
+        ("update", "MODEL CAMPAIGN"),
+    ],
+)
+def test_a_verb_calls_what_it_takes_as_the_documents_do(verb: str, words: str) -> None:
+    usage = CliRunner().invoke(app, [verb, "--help"]).output.strip().splitlines()[0]
+    taken = usage.partition("[OPTIONS]")[2]
+    assert "".join(letter for letter in taken if letter.isalpha() or letter == " ").strip() == words

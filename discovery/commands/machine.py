@@ -10,7 +10,7 @@ from discovery.targets import TARGETS
 
 
 def export(
-    run: Annotated[Path, typer.Argument(help="Folder of a finished run.")],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a finished run.")],
     model: Annotated[str, typer.Option(help="Name of one of its models.")],
     to: Annotated[list[str], typer.Option(help=f"{', '.join(TARGETS)}; may be repeated.")],
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the files [RUN/export/MODEL].")] = None,
@@ -38,7 +38,7 @@ def export(
 
 
 def compensate(
-    model: Annotated[Path, typer.Argument(help="An exported model (.json).")],
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="An exported model (.json).")],
     inputs: Annotated[
         str | None, typer.Option(help="CSV file with time and the inputs, or - for stdin.")
     ] = None,
@@ -109,9 +109,12 @@ def compensate(
 
 
 def update(
-    model: Annotated[Path, typer.Argument(help="The exported model at work (.json).")],
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="The exported model at work (.json).")],
     campaign: Annotated[
-        Path, typer.Argument(help="A campaign file with the recordings since its last revision.")
+        Path,
+        typer.Argument(
+            metavar="CAMPAIGN", help="A campaign file with the recordings since its last revision."
+        ),
     ],
     recordings: Annotated[
         list[str] | None, typer.Option("--recording", help="In order; may be repeated [all of the campaign].")

@@ -7,7 +7,10 @@ import typer
 
 
 def check(
-    campaign: Annotated[Path, typer.Argument(help="A campaign file, or a folder that holds campaign.toml.")],
+    campaign: Annotated[
+        Path,
+        typer.Argument(metavar="CAMPAIGN", help="A campaign file, or a folder that holds campaign.toml."),
+    ],
     models: Annotated[
         list[Path] | None,
         typer.Option("--model", help="A model file: do its names and units fit? Repeatable."),

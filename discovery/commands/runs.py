@@ -7,7 +7,9 @@ import typer
 
 
 def run(
-    experiment: Annotated[Path, typer.Argument(help="An experiment file, e.g. experiments/nmv5000.toml.")],
+    experiment: Annotated[
+        Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, e.g. experiments/nmv5000.toml.")
+    ],
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the results [runs/NAME].")] = None,
 ) -> None:
     """Do the main job: fit, discover, cross-validate, compare, diagnose, report, export.
@@ -55,7 +57,7 @@ def diagnose(
 
 
 def compare(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders of results.")],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN", help="Folders of results.")],
     out: Annotated[
         Path | None, typer.Option("--out", help="Write a page on them: FILE.html, or a folder.")
     ] = None,
