@@ -17,6 +17,9 @@ from discovery.models import Model, Parameter, State
 from discovery.models.modelfile import read_model, write_model
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.sparse import Discovery, SparseOptions, discover
+from discovery.sparse.byrates import Growth, _exchanged
+from discovery.sparse.ratedata import make_rate_data, rough_noise
+from discovery.sparse.rates import Candidate, with_candidates
 from discovery.terms import Number, Term, parse
 
 Array = NDArray[np.float64]
@@ -170,6 +173,24 @@ def test_a_baseline_file_gets_the_term_that_it_lacks(tmp_path: Path) -> None:
     assert discovery.report["groups"][0]["kept"] == ["body: pump*(T_fluid - body)"]
     assert discovery.model.parameters["body_p1"].value == pytest.approx(25, rel=0.05)
     assert discovery.model.parameters["hA"].value == pytest.approx(10, rel=0.05)
+
+
+def test_a_term_that_entered_in_place_of_another_gives_way() -> None:
+    """Wet load stands in for the fluid where the baseline is bent enough; fitted together, it does not."""
+    body = State("body", "degC", 50e3, parse("T_env"), 0.5, 1 / 50e3)
+    parameters = {"hA": Parameter(10.0, "W/K", 0.0), "loss": Parameter(1.0, "1", 0.0)}
+    terms = (Term("air", "body", parse("hA*(T_env - body)")), Term("load", "body", parse("loss*P")))
+    baseline = Model("body", parameters, {"body": body}, terms, {"E": parse("3*(body - 22)")})
+    truth = baseline.with_terms(Term("fluid", "body", parse("25*pump*(T_fluid - body)")))
+    data = make_rate_data(make_campaign(truth, ("a", "b")), ["a", "b"], ["E"], list(CHANNELS)[:4], 24)
+    offered = [Candidate("body", parse(one)) for one in ("pump*P", "pump", "pump*(T_fluid - body)")]
+    model, labels = with_candidates(baseline, offered)
+    growth, noise = Growth(restart=baseline.values()), rough_noise(data)
+    for first in (["body_p1"], ["body_p1", "body_p2"], ["body_p3"]):
+        found, entered = _exchanged(data, model, labels, first, growth, noise)
+        assert entered == ["body_p3"]
+        assert found.parameters["body_p3"].value == pytest.approx(25, rel=0.05)
+        assert found.parameters["body_p1"].value == found.parameters["body_p2"].value == 0.0
 
 
 def test_two_measured_temperatures_are_found_to_be_coupled() -> None:
