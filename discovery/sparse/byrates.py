@@ -87,7 +87,7 @@ def discover_rates(
     window = {*path[max(0, last - _SIZES + 1) : last + 1], *([simple] if plain else [])}
     supports = sorted(window, key=len)
 
-    errors = np.array([_left_out(data, model, seen, one, noise) for one in supports])
+    errors = np.array([_left_out(data, model, seen, one, noise, growth is None) for one in supports])
     usual = NAME if growth is None else CLAIM
     row = choose(errors, usual if options.tolerance is None else options.tolerance)
     worth = dispersion * (np.log(max(g.count, 2)) + 2 * np.log(max(len(labels), 1)))  # of one more term
@@ -262,11 +262,13 @@ def _refit(
     return refit(without(model, gone), data.campaign, recordings, data.outputs, start, grids, noise, rounds)
 
 
-def _left_out(data: RateData, model: Model, seen: Evidence, support: Support, noise: Noise) -> Array:
+def _left_out(
+    data: RateData, model: Model, seen: Evidence, support: Support, noise: Noise, whole: bool
+) -> Array:
     """Mean squared error (B,) of the free run on each block, by fits that have not seen its fold."""
     blocks = data.blocks
     errors = np.full(blocks.count, np.nan)
-    for fold in make_folds(blocks):
+    for fold in make_folds(blocks, whole):
         keep = {r: ~np.isin(block, fold) for r, block in zip(data.recordings, blocks.of, strict=True)}
         train = {r: masked(data.grids[r], keep[r]) for r in data.recordings if keep[r].any()}
         try:

@@ -50,13 +50,19 @@ def make_blocks(times: Sequence[Array], count: int) -> Blocks:
     return Blocks(tuple(of), np.array(recording, dtype=np.intp))
 
 
-def make_folds(blocks: Blocks) -> list[Ints]:
+def make_folds(blocks: Blocks, whole: bool = True) -> list[Ints]:
     """Blocks left out in each fold: one recording at a time (several when there are many), else a quarter of
     the one.
+
+    Args:
+        whole: leave out whole recordings where there are several. Else a quarter of each: recordings that
+            were made for different things do not tell each other's part of a model.
     """
     recordings = int(blocks.recording.max()) + 1
-    if recordings == 1:
-        return list(np.array_split(np.arange(blocks.count), _MOST_FOLDS))
+    if recordings == 1 or not whole:
+        each = [np.flatnonzero(blocks.recording == i) for i in range(recordings)]
+        quarters = [np.array_split(one, _MOST_FOLDS) for one in each]
+        return [np.concatenate(parts) for parts in zip(*quarters, strict=True)]
     folds = min(recordings, _MOST_FOLDS)
     return [np.flatnonzero(blocks.recording % folds == k) for k in range(folds)]
 

@@ -22,6 +22,12 @@ def test_one_recording_is_left_out_in_quarters_and_several_one_by_one() -> None:
         assert set(blocks.recording[fold]) == {k}
 
 
+def test_a_quarter_of_each_recording_is_left_out_where_all_are_needed() -> None:
+    blocks = make_blocks([np.arange(0.0, 4800.0, 60.0), np.arange(0.0, 2400.0, 60.0)], 12)
+    folds = make_folds(blocks, whole=False)
+    assert [fold.tolist() for fold in folds] == [[0, 1, 8], [2, 3, 9], [4, 5, 10], [6, 7, 11]]
+
+
 def test_the_sparsest_of_equals_is_chosen() -> None:
     rng = np.random.default_rng(0)
     noise = rng.uniform(0.8, 1.2, 24)
