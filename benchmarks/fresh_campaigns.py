@@ -61,7 +61,7 @@ def machine(seed: int, spread: float) -> Machine:
 def campaign(experiment: Experiment, seed: int, spread: float, folder: Path) -> Experiment:
     """The experiment on a campaign recorded for it, through its files."""
     plant = machine(seed, spread)
-    needed = (*experiment.fit, *HELD_OUT, "only_environment", "only_fluid")
+    needed = (*experiment.fit, *HELD_OUT, "only_environment", "only_fluid", "warm_up")
     orders = [replace(o, seed=100 * seed + o.seed, machine=plant) for o in ORDERS if o.name in needed]
     write_campaign(folder, f"seed {seed}", orders)
     return replace(experiment, campaign=load_campaign(folder))
@@ -69,7 +69,9 @@ def campaign(experiment: Experiment, seed: int, spread: float, folder: Path) -> 
 
 def scores(experiment: Experiment, name: str) -> Scores:
     """Free runs on the held-out recordings of a model fitted to the others."""
-    model, _ = starting_model(experiment, name, experiment.form.models[name])
+    entry = experiment.form.models[name]
+    experiment = experiment.seen_by(entry)
+    model, _ = starting_model(experiment, name, entry)
     fit = fit_model(model, experiment.fitting, experiment.fit, experiment.outputs)
     return {recording: predict(fit, experiment, recording).scores() for recording in HELD_OUT}
 

@@ -112,7 +112,8 @@ def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -
     with staged(folder) as temporary:
         found = diagnosis(experiment, progress)
         assert found is not None
-        fitted = {name: fit_model_of(experiment, name, entry.kind, replace(found.context.model, name=name))}
+        model = replace(found.context.model, name=name)
+        fitted = {name: fit_model_of(experiment.seen_by(entry), name, entry.kind, model)}
         if found.repaired is not None:
             name = _free_name("repaired", form.models)
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
@@ -133,12 +134,15 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
     """One model: start values, fit, cross-validation on the fit recordings alone; then free runs on all."""
     began = clock.perf_counter()
     progress(f"fitting {name}")
+    common, experiment = experiment.fit, experiment.seen_by(entry)
     model, report = starting_model(experiment, name, entry, progress)
     loss: Loss = getattr(entry, "loss", "linear")
     fitted = fit_model_of(
         experiment, name, entry.kind, model, report, experiment.outputs_of(entry), loss, progress
     )
-    return replace(fitted, seconds=clock.perf_counter() - began)
+    also = [recording for recording in experiment.fit if recording not in common]
+    told = [f"is fitted to {', '.join(also)} besides"] if also else []
+    return replace(fitted, notes=(*told, *fitted.notes), seconds=clock.perf_counter() - began)
 
 
 def fit_model_of(
@@ -168,6 +172,8 @@ def repaired_of(
     experiment: Experiment, name: str, found: Diagnosis, repaired: Model, progress: Progress = silent
 ) -> Fitted:
     """The repaired model of a diagnosis with the very numbers that the diagnosis found and proved."""
+    if (wanted := experiment.form.mismatch) is not None:
+        experiment = experiment.seen_by(experiment.form.models[wanted.model])
     fit = written_with(found.after.fit, repaired, experiment.fitting)
     return judged(experiment, name, "repaired", repaired, fit, None, found.seconds, progress)
 
@@ -221,6 +227,7 @@ def diagnosis(
     from discovery.mismatch import diagnose as find_missing
 
     name, entry = wanted.model, experiment.form.models[wanted.model]
+    experiment = experiment.seen_by(entry)
     model = fitted[name].start if fitted else starting_model(experiment, name, entry, progress)[0]
     progress(f"looking for what {name} leaves out")
     return find_missing(

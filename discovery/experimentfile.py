@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 
 from discovery.errors import UserError
-from discovery.experimentform import ExperimentForm, FileEntry, ModelEntry, separate
+from discovery.experimentform import ExperimentForm, FileEntry, ModelEntry, own_recordings, separate
 from discovery.files import dotted, locate, read_text, read_toml
 from discovery.models import Model, check_model, read_model
 from discovery.models.check import check_outputs
@@ -62,6 +62,13 @@ class Experiment:
     def fitting(self) -> Campaign:
         """The campaign as fits see it."""
         return only(self.campaign, self.fit)
+
+    def seen_by(self, entry: ModelEntry) -> Experiment:
+        """The experiment as a model has it that is fitted to further recordings."""
+        also = [name for name in getattr(entry, "also", ()) if name not in self.fit]
+        if not also:
+            return self
+        return replace(self, form=self.form.model_copy(update={"fit": [*self.fit, *also]}))
 
     def inputs(self, entry: ModelEntry) -> list[str]:
         """Inputs of a built model: those stated, else the channels of the roles that the paper uses.
@@ -137,8 +144,7 @@ def _recordings(path: Path, form: ExperimentForm) -> list[str]:
     named: dict[str, tuple[str, ...]] = dict.fromkeys(form.fit, ("fit",))
     named |= dict.fromkeys(form.held_out, ("held_out",))
     for model, entry in form.models.items():
-        for names in separate(entry).values():
-            named |= {name: ("models", model) for name in names if name not in named}
+        named |= {name: ("models", model) for _, name in own_recordings(entry) if name not in named}
     for name, key in named.items():
         if name not in known:
             raise _mistake(path, key, f"no recording '{name}'; {suggest(name, known)}")
@@ -178,9 +184,10 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
                 raise _mistake(
                     path, key, f"'{name}' is no output of the experiment; {suggest(name, list(outputs))}"
                 )
-        for name in {name for names in separate(entry).values() for name in names} & set(form.held_out):
-            raise _mistake(path, key, f"separate: '{name}' is held out; a fit must not see it")
-    alone = [name for entry in form.models.values() for names in separate(entry).values() for name in names]
+        for word, name in own_recordings(entry):
+            if name in form.held_out:
+                raise _mistake(path, key, f"{word}: '{name}' is held out; a fit must not see it")
+    alone = [name for entry in form.models.values() for _, name in own_recordings(entry)]
     for one, other in twins(campaign, form.held_out, [*form.fit, *alone]):
         what = f"'{one}' holds the same readings as '{other}', which is fitted; hold out another recording"
         raise _mistake(path, ("held_out",), what)

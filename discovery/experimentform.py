@@ -25,6 +25,7 @@ def _file_name(name: str) -> str:
 Inputs = Annotated[list[str] | None, Field(min_length=1, description="default by role, as in the paper")]
 Outputs = Annotated[list[str] | None, Field(min_length=1, description="default: those of the experiment")]
 Pull = Annotated[Loss, Field(description="how outliers pull")]
+Also = Annotated[list[str], Field(description="recordings that this model is fitted to besides `fit`")]
 
 
 class FileEntry(Strict):
@@ -33,6 +34,7 @@ class FileEntry(Strict):
     kind: Literal["file"] = "file"
     file: str = Field(min_length=1, description="model file, relative to the experiment file")
     outputs: Outputs = None
+    also: Also = []
     loss: Pull = "linear"
 
 
@@ -42,6 +44,7 @@ class ReducedEntry(Strict):
     kind: Literal["reduced"]
     inputs: Inputs = None
     outputs: Outputs = None
+    also: Also = []
     loss: Pull = "linear"
 
 
@@ -105,6 +108,12 @@ class ExperimentForm(Strict):
     models: dict[Annotated[str, AfterValidator(_file_name)], TaggedEntry] = Field(min_length=1)
     mismatch: MismatchForm | None = None
     export: ExportForm | None = None
+
+
+def own_recordings(entry: ModelEntry) -> list[tuple[str, str]]:
+    """What a model says of recordings of its own, beside those that all are fitted to: word and recording."""
+    alone = [("separate", name) for names in separate(entry).values() for name in names]
+    return alone + [("also", name) for name in getattr(entry, "also", ())]
 
 
 def separate(entry: ModelEntry) -> Mapping[str, list[str]]:

@@ -202,6 +202,23 @@ def test_one_influence_after_the_other(folder: Path) -> None:
     assert found["values"]["p4_E_Y0C"]["low"] < found["values"]["p4_E_Y0C"]["value"]
 
 
+def test_a_model_may_be_fitted_to_more_than_the_others(folder: Path) -> None:
+    """As if the experiment named those recordings for it; the other models do not see them."""
+    text = EXPERIMENT.replace('fit = ["a", "b"]', 'fit = ["a"]')
+    more = text.replace('"model.toml" }', '"model.toml", also = ["b"] }')
+    found = {}
+    for name, content in (("both", EXPERIMENT), ("one", text), ("more", more)):
+        (folder / "experiment.toml").write_text(content)
+        found[name] = results_of(run(folder / "experiment.toml", folder / name))
+    both, one, got = (found[name]["models"] for name in ("both", "one", "more"))
+    for key in ("values", "cross_validation", "recordings"):
+        assert got["one_body"][key] == both["one_body"][key] != one["one_body"][key]
+        assert got["reduced"][key] == one["reduced"][key] != both["reduced"][key]
+    assert found["more"]["fit"] == ["a"]
+    assert got["one_body"]["notes"][0] == "is fitted to b besides"
+    assert set(got["reduced"]["recordings"]) == {"a", "c"}
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -221,6 +238,8 @@ def test_one_influence_after_the_other(folder: Path) -> None:
         ('kind = "reduced"', 'kind = "reduced", input = ["P"]', ["line 8", "did you mean 'inputs'"]),
         ('inputs = ["T_env", "P"]', 'inputs = ["T_env", "Q"]', ["line 9", "no channel 'Q'"]),
         ('inputs = ["T_env", "P"]', 'separate = { P = ["c"] }', ["line 9", "'c' is held out"]),
+        ('"model.toml"', '"model.toml", also = ["c"]', ["line 10", "also: 'c' is held out"]),
+        ('kind = "reduced"', 'kind = "sindy", also = ["z"]', ["line 8", "no recording 'z'"]),
         ('inputs = ["T_env", "P"]', 'separate = { P = ["z"] }', ["line 9", "no recording 'z'"]),
         ('inputs = ["T_env", "P"]', 'inputs = ["T_env", "E_R0T"]', ["line 9", "is an output of this"]),
         ('file = "model.toml"', 'file = "modell.toml"', ["modell.toml", "no such file"]),

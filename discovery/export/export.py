@@ -181,11 +181,12 @@ def export_run(
     from discovery.recordings import load_campaign
 
     results = read_results(run)
-    fit = [str(recording) for recording in results["fit"]]
     model_file = run / "models" / f"{name}.toml"
     if not model_file.is_file():
         known = sorted(path.stem for path in (run / "models").glob("*.toml"))
         raise UserError(f"{run}: no model '{name}'; {suggest(name, known)}")
+    seen = (*results["fit"], *results["models"].get(name, {}).get("recordings", {}))
+    fit = [str(recording) for recording in dict.fromkeys(seen) if recording not in results["held_out"]]
     place = campaign or _campaign_of(run, results)
     loaded = load_campaign(place, only=fit)
     model = read_model(model_file)

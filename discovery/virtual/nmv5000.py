@@ -22,6 +22,9 @@ ORDERS = (
     Order("only_environment", "environment", 6, hours=48.0, note="only the room changes, machine at rest"),
     Order("only_fluid", "fluid", 7, hours=48.0, note="only the fluid changes, table at 60 rpm"),
     Order("only_load", "internal", 8, hours=48.0, note="only the drive works, pump off, room held"),
+    Order(
+        "warm_up", "warm_up", 9, hours=25.0, note="600 rpm for 15 h, then 10 h at rest, under fluid: figure 3"
+    ),
 )
 
 CAMPAIGNS = {"nmv5000": (TITLE, ORDERS)}
