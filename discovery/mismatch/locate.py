@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.context import Context
 from discovery.mismatch.forcing import Forcing
+from discovery.mismatch.regime import heat_of, of_effects, of_free_heat
 from discovery.mismatch.verdict import Named
-from discovery.terms import evaluate
 
 Array = NDArray[np.float64]
-
-Bounds = dict[str, tuple[float, float]]  # of a variable: above, and up to
 
 MOST_WINDOWS = 8
 
@@ -54,11 +52,15 @@ def locate(
     Outputs by the excess of its residual over the reading noise, states by free forcing (and by the named
     effects where there are some), windows and regime from the missing heat itself.
     """
+    acting = [n.hypothesis for n in named if n.hypothesis.terms and n.hypothesis.recording is None]
+    rule = of_effects(best, acting, baseline.fit.problem.model) if acting else None
+    if not named and before and before[0].gain > 0:
+        rule = of_free_heat(baseline, before[0])
     return Location(
         _outputs(baseline, best),
         _states(before, named),
         _windows(context, best, named, before),
-        regime(baseline, before[0]) if before and (before[0].gain > 0 or named) else None,
+        rule,
     )
 
 
@@ -105,14 +107,8 @@ def _windows(
         for h in values:
             if h.recording not in (None, run):
                 continue
-            heat = np.zeros(2 * len(trajectory.system.grid.step))
             place = h.states[0] if h.states else ""
-            env = {**trajectory.at_ends(), **best.model.values(run)}
-            for term in h.terms:
-                if term.into == place or not place:
-                    heat = heat + np.broadcast_to(
-                        evaluate(term.expression, env, memory=trajectory.system.ends).value, heat.shape
-                    )
+            heat = heat_of(best, trajectory, h)
             series = 0.5 * (heat[0::2] + heat[1::2])
             found += _spans(time, series, 0.5 * float(np.percentile(np.abs(series), 95)), run, place, offset)
     if not values and before and before[0].gain > 0:
@@ -149,88 +145,3 @@ def _spans(
         )
         k = end + 1
     return out
-
-
-def regime(baseline: Assessment, f: Forcing, seed: int = 0) -> str | None:
-    """A rule over inputs and states, at most two deep, that says when heat is missing; None where none holds.
-
-    The tree must beat 95 % of trees grown on heat whose days were shuffled.
-    """
-    from sklearn.tree import DecisionTreeRegressor
-
-    features: list[Array] = []
-    values: list[Mapping[str, Array | float]] = []
-    names: list[str] = []
-    heat: list[Array] = []
-    for trajectory in baseline.fit.trajectories:
-        run = trajectory.system.grid.recording
-        nodes = {k: v for k, v in trajectory.at_nodes().items() if np.ndim(v) and k != "time"}
-        time, edges = trajectory.system.grid.time, f.edges[run]
-        names = list(nodes)
-        values.append(nodes)
-        block = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2)
-        counts = np.maximum(np.bincount(block, minlength=len(edges) - 1), 1)
-        features.append(
-            np.column_stack(
-                [np.bincount(block, v, minlength=len(edges) - 1) / counts for v in nodes.values()]
-            )
-        )
-        heat.append(f.heat[run])
-    x, y = np.concatenate(features), np.concatenate(heat)
-    switches = {n for n in names if all(np.isin(nodes[n], (0.0, 1.0)).all() for nodes in values)}
-    moving = np.ptp(x, axis=0) > 1e-9
-    x, names = x[:, moving], [n for n, m in zip(names, moving, strict=True) if m]
-    if not len(names) or np.ptp(y) == 0:
-        return None
-
-    def grow(target: Array) -> DecisionTreeRegressor:
-        return DecisionTreeRegressor(max_depth=2, min_samples_leaf=max(6, len(y) // 12), random_state=0).fit(
-            x, target
-        )
-
-    tree = grow(y)
-    real = float(tree.score(x, y))
-    rng = np.random.default_rng(seed)
-    size = 12
-    blocks = [np.arange(i, min(i + size, len(y))) for i in range(0, len(y), size)]
-    shuffled = []
-    for _ in range(40):
-        target = y[np.concatenate([blocks[i] for i in rng.permutation(len(blocks))])]
-        shuffled.append(float(grow(target).score(x, target)))
-    if real < np.quantile(shuffled, 0.95):
-        return None
-    return _rule(tree, names, switches)
-
-
-def _rule(  # type: ignore[no-untyped-def]
-    tree, names: Sequence[str], switches: Collection[str]
-) -> str | None:
-    """The path to the leaf with most heat: for each variable the tightest bounds."""
-    t = tree.tree_
-    best = 0.0
-    bounds: Bounds = {}
-
-    def walk(node: int, path: Bounds) -> None:
-        nonlocal best, bounds
-        if t.children_left[node] < 0:
-            value = abs(float(t.value[node].ravel()[0]))
-            if value > best:
-                best, bounds = value, path
-            return
-        name, edge = names[t.feature[node]], float(t.threshold[node])
-        low, high = path.get(name, (-np.inf, np.inf))
-        walk(t.children_left[node], {**path, name: (low, min(high, edge))})
-        walk(t.children_right[node], {**path, name: (max(low, edge), high)})
-
-    walk(0, {})
-    return " and ".join(_said(name, *ends, name in switches) for name, ends in bounds.items()) or None
-
-
-def _said(name: str, low: float, high: float, is_switch: bool) -> str:
-    """One condition of a rule, as an expression of a model file would have it. Of a switch the tree sees the
-    share of a span that it was on: one says that it was on, or off.
-    """
-    if is_switch and not (low > -np.inf and high < np.inf):
-        low, high = (0.5, high) if low > -np.inf else (low, 0.5)
-    above = [f"{name} > {low:.4g}"] if low > -np.inf else []
-    return " and ".join([*above, *([f"{name} <= {high:.4g}"] if high < np.inf else [])])

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from discovery.mismatch.assess import assess
+from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import make_context
 from discovery.mismatch.describe import describe
 from discovery.mismatch.forcing import BLOCKS, Forcing, free_forcing
-from discovery.mismatch.locate import regime
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.mismatch.regime import of_effects, of_free_heat
 from discovery.mismatch.scales import lags
 from tests.mismatch.machine import SEEN, Array, campaign, model, simulated
 from tests.mismatch.test_ask import plate, ten_minutes
@@ -29,7 +31,7 @@ def ruled(heat: Callable[[Array, Array], Array]) -> str:
     block = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, BLOCKS - 1)
     mean = [np.bincount(block, nodes[n]) / np.bincount(block) for n in ("speed", "pump")]
     series = {"r1": heat(*mean)}
-    return regime(current, Forcing("bed", 50.0, {"r1": edges}, series, series, np.zeros(0))) or ""
+    return of_free_heat(current, Forcing("bed", 50.0, {"r1": edges}, series, series, np.zeros(0))) or ""
 
 
 @pytest.mark.parametrize(
@@ -67,3 +69,28 @@ def test_lags_of_a_description_are_those_that_recordings_can_show() -> None:
     times = [float(t) for t in re.findall(r"lag\(\w+, ([\d.]+)\)", found.formula)]
     assert times
     assert max(times) <= 60.0
+
+
+@pytest.mark.parametrize(
+    ("word", "state", "rule"),
+    [
+        ("fluid_convection", "bed", r"pump > 0\.5"),
+        ("friction_speed", "motor", r"speed > \d+(\.\d+)?"),
+        ("fluid_convection_speed", "table", r"pump > 0\.5( and speed > \d+(\.\d+)?)?"),
+        ("natural_convection", "bed", None),
+    ],
+)
+def test_a_named_effect_says_itself_when_it_acts(word: str, state: str, rule: str | None) -> None:
+    """By its own formula: where the pump gates it, where it needs speed; what always acts has no rule."""
+    runs = ["r1", "r2"]
+    seen = campaign(*(simulated(int(r[1:])) for r in runs))
+    where = make_context(seen, model(), runs, tuple(SEEN), [catalogue()[word]])
+    claims = hypotheses(where.baseline.problem.model, seen.channels, tuple(SEEN), runs, where.effects)
+    h = next(h for h in claims if h.states == (state,))
+    answer = assess(where, (h,), sizes=dict.fromkeys(h.amplitudes, 5.0))
+    parameters = {**answer.model.parameters}
+    for name in h.amplitudes:  # any size will do: here nothing of the kind acts
+        parameters[name] = replace(parameters[name], value=5.0)
+    answer = replace(answer, model=replace(answer.model, parameters=parameters))
+    found = of_effects(answer, [h], where.baseline.problem.model)
+    assert found is None if rule is None else re.fullmatch(rule, found or "")
