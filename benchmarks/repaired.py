@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from discovery.experiment import diagnose
-from discovery.experimentfile import load_experiment
+from discovery.experiment import diagnose, load_experiment
 
 EXPERIMENTS = Path(__file__).parents[1] / "experiments"
 GROUPS = {

@@ -15,15 +15,14 @@ from typer.testing import CliRunner
 
 from discovery.cli import app
 from discovery.errors import RunsAwayError, UserError
-from discovery.experiment import run
-from discovery.experimentfile import load_experiment
-from discovery.fitted import offset_notes
+from discovery.experiment import load_experiment, run
+from discovery.experiment.fitted import offset_notes
+from discovery.experiment.summary import comparison, rms_table
 from discovery.fitting import Fit
 from discovery.models import read_model
 from discovery.recordings import Channel
 from discovery.report.ranking import ranked
 from discovery.report.run import load_run
-from discovery.summary import comparison, rms_table
 from tests.small import CAMPAIGN, EXPERIMENT, MODEL, write_recording, write_small
 
 
@@ -329,7 +328,7 @@ def test_an_interrupted_run_leaves_what_was_there(folder: Path, monkeypatch: pyt
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("discovery.experiment.write_run", interrupted)
+    monkeypatch.setattr("discovery.experiment.pipeline.write_run", interrupted)
     with pytest.raises(KeyboardInterrupt):
         run(folder / "experiment.toml", out)
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
@@ -423,7 +422,7 @@ def test_a_model_that_runs_away_in_cross_validation_is_told_and_kept(
     def explode(*_: object) -> None:
         raise RunsAwayError("model 'x' runs away on recording 'a'")
 
-    monkeypatch.setattr("discovery.fitted.cross_validate", explode)
+    monkeypatch.setattr("discovery.experiment.fitted.cross_validate", explode)
     out = run(folder / "experiment.toml", folder / "out")
     for name, entry in results_of(out)["models"].items():
         assert entry["cross_validation"] == {}

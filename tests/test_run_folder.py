@@ -15,14 +15,13 @@ from typer.testing import CliRunner
 
 from discovery.cli import app
 from discovery.errors import UserError
-from discovery.experiment import diagnose, run
-from discovery.experimentfile import load_experiment
-from discovery.experimentform import ExportForm
+from discovery.experiment import diagnose, load_experiment, run
+from discovery.experiment.form import ExportForm
+from discovery.experiment.inputfiles import input_files
+from discovery.experiment.summary import comparison, summary
 from discovery.export import export_run, replay
-from discovery.inputfiles import input_files
 from discovery.mismatch.summary import summary as diagnosis_summary
 from discovery.report.run import load_run
-from discovery.summary import comparison, summary
 from discovery.targets import TARGETS
 from tests.small import CAMPAIGN, EXPERIMENT, write_small
 
@@ -174,7 +173,7 @@ def test_a_missing_compiler_is_told_before_anything_is_fitted(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("discovery.targets.shutil.which", lambda _: None)
-    monkeypatch.setattr("discovery.experiment.fit_entry", lambda *_: pytest.fail("fitted"))
+    monkeypatch.setattr("discovery.experiment.pipeline.fit_entry", lambda *_: pytest.fail("fitted"))
     for target in ("c", "fmu", "fmu3"):
         wanted = f'[export]\nmodel = "one_body"\nto = ["json", "{target}"]\n'
         (folder / "experiment.toml").write_text(SHORT.replace("[models]", wanted + "[models]"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from discovery.summary import rms_table
+from discovery.experiment.summary import rms_table
 
 
 def test_a_difference_of_temperatures_is_in_kelvin() -> None:

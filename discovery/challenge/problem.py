@@ -10,8 +10,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from discovery.experiment import starting_model
-from discovery.experimentfile import Experiment, load_experiment
+from discovery.experiment import Experiment, load_experiment
+from discovery.experiment.pipeline import starting_model
 from discovery.mismatch.assess import Assessment, assess
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context

@@ -16,9 +16,9 @@ from discovery.challenge.prepare import adopt, opened, prepare
 from discovery.challenge.seal import ANSWERS, SEAL, check_seal, read_seal, sha256
 from discovery.challenge.tally import Tally, score_all, tally
 from discovery.errors import UserError
+from discovery.experiment.results import write_json
 from discovery.files import read_text, write_atomic
 from discovery.progress import Progress, silent
-from discovery.results import write_json
 
 COUNT = 200
 

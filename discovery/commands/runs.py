@@ -18,8 +18,8 @@ def run(
     Exports, figures and notes in it stay.
     """
     from discovery.experiment import run as run_experiment
+    from discovery.experiment.summary import summary
     from discovery.progress import shown
-    from discovery.summary import summary
 
     with shown() as progress:
         folder = run_experiment(experiment, out, progress)
@@ -43,9 +43,9 @@ def diagnose(
     recordings cannot tell apart.
     """
     from discovery.experiment import diagnose as find
+    from discovery.experiment.summary import remarks
     from discovery.mismatch.summary import summary
     from discovery.progress import shown
-    from discovery.summary import remarks
 
     with shown() as progress:
         folder = find(experiment, out, progress)
@@ -63,7 +63,7 @@ def compare(
     ] = None,
 ) -> None:
     """Put the models of several runs side by side: rms of each error, recording by recording."""
-    from discovery.summary import comparison
+    from discovery.experiment.summary import comparison
 
     for line in comparison(runs):
         typer.echo(line)

@@ -19,7 +19,7 @@ def schema(file: str) -> str:
     """
     from pydantic import BaseModel
 
-    from discovery.experimentform import ExperimentForm
+    from discovery.experiment.form import ExperimentForm
     from discovery.models.modelfile import ModelForm
     from discovery.recordings.campaignfile import CampaignForm
 

@@ -102,7 +102,7 @@ def test_nothing_is_overwritten(desk: Path) -> None:
 
 
 def test_a_table_of_errors_makes_files_that_load(tmp_path: Path) -> None:
-    from discovery.experimentfile import load_experiment
+    from discovery.experiment import load_experiment
 
     rows = ["time,T_hall [°F],Spindle rpm,P_drive (kW),Coolant temp (°C),E_Y0C [µm],E_A0C [µm/m],comp E_Y0C"]
     rows += [
@@ -133,7 +133,7 @@ def test_a_table_of_errors_makes_files_that_load(tmp_path: Path) -> None:
 
 
 def test_the_first_model_counts_in_what_values_have_once_they_are_loaded(tmp_path: Path) -> None:
-    from discovery.experimentfile import load_experiment
+    from discovery.experiment import load_experiment
     from discovery.models.dimensions import check_dimensions
 
     rows = ["time,T_hall [°C],P_drive [hp],E_Y0C [mm],E_A0C [mm/m]"]
@@ -178,7 +178,7 @@ def test_columns_that_say_nothing_stay_out(tmp_path: Path) -> None:
     ],
 )
 def test_where_no_power_is_recorded(tmp_path: Path, header: str, term: str | None, hint: bool) -> None:
-    from discovery.experimentfile import load_experiment
+    from discovery.experiment import load_experiment
 
     rows = [f"{k},{k // 10 % 2},{20 + k / 9}" for k in range(60)]
     (tmp_path / "run.csv").write_text("\n".join([header, *rows]), "utf-8")
@@ -196,7 +196,7 @@ def test_where_no_power_is_recorded(tmp_path: Path, header: str, term: str | Non
 
 def test_body_temperatures_alone_drive_the_errors(tmp_path: Path) -> None:
     """The usual table of a spindle test: some temperatures, a displacement, nothing that says why."""
-    from discovery.experimentfile import load_experiment
+    from discovery.experiment import load_experiment
 
     rows = [f"{k},{20 + k / 9},{20 + k / 20},21,{k / 7}" for k in range(60)]
     (tmp_path / "run.csv").write_text("\n".join(["time_min,T1,T2,T_room,dZ_um", *rows]), "utf-8")
@@ -211,7 +211,7 @@ def test_body_temperatures_alone_drive_the_errors(tmp_path: Path) -> None:
 
 def test_a_coolant_with_a_flow_can_be_offered_as_convection(tmp_path: Path) -> None:
     """What the flow and its temperature are for: the model has a path to the fluid, gated by the flow."""
-    from discovery.experimentfile import load_experiment
+    from discovery.experiment import load_experiment
     from discovery.models.dimensions import check_dimensions
 
     rows = [f"{k},21,{18 + k % 4 / 9},{8 * (k // 9 % 2)},{k % 3},{20 + k / 9}" for k in range(60)]
@@ -229,7 +229,7 @@ def test_a_coolant_with_a_flow_can_be_offered_as_convection(tmp_path: Path) -> N
 
 def test_a_discharge_warms_although_its_power_is_below_zero(tmp_path: Path) -> None:
     """The gain that a plain least-squares fit of dT/dt on the power would find can be told by the model."""
-    from discovery.experimentfile import load_experiment
+    from discovery.experiment import load_experiment
 
     loads = [-3000 * (k // 9 % 2) for k in range(60)]
     rows = [f"{k},{load},{20 - sum(loads[:k]) / 9000}" for k, load in enumerate(loads)]

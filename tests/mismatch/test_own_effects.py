@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from discovery.errors import UserError
-from discovery.experiment import diagnose, diagnosis
-from discovery.experimentfile import load_experiment
+from discovery.experiment import diagnose, load_experiment
+from discovery.experiment.pipeline import diagnosis
 from discovery.models import read_model, write_model
 from tests.mismatch.machine import CHANNELS, Array, Inputs, model, simulated
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from discovery.challenge.problem import Answer, Problem
-from discovery.experiment import diagnosis
+from discovery.experiment.pipeline import diagnosis
 
 
 def workbench(problem: Problem) -> Answer:

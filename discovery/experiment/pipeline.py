@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from discovery.errors import UserError
-from discovery.experimentfile import Experiment, load_experiment, only
-from discovery.experimentform import (
+from discovery.experiment.experiment import Experiment, load_experiment, only
+from discovery.experiment.fitted import Fitted, judged
+from discovery.experiment.form import (
     ExportForm,
     FileEntry,
     MismatchForm,
@@ -19,19 +20,18 @@ from discovery.experimentform import (
     SuperpositionEntry,
     separate,
 )
-from discovery.fitted import Fitted, judged
+from discovery.experiment.joining import check_joins, join
+from discovery.experiment.results import write_run
 from discovery.fitting import fit_model
 from discovery.fitting.fit import Loss, written_with
 from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.starts import warm_start
-from discovery.joining import check_joins, join
 from discovery.models import Model
 from discovery.models.dimensions import with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
 from discovery.progress import Progress, silent
 from discovery.report import write_report
-from discovery.results import write_run
 from discovery.runfolder import default_folder, staged
 from discovery.sparse.options import SparseOptions
 from discovery.targets import check_targets

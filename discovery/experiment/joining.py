@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from discovery.errors import UserError
-from discovery.experimentfile import Experiment
+from discovery.experiment.experiment import Experiment
+from discovery.experiment.inputfiles import hashes, recording_files
+from discovery.experiment.results import write_json
 from discovery.files import read_text, write_atomic
-from discovery.inputfiles import hashes, recording_files
-from discovery.results import write_json
 from discovery.runfolder import RESULTS, read_results
 
 

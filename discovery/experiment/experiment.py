@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 
 from discovery.errors import UserError
-from discovery.experimentform import ExperimentForm, FileEntry, ModelEntry, own_recordings, separate
+from discovery.experiment.form import ExperimentForm, FileEntry, ModelEntry, own_recordings, separate
 from discovery.files import dotted, locate, read_text, read_toml
 from discovery.models import Model, check_model, read_model
 from discovery.models.check import check_outputs

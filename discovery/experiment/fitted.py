@@ -15,7 +15,7 @@ from discovery.dynamics.system import predict as model_outputs
 from discovery.errors import RunsAwayError
 from discovery.evaluation import evaluate
 from discovery.evaluation.crossvalidation import cross_validate
-from discovery.experimentfile import Experiment
+from discovery.experiment.experiment import Experiment
 from discovery.fitting import Fit, predict_recording
 from discovery.models import Model
 from discovery.models.convection import validity_of_model

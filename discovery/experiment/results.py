@@ -18,16 +18,16 @@ import numpy as np
 import discovery
 from discovery.evaluation.crossvalidation import parts_of_the_paper
 from discovery.evaluation.shares import term_shares
-from discovery.experimentfile import Experiment
+from discovery.experiment.experiment import Experiment
+from discovery.experiment.inputfiles import hashes, input_files
 from discovery.files import write_atomic
-from discovery.inputfiles import hashes, input_files
 from discovery.models import Model, write_model
 from discovery.models.equations import equations
 from discovery.recordings.check import check_campaign
 from discovery.runfolder import DIAGNOSIS, RESULTS
 
 if TYPE_CHECKING:
-    from discovery.fitted import Fitted
+    from discovery.experiment.fitted import Fitted
 
 _PACKAGES = ("numpy", "scipy", "numba", "pandas", "scikit-learn", "pysindy", "pint")
 

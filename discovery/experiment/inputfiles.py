@@ -6,8 +6,8 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from discovery.experimentfile import Experiment
-from discovery.experimentform import FileEntry
+from discovery.experiment.experiment import Experiment
+from discovery.experiment.form import FileEntry
 from discovery.files import read_toml
 from discovery.recordings.campaignfile import CampaignForm
 from discovery.sparse.options import SparseOptions
