@@ -13,7 +13,7 @@ from discovery.dynamics import make_grid
 from discovery.errors import UserError
 from discovery.fitting import fit_model
 from discovery.models import Model, Parameter, State
-from discovery.models.accept import check_model
+from discovery.models.check import check_model
 from discovery.models.modelfile import read_model
 from discovery.recordings import Campaign
 from discovery.sparse.bymasses import MassData, discover_error
