@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,8 @@ from discovery.dynamics import kernel
 from discovery.dynamics.grid import Grid, Memory
 from discovery.errors import RunsAwayError, UserError
 from discovery.models import Model, expanded
-from discovery.terms import Dual, degree, evaluate, names
+from discovery.recordings import Campaign
+from discovery.terms import Dual, degree, evaluate
 
 Array = NDArray[np.float64]
 
@@ -105,10 +106,16 @@ def shifted(system: System, offset: Mapping[str, float]) -> System:
     return replace(system, grid=grid, ends=Memory(grid, True), nodes=Memory(grid, False))
 
 
+def inputs_of(model: Model, campaign: Campaign, outputs: Collection[str]) -> list[str]:
+    """Channels that an expanded model needs of a recording, start values included, beside its outputs."""
+    starting = model.start_names & set(campaign.channels)
+    return sorted({*model.inputs, *starting} - set(outputs))
+
+
 def uncertain(system: System) -> tuple[str, ...]:
     """Channels known only within a spread that the model uses."""
     model = system.model
-    used = set(model.inputs).union(*(names(s.start) for s in model.states.values() if s.start is not None))
+    used = {*model.inputs, *model.start_names}
     own = {*model.parameters, *model.states}
     return tuple(name for name in system.grid.spread if name in used - own)
 

@@ -18,7 +18,6 @@ from discovery.models import Model, check_model, read_model
 from discovery.models.check import check_outputs
 from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, campaign_path
-from discovery.recordings.roles import CORRECTION
 from discovery.recordings.twins import twins
 from discovery.schema import suggest
 
@@ -78,7 +77,7 @@ class Experiment:
         stated = getattr(entry, "inputs", None)
         if stated:
             return list(stated)
-        channels = [c for c in self.campaign.channels.values() if not c.measured and c.role != CORRECTION]
+        channels = [c for c in self.campaign.channels.values() if c.is_input]
         roles = _INPUT_ROLES if any(c.role == "heat load" for c in channels) else (*_INPUT_ROLES, *_ELSE)
         usual = [c.name for role in roles for c in channels if c.role == role]
         moving = [name for name in usual if self._moves(name)]

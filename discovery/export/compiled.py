@@ -95,10 +95,8 @@ class _AtStart:
 def model_inputs(model: Model) -> tuple[str, ...]:
     """Channels that the model reads, those of its start values included, in the order of every target."""
     model = expanded(model)
-    used = set(model.inputs)
-    for state in model.states.values():
-        used |= names(state.start) if state.start is not None else set()
-    return tuple(sorted(used - set(model.states) - set(model.parameters) - {"time"}))
+    own = {*model.states, *model.parameters, "time"}
+    return tuple(sorted({*model.inputs, *model.start_names} - own))
 
 
 def compile_model(model: Model, step_s: float) -> Compiled:

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory, make_grid, make_system, sensitivities, simulate, start_values
-from discovery.dynamics.system import predict, shifted, uncertain
+from discovery.dynamics.system import inputs_of, predict, shifted, uncertain
 from discovery.models import Model, expanded
 from discovery.recordings import Campaign
-from discovery.terms import names
 
 Array = NDArray[np.float64]
 
@@ -35,10 +34,7 @@ def predict_recording(
         white: (Y,) reading noise that weighs the first reading against the declared start; default 1 um each.
     """
     model = expanded(model, campaign.channels)
-    used = set().union(*(names(s.start) for s in model.states.values() if s.start is not None)) & set(
-        campaign.channels
-    )
-    grid = grid or make_grid(campaign, recording, sorted((set(model.inputs) | used) - set(outputs)), outputs)
+    grid = grid or make_grid(campaign, recording, inputs_of(model, campaign, outputs), outputs)
     system = make_system(model, grid)
     values = model.values(recording)
     start = start_values(system, values)

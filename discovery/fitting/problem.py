@@ -18,10 +18,9 @@ from discovery.dynamics import (
     simulate,
     start_values,
 )
-from discovery.dynamics.system import predict, shifted, uncertain
+from discovery.dynamics.system import inputs_of, predict, shifted, uncertain
 from discovery.models import Model, expanded
 from discovery.recordings import Campaign
-from discovery.terms import names
 
 Array = NDArray[np.float64]
 
@@ -170,10 +169,7 @@ def make_problem(
     model = expanded(model, campaign.channels)
     if outputs is None:
         outputs = [name for name in (*model.outputs, *model.states) if name in campaign.channels]
-    used = set().union(*(names(s.start) for s in model.states.values() if s.start is not None)) & set(
-        campaign.channels
-    )
-    inputs = sorted((set(model.inputs) | used) - set(outputs))
+    inputs = inputs_of(model, campaign, outputs)
     systems = []
     for recording in recordings:
         grid = grids.get(recording) if grids else None

@@ -81,6 +81,12 @@ class Model:
         own = set(self.states) | set(self.parameters) | {"time"}
         return tuple(sorted(used - own))
 
+    @property
+    def start_names(self) -> frozenset[str]:
+        """Names that the formulas of start values use."""
+        starts = (state.start for state in self.states.values() if state.start is not None)
+        return frozenset().union(*(names(start) for start in starts))
+
     def expressions(self) -> list[Expression]:
         """Right-hand sides and outputs."""
         return [*(term.expression for term in self.terms), *self.outputs.values()]

@@ -16,7 +16,7 @@ from discovery.recordings.clockcheck import clock_findings
 from discovery.recordings.columns import Columns
 from discovery.recordings.correction import pair_corrections, uncompensated
 from discovery.recordings.reading import read_columns
-from discovery.recordings.roles import ROLES, Between
+from discovery.recordings.roles import ROLES, Between, is_input
 from discovery.recordings.units import Conversion, UnitError, conversion
 from discovery.schema import suggest
 
@@ -41,6 +41,11 @@ class Channel:
     def measured(self) -> bool:
         """Whether this is read now and then and compared with models, not fed to them."""
         return ROLES[self.role].measured
+
+    @property
+    def is_input(self) -> bool:
+        """Whether models are fed with this."""
+        return is_input(self.role)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from discovery.naming import is_taken, is_word
-from discovery.recordings.roles import CORRECTION, ROLES, Between, Role
+from discovery.recordings.roles import CORRECTION, Between, Role, is_input
 from discovery.schema import Strict
 
 
@@ -65,7 +65,7 @@ class ChannelForm(Strict):
 
     @model_validator(mode="after")
     def _inputs_alone_spread(self) -> Self:
-        if self.spread is not None and (ROLES[self.role].measured or self.role == CORRECTION):
+        if self.spread is not None and not is_input(self.role):
             raise ValueError(
                 f"spread belongs to inputs of models, not to the role '{self.role}'; "
                 "take it away (the noise of readings is noise)"

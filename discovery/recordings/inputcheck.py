@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Columns, FloatArray
 from discovery.recordings.finding import Finding, more
-from discovery.recordings.roles import CORRECTION
 
 _GAP = 20.0  # a stretch of so many usual steps without a value is a gap
 
@@ -21,7 +20,7 @@ def input_findings(
     """Inputs without any value (an error) or with long empty stretches, and readings in those (warnings)."""
     uncovered = {}
     for name, column in values.items():
-        if channels[name].measured or channels[name].role == CORRECTION:
+        if not channels[name].is_input:
             continue
         known = np.isfinite(column)
         if not known.any():

@@ -71,3 +71,8 @@ ROLES: dict[str, RoleFacts] = {
     CORRECTION: RoleFacts(("um", "um/m"), ranges=_DEVIATION),
     "other input": RoleFacts(()),
 }
+
+
+def is_input(role: str) -> bool:
+    """Whether models are fed with channels of a role: neither read and compared, nor added to readings."""
+    return not ROLES[role].measured and role != CORRECTION

@@ -249,7 +249,7 @@ def _on_file(
     fitted = fit_model(baseline, data.campaign, recordings, outputs, grids=data.grids).model
     model, labels = with_candidates(fitted, found)
     if options.keep_baseline is False:
-        used = names_of_starts_and_outputs(baseline)
+        used = baseline.start_names.union(*(names(e) for e in baseline.outputs.values()))
         labels |= {
             n: n
             for n in baseline.free
@@ -259,9 +259,3 @@ def _on_file(
     return discover_rates(
         data, model, labels, (), options, None if options.keep_baseline is False else growth
     )
-
-
-def names_of_starts_and_outputs(model: Model) -> frozenset[str]:
-    """Names used by outputs and start values."""
-    starts = [s.start for s in model.states.values() if s.start is not None]
-    return frozenset().union(*(names(e) for e in [*model.outputs.values(), *starts]))

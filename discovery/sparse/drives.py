@@ -13,7 +13,6 @@ from discovery.recordings import Campaign
 
 AMBIENT = "ambient temperature"
 FLOW = "fluid flow"
-MEASURED = ("error", "temperature", "applied correction")
 TEMPERATURES = (AMBIENT, "fluid temperature", "coolant temperature")
 
 
@@ -48,14 +47,14 @@ def make_inputs(campaign: Campaign, recordings: Sequence[str], asked: Sequence[s
                 f"{campaign.path}: the discovery asks for the input '{name}', which is no channel "
                 f"of the campaign ({', '.join(campaign.channels)}); mend the name under inputs"
             )
-        if campaign.channels[name].role in MEASURED:
+        if not campaign.channels[name].is_input:
             raise UserError(
                 f"{campaign.path}: '{name}' has the role {campaign.channels[name].role} and cannot drive "
                 "a model; take it out of inputs"
             )
     values = {}
     for name, channel in campaign.channels.items():
-        if channel.role in MEASURED or (asked is not None and name not in asked):
+        if not channel.is_input or (asked is not None and name not in asked):
             continue
         found = [_known(campaign, recording, name) for recording in recordings]
         if all(len(piece) for piece in found):

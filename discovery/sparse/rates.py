@@ -21,7 +21,7 @@ from discovery.models import Model, Parameter
 from discovery.recordings import Campaign
 from discovery.sparse.folds import Blocks
 from discovery.sparse.gram import Gram, gram, project_out, total
-from discovery.terms import Expression, Term, names, text
+from discovery.terms import Apply, Expression, Name, Number, Term, names, parse, text
 
 Array = NDArray[np.float64]
 
@@ -70,8 +70,6 @@ def with_candidates(model: Model, candidates: Sequence[Candidate]) -> tuple[Mode
 
 def parse_product(name: str, factor: str) -> Expression:
     """`name*(factor)` as an expression; the factor 1 is left out."""
-    from discovery.terms import parse
-
     return parse(name) if factor == "1" else parse(f"{name}*({factor})")
 
 
@@ -86,10 +84,9 @@ def without(model: Model, gone: Sequence[str]) -> Model:
         own = names(term.expression) & set(model.parameters)
         if not (own and own & dropped and _vanishes(term.expression, own & dropped)):
             terms.append(term)
-    left = frozenset().union(
+    left = model.start_names.union(
         *(names(t.expression) for t in terms), *(names(e) for e in model.outputs.values())
     )
-    left |= frozenset().union(*(names(s.start) for s in model.states.values() if s.start is not None))
     parameters = {
         name: replace(p, value=0.0, fixed=True, min=min(p.min, 0.0), max=max(p.max, 0.0))
         if name in dropped
@@ -111,17 +108,15 @@ def without_idle(model: Model, outputs: Sequence[str]) -> Model:
             break
         needed = more
     states = {name: state for name, state in model.states.items() if name in needed}
-    used = frozenset().union(*(names(t.expression) for t in mine), *(names(e) for e in read))
-    used |= frozenset().union(*(names(s.start) for s in states.values() if s.start is not None))
+    left = replace(model, states=states, terms=tuple(mine))
+    used = left.start_names.union(*(names(t.expression) for t in mine), *(names(e) for e in read))
     idle = frozenset().union(*(names(t.expression) for t in model.terms if t not in mine)) - used
     parameters = {name: p for name, p in model.parameters.items() if name not in idle}
-    return replace(model, states=states, terms=tuple(mine), parameters=parameters)
+    return replace(left, parameters=parameters)
 
 
 def _vanishes(expression: Expression, zero: set[str] | frozenset[str]) -> bool:
     """Whether an expression is identically zero once these names are."""
-    from discovery.terms import Apply, Name, Number
-
     match expression:
         case Number(value=value):
             return value == 0
