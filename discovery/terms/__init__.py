@@ -1,7 +1,9 @@
 """Terms: safe expressions with exact derivatives, the letters every model is written in."""
 
 from discovery.terms.dual import Dual, evaluate
-from discovery.terms.expression import Apply, Expression, Name, Number, degree, names, parse, substitute, text
+from discovery.terms.expression import Apply, Expression, Name, Number, degree, names, substitute
+from discovery.terms.parsing import parse
+from discovery.terms.printing import text
 from discovery.terms.term import Term
 
 __all__ = [

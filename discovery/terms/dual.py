@@ -61,12 +61,12 @@ def evaluate(
         expression: tree from `parse`.
         values: name -> scalar or (N,) array.
         wrt: names to differentiate by.
-        memory: needed by `delay` and `play` alone.
+        memory: needed by `delay`, `play` and, along a given trajectory, `lag`.
 
     Raises:
         KeyError: a name without a value.
 
-    >>> from discovery.terms.expression import parse
+    >>> from discovery.terms import parse
     >>> d = evaluate(parse("a*x**2"), {"a": 3.0, "x": np.array([1.0, 2.0])}, frozenset({"a", "x"}))
     >>> d.value.tolist(), d.partials["x"].tolist(), d.partials["a"].tolist()
     ([3.0, 12.0], [6.0, 12.0], [1.0, 4.0])

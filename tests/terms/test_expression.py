@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from discovery.errors import UserError
 from discovery.naming import FUNCTIONS
 from discovery.terms import Apply, Expression, Name, Number, degree, evaluate, names, parse, substitute, text
-from discovery.terms.expression import MAX_DEPTH, MAX_LENGTH
+from discovery.terms.parsing import MAX_DEPTH, MAX_LENGTH
 
 VARIABLES = ("x", "y", "T_fluid")
 VALUES = {
