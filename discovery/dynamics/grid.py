@@ -99,8 +99,8 @@ class Grid:
     def ends(self) -> dict[str, Array]:
         """Channels and `time` at the interval ends, each (2(T - 1),)."""
         left, right = self.time[:-1], self.time[1:]
-        values = {name: _interleave(s.at(left), s.at(right, "left")) for name, s in self.samples.items()}
-        return {**self._moved(values), "time": _interleave(left, right)}
+        values = {name: interleaved(s.at(left), s.at(right, "left")) for name, s in self.samples.items()}
+        return {**self._moved(values), "time": interleaved(left, right)}
 
     @cached_property
     def nodes(self) -> dict[str, Array]:
@@ -117,53 +117,8 @@ class Grid:
         return np.isfinite(self.readings)
 
 
-@dataclass(frozen=True)
-class Memory:
-    """Delay and play on the interval ends (`at_ends`) or on the nodes of a grid."""
-
-    grid: Grid
-    at_ends: bool
-
-    def delayed(self, channel: str, seconds: float) -> tuple[Array, Array]:
-        """Channel `seconds` ago and its derivative by `seconds`.
-
-        A held channel is averaged over each interval, which keeps switches inside an interval exact in the
-        mean and the delay differentiable.
-        """
-        samples, time = self.grid.samples[channel], self.grid.time - seconds
-        offset = self.grid.offset.get(channel, 0.0)
-        if samples.linear:
-            values = samples.at(time) + offset
-            width = 30.0
-            slope = (samples.at(time - width) - samples.at(time + width)) / (2 * width)
-            if not self.at_ends:
-                return values, slope
-            return _interleave(values[:-1], values[1:]), _interleave(slope[:-1], slope[1:])
-        if not self.at_ends:
-            return samples.at(time) + offset, np.zeros_like(time)
-        mean = np.diff(samples.integral(time)) / self.grid.step + offset
-        now = samples.at(time)
-        slope = -np.diff(now) / self.grid.step
-        return np.repeat(mean, 2), np.repeat(slope, 2)
-
-    def lagged(self, value: Array, time_constant: float) -> Array:
-        """First-order lag of a series along the instants of this memory, settled at the start."""
-        step = self.grid.step
-        if self.at_ends:
-            ends = np.ascontiguousarray(np.broadcast_to(value, (2 * len(step),)), dtype=float)
-            return np.asarray(series.lag_ends(ends, step, time_constant))
-        nodes = np.broadcast_to(value, (len(self.grid.time),)).astype(float)
-        lagged = series.lag_ends(_interleave(nodes[:-1], nodes[1:]), step, time_constant)
-        return np.concatenate((lagged[:1], lagged[1::2]))
-
-    def play(self, value: Array, width: float) -> tuple[Array, Ints, Array]:
-        """Play operator along the instants of this memory."""
-        count = 2 * len(self.grid.step) if self.at_ends else len(self.grid.time)
-        y, follows, contact = series.play(np.ascontiguousarray(np.broadcast_to(value, (count,))), abs(width))
-        return y, follows, contact
-
-
-def _interleave(left: Array, right: Array) -> Array:
+def interleaved(left: Array, right: Array) -> Array:
+    """Values at the left and right ends of intervals (K,) as one series (2K,)."""
     out = np.empty(2 * len(left))
     out[0::2], out[1::2] = left, right
     return out
@@ -195,19 +150,11 @@ def make_grid(
     """
     data = campaign.recordings[recording]
     outputs = tuple(outputs)
-    samples = {}
+    samples = _samples(campaign, recording, inputs)
     stamps = np.zeros(len(data.time), dtype=bool)
-    for name in inputs:
-        values = data.values.get(name)
-        known = np.isfinite(values) if values is not None else np.zeros(len(data.time), dtype=bool)
-        if values is None or not known.any():
-            raise UserError(
-                f"{campaign.path}: recording '{recording}' has no value of '{name}', "
-                "which the model needs as an input"
-            )
-        samples[name] = Samples(data.time[known], values[known], campaign.channels[name].between == "linear")
-        if np.ptp(values[known]) > 0:
-            stamps |= known
+    for name, one in samples.items():
+        if np.ptp(one.value) > 0:
+            stamps |= np.isfinite(data.values[name])
     missing = np.full(len(data.time), np.nan)
     table = (
         np.column_stack([data.values.get(name, missing) for name in outputs]) if outputs else missing[:, None]
@@ -221,20 +168,38 @@ def make_grid(
     if instants:
         read = read[:: _every(len(read), coarse)]
         rows = _coarse_rows(rows, read, data.time, samples.values(), coarse)
-    time = data.time[rows]
-    gaps = np.diff(time)
-    if (gaps > max_step).any():
-        extra = [
-            np.linspace(t, t + gap, int(np.ceil(gap / max_step)) + 1)[1:-1]
-            for t, gap in zip(time[:-1], gaps, strict=True)
-            if gap > max_step
-        ]
-        time = np.sort(np.concatenate([time, *extra]))
+    time = _divided(data.time[rows], max_step)
     if instants:
         samples = {name: s.averaged(time) for name, s in samples.items()}
     spread = {name: s for name in samples if (s := campaign.channels[name].spread) > 0}
     index = np.searchsorted(time, data.time[read])
     return Grid(recording, time, samples, outputs, index, table[read], spread, instants=instants)
+
+
+def _samples(campaign: Campaign, recording: str, inputs: Iterable[str]) -> dict[str, Samples]:
+    """Inputs as they were recorded. Raises UserError: one without any value."""
+    data, samples = campaign.recordings[recording], {}
+    for name in inputs:
+        values = data.values.get(name)
+        known = np.isfinite(values) if values is not None else np.zeros(len(data.time), dtype=bool)
+        if values is None or not known.any():
+            raise UserError(
+                f"{campaign.path}: recording '{recording}' has no value of '{name}', "
+                "which the model needs as an input"
+            )
+        samples[name] = Samples(data.time[known], values[known], campaign.channels[name].between == "linear")
+    return samples
+
+
+def _divided(time: Array, max_step: float) -> Array:
+    """Nodes (T,) with further ones between those that are more than `max_step` apart."""
+    gaps = np.diff(time)
+    long = gaps > max_step
+    extra = [
+        np.linspace(t, t + gap, int(np.ceil(gap / max_step)) + 1)[1:-1]
+        for t, gap in zip(time[:-1][long], gaps[long], strict=True)
+    ]
+    return np.sort(np.concatenate([time, *extra])) if extra else time
 
 
 def _every(count: int, coarse: int) -> int:

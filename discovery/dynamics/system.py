@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import kernel
-from discovery.dynamics.grid import Grid, Memory
+from discovery.dynamics.grid import Grid, interleaved
+from discovery.dynamics.memory import Memory
 from discovery.errors import RunsAwayError, UserError
 from discovery.models import Model, expanded
 from discovery.recordings import Campaign
@@ -132,12 +133,7 @@ def first_values(grid: Grid) -> dict[str, float]:
 
 
 def _state_ends(system: System, x: Array) -> dict[str, Array]:
-    out = {}
-    for i, name in enumerate(system.states):
-        both = np.empty(2 * (len(x) - 1))
-        both[0::2], both[1::2] = x[:-1, i], x[1:, i]
-        out[name] = both
-    return out
+    return {name: interleaved(x[:-1, i], x[1:, i]) for i, name in enumerate(system.states)}
 
 
 def _linearise(system: System, values: Mapping[str, float], x: Array) -> tuple[Array, Array, Array]:
