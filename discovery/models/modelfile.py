@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from itertools import count
 from pathlib import Path
 from typing import Any, Literal
@@ -88,6 +89,31 @@ def read_model(path: Path) -> Model:
         line = locate(source, key)
         return f"{path}{f', line {line}' if line else ''}, key {dotted(key)}"
 
+    _check_names(form, at)
+    parameters = {name: _parameter(entry, at("parameters", name)) for name, entry in form.parameters.items()}
+    per_unit = 1.0 / TIME_UNITS[form.time_unit]
+    states = {
+        name: _state(name, entry, per_unit, at("states", name, "start"))
+        for name, entry in form.states.items()
+    }
+    terms: list[Term] = []
+    for i, entry in enumerate(form.terms):
+        term = _term(i, entry, states, at)
+        if term.name in [other.name for other in terms]:
+            raise UserError(
+                f"{at('terms', i, 'name')}: another term is named '{term.name}'; name it differently"
+            )
+        check_memory(term.expression, parameters, states, at("terms", i, "expression"))
+        terms.append(term)
+    outputs = {}
+    for name, formula in form.outputs.items():
+        outputs[name] = parse(formula, place := at("outputs", name))
+        check_memory(outputs[name], parameters, states, place)
+    return Model(form.name or Path(path).stem, parameters, states, tuple(terms), outputs, form.time_unit)
+
+
+def _check_names(form: ModelForm, at: Callable[..., str]) -> None:
+    """Refuse names that expressions cannot use, and one name for two things."""
     for kind in ("parameters", "states"):
         for name in getattr(form, kind):
             if not is_word(name) or is_taken(name):
@@ -98,63 +124,26 @@ def read_model(path: Path) -> Model:
     for name in form.parameters.keys() & form.states.keys():
         raise UserError(f"{at('parameters', name)}: '{name}' is also a state; rename one of them")
 
-    parameters = {}
-    for name, entry in form.parameters.items():
-        if entry.min > entry.max:
-            raise UserError(f"{at('parameters', name)}: min {entry.min:g} is above max {entry.max:g}")
-        if not entry.min <= entry.start <= entry.max and not entry.fixed:
-            raise UserError(
-                f"{at('parameters', name)}: start {entry.start:g} lies outside "
-                f"min {entry.min:g} and max {entry.max:g}"
-            )
-        parameters[name] = Parameter(
-            entry.start,
-            entry.unit,
-            entry.min,
-            entry.max,
-            entry.fixed,
-            entry.per == "recording",
-            None if isinstance(entry.low, dict) else entry.low,
-            None if isinstance(entry.high, dict) else entry.high,
-            entry.values,
-            _intervals(entry),
+
+def _parameter(entry: ParameterForm, place: str) -> Parameter:
+    if entry.min > entry.max:
+        raise UserError(f"{place}: min {entry.min:g} is above max {entry.max:g}")
+    if not entry.min <= entry.start <= entry.max and not entry.fixed:
+        raise UserError(
+            f"{place}: start {entry.start:g} lies outside min {entry.min:g} and max {entry.max:g}"
         )
-    states = {}
-    per_unit = 1.0 / TIME_UNITS[form.time_unit]
-    for name, state in form.states.items():
-        start: Expression | None = None
-        if state.start is not None:
-            start = parse(state.start, place := at("states", name, "start"))
-            check_start(start, place)
-        spread = (
-            state.start_sd
-            if state.start_sd is not None
-            else (0.5 if state.unit in ("degC", "K", "kelvin") else 1.0)
-        )
-        scale = 1.0 / state.capacity if state.capacity else per_unit
-        states[name] = State(name, state.unit, state.capacity, start, spread, scale, state.memory)
-    terms: list[Term] = []
-    for i, term in enumerate(form.terms):
-        if term.source == term.into:
-            raise UserError(
-                f"{at('terms', i, 'from')}: '{term.into}' is also into; what leaves it enters another"
-            )
-        name = term.name or f"term {i + 1}"
-        if name in [other.name for other in terms]:
-            raise UserError(f"{at('terms', i, 'name')}: another term is named '{name}'; name it differently")
-        for key, state_name in (("into", term.into), ("from", term.source)):
-            if state_name is not None and state_name not in states:
-                raise UserError(
-                    f"{at('terms', i, key)}: '{state_name}' is not a state; states are {', '.join(states)}"
-                )
-        expression = parse(term.expression, place := at("terms", i, "expression"))
-        check_memory(expression, parameters, states, place)
-        terms.append(Term(name, term.into, expression, term.source, term.effect))
-    outputs = {}
-    for name, formula in form.outputs.items():
-        outputs[name] = parse(formula, place := at("outputs", name))
-        check_memory(outputs[name], parameters, states, place)
-    return Model(form.name or Path(path).stem, parameters, states, tuple(terms), outputs, form.time_unit)
+    return Parameter(
+        entry.start,
+        entry.unit,
+        entry.min,
+        entry.max,
+        entry.fixed,
+        entry.per == "recording",
+        None if isinstance(entry.low, dict) else entry.low,
+        None if isinstance(entry.high, dict) else entry.high,
+        entry.values,
+        _intervals(entry),
+    )
 
 
 def _intervals(entry: ParameterForm) -> dict[str, tuple[float, float]]:
@@ -164,60 +153,84 @@ def _intervals(entry: ParameterForm) -> dict[str, tuple[float, float]]:
     return {recording: (low[recording], high[recording]) for recording in low if recording in high}
 
 
+def _state(name: str, entry: StateForm, per_unit: float, place: str) -> State:
+    """A state; `per_unit`: what turns a rate per time unit of the model into one per second."""
+    start: Expression | None = None
+    if entry.start is not None:
+        start = parse(entry.start, place)
+        check_start(start, place)
+    usual = 0.5 if entry.unit in ("degC", "K", "kelvin") else 1.0
+    spread = usual if entry.start_sd is None else entry.start_sd
+    scale = 1.0 / entry.capacity if entry.capacity else per_unit
+    return State(name, entry.unit, entry.capacity, start, spread, scale, entry.memory)
+
+
+def _term(i: int, entry: TermForm, states: Mapping[str, State], at: Callable[..., str]) -> Term:
+    if entry.source == entry.into:
+        raise UserError(
+            f"{at('terms', i, 'from')}: '{entry.into}' is also into; what leaves it enters another"
+        )
+    for key, state in (("into", entry.into), ("from", entry.source)):
+        if state is not None and state not in states:
+            raise UserError(
+                f"{at('terms', i, key)}: '{state}' is not a state; states are {', '.join(states)}"
+            )
+    expression = parse(entry.expression, at("terms", i, "expression"))
+    return Term(entry.name or f"term {i + 1}", entry.into, expression, entry.source, entry.effect)
+
+
 def model_document(model: Model) -> dict[str, Any]:
     """The model as the nested mapping that its file holds."""
     model = in_time_unit(model)
-
-    def number(value: float) -> float:  # value and bounds alike, so that a value on its bound stays there
-        return float(f"{value:.10g}")
-
-    def finite(entries: dict[str, Any]) -> dict[str, Any]:
-        return {
-            key: value
-            for key, value in entries.items()
-            if value is not None and not (isinstance(value, float) and not math.isfinite(value))
-        }
-
-    parameters = {}
-    for name, p in model.parameters.items():
-        entry = finite({"start": number(p.value), "unit": p.unit, "min": number(p.min), "max": number(p.max)})
-        entry |= {"fixed": True} if p.fixed else {}
-        entry |= {"per": "recording"} if p.per_recording else {}
-        entry |= finite({"low": p.low and number(p.low), "high": p.high and number(p.high)})
-        entry |= {"values": {key: number(value) for key, value in p.values.items()}} if p.values else {}
-        for end, key in enumerate(("low", "high") if p.intervals else ()):
-            entry[key] = {recording: number(ends[end]) for recording, ends in p.intervals.items()}
-        parameters[name] = entry
-    states = {
-        name: finite(
-            {
-                "unit": s.unit,
-                "capacity": s.capacity,
-                "start": s.start and text(s.start),
-                "start_sd": s.start_sd,
-                "memory": s.memory or None,
-            }
-        )
-        for name, s in model.states.items()
-    }
-    terms = [
-        {
-            "name": name,
-            "into": term.into,
-            **({"from": term.source} if term.source else {}),
-            "expression": text(term.expression),
-            **({"effect": term.effect} if term.effect else {}),
-        }
-        for name, term in zip(_told_apart([term.name for term in model.terms]), model.terms, strict=True)
-    ]
-    outputs = {name: text(expression) for name, expression in model.outputs.items()}
+    told_apart = zip(_told_apart([term.name for term in model.terms]), model.terms, strict=True)
     return {
         "name": model.name,
         "time_unit": model.time_unit,
-        "parameters": parameters,
-        "states": states,
-        "terms": terms,
-        "outputs": outputs,
+        "parameters": {name: _parameter_entry(p) for name, p in model.parameters.items()},
+        "states": {name: _state_entry(state) for name, state in model.states.items()},
+        "terms": [_term_entry(name, term) for name, term in told_apart],
+        "outputs": {name: text(expression) for name, expression in model.outputs.items()},
+    }
+
+
+def _parameter_entry(p: Parameter) -> dict[str, Any]:
+    def number(value: float) -> float:  # value and bounds alike, so that a value on its bound stays there
+        return float(f"{value:.10g}")
+
+    entry = _finite({"start": number(p.value), "unit": p.unit, "min": number(p.min), "max": number(p.max)})
+    entry |= {"fixed": True} if p.fixed else {}
+    entry |= {"per": "recording"} if p.per_recording else {}
+    entry |= _finite({"low": p.low and number(p.low), "high": p.high and number(p.high)})
+    entry |= {"values": {key: number(value) for key, value in p.values.items()}} if p.values else {}
+    for end, key in enumerate(("low", "high") if p.intervals else ()):
+        entry[key] = {recording: number(ends[end]) for recording, ends in p.intervals.items()}
+    return entry
+
+
+def _state_entry(state: State) -> dict[str, Any]:
+    return _finite(
+        {
+            "unit": state.unit,
+            "capacity": state.capacity,
+            "start": state.start and text(state.start),
+            "start_sd": state.start_sd,
+            "memory": state.memory or None,
+        }
+    )
+
+
+def _term_entry(name: str, term: Term) -> dict[str, Any]:
+    source = {"from": term.source} if term.source else {}
+    effect = {"effect": term.effect} if term.effect else {}
+    return {"name": name, "into": term.into, **source, "expression": text(term.expression), **effect}
+
+
+def _finite(entries: dict[str, Any]) -> dict[str, Any]:
+    """What a file holds: neither None nor a number that is infinite or none."""
+    return {
+        key: value
+        for key, value in entries.items()
+        if value is not None and not (isinstance(value, float) and not math.isfinite(value))
     }
 
 
