@@ -25,8 +25,7 @@ from discovery.export.replay import (
     write_files,
 )
 from discovery.export.seal import open_seal
-from discovery.export.st import KINDS, st_name, st_text
-from discovery.export.stproof import prove_st
+from discovery.export.st import KINDS, prove_st, st_name, st_text
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.runfolder import read_results

@@ -13,7 +13,7 @@ from discovery.export.compiled import compile_model
 from discovery.export.document import Exported
 from discovery.export.replay import make_reference, prove_c
 from discovery.export.seal import Seal
-from discovery.export.stproof import prove_st
+from discovery.export.st import prove_st
 from discovery.models import Model, Parameter, State
 from discovery.terms import Term, parse
 from tests.export.conftest import needs_gcc

@@ -14,7 +14,7 @@ from discovery.cli import app
 from discovery.errors import UserError
 from discovery.export import export_model
 from discovery.export.identifiers import comment, identifiers
-from discovery.export.stread import read_structured_text
+from discovery.export.st.reader import read_structured_text
 from discovery.models import Model, State
 from discovery.models.modelfile import write_model
 from discovery.recordings import Campaign

@@ -1,4 +1,4 @@
-"""A reader of the structured text that `st.py` writes, to replay it where no compiler is installed.
+"""A reader of the structured text that `block.py` writes, to replay it where no compiler is installed.
 
 It knows the subset that is written and nothing more: assignments, IF, WHILE, arrays, calls of functions. It
 computes in the type that the text declares (REAL: 32 bit), and refuses an untyped real literal.

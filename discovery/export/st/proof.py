@@ -13,8 +13,9 @@ from discovery.errors import UserError
 from discovery.export.document import Exported
 from discovery.export.identifiers import identifiers
 from discovery.export.replay import LIMITS, Proof, Reference, within
-from discovery.export.st import KINDS, st_name, st_text
-from discovery.export.stread import read_structured_text
+from discovery.export.st.block import st_name, st_text
+from discovery.export.st.language import KINDS
+from discovery.export.st.reader import read_structured_text
 
 STEPS = 360  # of the reference that are read step by step
 

@@ -1,0 +1,7 @@
+"""Structured text (IEC 61131-3): the function block of a model, and the proof that it is the model."""
+
+from discovery.export.st.block import st_name, st_text
+from discovery.export.st.language import KINDS
+from discovery.export.st.proof import prove_st
+
+__all__ = ["KINDS", "prove_st", "st_name", "st_text"]
