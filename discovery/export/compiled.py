@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from discovery.errors import UserError
@@ -114,41 +114,12 @@ def compile_model(model: Model, step_s: float) -> Compiled:
     kept = {apply: k for k, apply in enumerate(delays)}
     slots = {apply: k for k, apply in enumerate(plays)}
 
-    # the start: states from channels and parameters, plays at rest
-    rest = _AtStart(fed)
-    zero = Node(build.constant(0.0))
-    known = {**dict.fromkeys(states, zero), **common, **fed, "time": zero}
-    first = {
-        name: Node(compile_expression(build, state.start, known, rest).value)
-        if state.start is not None
-        else zero
-        for name, state in model.states.items()
-    }
-    known |= first
-    at_rest = [compile_expression(build, apply, known, rest).value for apply in plays]
-    start = build.program([*(first[name].value for name in states), *at_rest])
-
-    # one step: everything from the running state
+    start = _start_program(model, build, {**common, **fed}, _AtStart(fed), plays)
     running = _Running(kept, slots)
     one = build.constant(1.0)
     env = {**common, **fed, "time": Node(build.load("time"))}
     env |= {name: Node(build.load("state", i), {name: one}) for i, name in enumerate(states)}
-    nodes = [compile_expression(build, term.expression, env, running) for term in model.terms]
-    rates, jacobian = [], {}
-    for i, name in enumerate(states):
-        scale = build.constant(model.states[name].scale)
-        entering = [node for node, term in zip(nodes, model.terms, strict=True) if term.into == name]
-        leaving = [node for node, term in zip(nodes, model.terms, strict=True) if term.source == name]
-        rates.append(_net(build, scale, [n.value for n in entering], [n.value for n in leaving]))
-        for j, other in enumerate(states):
-            gain = _net(
-                build,
-                scale,
-                [n.partials[other] for n in entering if other in n.partials],
-                [n.partials[other] for n in leaving if other in n.partials],
-            )
-            if build.constant_of(gain) != 0.0:
-                jacobian[i, j] = gain
+    rates, jacobian = _rates(model, build, env, running)
     read = [
         compile_expression(build, expression, env, running).value for expression in model.outputs.values()
     ]
@@ -168,6 +139,46 @@ def compile_model(model: Model, step_s: float) -> Compiled:
         build.program([*rates, *jacobian.values(), *moved]),
         build.program([*read, *moved]),
     )
+
+
+def _start_program(
+    model: Model, build: Builder, fed: Mapping[str, Node], rest: _AtStart, plays: Sequence[Apply]
+) -> Program:
+    """Start values of the states from channels and parameters, plays at rest."""
+    zero = Node(build.constant(0.0))
+    known = {**dict.fromkeys(model.states, zero), **fed, "time": zero}
+    first = {
+        name: Node(compile_expression(build, state.start, known, rest).value)
+        if state.start is not None
+        else zero
+        for name, state in model.states.items()
+    }
+    known |= first
+    at_rest = [compile_expression(build, apply, known, rest).value for apply in plays]
+    return build.program([*(node.value for node in first.values()), *at_rest])
+
+
+def _rates(
+    model: Model, build: Builder, env: Mapping[str, Node], running: _Running
+) -> tuple[list[int], dict[tuple[int, int], int]]:
+    """dx/dt of each state, and the nonzeros of their Jacobian by row and column."""
+    nodes = [compile_expression(build, term.expression, env, running) for term in model.terms]
+    rates, jacobian = [], {}
+    for i, (name, state) in enumerate(model.states.items()):
+        scale = build.constant(state.scale)
+        entering = [node for node, term in zip(nodes, model.terms, strict=True) if term.into == name]
+        leaving = [node for node, term in zip(nodes, model.terms, strict=True) if term.source == name]
+        rates.append(_net(build, scale, [n.value for n in entering], [n.value for n in leaving]))
+        for j, other in enumerate(model.states):
+            gain = _net(
+                build,
+                scale,
+                [n.partials[other] for n in entering if other in n.partials],
+                [n.partials[other] for n in leaving if other in n.partials],
+            )
+            if build.constant_of(gain) != 0.0:
+                jacobian[i, j] = gain
+    return rates, jacobian
 
 
 def _net(build: Builder, scale: int, entering: list[int], leaving: list[int]) -> int:

@@ -17,7 +17,7 @@ from discovery.export.seal import Seal, open_seal, seal_bytes
 from discovery.extras import need
 from discovery.files import write_atomic
 from discovery.models import Model, Parameter, State
-from discovery.terms import Term, parse
+from discovery.terms import Expression, Term, parse
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -99,47 +99,12 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
             f"update it"
         )
     _check_schema(document, place)
-    parameters = {
-        p["name"]: Parameter(
-            p["value"],
-            p["unit"],
-            -math.inf if p["min"] is None else p["min"],
-            math.inf if p["max"] is None else p["max"],
-            p["fixed"],
-            low=p["low"],
-            high=p["high"],
-        )
-        for p in document["parameters"]
-    }
-    states = {
-        s["name"]: State(
-            s["name"],
-            s["unit"],
-            None,
-            None if s["start"] is None else parse(s["start"], f"{place}, start of {s['name']}"),
-            s["start_sd"],
-            s["scale"],
-            s.get("memory", False),
-        )
-        for s in document["states"]
-    }
-    terms = tuple(
-        Term(
-            t["name"],
-            t["into"],
-            parse(t["expression"], f"{place}, term '{t['name']}'"),
-            t["from"],
-            t["effect"],
-        )
-        for t in document["terms"]
-    )
-    outputs = {o["name"]: parse(o["expression"], f"{place}, output {o['name']}") for o in document["outputs"]}
-    model = Model(document["name"], parameters, states, terms, outputs)
-    for term in terms:
-        if term.into not in states or (term.source is not None and term.source not in states):
+    model = _model(document, place)
+    for term in model.terms:
+        if term.into not in model.states or (term.source is not None and term.source not in model.states):
             raise UserError(
                 f"{place}: term '{term.name}' enters or leaves a state that is not listed; export the "
-                f"model again"
+                "model again"
             )
     if model_inputs(model) != tuple(i["name"] for i in document["inputs"]):
         raise UserError(f"{place}: the inputs listed are not those of its formulas; export the model again")
@@ -161,6 +126,44 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
         document,
         seal,
     )
+
+
+def _model(document: Mapping[str, Any], place: str | Path) -> Model:
+    """The model that the entries of a document spell. Raises UserError: a formula outside the grammar."""
+
+    def parsed(formula: str, what: str) -> Expression:
+        return parse(formula, f"{place}, {what}")
+
+    parameters = {
+        p["name"]: Parameter(
+            p["value"],
+            p["unit"],
+            -math.inf if p["min"] is None else p["min"],
+            math.inf if p["max"] is None else p["max"],
+            p["fixed"],
+            low=p["low"],
+            high=p["high"],
+        )
+        for p in document["parameters"]
+    }
+    states = {
+        s["name"]: State(
+            s["name"],
+            s["unit"],
+            None,
+            None if s["start"] is None else parsed(s["start"], f"start of {s['name']}"),
+            s["start_sd"],
+            s["scale"],
+            s.get("memory", False),
+        )
+        for s in document["states"]
+    }
+    terms = tuple(
+        Term(t["name"], t["into"], parsed(t["expression"], f"term '{t['name']}'"), t["from"], t["effect"])
+        for t in document["terms"]
+    )
+    outputs = {o["name"]: parsed(o["expression"], f"output {o['name']}") for o in document["outputs"]}
+    return Model(document["name"], parameters, states, terms, outputs)
 
 
 @cache

@@ -13,12 +13,12 @@ from discovery import __version__
 from discovery.errors import UserError
 from discovery.export.compiled import compile_model
 from discovery.export.document import FORMAT, VERSION
-from discovery.export.knowledge import knowledge
-from discovery.export.ranges import input_range, output_ranges
+from discovery.export.knowledge import Knowledge, knowledge
+from discovery.export.ranges import OutputRange, input_range, output_ranges
 from discovery.export.stepper import INTEGRATOR
-from discovery.models import Model, Parameter, expanded
+from discovery.models import Model, Parameter, State, expanded
 from discovery.recordings import Campaign
-from discovery.terms import Expression, Name, Number, names, substitute, text
+from discovery.terms import Expression, Name, Number, Term, names, substitute, text
 
 START_SD = 2.0  # um or K: of a start value that was a reading and is a guess now
 
@@ -96,26 +96,6 @@ def make_document(
             )
     compiled = compile_model(model, step_s)
     limits = output_ranges(compiled, campaign, recordings)
-    known_by = knowledge(model, campaign, recordings)
-    inputs = []
-    for name in compiled.inputs:
-        channel = campaign.channels[name]
-        inputs.append(
-            {"name": name, "role": channel.role, "unit": channel.unit, "between": channel.between}
-            | asdict(input_range(campaign, recordings, name))
-        )
-    outputs = []
-    for name, expression in model.outputs.items():
-        channel = campaign.channels[name]
-        outputs.append(
-            {
-                "name": name,
-                "role": channel.role,
-                "unit": channel.unit,
-                "expression": text(expression),
-            }
-            | asdict(limits[name])
-        )
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -123,37 +103,12 @@ def make_document(
         "revision": revision,
         "step_s": float(step_s),
         "integrator": list(INTEGRATOR),
-        "inputs": inputs,
+        "inputs": [_input(campaign, recordings, name) for name in compiled.inputs],
         "parameters": [_parameter(name, p) for name, p in model.parameters.items()],
-        "states": [
-            {
-                "name": name,
-                "unit": s.unit,
-                "scale": s.scale,
-                "start": text(s.start) if s.start is not None else None,
-                "start_sd": s.start_sd,
-            }
-            | ({"memory": True} if s.memory else {})
-            for name, s in model.states.items()
-        ],
-        "terms": [
-            {
-                "name": t.name,
-                "into": t.into,
-                "from": t.source,
-                "expression": text(t.expression),
-                "effect": t.effect,
-            }
-            for t in model.terms
-        ],
-        "outputs": outputs,
-        "knowledge": {
-            "residual": dict(known_by.residual),
-            "slow_share": known_by.slow_share,
-            "parameters": list(known_by.parameters),
-            "covariance": known_by.covariance.tolist(),
-            "first": np.sqrt(np.diag(known_by.covariance)).tolist(),
-        },
+        "states": [_state(state) for state in model.states.values()],
+        "terms": [_term(term) for term in model.terms],
+        "outputs": [_output(campaign, name, e, limits[name]) for name, e in model.outputs.items()],
+        "knowledge": _knowledge(knowledge(model, campaign, recordings)),
         "provenance": {
             "tool": f"discovery {__version__}",
             "campaign": campaign.name,
@@ -161,6 +116,50 @@ def make_document(
             **(provenance or {}),
         },
         "changelog": [dict(entry) for entry in changelog],
+    }
+
+
+def _input(campaign: Campaign, recordings: Sequence[str], name: str) -> dict[str, Any]:
+    channel = campaign.channels[name]
+    entry = {"name": name, "role": channel.role, "unit": channel.unit, "between": channel.between}
+    return entry | asdict(input_range(campaign, recordings, name))
+
+
+def _output(campaign: Campaign, name: str, expression: Expression, limits: OutputRange) -> dict[str, Any]:
+    channel = campaign.channels[name]
+    entry = {"name": name, "role": channel.role, "unit": channel.unit, "expression": text(expression)}
+    return entry | asdict(limits)
+
+
+def _state(state: State) -> dict[str, Any]:
+    entry = {
+        "name": state.name,
+        "unit": state.unit,
+        "scale": state.scale,
+        "start": text(state.start) if state.start is not None else None,
+        "start_sd": state.start_sd,
+    }
+    return entry | ({"memory": True} if state.memory else {})
+
+
+def _term(term: Term) -> dict[str, Any]:
+    return {
+        "name": term.name,
+        "into": term.into,
+        "from": term.source,
+        "expression": text(term.expression),
+        "effect": term.effect,
+    }
+
+
+def _knowledge(known: Knowledge) -> dict[str, Any]:
+    """`first`: standard deviations, which stay as they are when an update changes the covariance."""
+    return {
+        "residual": dict(known.residual),
+        "slow_share": known.slow_share,
+        "parameters": list(known.parameters),
+        "covariance": known.covariance.tolist(),
+        "first": np.sqrt(np.diag(known.covariance)).tolist(),
     }
 
 
