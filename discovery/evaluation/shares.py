@@ -12,10 +12,9 @@ from discovery.terms import evaluate
 def term_shares(fit: Fit) -> dict[str, float]:
     """Share of each term in what moves the outputs, by name; they add up to 1.
 
-    The effect of a term is what the outputs would lose without it, to first order: its own heat flow or
-    rate along the fitted trajectory, filtered through the model's dynamics, as rms over the readings in
-    units of their
-    noise.
+    The effect of a term is what the outputs would lose without it, to first order: its own heat flow or rate
+    along the fitted trajectory, filtered through the model's dynamics, as rms over the readings in units of
+    their noise.
     """
     terms = fit.problem.model.terms
     white = np.array(fit.noise.white)

@@ -13,7 +13,7 @@ from discovery.dynamics import Grid
 from discovery.fitting import fit_model
 from discovery.recordings import Campaign
 from discovery.sparse.discovery import Discovery, PathPoint
-from discovery.sparse.folds import PREDICT, Blocks, choose, make_folds
+from discovery.sparse.folds import PREDICT, Blocks, bootstraps, choose, make_folds
 from discovery.sparse.gram import Gram, solve
 from discovery.sparse.masses import MassLibrary, Response, block_grams, free_run, mass_model, pooled
 from discovery.sparse.optimisers import pysindy_path
@@ -45,7 +45,6 @@ class _Problem:
     readings: tuple[Array, ...]  # (R,) each
     grams: tuple[dict[int, Gram], ...]
     start_sd: float
-    always: Support
     low: Array
     high: Array
 
@@ -59,19 +58,14 @@ def discover_error(
     recordings: Sequence[str],
     output: str,
     options: SparseOptions,
-    always: Support = OFFSET,
 ) -> Discovery:
-    """Choose the masses and drives of one error and fit their numbers.
-
-    Args:
-        always: columns that cannot leave.
-    """
+    """Choose the masses and drives of one error and fit their numbers."""
     column = data.grids[recordings[0]].outputs.index(output)
     readings = [data.grids[r].readings[:, column] for r in recordings]
     size = float(np.sqrt(np.nanmean(np.concatenate(readings) ** 2)))
     noise = campaign.channels[output].noise or 0.02 * size
     start_sd = max(noise, START_SHARE * size)
-    problem = _pose(data, readings, noise, start_sd / noise, always, options)
+    problem = _pose(data, readings, noise, start_sd / noise, options)
 
     everything = np.ones(data.blocks.count)
     errors = _left_out(problem, options)
@@ -122,7 +116,6 @@ def _pose(
     readings: Sequence[Array],
     noise: float,
     start_sd: float,
-    always: Support,
     options: SparseOptions,
 ) -> _Problem:
     scaled = tuple(series / noise for series in readings)
@@ -135,15 +128,15 @@ def _pose(
     for k, drive in enumerate(data.library.drive):
         if drive >= 0 and (bound := options.bounds.get(text(data.library.drives[drive]))):
             low[k], high[k] = bound[0] / noise, bound[1] / noise
-    return _Problem(data, scaled, grams, start_sd, always, low, high)
+    return _Problem(data, scaled, grams, start_sd, low, high)
 
 
 def _path(g: Gram, problem: _Problem, options: SparseOptions, size: int | None = None) -> list[Support]:
     if options.optimiser != "elimination":
-        return [s for s in pysindy_path(g, options.optimiser, problem.always) if len(s) <= options.max_terms]
+        return [s for s in pysindy_path(g, options.optimiser, OFFSET) if len(s) <= options.max_terms]
     groups = problem.data.library.mass
     return forward(
-        g, size or options.max_terms, problem.always, groups, options.max_masses, problem.low, problem.high
+        g, size or options.max_terms, OFFSET, groups, options.max_masses, problem.low, problem.high
     )
 
 
@@ -177,12 +170,10 @@ def _stability(
     problem: _Problem, chosen: Support, options: SparseOptions
 ) -> tuple[dict[int, float], dict[str, float]]:
     """Share of block bootstraps that keep each chosen column, and each drive through whatever mass."""
-    rng = np.random.default_rng(options.seed)
-    library, blocks = problem.data.library, problem.data.blocks
+    library = problem.data.library
     kept: Counter[int] = Counter()
     drives: Counter[str] = Counter()
-    for _ in range(options.bootstraps):
-        weights = rng.multinomial(blocks.count, np.full(blocks.count, 1 / blocks.count)).astype(float)
+    for weights in bootstraps(problem.data.blocks.count, options.bootstraps, options.seed):
         path = _path(problem.gram(weights), problem, options, len(chosen))
         support = min(path, key=lambda s: abs(len(s) - len(chosen)), default=())
         kept.update(support)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,12 @@ from discovery.fitting import Fit, Noise, predict_recording
 from discovery.fitting.noise import white_noise
 from discovery.models import Model
 from discovery.sparse.discovery import Discovery, PathPoint
-from discovery.sparse.folds import CLAIM, NAME, choose, make_folds
+from discovery.sparse.folds import CLAIM, NAME, bootstraps, choose, make_folds
 from discovery.sparse.gram import Gram, solve
+from discovery.sparse.growth import Growth, grown
 from discovery.sparse.optimisers import pysindy_path
 from discovery.sparse.options import SparseOptions
-from discovery.sparse.path import Support, best_of_each_size, forward
+from discovery.sparse.path import Support, best_of_each_size
 from discovery.sparse.ratedata import RateData, has_reading, rough_noise, stated_noise
 from discovery.sparse.rates import Evidence, evidence, extended_bic, masked, refit, without
 
@@ -30,20 +31,6 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 3  # of a fit in a fold: it starts where the normal equations of the fold have their minimum
 _SIZES = 5  # that are refitted and run freely, down from the one that the criterion names
-
-
-@dataclass(frozen=True)
-class Growth:
-    """How a model grows: coefficients that are in it from the start and may leave, and how many more may
-    enter.
-
-    A baseline that lacks something large is bent by its fit; so each fit also starts from the values
-    `restart` that the baseline had before, and the better one counts.
-    """
-
-    entered: tuple[str, ...] = ()
-    most: int = 15
-    restart: Mapping[str, float] = field(default_factory=dict)
 
 
 def discover_rates(
@@ -70,7 +57,7 @@ def discover_rates(
             a term of a higher order.
     """
     if growth is not None:
-        model, labels = _grown(data, model, labels, growth)
+        model, labels = grown(data, model, labels, growth)
     full = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, rough_noise(data))
     noise = white_noise(data.outputs, stated_noise(data), list(full.residuals().values()))
     full = replace(full, noise=noise)
@@ -115,101 +102,6 @@ def discover_rates(
     }
     named = {labels[seen.names[j]]: share for j, share in stability.items() if seen.names[j] in labels}
     return Discovery(fit.model, points, named, report)
-
-
-def _grown(
-    data: RateData, model: Model, labels: Mapping[str, str], growth: Growth
-) -> tuple[Model, dict[str, str]]:
-    """The baseline with the candidates that its residual asks for, one at a time, each time fitted anew.
-
-    A candidate enters by its score: what its column, filtered through the present model, takes off the cost
-    when all fitted parameters may follow. Growth ends where the extended criterion does not pay for the next
-    term.
-    """
-    entered = list(growth.entered)
-    noise = rough_noise(data)
-    for _ in range(growth.most + 1):
-        model, _ = _fitted_with(data, model, labels, entered, growth, noise)
-        seen = _seen_from(data, model, noise)
-        kept = [i for i, name in enumerate(seen.names) if name in entered or name not in labels]
-        g = seen.pooled()
-        better = forward(g, len(kept) + 1, kept, low=seen.low, high=seen.high)
-        if not better:
-            break
-        costs = [g.cost(solve(g, s)) for s in (kept, better[0])]
-        dispersion = max(costs[1] / g.count, 1.0)
-        before, after = extended_bic(g, [0, 1], [c / dispersion for c in costs], len(labels))
-        if after >= before:
-            break
-        entered.append(next(seen.names[i] for i in better[0] if i not in kept))
-    model, entered = _exchanged(data, model, labels, entered, growth, noise)
-    grown = without(model, [name for name in labels if name not in entered])
-    return grown, {name: labels[name] for name in entered}
-
-
-def _exchanged(
-    data: RateData,
-    model: Model,
-    labels: Mapping[str, str],
-    entered: Sequence[str],
-    growth: Growth,
-    noise: Noise,
-) -> tuple[Model, list[str]]:
-    """The terms that entered, or others in their place that do better together.
-
-    The first terms enter a baseline that is bent by what it lacks; a proxy that came in then may keep the
-    right one out. From where all fit together, every set of that size is ranked anew.
-    """
-    entered = list(entered)
-    model, cost = _fitted_with(data, model, labels, entered, growth, noise)
-    for _ in range(growth.most):
-        seen = _seen_from(data, model, noise)
-        kept = [i for i, name in enumerate(seen.names) if name not in labels]
-        g = seen.pooled()
-        path = best_of_each_size(g, len(kept) + len(entered), kept, seen.low, seen.high)
-        costs = [g.cost(solve(g, s, seen.low, seen.high)) for s in path]
-        dispersion = max(min(costs) / g.count, 1.0)
-        ranked = extended_bic(g, [len(s) for s in path], [c / dispersion for c in costs], len(labels))
-        other = [seen.names[i] for i in path[int(np.argmin(ranked))] if i not in kept]
-        if set(other) == set(entered):
-            break
-        tried, its = _fitted_with(data, model, labels, other, growth, noise)
-        sizes, both = [len(entered), len(other)], [2 * cost / dispersion, 2 * its / dispersion]
-        before, after = extended_bic(g, sizes, both, len(labels))
-        if after >= before:
-            break
-        entered, model, cost = other, tried, its
-    return model, entered
-
-
-def _fitted_with(
-    data: RateData,
-    model: Model,
-    labels: Mapping[str, str],
-    entered: Sequence[str],
-    growth: Growth,
-    noise: Noise,
-) -> tuple[Model, float]:
-    """The model with all candidates, fitted with those that entered (the others zero), and its cost."""
-    small = without(model, [name for name in labels if name not in entered])
-    starts = [{}, growth.restart] if growth.restart else [{}]
-    fits = [
-        refit(small, data.campaign, data.recordings, data.outputs, start, data.grids, noise, 40)
-        for start in starts
-    ]
-    fit = min(fits, key=lambda one: one.cost)
-    out = {
-        name: float(np.clip(0.0, model.parameters[name].min, model.parameters[name].max))
-        for name in labels
-        if name not in entered
-    }
-    return model.with_values(out | {name: fit.model.parameters[name].value for name in small.free}), fit.cost
-
-
-def _seen_from(data: RateData, model: Model, noise: Noise) -> Evidence:
-    """The normal equations around a model as it stands."""
-    here = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, noise, 1)
-    return evidence(here, data.blocks)
 
 
 def _path(g: Gram, seen: Evidence, kept: Sequence[int], options: SparseOptions, most: int) -> list[Support]:
@@ -298,11 +190,8 @@ def _stability(
     seen: Evidence, kept: Sequence[int], chosen: Support, options: SparseOptions
 ) -> dict[int, float]:
     """Share of block bootstraps that keep each chosen column."""
-    rng = np.random.default_rng(options.seed)
-    count = len(seen.blocks)
     found: Counter[int] = Counter()
-    for _ in range(options.bootstraps):
-        weights = rng.multinomial(count, np.full(count, 1 / count)).astype(float)
+    for weights in bootstraps(len(seen.blocks), options.bootstraps, options.seed):
         path = _path(seen.pooled(weights), seen, kept, options, len(chosen))
         nearest: Support = min(path, key=lambda s: abs(len(s) - len(chosen)), default=())
         found.update(nearest)

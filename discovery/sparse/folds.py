@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,6 +65,13 @@ def make_folds(blocks: Blocks, whole: bool = True) -> list[Ints]:
         return [np.concatenate(parts) for parts in zip(*quarters, strict=True)]
     folds = min(recordings, _MOST_FOLDS)
     return [np.flatnonzero(blocks.recording % folds == k) for k in range(folds)]
+
+
+def bootstraps(blocks: int, count: int, seed: int) -> Iterator[Array]:
+    """How often each block (B,) is drawn in each of `count` block bootstraps."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        yield rng.multinomial(blocks, np.full(blocks, 1 / blocks)).astype(float)
 
 
 def choose(errors: Array, tolerance: float) -> int:

@@ -3,11 +3,9 @@
     -int w'(t) y dt = sum_k theta_k int w(t) phi_k(u, y) dt,       w(t) = (1 - (t/H)^2)^p on |t| < H
 
 (Messenger & Bortz, Multiscale Model. Simul. 19, 2021). Readings may be irregular and slow while inputs come
-every few
-seconds: readings are joined by straight lines, inputs keep their own sampling, and both are integrated on the
-    fine
-raster. No derivative is taken. Noise of `y` inside the library biases the pole a little; output error refines
-it.
+every few seconds: readings are joined by straight lines, inputs keep their own sampling, and both are
+integrated on the fine raster. No derivative is taken. Noise of `y` inside the library biases the pole a
+little; output error refines it.
 """
 
 from __future__ import annotations

@@ -12,9 +12,9 @@ from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.sparse import Discovery, SparseOptions, discover
 from discovery.sparse.byrates import _plainer
-from discovery.sparse.discover import second_masses
 from discovery.sparse.gram import gram
 from discovery.sparse.rates import Evidence, without_idle
+from discovery.sparse.temperatures import second_masses
 from discovery.terms import Term, parse
 
 Array = NDArray[np.float64]

@@ -1,0 +1,36 @@
+"""Start values of candidate terms, from the weak form of the recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discovery.sparse.gram import solve, total
+from discovery.sparse.ratedata import RateData
+from discovery.sparse.rates import Candidate
+from discovery.sparse.weak import weak_gram, weak_rows
+
+
+def started(
+    found: Sequence[Candidate],
+    data: RateData,
+    channel: Mapping[str, str],
+    constants: Mapping[str, float] | None = None,
+) -> list[Candidate]:
+    """Candidates with start values from the weak form; `channel` says which readings stand for each state.
+
+    Hidden masses keep theirs: the weak form sees what is measured alone.
+    """
+    placed: dict[Candidate, float] = {}
+    for state, output in channel.items():
+        mine = [c for c in found if c.into == state and "_mass" not in c.label]
+        rows = [
+            weak_rows(data.grids[r], output, [c.expression for c in mine], constants, aliases=channel)
+            for r in data.recordings
+        ]
+        low, high = (np.array([getattr(c, side) for c in mine]) for side in ("low", "high"))
+        theta = 3600 * solve(total([weak_gram(one) for one in rows]), range(len(mine)), low, high)
+        placed |= {c: float(np.clip(value, c.low, c.high)) for c, value in zip(mine, theta, strict=True)}
+    return [replace(c, start=placed.get(c, c.start)) for c in found]

@@ -1,0 +1,99 @@
+"""Discovery of terms of measured temperatures: a body behind each sensor, all bodies together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign
+from discovery.sparse.byrates import discover_rates
+from discovery.sparse.discovery import Discovery
+from discovery.sparse.drives import AMBIENT, Inputs
+from discovery.sparse.families import candidates
+from discovery.sparse.options import SparseOptions
+from discovery.sparse.ratedata import make_rate_data, nearer
+from discovery.sparse.rates import Candidate, with_candidates, without_idle
+from discovery.sparse.starts import started
+from discovery.terms import Name, Term, parse, text
+
+LABORATORY = ("linear", "coupling", "radiation", "load", "second mass")
+# s, time constants of the masses behind each body: two of a series in steps of four, in proportion to the
+# recordings, of which the slower one shall see the sixth part
+SECOND_MASS, _STEP, _SEEN = (300.0, 1200.0), 4.0, 6.0
+SENSOR_LAG = (1.0, 20.0, 300.0)  # s: least, start, most
+START_SD = 5.0  # K: a first reading may be an artefact of switching on
+
+
+def discover_temperatures(
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    inputs: Inputs,
+    options: SparseOptions,
+) -> Discovery:
+    """Choose the terms that move bodies behind sensors, and fit their numbers."""
+    room, states = _room(outputs, inputs, len(recordings))
+    longest = max(float(campaign.recordings[r].time[-1]) for r in recordings)
+    masses = second_masses(longest) if "second mass" in (options.library or LABORATORY) else ()
+    least, lag, most = (min(t, longest / 4) for t in SENSOR_LAG)
+    parameters, terms = {}, []
+    bodies = [f"{name}_body" for name in outputs]
+    for name, body in zip(outputs, bodies, strict=True):
+        parameters[f"{name}_lag"] = Parameter(lag, "s", least, most)
+        states[name] = State(name, "degC", None, None, START_SD, 1.0)
+        terms.append(Term(f"sensor {name} follows", name, parse(f"({body} - {name})/{name}_lag")))
+        states[body] = State(body, "degC", None, Name(name), START_SD, 1 / 3600)
+        for k, tau in enumerate(masses, start=1):
+            mass = f"{body}_mass{k}"
+            states[mass] = State(mass, "degC", None, Name(name), 0.0, 1.0)
+            terms.append(Term(f"{mass} follows", mass, parse(f"({body} - {mass})/{tau:g}")))
+    empty = Model("temperatures", parameters, states, tuple(terms), {}, "h")
+    words = options.library or LABORATORY
+    own = [Candidate(body, parse(f"{room} - {body}"), 0.0) for body in bodies]
+    given = candidates(bodies, empty, campaign, inputs, words, options, room)
+    offered = [*own, *(c for c in given if (c.into, c.label) not in {(o.into, o.label) for o in own})]
+    data = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
+    channel, known = dict(zip(bodies, outputs, strict=True)), {room: inputs.reference}
+    loads = inputs.of("heat load", "cooling power") or inputs.of("rotation speed", "other input")
+    simple = {text(o.expression) for o in own} | set(loads)
+    basis = [c for c in offered if c.label in simple]
+    cautious = {(c.into, c.label): c for c in started(basis, data, channel, known)}
+    begun = started(offered, data, channel, known)
+    model, labels = with_candidates(empty, begun)
+    slow, _ = with_candidates(
+        empty, [cautious.get((c.into, c.label), replace(c, start=0.0)) for c in offered]
+    )
+    decay = [n for n, label in labels.items() if label.endswith(f": {room} - {label.split(': ')[0]}")]
+    plain = [n for n, label in labels.items() if label.split(": ", 1)[1] in simple]
+    first = {"1", *simple, *(text(parse(f"{a} - {b}")) for a in bodies for b in bodies if a != b)}
+    easy = [n for n, label in labels.items() if label.split(": ", 1)[1] in first]
+    found = discover_rates(data, nearer(data, model, slow), labels, decay, options, plain=plain, easy=easy)
+    return replace(found, model=without_idle(found.model, outputs))
+
+
+def _room(outputs: Sequence[str], inputs: Inputs, count: int) -> tuple[str, dict[str, State]]:
+    """The temperature of the room: its channel where it moves, else a constant of each of `count` recordings.
+
+    Where the sensors start near what is known of the room they stand in it at rest, and their mean tells the
+    room's temperature of that day. A single recording does not tell it from steady heat: its readings would
+    pull it away from where free runs, which see the first reading alone, begin.
+    """
+    if air := inputs.of(AMBIENT):
+        return air[0], {}
+    mean = f"({' + '.join(outputs)})/{len(outputs)}"
+    start = parse(f"where({mean} < {inputs.reference + 2:g}, {mean}, {inputs.reference:g})")
+    return "room", {"room": State("room", "degC", None, start, 0.5 if count > 1 else 0.1, 1 / 3600)}
+
+
+def second_masses(longest: float) -> tuple[float, ...]:
+    """Time constants [s] of the masses behind a body that recordings of this length [s] can show.
+
+    >>> second_masses(7200.0), second_masses(86400.0)
+    ((300.0, 1200.0), (4800.0, 19200.0))
+    """
+    slower = max(longest, 1.0) / _SEEN / SECOND_MASS[-1]
+    scale = _STEP ** round(float(np.log(slower) / np.log(_STEP)))
+    return tuple(tau * scale for tau in SECOND_MASS)
