@@ -7,24 +7,35 @@ Table, C-Body 1 and 2, B-Body 1 and 2 as in figure 4 of Mayr et al., "Compensati
 on five axis machine tools"; the fluid floods Table and C-Body 1 with the film coefficient h of eqs. (1) to
 (5), spelt out in the expression (see `convection` for what they mean and where they hold). Drive losses and
 internal cooling enter the C axis. Capacities and levers come from drawings; the rest is a rough start that a
-fit replaces. Of eq. (1) only the product of area
-and coefficient can be calibrated: hF is an effective area.
+fit replaces. Of eq. (1) only the product of area and coefficient can be calibrated: hF is an effective area.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from discovery.models.convection import Speeding
 from discovery.models.model import Model, Parameter, State
 from discovery.terms import Term, parse
 
-# body: capacity [J/K] and start values of air [W/K], share of drive power [1], internal cooling [W/K], wet
-# area [m2]
-BODIES: dict[str, tuple[float, float, float | None, float | None, float | None]] = {
-    "table": (45e3, 3.0, 0.1, None, 0.05),
-    "c_body_1": (62e3, 2.0, 0.4, 20.0, 0.03),
-    "c_body_2": (82e3, 2.0, 0.5, 80.0, None),
-    "b_body_1": (165e3, 5.0, None, None, None),
-    "b_body_2": (240e3, 7.0, None, None, None),
+
+@dataclass(frozen=True)
+class Body:
+    """Capacity [J/K], and start values of what acts on it; None: it does not."""
+
+    capacity: float
+    air: float  # W/K
+    loss: float | None = None  # share of drive power
+    cooling: float | None = None  # W/K, internal
+    wet: float | None = None  # m2
+
+
+BODIES = {
+    "table": Body(45e3, 3.0, loss=0.1, wet=0.05),
+    "c_body_1": Body(62e3, 2.0, loss=0.4, cooling=20.0, wet=0.03),
+    "c_body_2": Body(82e3, 2.0, loss=0.5, cooling=80.0),
+    "b_body_1": Body(165e3, 5.0),
+    "b_body_2": Body(240e3, 7.0),
 }
 # into, from: start value [W/K]
 LINKS = {
@@ -78,33 +89,35 @@ def thermobalance(*, fluid: bool = True, variant: Speeding = "none") -> Model:
     ]
     terms.append(Term("conduction bed to b_body_2", "b_body_2", parse("G_b2_bed*(bed - b_body_2)")))
     terms.append(Term("bed follows the room", "bed", parse("(T_env - bed)/tau_bed")))
-    for body, (_, air, *_) in BODIES.items():
-        parameters[f"hA_{_short(body)}"] = _positive(air, "W/K")
-        terms.append(Term(f"air around {body}", body, parse(f"hA_{_short(body)}*(T_env - {body})")))
-    for body, (_, _, loss, *_) in BODIES.items():
-        if loss is not None:
-            parameters[f"loss_{_short(body)}"] = Parameter(loss, "1", 0.0, 1.0)
-            terms.append(Term(f"drive loss into {body}", body, parse(f"loss_{_short(body)}*P_drive")))
-    for body, (_, _, _, cooling, _) in BODIES.items():
-        if cooling is not None:
-            parameters[f"cool_{_short(body)}"] = _positive(cooling, "W/K")
-            terms.append(
-                Term(f"internal cooling of {body}", body, parse(f"cool_{_short(body)}*(T_cool - {body})"))
-            )
+    for name, body in BODIES.items():
+        parameters[f"hA_{_short(name)}"] = _positive(body.air, "W/K")
+        terms.append(Term(f"air around {name}", name, parse(f"hA_{_short(name)}*(T_env - {name})")))
+    for name, body in BODIES.items():
+        if body.loss is not None:
+            parameters[f"loss_{_short(name)}"] = Parameter(body.loss, "1", 0.0, 1.0)
+            terms.append(Term(f"drive loss into {name}", name, parse(f"loss_{_short(name)}*P_drive")))
+    for name, body in BODIES.items():
+        if body.cooling is not None:
+            parameters[f"cool_{_short(name)}"] = _positive(body.cooling, "W/K")
+            flow = f"cool_{_short(name)}*(T_cool - {name})"
+            terms.append(Term(f"internal cooling of {name}", name, parse(flow)))
     parameters["tau_bed"] = Parameter(90e3, "s", 20e3, 400e3)
-    for body, (*_, wet) in BODIES.items():
-        if fluid and wet is not None:
-            parameters[f"hF_{_short(body)}"] = _positive(wet, "m**2")
-            flow = f"hF_{_short(body)}*pump*{film(variant)}*(T_fluid - {body})"
-            terms.append(Term(f"cutting fluid on {body}", body, parse(flow)))
+    for name, body in BODIES.items():
+        if fluid and body.wet is not None:
+            parameters[f"hF_{_short(name)}"] = _positive(body.wet, "m**2")
+            flow = f"hF_{_short(name)}*pump*{film(variant)}*(T_fluid - {name})"
+            terms.append(Term(f"cutting fluid on {name}", name, parse(flow)))
     if fluid:
         parameters |= _fluid_parameters()
     parameters["T_ref"] = Parameter(22.0, "degC", fixed=True)
-    states = {name: State(name, "degC", C, parse("T_env"), 0.5, 1.0 / C) for name, (C, *_) in BODIES.items()}
+    states = {
+        name: State(name, "degC", body.capacity, parse("T_env"), 0.5, 1.0 / body.capacity)
+        for name, body in BODIES.items()
+    }
     states["bed"] = State("bed", "degC", None, parse("T_env"), 0.5, 1.0)
     outputs = {error: parse(levers) for error, levers in LEVERS.items()}
-    name = "thermobalance, five bodies" if fluid else "dry thermobalance, five bodies"
-    return Model(name, parameters, states, tuple(terms), outputs)
+    title = "thermobalance, five bodies" if fluid else "dry thermobalance, five bodies"
+    return Model(title, parameters, states, tuple(terms), outputs)
 
 
 def _fluid_parameters() -> dict[str, Parameter]:
