@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
-from discovery.fitting.fit import Loss
+from discovery.fitting.solve import Loss
 from discovery.mismatch.catalogue.form import EffectForm
 from discovery.schema import Strict
 from discovery.sparse.options import SparseOptions

@@ -23,8 +23,9 @@ from discovery.experiment.form import (
 from discovery.experiment.joining import check_joins, join
 from discovery.experiment.results import write_run
 from discovery.fitting import fit_model
-from discovery.fitting.fit import Loss, written_with
+from discovery.fitting.fit import written_with
 from discovery.fitting.sequential import fit_one_at_a_time
+from discovery.fitting.solve import Loss
 from discovery.fitting.starts import warm_start
 from discovery.models import Model
 from discovery.models.dimensions import with_coefficient_units

@@ -7,23 +7,24 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
-from discovery.errors import RunsAwayError
 from discovery.fitting.covariance import covariance_of, with_intervals
-from discovery.fitting.kalman import Filter, innovations, make_filter, whiten
+from discovery.fitting.kalman import innovations
 from discovery.fitting.noise import Noise, readings_as_one, resolution, white_noise
 from discovery.fitting.problem import Problem, make_problem
+from discovery.fitting.solve import Loss, Solution, solve
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.threads import one_thread
 
 Array = NDArray[np.float64]
-Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
+
+_ROUNDS = 3  # of a fit that also finds the noise, or how much a prior counts
+_ROUGH = 15  # of Levenberg-Marquardt in a round between the first and the last
 
 
 @dataclass(frozen=True)
@@ -100,49 +101,42 @@ def fit_model(
         begin: a fit to begin from, of a model that has most of the unknowns; `guess` goes before it.
         max_rounds: of Levenberg-Marquardt.
         tolerance: relative change of the cost that ends them.
+
+    Raises:
+        UserError: an input that a recording does not hold.
+        RunsAwayError: the model does not stay finite where the fit begins.
     """
     began = clock.perf_counter()
     problem = make_problem(model, campaign, recordings, outputs, grids, priors, belief)
     stated = {name: campaign.channels[name].noise for name in problem.outputs}
     theta = _beginning(problem, guess or {}, begin)
-    given = noise is not None
-    readings = [s.grid.readings for s in problem.systems]
+    readings = [system.grid.readings for system in problem.systems]
     least = resolution(readings)
     current = noise or white_noise(problem.outputs, stated, readings, least)
     uncertain = any(u.is_offset for u in problem.unknowns)
     together = 1.0
-    rounds = 1 if given and not uncertain else 3
-    solution = None
+    rounds = _ROUNDS if noise is None or uncertain else 1
     for k in range(rounds):
-        most = max_rounds if k in (0, rounds - 1) else 15
-        solution = _solve(problem, theta, current, loss, most, tolerance, together)
+        most = max_rounds if k in (0, rounds - 1) else _ROUGH
+        solution = solve(problem, theta, current, loss, most, tolerance, together)
         theta = solution.theta
-        if k == rounds - 1 or rounds == 1:
+        if k == rounds - 1:
             break
         left = [problem.residual(t) for t in solution.trajectories]
         settled = True
-        if not given:
+        if noise is None:
             updated = white_noise(problem.outputs, stated, left, least)
             change = max(abs(np.log(a / b)) for a, b in zip(updated.white, current.white, strict=True))
             settled, current = change < 0.02, updated
         if uncertain:
-            before, together = (
-                together,
-                readings_as_one(
-                    [innovations(t, current, r) for t, r in zip(solution.trajectories, left, strict=True)]
-                ),
-            )
+            alone = [innovations(t, current, r) for t, r in zip(solution.trajectories, left, strict=True)]
+            before, together = together, readings_as_one(alone)
             settled = settled and abs(np.log(together / before)) < 0.1
         if settled:
             break
-    assert solution is not None
     covariance, lost = covariance_of(problem, solution.jacobian, theta)
-    if not given and loss == "linear":
-        # Stated noise is a claim about the sensor, not about the model: intervals follow the larger of the
-        # two.
-        # (With estimated noise the factor is one by construction.)
-        freedom = max(1, sum(int(s.grid.measured.sum()) for s in problem.systems) - len(theta))
-        covariance = covariance * max(1.0, 2 * solution.cost / freedom)
+    if noise is None and loss == "linear":
+        covariance = covariance * _excess(problem, solution)
     if uncertain:  # their priors were counted `together` times: back to one
         times = np.sqrt([together if u.is_offset else 1.0 for u in problem.unknowns])
         covariance = covariance * np.outer(times, times)
@@ -180,12 +174,14 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
     )
 
 
-@dataclass(frozen=True)
-class _Solution:
-    theta: Array
-    trajectories: tuple[Trajectory, ...]
-    jacobian: Array
-    cost: float
+def _excess(problem: Problem, solution: Solution) -> float:
+    """Residual variance over that of the stated noise, at least 1.
+
+    Stated noise is a claim about the sensor, not about the model: intervals follow the larger of the two.
+    With estimated noise the factor is one by construction.
+    """
+    count = sum(int(system.grid.measured.sum()) for system in problem.systems)
+    return max(1.0, 2 * solution.cost / max(1, count - len(solution.theta)))
 
 
 def _beginning(problem: Problem, guess: Mapping[str, float], begin: Fit | None) -> Array:
@@ -199,61 +195,3 @@ def _beginning(problem: Problem, guess: Mapping[str, float], begin: Fit | None) 
             for u in problem.unknowns
         ]
     )
-
-
-def _solve(
-    problem: Problem,
-    theta: Array,
-    noise: Noise,
-    loss: Loss,
-    max_rounds: int,
-    tolerance: float,
-    together: float = 1.0,
-) -> _Solution:
-    from scipy.optimize import least_squares
-
-    low, high = problem.bounds
-    guesses: dict[str, Array] = {}
-    last: dict[bytes, tuple[Array, tuple[tuple[Trajectory, Filter | None], ...]]] = {}
-
-    def run(x: Array) -> tuple[Array, tuple[tuple[Trajectory, Filter | None], ...]]:
-        key = x.tobytes()
-        if key not in last:
-            trajectories = tuple(problem.run(s, x, guesses.get(s.grid.recording)) for s in problem.systems)
-            for t in trajectories:
-                guesses[t.system.grid.recording] = t.x
-            runs = tuple((t, None if noise.is_white else make_filter(t)) for t in trajectories)
-            parts = [whiten(t, noise, problem.residual(t)[:, :, None], part)[:, 0] for t, part in runs]
-            last.clear()
-            last[key] = (np.concatenate([*parts, problem.prior_rows(x, together)[0]]), runs)
-        return last[key]
-
-    def jacobian(x: Array) -> Array:
-        parts = [whiten(t, noise, -problem.jacobian(t), part) for t, part in run(x)[1]]
-        return np.concatenate([*parts, problem.prior_rows(x, together)[1]])
-
-    def residual(x: Array) -> Array:
-        try:
-            return run(x)[0]
-        except RunsAwayError:  # a trial step: the solver takes a shorter one
-            return np.full(rows, np.inf)
-
-    # scipy refuses a start on the bound's wrong side by rounding, and moves one that lies on it inside
-    x0 = np.clip(theta, low, high)
-    rows = len(run(x0)[0])
-    if len(x0):
-        result = least_squares(
-            residual,
-            x0,
-            jac=jacobian,
-            bounds=(low, high),
-            x_scale="jac",
-            loss=loss,
-            max_nfev=max_rounds,
-            ftol=tolerance,  # alone: scipy's xtol measures all unknowns on one scale, W/K and seconds alike
-            xtol=1e-13,
-            gtol=1e-12,
-        )
-        x0 = result.x
-    left, runs = run(x0)
-    return _Solution(x0, tuple(t for t, _ in runs), jacobian(x0), 0.5 * float(left @ left))

@@ -97,8 +97,7 @@ def _evaluate(
                 partials[channel] = partials.get(channel, 0.0) + 1.0
             return Dual(late, partials)
         case Apply(function="lag", arguments=(inner, tau)) if memory is not None:
-            # A model's own lags are states (models.expanded); this one serves candidates, seen along a given
-            # trajectory.
+            # a model's own lags are states (models.expanded); here are those of candidates on a trajectory
             series = np.asarray(evaluate(inner, values, memory=memory).value, dtype=float)
             return Dual(memory.lagged(series, float(np.mean(evaluate(tau, values, memory=memory).value))))
         case Apply(function="play", arguments=(inner, width)):
