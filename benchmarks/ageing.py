@@ -102,7 +102,7 @@ def main(days: int, seed: int) -> None:
         updated, left, fresh_left = rows[-1]
         print(
             f"day {day:2d}: left {updated:.2f} with updating, {left:.2f} without, {fresh_left:.2f} had it "
-            f"not aged; "
+            "not aged; "
             f"{finding.verdict}, p = {finding.p_value:.2g}"
         )
     found = np.array(rows)

@@ -63,7 +63,7 @@ def main() -> None:
         stepper.run(u)
         print(
             f"{title}, Python reference, many steps: {1e6 * (time.perf_counter() - began) / len(u):.2f} "
-            f"us per step"
+            "us per step"
         )
         try_faults(exported, u[:10], [], 10.0)
         began = time.perf_counter()

@@ -145,8 +145,8 @@ def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
         most = f" to {found[high][0]:+.2g} {unit} in '{high}'" if high != low else ""
         notes.append(
             f"{name} is known within {channels[name].spread:.3g} {unit}: the fit takes it for off by "
-            f"{found[low][0]:+.2g} {unit} in '{low}'{most}; in an unseen recording the first reading alone "
-            "tells"
+            f"{found[low][0]:+.2g} {unit} in '{low}'{most}; in an unseen recording the "
+            "first reading alone tells"
         )
     return notes
 

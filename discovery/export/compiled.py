@@ -219,8 +219,8 @@ def _delay(
     assert isinstance(channel, Name)
     if channel.id not in inputs:
         raise UserError(
-            f"model '{model.name}': delay({channel.id}, ...) is not of an input; only a channel can be "
-            f"delayed"
+            f"model '{model.name}': delay({channel.id}, ...) is not of an input; "
+            "only a channel can be delayed"
         )
     seconds = None
     if names(duration) <= set(model.parameters):
@@ -228,15 +228,13 @@ def _delay(
     if seconds is None or not math.isfinite(seconds) or seconds < 0.0:
         raise UserError(
             f"model '{model.name}': the delay of {channel.id} must be a number of seconds from 0 up to be "
-            f"exported; "
-            "it may hold parameters, no states and no channels"
+            "exported; it may hold parameters, no states and no channels"
         )
     steps = seconds / step_s
     if steps > MAX_DELAY_STEPS:
         raise UserError(
             f"model '{model.name}': the delay of {channel.id} is {seconds:.0f} s, {steps:.0f} steps of "
-            f"{step_s:g} s; "
-            f"a controller keeps at most {MAX_DELAY_STEPS}: export with a longer step"
+            f"{step_s:g} s; a controller keeps at most {MAX_DELAY_STEPS}: export with a longer step"
         )
     whole = math.floor(steps)
     return Delay(inputs.index(channel.id), whole, steps - whole)

@@ -95,16 +95,16 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
         )
     if document.get("version") != VERSION:
         raise UserError(
-            f"{place}: version {document.get('version')!r} is not {VERSION}, the one this program reads; "
-            f"update it"
+            f"{place}: version {document.get('version')!r} is not {VERSION}, the one "
+            "this program reads; update it"
         )
     _check_schema(document, place)
     model = _model(document, place)
     for term in model.terms:
         if term.into not in model.states or (term.source is not None and term.source not in model.states):
             raise UserError(
-                f"{place}: term '{term.name}' enters or leaves a state that is not listed; export the "
-                "model again"
+                f"{place}: term '{term.name}' enters or leaves a state that is not "
+                "listed; export the model again"
             )
     if model_inputs(model) != tuple(i["name"] for i in document["inputs"]):
         raise UserError(f"{place}: the inputs listed are not those of its formulas; export the model again")

@@ -48,8 +48,7 @@ class Export:
         """What a user wants to know of it."""
         step = (
             f"the fixed step is {self.agreement['integrator_um']:.2g} um from the fitted model under the "
-            f"same inputs, "
-            f"{self.agreement['held_inputs_um']:.2g} um where inputs are held over a step"
+            f"same inputs, {self.agreement['held_inputs_um']:.2g} um where inputs are held over a step"
         )
         return [*(str(path) for path in self.files), *(str(proof) for proof in self.proofs), step]
 

@@ -56,8 +56,7 @@ def exportable(model: Model, campaign: Campaign) -> Model:
         if set(read) & set(bodies) and not room:
             raise UserError(
                 f"model '{model.name}': state '{name}' starts at the reading of {read[0]}, which a "
-                f"controller does "
-                "not have, and no channel is an ambient temperature; give it a start value"
+                "controller does not have, and no channel is an ambient temperature; give it a start value"
             )
         if start is not None and read:
             spread = max(state.start_sd, START_SD)
@@ -91,8 +90,8 @@ def make_document(
     for expression in model.expressions():
         for name in sorted(names(expression) - known):
             raise UserError(
-                f"model '{model.name}': '{name}' is no channel of campaign {campaign.path}; it cannot be "
-                f"exported"
+                f"model '{model.name}': '{name}' is no channel of campaign "
+                f"{campaign.path}; it cannot be exported"
             )
     compiled = compile_model(model, step_s)
     limits = output_ranges(compiled, campaign, recordings)

@@ -67,8 +67,8 @@ def sampled_inputs(campaign: Campaign, recording: str, inputs: Sequence[str], st
         )
         if channel is None or not np.isfinite(values).all():
             raise UserError(
-                f"{campaign.path}: recording '{recording}' has no value of '{name}', which the model "
-                f"needs as an input"
+                f"{campaign.path}: recording '{recording}' has no value of '{name}', which "
+                "the model needs as an input"
             )
         columns.append(values)
     return np.column_stack(columns) if columns else np.zeros((len(at), 0))
@@ -120,8 +120,8 @@ def output_ranges(
         if len(y) < len(inputs):
             raise UserError(
                 f"model '{compiled.name}' runs away after {len(y) * compiled.step_s / 3600:.1f} h of "
-                f"recording '{recording}' "
-                f"with a fixed step of {compiled.step_s:g} s; check the model or export with a shorter --step"
+                f"recording '{recording}' with a fixed step of {compiled.step_s:g} s; check the model or "
+                "export with a shorter --step"
             )
         size = np.maximum(size, np.max(np.abs(y), axis=0))
         rate = np.maximum(rate, np.max(np.abs(np.diff(y, axis=0)), axis=0, initial=0.0) / compiled.step_s)

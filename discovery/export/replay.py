@@ -64,8 +64,8 @@ def make_reference(compiled: Compiled, inputs: Array) -> Reference:
     y = free_run(compiled, inputs)
     if len(y) < len(inputs):
         raise UserError(
-            f"model '{compiled.name}' is not finite after {len(y)} steps of its reference inputs; check "
-            f"it or shorten the step"
+            f"model '{compiled.name}' is not finite after {len(y)} steps of its reference inputs; "
+            "check it or shorten the step"
         )
     return Reference(inputs, y)
 

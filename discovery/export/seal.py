@@ -66,8 +66,8 @@ def open_seal(data: bytes, place: str | Path) -> tuple[dict[str, Any], Seal]:
         )
     if seal.signature is not None and not _signed(head, seal):
         raise UserError(
-            f"{place}: the signature is not that of its public key; do not use this file, export the "
-            f"model again"
+            f"{place}: the signature is not that of its public key; do not use this "
+            "file, export the model again"
         )
     try:
         document = _json(head + b"\n}")
@@ -110,13 +110,13 @@ def require_trusted(seal: Seal, trusted: Ed25519PublicKey, place: str | Path) ->
     """
     if seal.signature is None:
         raise UserError(
-            f"{place}: the model is not signed, so it is not run; sign it with `discovery export ... "
-            f"--sign KEY`"
+            f"{place}: the model is not signed, so it is not run; sign it with "
+            "`discovery export ... --sign KEY`"
         )
     if seal.public_key != trusted.public_bytes_raw().hex():
         raise UserError(
-            f"{place}: the model is signed by key {str(seal.public_key)[:16]}..., which is not the "
-            f"trusted one"
+            f"{place}: the model is signed by key {str(seal.public_key)[:16]}..., "
+            "which is not the trusted one"
         )
 
 
@@ -160,8 +160,8 @@ def public_key(path: Path) -> Ed25519PublicKey:
 
     if not path.exists():
         raise UserError(
-            f"{path}: there is no such key; it stands as KEY.pub beside the key given to `discovery "
-            f"export --sign KEY`"
+            f"{path}: there is no such key; it stands as KEY.pub beside the key given to "
+            "`discovery export --sign KEY`"
         )
     try:
         found = form.load_pem_public_key(path.read_bytes())

@@ -29,17 +29,15 @@ Table = tuple[NDArray[np.int64], Array, NDArray[np.int64]]
 
 INTEGRATOR = (
     "Inputs u are held over the step of h = step_s seconds; outputs are valid at its end.",
-    "1. delays: an input d = (whole + part) h seconds ago is (1 - part) u[k - whole] + part u[k - whole "
-    "- 1]; "
-    "before the start it was u[0].",
+    "1. delays: an input d = (whole + part) h seconds ago is (1 - part) u[k - whole] + part u[k - whole - "
+    "1]; before the start it was u[0].",
     "2. f_i = scale_i (sum of the terms into i - sum of the terms from i) at (x, u, time = k h); "
     "A_ij = df_i/dx_j, exact; comparisons and sign() have no slope, max and min that of the argument taken; "
     "a play has slope 1 in contact, else 0.",
-    "3. play(e, w): p = max(e - |w|, min(e + |w|, p)), evaluated at the beginning of the step and again "
-    "at its end; "
-    "at the start p = e.",
-    "4. s = smallest count of sub-steps for which (largest absolute row sum of A) h/s <= 1/2; tau = h/s; "
-    "z = 0.",
+    "3. play(e, w): p = max(e - |w|, min(e + |w|, p)), evaluated at the beginning of the step and again at "
+    "its end; at the start p = e.",
+    "4. s = smallest count of sub-steps for which (largest absolute row sum of A) h/s "
+    "<= 1/2; tau = h/s; z = 0.",
     "5. s times: v = tau (A z + f), z = z + v; for j = 2 ... 12: v = (tau/j) A v, z = z + v.",
     "6. x = x + z by compensated summation: i = z - c, n = x + i, c = (n - x) - i, x = n.",
     "7. y = outputs(x, u, time = (k + 1) h). If a state or output is not finite or not below 1e30, or s "
@@ -84,8 +82,8 @@ class Stepper:
         values = _run(self._tables.start, u, empty, empty, empty)
         if not np.isfinite(values).all():
             raise UserError(
-                f"model '{self.compiled.name}' has no finite start for these inputs; check that all are "
-                f"measured"
+                f"model '{self.compiled.name}' has no finite start for these inputs; "
+                "check that all are measured"
             )
         n = len(self.compiled.states)
         self.x[:], self.carry[:], self.plays[:] = values[:n], 0.0, values[n:]

@@ -61,8 +61,8 @@ def _said(
     lines = []
     for table in tables:
         lines.append(
-            f"{table.path.name}: {len(table.time)} rows over {_duration(float(table.time[-1]))}; "
-            f"time {table.about_time}"
+            f"{table.path.name}: {len(table.time)} rows over "
+            f"{_duration(float(table.time[-1]))}; time {table.about_time}"
         )
         lines += [f"  {note}" for note in table.notes]
     lines += found.notes

@@ -106,8 +106,8 @@ def find_clock(path: Path, names: Sequence[str], units: Sequence[str], body: Seq
             backwards = (body[int(np.flatnonzero(steps < 0)[0]) + 1][0], names[columns[0]])
     if backwards:
         raise UserError(
-            f"{path}, line {backwards[0]}: the time does not run forward in column '{backwards[1]}'; "
-            "sort the rows"
+            f"{path}, line {backwards[0]}: the time does not run forward in column "
+            f"'{backwards[1]}'; sort the rows"
         )
     raise UserError(
         f"{path}: no column of time was found; call one 'time' (seconds, or instants as 2026-03-01T08:00:00)"

@@ -59,7 +59,7 @@ class ChannelForm(Strict):
         if given and self.role != CORRECTION:
             raise ValueError(
                 f"{' and '.join(given)} belong to the role '{CORRECTION}' alone; "
-                f"take them away or change the role"
+                "take them away or change the role"
             )
         return self
 

@@ -204,8 +204,8 @@ def _proof(diagnosis: Mapping[str, Any]) -> list[str]:
     if held:
         each = [f"{number(s['rms_before'])} → {number(s['rms_after'])} on {name}" for name, s in held.items()]
         points.append(
-            "Repaired and run freely on unseen recordings it leaves (rms, errors weighed by their noise): "
-            f"{listed(each)}."
+            "Repaired and run freely on unseen recordings it leaves (rms, errors weighed by "
+            f"their noise): {listed(each)}."
         )
     explained = improvement.get("explained")
     if improvement.get("contradicted_by"):

@@ -84,8 +84,8 @@ def belief_of(exported: Exported) -> Belief:
     found = exported.document["knowledge"]
     if not found["parameters"]:
         raise UserError(
-            f"model '{exported.model.name}' does not say how well its parameters are known; export it "
-            f"again from its run"
+            f"model '{exported.model.name}' does not say how well its parameters are known; "
+            "export it again from its run"
         )
     covariance = np.array(found["covariance"])
     model = exported.model
@@ -114,8 +114,8 @@ def update_belief(
     outputs = [n for n in levels if n in data.values and np.isfinite(data.values[n]).any()]
     if not outputs:
         raise UserError(
-            f"{campaign.path}: recording '{recording}' holds no reading of {', '.join(levels)}; there is "
-            f"nothing to learn from"
+            f"{campaign.path}: recording '{recording}' holds no reading of {', '.join(levels)}; "
+            "there is nothing to learn from"
         )
     problem = make_problem(belief.model, campaign, [recording], outputs)
     now = make_problem(belief.at_work, campaign, [recording], outputs)

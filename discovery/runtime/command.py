@@ -39,8 +39,7 @@ def trusted_model(
     if not allow_unsigned:
         raise UserError(
             f"{model}: no key is trusted, so the model is not run; say --trust KEY.pub of the key that "
-            f"signed it, "
-            "or --allow-unsigned to try it where no machine hangs on it"
+            "signed it, or --allow-unsigned to try it where no machine hangs on it"
         )
     return exported, None
 
@@ -139,8 +138,8 @@ def go_back(folder: Path, say: Say) -> None:
     """One step back to the model before."""
     back = step_back(folder)
     say(
-        f"revision {back.revision} of '{back.model.name}' is at work again; its offsets begin where the "
-        f"last ones were"
+        f"revision {back.revision} of '{back.model.name}' is at work again; its offsets "
+        "begin where the last ones were"
     )
 
 
@@ -156,8 +155,8 @@ def _open(path: Path) -> TextIO:
         raise UserError(f"{path}: this is a folder; name a CSV file in it")
     if not path.is_file():
         raise UserError(
-            f"{path}: there is no such file; name a CSV file with the columns time and the inputs of the "
-            f"model, or -"
+            f"{path}: there is no such file; name a CSV file with the columns time and the "
+            "inputs of the model, or -"
         )
     if path.suffix == ".gz":
         return gzip.open(path, "rt", encoding="utf-8", errors="replace", newline="")

@@ -114,8 +114,8 @@ class Link:
                 )
             if writes and ua.AccessLevel.CurrentWrite not in await node.get_user_access_level():
                 raise UserError(
-                    f"{self.form.url}: {node_id} for '{name}' cannot be written by this user; grant write "
-                    f"access to it"
+                    f"{self.form.url}: {node_id} for '{name}' cannot be written by this "
+                    "user; grant write access to it"
                 )
             self.kinds[name] = kind
 

@@ -37,8 +37,8 @@ class Update:
             lines.append("the model stays as it is")
         else:
             lines.append(
-                f"{self.path}: the next revision; `discovery compensate` runs it in the shadow of the one "
-                f"at work first"
+                f"{self.path}: the next revision; `discovery compensate` runs it in the "
+                "shadow of the one at work first"
             )
         return lines
 
