@@ -114,29 +114,3 @@ def _mask(recording: Recording, outputs: Sequence[str], window: Window) -> Recor
         series[hidden & (np.cumsum(np.isfinite(series)) > 1)] = np.nan
         values[name] = series
     return replace(recording, values=values)
-
-
-def parts_of_the_paper(campaign: Campaign, fit: Sequence[str], held_out: Sequence[str]) -> dict[str, str]:
-    """Which recording plays which part of the paper: "test cycle", "2. test cycle", "left side", "100 mm".
-
-    The left nozzle is told by a channel of role nozzle side or by its name, the 100 mm by a nozzle height of
-    100.
-    """
-    left = [name for name in held_out if "left" in name.lower() or _constant(campaign, name, "nozzle side")]
-    high = [
-        name
-        for name in held_out
-        if name not in left and (_constant(campaign, name, "nozzle height") or 0.0) > 75.0
-    ]
-    plain = [name for name in held_out if name not in left and name not in high]
-    parts = {"test cycle": fit, "2. test cycle": plain, "left side": left, "100 mm": high}
-    return {part: names[0] for part, names in parts.items() if names}
-
-
-def _constant(campaign: Campaign, recording: str, role: str) -> float | None:
-    """Mean of the first channel of a role."""
-    for channel in campaign.channels.values():
-        values = campaign.recordings[recording].values.get(channel.name)
-        if channel.role == role and values is not None and np.isfinite(values).any():
-            return float(np.nanmean(values))
-    return None

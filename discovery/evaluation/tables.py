@@ -25,8 +25,7 @@ def table_1(results: Mapping[str, Any], model: str, recordings: Mapping[str, str
 
     Args:
         results: content of results.json.
-        recordings: column of the paper -> recording that plays its part (see
-            `crossvalidation.parts_of_the_paper`).
+        recordings: column of the paper -> recording that plays its part (see `paper.parts_of_the_paper`).
     """
     found = results["models"][model]["recordings"]
     header = ["Error"]

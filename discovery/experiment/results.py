@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import discovery
-from discovery.evaluation.crossvalidation import parts_of_the_paper
+from discovery.evaluation.paper import parts_of_the_paper
 from discovery.evaluation.shares import term_shares
 from discovery.experiment.experiment import Experiment
 from discovery.experiment.inputfiles import hashes, input_files

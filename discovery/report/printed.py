@@ -102,7 +102,7 @@ def paper_tables(run: Run) -> list[Printed]:
     scored = [r for r in recordings if any(r in model.get("recordings", {}) for model in found.values())]
     order = ranked(run)
     out = [printed(_in_units(run, tables.table_3(run.results, r, order)), left=[1]) for r in scored]
-    parts = run.results.get("parts") or _parts(run)
+    parts = run.results.get("parts") or {}
     for model in order:
         if "thermobalance" in (model, kind(run, model)) and found[model].get("recordings") and parts:
             out.insert(0, printed(tables.table_1(run.results, model, parts)))
@@ -114,20 +114,6 @@ def _in_units(run: Run, table: tables.Table) -> tables.Table:
     """The table with each error named in its unit."""
     rows = ((with_unit(str(error), run.unit(str(error))), *cells) for error, *cells in table.rows)
     return replace(table, rows=tuple(rows))
-
-
-def _parts(run: Run) -> dict[str, str]:
-    """Which recording plays which part of Table 1: first fitted, first unseen, first whose name says left."""
-    left = next(
-        (name for name in [*run.held_out, *run.results.get("fit", [])] if "left" in name.lower()), None
-    )
-    fit = next(iter(run.results.get("fit", [])), None)
-    second = next((name for name in run.held_out if name != left), None)
-    return {
-        part: name
-        for part, name in {"test cycle": fit, "2. test cycle": second, "left side": left}.items()
-        if name
-    }
 
 
 def rms_tables(run: Run) -> list[Printed]:

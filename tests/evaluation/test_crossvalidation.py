@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from discovery.evaluation.crossvalidation import cross_validate, folds, parts_of_the_paper
+from discovery.evaluation.crossvalidation import cross_validate, folds
+from discovery.evaluation.paper import parts_of_the_paper
 from discovery.models import Model
 from discovery.models.reduced import reduced
 from discovery.recordings import Campaign, Channel, Recording
