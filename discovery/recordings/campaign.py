@@ -20,7 +20,7 @@ from discovery.recordings.roles import ROLES, Between, is_input
 from discovery.recordings.units import Conversion, UnitError, conversion
 from discovery.schema import suggest
 
-FloatArray = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ class Recording:
     """
 
     name: str
-    time: FloatArray
-    values: Mapping[str, FloatArray]
+    time: Array
+    values: Mapping[str, Array]
     note: str = ""
     origin: str | None = None
     start: float = 0.0
@@ -115,7 +115,7 @@ def wanted_columns(form: RecordingForm, channels: Mapping[str, ChannelForm]) -> 
 
 def channel_values(
     columns: Columns, form: RecordingForm, channels: Mapping[str, ChannelForm], to: Mapping[str, Conversion]
-) -> dict[str, FloatArray]:
+) -> dict[str, Array]:
     """Each channel that the file or `set` gives, (T,), in its canonical unit."""
     raw = {
         name: columns.values[column]

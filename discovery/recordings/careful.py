@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from discovery.recordings.clock import is_instant, parse_instant, seconds_between
-from discovery.recordings.columns import EMPTY_CELLS, TIME, Columns, FloatArray
+from discovery.recordings.columns import EMPTY_CELLS, TIME, Array, Columns
 from discovery.recordings.finding import Finding
 
 _SEPARATORS = {",": "a comma", ";": "a semicolon", "\t": "a tab", "|": "a bar"}
@@ -180,9 +180,7 @@ def _short(text: str) -> str:
     return text if len(text) <= 30 else f"{text[:27]}..."
 
 
-def _clock(
-    stamps: Sequence[float | datetime], line: int, troubles: _Troubles
-) -> tuple[FloatArray, str | None]:
+def _clock(stamps: Sequence[float | datetime], line: int, troubles: _Troubles) -> tuple[Array, str | None]:
     instants = [stamp for stamp in stamps if isinstance(stamp, datetime)]
     if not instants:
         return np.array(stamps, dtype=np.float64), None

@@ -11,7 +11,7 @@ from discovery.files import Key, dotted, locate, parse_toml, read_text
 from discovery.recordings.campaign import Channel, channel_values, make_channel, wanted_columns
 from discovery.recordings.campaignfile import CampaignForm, RecordingForm, campaign_path
 from discovery.recordings.clockcheck import clock_findings
-from discovery.recordings.columns import TIME, Columns, FloatArray
+from discovery.recordings.columns import TIME, Array, Columns
 from discovery.recordings.correction import pair_corrections
 from discovery.recordings.correctioncheck import correction_findings
 from discovery.recordings.finding import Finding
@@ -154,7 +154,7 @@ def _content_findings(
     columns: Columns,
     channels: Mapping[str, Channel],
     recording: RecordingForm,
-    values: Mapping[str, FloatArray],
+    values: Mapping[str, Array],
 ) -> Iterator[Finding]:
     for name, column in values.items():
         yield from range_findings(file, columns.lines, channels[name], column)

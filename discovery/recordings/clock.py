@@ -6,7 +6,7 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 def is_instant(text: str) -> bool:
@@ -23,7 +23,7 @@ def parse_instant(text: str) -> datetime:
     return datetime.fromisoformat(text.strip())
 
 
-def seconds_between(instants: Sequence[datetime]) -> FloatArray:
+def seconds_between(instants: Sequence[datetime]) -> Array:
     """Seconds since the first instant, (T,).
 
     Instants with and without a zone cannot be compared: raises ValueError.

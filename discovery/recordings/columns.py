@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+Array = NDArray[np.float64]
 Lines = NDArray[np.int64]
 
 TIME = "time"
@@ -22,8 +22,8 @@ class Columns:
     """
 
     header: tuple[str, ...]
-    time: FloatArray
-    values: Mapping[str, FloatArray]
+    time: Array
+    values: Mapping[str, Array]
     lines: Lines
     origin: str | None = None
 

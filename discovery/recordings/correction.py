@@ -18,7 +18,7 @@ from discovery.recordings.campaignfile import ChannelForm
 from discovery.recordings.roles import CORRECTION, ROLES, Between
 from discovery.schema import suggest
 
-FloatArray = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 def pair_corrections(
@@ -74,11 +74,11 @@ def corrected_by_name(correction: str, errors: Sequence[str], *, only: bool) -> 
 
 def uncompensated(
     where: str,
-    time: FloatArray,
-    values: Mapping[str, FloatArray],
+    time: Array,
+    values: Mapping[str, Array],
     channels: Mapping[str, ChannelForm],
     pairs: Mapping[str, str],
-) -> dict[str, FloatArray]:
+) -> dict[str, Array]:
     """The values of a recording with each error as it were without compensation.
 
     A reading before the first known correction is left out: nobody knows what it lacks.
@@ -104,7 +104,7 @@ def uncompensated(
     return found
 
 
-def at_every_row(time: FloatArray, values: FloatArray, between: Between) -> FloatArray:
+def at_every_row(time: Array, values: Array, between: Between) -> Array:
     """A channel (T,) at every row, held or straight between its values; NaN before the first one.
 
     >>> import numpy as np

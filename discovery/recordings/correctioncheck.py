@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from discovery.recordings.columns import Columns, FloatArray
+from discovery.recordings.columns import Array, Columns
 from discovery.recordings.finding import Finding, more
 from discovery.recordings.inputcheck import inside, long_gaps
 
@@ -13,7 +13,7 @@ _LEAST = 0.1  # um, um/m: no controller corrects in finer steps
 
 
 def correction_findings(
-    file: Path, columns: Columns, values: Mapping[str, FloatArray], pairs: Mapping[str, str]
+    file: Path, columns: Columns, values: Mapping[str, Array], pairs: Mapping[str, str]
 ) -> Iterator[Finding]:
     """A correction that is known nowhere (an error), or not where its error was read, or too small to be one.
 
@@ -27,7 +27,7 @@ def correction_findings(
 
 
 def _findings(
-    file: Path, columns: Columns, name: str, error: str, values: Mapping[str, FloatArray]
+    file: Path, columns: Columns, name: str, error: str, values: Mapping[str, Array]
 ) -> Iterator[Finding]:
     known, read = np.isfinite(values[name]), np.isfinite(values[error])
     if not known.any():

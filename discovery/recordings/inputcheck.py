@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.recordings.campaign import Channel
-from discovery.recordings.columns import Columns, FloatArray
+from discovery.recordings.columns import Array, Columns
 from discovery.recordings.finding import Finding, more
 
 _GAP = 20.0  # a stretch of so many usual steps without a value is a gap
 
 
 def input_findings(
-    file: Path, columns: Columns, channels: Mapping[str, Channel], values: Mapping[str, FloatArray]
+    file: Path, columns: Columns, channels: Mapping[str, Channel], values: Mapping[str, Array]
 ) -> Iterator[Finding]:
     """Inputs without any value (an error) or with long empty stretches, and readings in those (warnings)."""
     uncovered = {}
@@ -35,7 +35,7 @@ def input_findings(
             yield from _alone(file, columns, name, np.isfinite(column), uncovered)
 
 
-def long_gaps(time: FloatArray, known: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def long_gaps(time: Array, known: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last row of each long stretch of rows without a value."""
     rows = np.flatnonzero(known)
     usual = float(np.median(np.diff(time[rows]))) if rows.size > 1 else 0.0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from discovery.recordings.clock import is_instant, parse_instant, seconds_between
-from discovery.recordings.columns import EMPTY_CELLS, TIME, Columns, FloatArray
+from discovery.recordings.columns import EMPTY_CELLS, TIME, Array, Columns
 
 
 def read_quick_csv(data: bytes, wanted: Collection[str]) -> Columns | None:
@@ -104,7 +104,7 @@ def _instant(stamp: datetime | str | None) -> datetime:
     return stamp.astimezone(UTC) if stamp.tzinfo else stamp
 
 
-def _floats(column: Any) -> FloatArray:
+def _floats(column: Any) -> Array:
     """Numbers as floats, (T,); null and NaN both mean not measured.
 
     Read from Arrow's own buffers: its conversions to numpy would import pandas.

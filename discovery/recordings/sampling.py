@@ -5,10 +5,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from discovery.recordings.campaign import Channel, Recording
 
-FloatArray = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
-def sample_input(recording: Recording, channel: Channel, at_times: ArrayLike) -> FloatArray:
+def sample_input(recording: Recording, channel: Channel, at_times: ArrayLike) -> Array:
     """The input `channel` at `at_times` [s since the start of the recording], (T,), in the channel's unit.
 
     Held: the last known value. Linear: straight between known stamps. Before the first known stamp its value
@@ -28,5 +28,5 @@ def sample_input(recording: Recording, channel: Channel, at_times: ArrayLike) ->
     stamps, values = recording.time[known], values[known]
     if channel.between == "linear":
         return np.interp(at, stamps, values)
-    held: FloatArray = values[np.maximum(np.searchsorted(stamps, at, side="right") - 1, 0)]
+    held: Array = values[np.maximum(np.searchsorted(stamps, at, side="right") - 1, 0)]
     return held

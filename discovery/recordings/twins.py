@@ -6,10 +6,10 @@ from collections.abc import Collection, Iterable, Iterator
 import numpy as np
 
 from discovery.recordings.campaign import Campaign
-from discovery.recordings.columns import FloatArray
+from discovery.recordings.columns import Array
 
 
-def fingerprint(time: FloatArray, readings: Iterable[FloatArray]) -> str | None:
+def fingerprint(time: Array, readings: Iterable[Array]) -> str | None:
     """The same for two recordings with the same stamps since their first and the same readings, each (T,).
 
     Inputs do not count: a copy with another constant is still a copy. None where nothing varies, since two

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from discovery.recordings.campaign import Channel
-from discovery.recordings.columns import FloatArray, Lines
+from discovery.recordings.columns import Array, Lines
 from discovery.recordings.finding import Finding, more
 from discovery.recordings.roles import ROLES
 
@@ -23,7 +23,7 @@ _AGREE = 0.1  # of that distance: what the neighbours differ by
 _SENSORS = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature", "error")
 
 
-def range_findings(file: Path, lines: Lines, channel: Channel, column: FloatArray) -> Iterator[Finding]:
+def range_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
     """Values that the role cannot have (errors) or seldom has (warnings). `column` (T,): canonical unit."""
     limits = ROLES[channel.role].ranges.get(channel.unit)
     if limits is None:
@@ -42,13 +42,13 @@ def range_findings(file: Path, lines: Lines, channel: Channel, column: FloatArra
         yield Finding("warning", file, int(lines[unusual[0]]), what + more(unusual.size), do)
 
 
-def below_zero(column: FloatArray) -> Lines:
+def below_zero(column: Array) -> Lines:
     """Rows of a heat load that takes heat away, beyond the noise around zero."""
     largest = float(np.nanmax(np.abs(column), initial=0.0))
     return np.flatnonzero(column < -_NEAR_ZERO * largest)
 
 
-def load_findings(file: Path, lines: Lines, channel: Channel, column: FloatArray) -> Iterator[Finding]:
+def load_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
     """A heat load that is counted below zero: a discharge, a brake, a sign turned round.
 
     What a controller sends, in percent or steps, may heat and cool in turn; watts of heat may not.
@@ -62,11 +62,11 @@ def load_findings(file: Path, lines: Lines, channel: Channel, column: FloatArray
     yield Finding("warning", file, int(lines[rows[0]]), what + more(rows.size), do)
 
 
-def _outside(column: FloatArray, limits: tuple[float, float]) -> Lines:
+def _outside(column: Array, limits: tuple[float, float]) -> Lines:
     return np.flatnonzero((column < limits[0]) | (column > limits[1]))  # NaN is neither
 
 
-def frozen_findings(file: Path, lines: Lines, channel: Channel, column: FloatArray) -> Iterator[Finding]:
+def frozen_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
     """A sensor that repeats one value far longer than it does elsewhere in the recording.
 
     When a reading differs from the one before with probability p, the longest run of equal readings among n
@@ -97,7 +97,7 @@ def frozen_findings(file: Path, lines: Lines, channel: Channel, column: FloatArr
         )
 
 
-def lone_findings(file: Path, lines: Lines, channel: Channel, column: FloatArray) -> Iterator[Finding]:
+def lone_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
     """A single reading far from both neighbours, which agree: a loose contact, a lost byte."""
     known = np.flatnonzero(np.isfinite(column))
     if channel.role not in _SENSORS or channel.unit not in _LEAST or known.size < FEW:
@@ -120,7 +120,7 @@ def lone_findings(file: Path, lines: Lines, channel: Channel, column: FloatArray
         yield Finding("warning", file, int(lines[known[first]]), what + more(lone.size), do)
 
 
-def few_findings(file: Path, channel: Channel, column: FloatArray) -> Iterator[Finding]:
+def few_findings(file: Path, channel: Channel, column: Array) -> Iterator[Finding]:
     """A measured channel with so few readings that no model can be judged by them."""
     count = int(np.isfinite(column).sum())
     if count < FEW:
