@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from discovery.errors import UserError
-from discovery.firsthour.rows import Sheet, is_number, is_word
+from discovery.firsthour.rows import Sheet, holds_word, is_number
 from discovery.firsthour.words import TEMPERATURES, plain, role_of
 
 _MOST = 50  # sensors
@@ -68,7 +68,7 @@ def _in_turn(cells: Sequence[str]) -> bool:
 
 
 def _is_words(cells: Sequence[str]) -> bool:
-    return all(is_word(cell) for cell in set(cells))
+    return all(holds_word(cell) for cell in set(cells))
 
 
 def _numbered(name: str, cells: Sequence[str]) -> bool:

@@ -84,11 +84,11 @@ def _width(rows: Sequence[Row]) -> int:
 def _one_mark_less(rows: list[Row]) -> list[Row]:
     """A mark behind the last name alone, or behind the last number alone, ends no column."""
     width = _width(rows)
-    names = next((cells for _, cells in rows if len(cells) > 1 and all(map(is_word, cells))), [])
+    names = next((cells for _, cells in rows if len(cells) > 1 and all(map(holds_word, cells))), [])
     if len(names) == width - 1 and not any(cells[-1] for _, cells in rows if len(cells) == width):
         return [(line, cells[: width - 1] if len(cells) == width else cells) for line, cells in rows]
     ended = [
-        len(cells) == width + 1 and cells[-1] == "" and all(map(is_word, cells[:-1])) for _, cells in rows
+        len(cells) == width + 1 and cells[-1] == "" and all(map(holds_word, cells[:-1])) for _, cells in rows
     ]
     return [(line, cells[:-1] if cut else cells) for cut, (line, cells) in zip(ended, rows, strict=True)]
 
@@ -96,7 +96,7 @@ def _one_mark_less(rows: list[Row]) -> list[Row]:
 def _compare(path: Path, above: Sequence[Row], width: int) -> None:
     """Raise a UserError where the line above the rows is a header with more or fewer names than they have."""
     line, names = above[-1] if above else (0, [])
-    if len(names) > 1 and all(is_word(name) for name in names):
+    if len(names) > 1 and all(holds_word(name) for name in names):
         raise UserError(
             f"{path}, line {line}: the header has {len(names)} names, the rows {width} cells; "
             f"{'add the missing names' if len(names) < width else 'a name too many or a column is missing'}"
@@ -113,7 +113,7 @@ def is_stamp(cell: str) -> bool:
     return bool(re.match(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?!\d)|\d{1,3}:\d{2}(:\d{2})?", cell))
 
 
-def is_word(cell: str) -> bool:
+def holds_word(cell: str) -> bool:
     """Whether a cell holds neither a number nor a switch nor a word for "not measured"."""
     return not is_number(cell) and cell.lower() not in _EMPTY and cell.lower() not in _SWITCH
 

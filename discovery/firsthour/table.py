@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from discovery.errors import UserError
 from discovery.firsthour.clocks import is_clock
 from discovery.firsthour.longform import long_notes
-from discovery.firsthour.rows import is_word, number, read_sheet
+from discovery.firsthour.rows import holds_word, number, read_sheet
 from discovery.firsthour.stamps import find_clock
+from discovery.naming import is_taken, is_word
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,7 @@ def read_own(path: Path) -> OwnTable:
             continue
         cells = [row[index] for _, row in sheet.body]
         header = sheet.header[index]
-        if all(is_word(cell) for cell in cells if cell) and any(cells):
+        if all(holds_word(cell) for cell in cells if cell) and any(cells):
             notes.append(f"column '{header}' holds words: left out")
             continue
         values = np.array(
@@ -98,20 +99,7 @@ def _identifier(words: str, taken: set[str]) -> str:
     name = re.sub(r"\W+", "_", words.replace("°", ""), flags=re.ASCII).strip("_") or "channel"
     name = f"x_{name}" if name[0].isdigit() else name
     base, count = name, 1
-    while name in taken or name in (
-        "lambda",
-        "in",
-        "is",
-        "if",
-        "or",
-        "as",
-        "min",
-        "max",
-        "abs",
-        "exp",
-        "log",
-        "lag",
-    ):
+    while name in taken or is_taken(name) or not is_word(name):
         count += 1
         name = f"{base}_{count}"
     taken.add(name)
