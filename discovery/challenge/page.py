@@ -20,34 +20,34 @@ _HERE = Path(__file__).parent
 
 def render(seal: Mapping[str, Any], changed: Sequence[str], tallies: Mapping[str, Tally]) -> str:
     """The page as HTML."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
-    from discovery.report import page
+    from discovery.report.page import style, templates
 
     ours = tallies[WORKBENCH]
     charts = [{**f, "svg": Markup(f["svg"])} for f in all_figures(tallies, ours)]
-    environment = Environment(
-        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    return environment.get_template("page.html.j2").render(
-        css=Markup((Path(page.__file__).parent / "page.css").read_text("utf-8")),
-        version=__version__,
-        headline=headline(ours),
-        figures=_figures(ours),
-        table=rows(tallies),
-        aims={line.title: line.reached(ours) for line in LINES},
-        charts=[c for c in charts if not c.get("wide")],
-        wide=[c for c in charts if c.get("wide")],
-        behind=behind(tallies),
-        power=power_rows(ours),
-        reliability=reliability_rows(ours),
-        wrong=[_row(s) for s in wrong(ours)],
-        cases=[_row(s) for s in ours.scored],
-        seal=seal,
-        changed=list(changed),
-        upper=f"{100 * ours.false_alarms.upper():.1f} %",
-        quiet=ours.false_alarms,
+    return (
+        templates(_HERE)
+        .get_template("page.html.j2")
+        .render(
+            css=style(),
+            version=__version__,
+            headline=headline(ours),
+            figures=_figures(ours),
+            table=rows(tallies),
+            aims={line.title: line.reached(ours) for line in LINES},
+            charts=[c for c in charts if not c.get("wide")],
+            wide=[c for c in charts if c.get("wide")],
+            behind=behind(tallies),
+            power=power_rows(ours),
+            reliability=reliability_rows(ours),
+            wrong=[_row(s) for s in wrong(ours)],
+            cases=[_row(s) for s in ours.scored],
+            seal=seal,
+            changed=list(changed),
+            upper=f"{100 * ours.false_alarms.upper():.1f} %",
+            quiet=ours.false_alarms,
+        )
     )
 
 

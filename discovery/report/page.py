@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,10 @@ from discovery.report.printed import paper_tables, rms_tables, summary
 from discovery.report.ranking import is_error, origin, ranked
 from discovery.report.run import Run, load_run
 from discovery.report.text import listed
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
 
 _HERE = Path(__file__).parent
 _BUDGET = 300_000  # numbers that all curves of a page may hold together, below 2 MB
@@ -91,25 +95,40 @@ def charts_of(run: Run) -> list[Chart]:
 
 def fill(template: str, view: Mapping[str, Any], charts: Sequence[Chart]) -> str:
     """A template with its view, style, script and the data of its charts."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(
-        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
     curves = sum(len(panel.series) for chart in charts for panel in chart.panels)
     most = int(np.clip(_BUDGET / max(curves, 1) / 2, 120, 1500))
     data = json.dumps(payload(list(charts), most), separators=(",", ":"), allow_nan=False).replace(
         "<", "\\u003c"
     )
-    return environment.get_template(template).render(
-        **view,
-        contents=_contents(view),
-        version=__version__,
-        css=Markup((_HERE / "page.css").read_text("utf-8")),
-        script=Markup((_HERE / "charts.js").read_text("utf-8")),
-        data=Markup(data),
+    return (
+        templates(_HERE)
+        .get_template(template)
+        .render(
+            **view,
+            contents=_contents(view),
+            version=__version__,
+            css=style(),
+            script=Markup((_HERE / "charts.js").read_text("utf-8")),
+            data=Markup(data),
+        )
     )
+
+
+def templates(folder: Path) -> Environment:
+    """The templates of a folder; a name that a view does not have is a mistake, not an empty text."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    loader = FileSystemLoader(folder)
+    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+
+
+def style() -> Markup:
+    """The style sheet of all pages."""
+    from markupsafe import Markup
+
+    return Markup((_HERE / "page.css").read_text("utf-8"))
 
 
 def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
