@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.recordings import Campaign, Recording
@@ -65,7 +66,7 @@ def campaign_from_frames(
     return Campaign(name, made, recordings, Path(name))
 
 
-def _seconds(key: str, frame: pd.DataFrame) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _seconds(key: str, frame: pd.DataFrame) -> NDArray[np.float64]:
     import pandas as pd
 
     index = frame.index

@@ -37,13 +37,13 @@ class Share:
         high = float(beta.ppf(1 - tail, k + 1, n - k)) if k < n else 1.0
         return low, high
 
-    def upper(self, level: float = 0.95) -> float:
-        """Exact one-sided upper bound of the share.
+    def upper(self) -> float:
+        """Exact one-sided upper bound of the share, 95 %.
 
         >>> round(Share(0, 50).upper(), 4)  # 1 - 0.05**(1/50)
         0.0582
         """
-        return self.interval(2 * level - 1)[1]
+        return self.interval(0.9)[1]
 
 
 def share(flags: list[bool]) -> Share:

@@ -8,12 +8,13 @@ import subprocess
 import sys
 import tempfile
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from discovery.challenge.seal import CASES
 from discovery.files import write_atomic
+from discovery.progress import Progress
 from discovery.threads import NAMES
 
 SOLVED = "solved"
@@ -29,7 +30,7 @@ def missing(folder: Path, cases: Sequence[str], methods: Sequence[str]) -> dict[
 
 
 def solve_all(
-    folder: Path, cases: Sequence[str], methods: Sequence[str], jobs: int, tell: Callable[[str], None]
+    folder: Path, cases: Sequence[str], methods: Sequence[str], jobs: int, progress: Progress
 ) -> dict[str, str]:
     """Solve what is not solved yet.
 
@@ -48,7 +49,7 @@ def solve_all(
                 if message := future.result():
                     failures[futures[future]] = message
                 rest = (clock.perf_counter() - began) / done * (len(todo) - done)
-                tell(f"solved {solved + done} of {len(cases)} cases, {_span(rest)} to go")
+                progress(f"solved {solved + done} of {len(cases)} cases, {_span(rest)} to go")
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import secrets
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -17,6 +17,7 @@ import numpy as np
 from discovery.challenge.seal import ANSWERS, CASES, SEAL, read_seal, write_seal
 from discovery.errors import UserError
 from discovery.files import read_text, write_atomic
+from discovery.progress import Progress
 from discovery.virtual.cases import Case, draw_kinds, make_case
 
 CONTRACT = (
@@ -57,7 +58,7 @@ def make(order: Order) -> Case:
     return make_case(order.seed, order.kind, order.name.replace("_", " "))
 
 
-def prepare(folder: Path, count: int, seed: int, jobs: int, tell: Callable[[str], None]) -> dict[str, Any]:
+def prepare(folder: Path, count: int, seed: int, jobs: int, progress: Progress) -> dict[str, Any]:
     """Write and seal `count` cases drawn from `seed`.
 
     Returns:
@@ -74,7 +75,7 @@ def prepare(folder: Path, count: int, seed: int, jobs: int, tell: Callable[[str]
             for name, content in case.files.items():
                 write_atomic(folder / CASES / order.name / name, content)
             answers["cases"][order.name] = case.key
-            tell(f"writing case {done} of {count}")
+            progress(f"writing case {done} of {count}")
     return _close(folder, answers)
 
 

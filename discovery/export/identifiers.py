@@ -18,13 +18,13 @@ def identifier(text: str) -> str:
     return word if word and not word[0].isdigit() else f"m_{word}"
 
 
-def identifiers(names: Sequence[str], taken: frozenset[str] = frozenset()) -> list[str]:
+def identifiers(names: Sequence[str]) -> list[str]:
     """Different identifiers for names, different also when case does not count.
 
     >>> identifiers(["T", "t", "T"])
     ['T', 't_2', 'T_3']
     """
-    used = {word.lower() for word in taken}
+    used: set[str] = set()
     found = []
     for name in names:
         word, k = identifier(name), 1

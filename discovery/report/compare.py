@@ -12,7 +12,7 @@ from discovery.errors import UserError
 from discovery.files import write_atomic
 from discovery.models import Model
 from discovery.report.page import render
-from discovery.report.run import Predictions, Run, load_run
+from discovery.report.run import Array, Predictions, Run, load_run
 
 
 def write_comparison(run_dirs: Sequence[Path], out: Path) -> Path:
@@ -101,9 +101,7 @@ def _predictions(runs: Sequence[Run], labels: Sequence[str], recording: str) -> 
     parts = [run.predictions[recording] for run in runs]
     time = np.unique(np.concatenate([part.time for part in parts]))
 
-    def spread(
-        part: Predictions, values: np.ndarray[Any, np.dtype[np.float64]]
-    ) -> np.ndarray[Any, np.dtype[np.float64]]:
+    def spread(part: Predictions, values: Array) -> Array:
         out = np.full(len(time), np.nan)
         out[np.searchsorted(time, part.time)] = values
         return out

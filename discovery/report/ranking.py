@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeGuard
 
 from discovery.report.run import Run
 
@@ -63,7 +63,7 @@ def ratio(run: Run, model: str, other: str | None) -> float:
 
 
 def _positive(value: object) -> bool:
-    return isinstance(value, int | float) and math.isfinite(value) and value > 0
+    return _is_number(value) and value > 0
 
 
 def ranked(run: Run) -> list[str]:
@@ -93,7 +93,7 @@ def mean_improvement(run: Run, model: str, recording: str | None = None) -> floa
     return sum(found) / len(found) if found else math.nan
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and math.isfinite(value)
 
 

@@ -32,15 +32,15 @@ def weak_rows(
     output: str,
     library: Sequence[Expression],
     constants: Mapping[str, float] | None = None,
-    half_width: float | None = None,
     aliases: Mapping[str, str] | None = None,
 ) -> tuple[Array, Array, Array]:
     """Rows of the weak regression of d(output)/dt on a library, rates per second.
 
+    H is a 36th of the recording and at least 8 readings, at most a quarter.
+
     Args:
         library: expressions of channels and outputs, without memory.
         constants: values of further names.
-        half_width: H [s]; default a 36th of the recording and at least 8 readings. At most a quarter is used.
         aliases: further names of outputs, as {"y": "E_Y0C"}.
 
     Returns:
@@ -48,7 +48,7 @@ def weak_rows(
     """
     span = float(grid.time[-1] - grid.time[0])
     usual = max(_SHARE * span, _READINGS * float(np.median(np.diff(grid.time[grid.read]))))
-    half = min(half_width or usual, span / 4)
+    half = min(usual, span / 4)
     finest = float(np.min(grid.step))
     step = half / max(8, round(half / max(finest, span / _MOST_POINTS)))
     time = np.arange(grid.time[0], grid.time[-1] + 1e-6 * step, step)
