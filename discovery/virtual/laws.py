@@ -54,36 +54,44 @@ def body_law(
 
 
 def always(u: Inputs) -> Array:
+    """1 at every step, (n,)."""
     return np.ones_like(u.air)
 
 
 def while_pumping(u: Inputs) -> Array:
+    """The pump, 0 or 1, (n,)."""
     return u.pump
 
 
 def fluid(u: Inputs) -> Array:
+    """Temperature of the fluid, (n,) degC."""
     return u.fluid
 
 
 def speed_power(p: float) -> Callable[[Inputs], Array]:
+    """(n/600)^p of the speed n in rpm."""
     return lambda u: np.asarray((u.speed / 600.0) ** p)
 
 
 def wet_speed_power(p: float) -> Callable[[Inputs], Array]:
+    """pump (n/600)^p of the speed n in rpm."""
     return lambda u: np.asarray(u.pump * (u.speed / 600.0) ** p)
 
 
 def one_of(rng: Draw, places: tuple[int, ...]) -> int:
+    """One of some bodies, drawn."""
     return int(rng.choice(places))
 
 
 def fluid_convection(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size pump (T_fluid - T) at a body that the baseline takes for dry."""
     b = one_of(rng, (2, 3, 4))
     law = body_law(chains.TO_REF, b, while_pumping, fluid)
     return Concealed("fluid_convection", (BODIES[b],), law, "W/K", 20.0, 60.0, "pump > 0.5")
 
 
 def fluid_convection_speed(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size pump (n/600)^m (T_fluid - T), m 0.5 to 0.9."""
     b, m = one_of(rng, WET), rng.uniform(0.5, 0.9)
     law = body_law(chains.TO_REF, b, wet_speed_power(m), fluid)
     shape, also = {"m": m}, ("rim_detachment",) if b == 1 else ()
@@ -122,12 +130,14 @@ def evaporation_drying(rng: Draw, _: FineMachine) -> Concealed:
 
 
 def film_drag(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size pump (n/600)^m at the table, m 1.8 to 2.2."""
     p = rng.uniform(1.8, 2.2)
     law = body_law(chains.HEAT, 0, wet_speed_power(p))
     return Concealed("film_drag", (BODIES[0],), law, "W", 30.0, 150.0, "pump > 0.5 and speed > 600", {"m": p})
 
 
 def flooded_gap(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size pump (T_1 - T_2) between C-Body 1 and the B corpus."""
     del rng
     law = body_law(chains.LINK, 1, while_pumping, out=3)
     return Concealed("flooded_gap", (BODIES[1], BODIES[3]), law, "W/K", 30.0, 90.0, "pump > 0.5")
@@ -147,12 +157,14 @@ def fluid_delay(rng: Draw, m: FineMachine) -> Concealed:
 
 
 def friction_speed(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size (n/600)^m that the recorded power does not show, m 1.3 to 1.9."""
     b, p = one_of(rng, LOSSES), rng.uniform(1.3, 1.9)
     law = body_law(chains.HEAT, b, speed_power(p))
     return Concealed("friction_speed", (BODIES[b],), law, "W", 50.0, 250.0, "speed > 0", {"m": p})
 
 
 def viscosity_temperature(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size (n/600)^m exp(-k (T - 22)), k 0.025 to 0.04 1/K."""
     b, p, k = one_of(rng, (1, 2)), rng.uniform(1.3, 1.9), rng.uniform(0.025, 0.04)
     law = body_law(chains.EXPONENT, b, speed_power(p), shape=(-k, 0.0, 1.0))
     shape, also = {"k": k, "m": p}, ("friction_speed",)
@@ -162,18 +174,21 @@ def viscosity_temperature(rng: Draw, _: FineMachine) -> Concealed:
 
 
 def thermal_preload(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size (n/600)^m (T - T_b_corpus) at C-Body 1."""
     p = rng.uniform(0.9, 1.2)
     law = body_law(chains.DRIVEN, 1, speed_power(p), out=3)
     return Concealed("thermal_preload", (BODIES[1],), law, "W/K", 5.0, 15.0, "speed > 0", {"m": p})
 
 
 def rotating_air_convection(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size (n/600)^m (T_env - T), m 0.6 to 0.9."""
     b, p = one_of(rng, (0, 1)), rng.uniform(0.6, 0.9)
     law = body_law(chains.TO_REF, b, speed_power(p))
     return Concealed("rotating_air_convection", (BODIES[b],), law, "W/K", 8.0, 30.0, "speed > 0", {"m": p})
 
 
 def natural_convection(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size (|dT|/5)^m dT with dT = T_env - T, m 0.2 to 0.3."""
     b, p = one_of(rng, (0, 1, 2, 3, 4)), rng.uniform(0.2, 0.3)
     law = body_law(chains.POWER, b, always, shape=(p, 0.0, 1.0))
     return Concealed(
@@ -182,6 +197,7 @@ def natural_convection(rng: Draw, _: FineMachine) -> Concealed:
 
 
 def conduction_path(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size (T_1 - T_2) between two bodies that the baseline does not link."""
     missing = [(i, j) for i in range(5) for j in range(i + 1, 5) if (i, j) not in LINKS]
     i, j = missing[int(rng.integers(len(missing)))]
     law = body_law(chains.LINK, i, always, out=j)
@@ -189,6 +205,7 @@ def conduction_path(rng: Draw, _: FineMachine) -> Concealed:
 
 
 def second_thermal_mass(rng: Draw, _: FineMachine) -> Concealed:
+    """A hidden mass of 0.5 to 2 h hangs on a body by `size`."""
     b, tau = one_of(rng, (0, 1, 2, 3)), rng.uniform(1800, 7200)
     law = body_law(chains.HIDDEN_MASS, b, always, shape=(tau, 0.0, 1.0))
     return Concealed(
@@ -197,12 +214,14 @@ def second_thermal_mass(rng: Draw, _: FineMachine) -> Concealed:
 
 
 def bed_memory(rng: Draw, _: FineMachine) -> Concealed:
+    """q = size (T_bed - T), the bed follows the room in 20 to 50 h."""
     b, tau = one_of(rng, (3, 4)), rng.uniform(20, 50) * 3600
     law = body_law(chains.TO_REF, b, always, lambda u: first_order(u.air, tau))
     return Concealed("bed_memory", (BODIES[b],), law, "W/K", 10.0, 40.0, "", {"time_constant_s": tau})
 
 
 def contact_conductance(rng: Draw, m: FineMachine) -> Concealed:
+    """A link conducts 1 + size ((T_1 + T_2)/2 - 22) times as well."""
     k = int(rng.integers(len(LINKS)))
     i, j = LINKS[k]
     law = body_law(chains.CONTACT, i, lambda u: np.full_like(u.air, m.links[k]), out=j)

@@ -42,6 +42,7 @@ def friction_torque(speed: float, m: Machine) -> float:
 
 @njit(cache=True)
 def copper_loss(speed: float, m: Machine) -> float:
+    """Copper loss [W], by the square of the torque."""
     return m.copper * (friction_torque(speed, m) / 6.5) ** 2
 
 
