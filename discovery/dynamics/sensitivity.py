@@ -48,58 +48,51 @@ def sensitivities(
         count: number of candidate owners; default the largest owner plus one.
     """
     system = trajectory.system
-    steps = len(system.grid.step)
     owners = count if count is not None else max((c.owner for c in candidates), default=-1) + 1
-    total = len(parameters) + len(starts) + owners
-    owner: list[int] = []
-    into: list[int] = []
-    source: list[int] = []
-    series: list[Array] = []
-    wanted = frozenset(parameters)
-    if parameters:
-        env = trajectory.at_ends()
-        for term, i, j in zip(system.model.terms, system.into, system.source, strict=True):
-            if wanted.isdisjoint(names(term.expression)):
-                continue
-            dual = evaluate(term.expression, env, wanted, system.ends)
-            for name, partial in dual.partials.items():
-                owner.append(parameters.index(name))
-                into.append(i)
-                source.append(j)
-                series.append(np.broadcast_to(partial, (2 * steps,)))
-    for column in candidates:
-        owner.append(len(parameters) + len(starts) + column.owner)
-        into.append(system.states.index(column.into))
-        source.append(system.states.index(column.source) if column.source else -1)
-        series.append(np.broadcast_to(column.series, (2 * steps,)))
+    first = len(parameters) + len(starts)
+    moved = _moved_terms(trajectory, parameters) if parameters else []
+    pieces = [*moved, *candidates]
+    owner = [piece.owner for piece in moved] + [first + piece.owner for piece in candidates]
+    place = {name: i for i, name in enumerate(system.states)}
+    into = np.array([place[piece.into] for piece in pieces], dtype=np.int64)
+    source = np.array([place[p.source] if p.source else -1 for p in pieces], dtype=np.int64)
+    steps = len(system.grid.step)
+    series = [np.broadcast_to(piece.series, (2 * steps,)) for piece in pieces]
     stacked = np.array(series).reshape(len(series), steps, 2)
-    left = np.ascontiguousarray(stacked[:, :, 0].T)
-    right = np.ascontiguousarray(stacked[:, :, 1].T)
-    into_index = np.array(into, dtype=np.int64)
-    source_index = np.array(source, dtype=np.int64)
-    read = system.grid.read.astype(np.int64)
     s = kernel.columns(
         trajectory.which,
         trajectory.e,
         trajectory.w0,
         trajectory.w1,
-        _start_slopes(trajectory, parameters, starts, total),
+        _start_slopes(trajectory, parameters, starts, first + owners),
         np.array(owner, dtype=np.int64),
-        into_index,
-        system.scale[into_index],
-        source_index,
-        system.scale[source_index],
-        left,
-        right,
-        read,
+        into,
+        system.scale[into],
+        source,
+        system.scale[source],
+        np.ascontiguousarray(stacked[:, :, 0].T),
+        np.ascontiguousarray(stacked[:, :, 1].T),
+        system.grid.read.astype(np.int64),
     )
     dy: Array = np.einsum("ryn,rnm->rym", output_matrix(trajectory), s)
-    for y, dual in enumerate(outputs(trajectory, wanted) if parameters else []):
+    for y, dual in enumerate(outputs(trajectory, frozenset(parameters)) if parameters else []):
         for name, partial in dual.partials.items():
             dy[:, y, parameters.index(name)] += np.broadcast_to(partial, (len(system.grid.time),))[
                 system.grid.read
             ]
     return dy
+
+
+def _moved_terms(trajectory: Trajectory, parameters: Sequence[str]) -> list[Column]:
+    """How each term moves with each parameter in it; owners count the parameters."""
+    system, wanted = trajectory.system, frozenset(parameters)
+    env = trajectory.at_ends()
+    return [
+        Column(parameters.index(name), term.into, np.asarray(partial), term.source)
+        for term in system.model.terms
+        if not wanted.isdisjoint(names(term.expression))
+        for name, partial in evaluate(term.expression, env, wanted, system.ends).partials.items()
+    ]
 
 
 def _start_slopes(
