@@ -103,11 +103,19 @@ def noise(rng: Draw, n: int, step_s: float, tau_s: float, sd: float) -> Array:
     return np.asarray(lfilter([1.0], [1.0, -keep], drive))
 
 
-def _steps(rng: Draw, n: int, low_h: float, high_h: float, level: Callable[[], float]) -> Array:
-    """Random levels held for random times."""
+def steps(
+    rng: Draw,
+    n: int,
+    low_h: float,
+    high_h: float,
+    level: Callable[[], float],
+    step_s: float = STEP_S,
+    least: int = 1,
+) -> Array:
+    """Random levels (n,) held for random times, from `low_h` to `high_h` [h] and at least `least` steps."""
     values, at = np.empty(n), 0
     while at < n:
-        end = at + max(1, round(rng.uniform(low_h, high_h) * HOUR / STEP_S))
+        end = at + max(least, round(rng.uniform(low_h, high_h) * HOUR / step_s))
         values[at:end] = level()
         at = end
     return values
@@ -115,9 +123,9 @@ def _steps(rng: Draw, n: int, low_h: float, high_h: float, level: Callable[[], f
 
 def _random_speed(rng: Draw, n: int) -> Array:
     """Random speed pattern: jobs of 6 to 18 h with their own speeds, one twelfth of the time at rest."""
-    job = _steps(rng, n, 6, 18, lambda: float(rng.integers(400, 1200)))
-    around = _steps(rng, n, 0.3, 3.0, lambda: float(rng.integers(-300, 300)))
-    rest = _steps(rng, n, 0.3, 3.0, lambda: float(rng.uniform() < 0.08))
+    job = steps(rng, n, 6, 18, lambda: float(rng.integers(400, 1200)))
+    around = steps(rng, n, 0.3, 3.0, lambda: float(rng.integers(-300, 300)))
+    rest = steps(rng, n, 0.3, 3.0, lambda: float(rng.uniform() < 0.08))
     return np.where(rest > 0, 0.0, np.clip(job + around, 100.0, 1200.0))
 
 
@@ -143,19 +151,19 @@ def _dry(rng: Draw, n: int) -> _Pattern:
 
 def _flow(rng: Draw, n: int) -> _Pattern:
     """As the wet cycle, with the flow in steps."""
-    flow = _steps(rng, n, 0.5, 3.0, lambda: float(rng.choice([0.0, 0.25, 0.5, 0.75, 1.0])))
+    flow = steps(rng, n, 0.5, 3.0, lambda: float(rng.choice([0.0, 0.25, 0.5, 0.75, 1.0])))
     return _Pattern(room(rng, n), _random_speed(rng, n), flow, np.zeros(n), 25.0)
 
 
 def _environment(rng: Draw, n: int) -> _Pattern:
     """Only the room changes: machine at rest, pump off."""
-    air = room(rng, n, daily=2.0, weather=0.8) + _steps(rng, n, 8, 16, lambda: float(rng.uniform(-1.5, 1.5)))
+    air = room(rng, n, daily=2.0, weather=0.8) + steps(rng, n, 8, 16, lambda: float(rng.uniform(-1.5, 1.5)))
     return _Pattern(air, np.zeros(n), np.zeros(n), np.zeros(n), 22.0)
 
 
 def _fluid(rng: Draw, n: int) -> _Pattern:
     """Only the fluid changes: tank heated and cooled in steps, table at 60 rpm to be wet all round."""
-    tank = _steps(rng, n, 3, 10, lambda: float(rng.uniform(-900, 300)))
+    tank = steps(rng, n, 3, 10, lambda: float(rng.uniform(-900, 300)))
     return _Pattern(room(rng, n, 0.05, 0.05), np.full(n, 60.0), np.ones(n), tank, 22.0)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.virtual.cycles import HOUR, noise, room
+from discovery.virtual.cycles import HOUR, noise, room, steps
 
 Array = NDArray[np.float64]
 
@@ -93,17 +93,10 @@ def draw_inputs(rng: np.random.Generator, m: FineMachine, hours: float = 72.0) -
     n = round(hours * HOUR / STEP_S)
     t = (np.arange(n) + 0.5) * STEP_S
 
-    def steps(low_h: float, high_h: float, level: Callable[[], float]) -> Array:
-        values, at = np.empty(n), 0
-        while at < n:
-            end = at + max(3, round(rng.uniform(low_h, high_h) * HOUR / STEP_S))
-            values[at:end] = level()
-            at = end
-        return values
-
+    held = partial(steps, rng, n, step_s=STEP_S, least=3)
     top = rng.uniform(1000, 1200)
-    speed = steps(0.3, 3.2, lambda: 0.0 if rng.uniform() < 0.3 else float(rng.uniform(0.12, 1.0) * top))
-    pump = steps(0.5, 4.0, lambda: float(rng.uniform() < 0.55))
+    speed = held(0.3, 3.2, lambda: 0.0 if rng.uniform() < 0.3 else float(rng.uniform(0.12, 1.0) * top))
+    pump = held(0.5, 4.0, lambda: float(rng.uniform() < 0.55))
     air = (
         room(rng, n * 2, rng.uniform(0.8, 1.6), 0.5, rng.uniform(21, 23))[: 2 * n].reshape(n, 2).mean(axis=1)
     )
