@@ -61,21 +61,8 @@ def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
         if told and _is_load(one) and not stated[name] and not on[name]:
             guesses[name] = replace(one, unit=told[0], why=f"{one.why}, in {told[0]} as the others")
     guesses = _signed(columns, _the_fluid(_one_room(_one_unit(columns, guesses))))
-    errors = [name for name, one in guesses.items() if one.role == "error"]
-    corrections = [name for name, one in guesses.items() if one.role == "applied correction"]
-    for name in corrections:
-        one, error = guesses[name], corrected_by_name(name, errors, only=len(corrections) == 1)
-        if not errors:
-            why = f"{one.why}, but there is no error that it could correct"
-            guesses[name] = replace(one, role="other input", why=why, sure=False)
-        elif error is None:
-            why = f'{one.why}; say which error it corrects: corrects = "{errors[0]}"'
-            guesses[name] = replace(one, why=why, sure=False)
-        else:
-            why = f"{one.why}; it is added to {error} (what was added to the position needs sign = -1)"
-            unit = one.unit if stated[name] else guesses[error].unit
-            guesses[name] = replace(one, unit=unit, why=why, sure=False, corrects=error)
-    if errors and not _stated(guesses):
+    guesses = _corrections(columns, guesses)
+    if any(one.role == "error" for one in guesses.values()) and not _stated(guesses):
         for name, one in guesses.items():
             if one.role == "temperature" and one.unit in DEGREES:
                 why = f"{one.why}; an input of the errors, since nothing else says what heats the machine"
@@ -173,6 +160,26 @@ def _the_fluid(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
         [name] = coolants
         why = f"{guesses[name].why}; taken for the fluid of {flows[0]}, as the file has no other"
         found[name] = replace(guesses[name], role="fluid temperature", why=why, sure=False)
+    return found
+
+
+def _corrections(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Which error each applied correction belongs to; without an error it is an input like others."""
+    found, stated = dict(guesses), {column.name: column.unit for column in columns}
+    errors = [name for name, one in guesses.items() if one.role == "error"]
+    corrections = [name for name, one in guesses.items() if one.role == "applied correction"]
+    for name in corrections:
+        one, error = guesses[name], corrected_by_name(name, errors, only=len(corrections) == 1)
+        if not errors:
+            why = f"{one.why}, but there is no error that it could correct"
+            found[name] = replace(one, role="other input", why=why, sure=False)
+        elif error is None:
+            why = f'{one.why}; say which error it corrects: corrects = "{errors[0]}"'
+            found[name] = replace(one, why=why, sure=False)
+        else:
+            why = f"{one.why}; it is added to {error} (what was added to the position needs sign = -1)"
+            unit = one.unit if stated[name] else guesses[error].unit
+            found[name] = replace(one, unit=unit, why=why, sure=False, corrects=error)
     return found
 
 
