@@ -95,6 +95,16 @@ def _exponential(a, h, e, w0, w1):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _equal(a, j, k):  # type: ignore[no-untyped-def]
+    """Whether the matrices at two places of a (K, n, n) are the same, number by number."""
+    for p in range(a.shape[1]):
+        for q in range(a.shape[2]):
+            if a[j, p, q] != a[k, p, q]:
+                return False
+    return True
+
+
+@njit(cache=True)
 def transitions(a, h):  # type: ignore[no-untyped-def]
     """Transition matrices of all intervals, each distinct one computed once.
 
@@ -116,17 +126,7 @@ def transitions(a, h):  # type: ignore[no-untyped-def]
         found = -1
         for u in range(used - 1, max(used - 1 - _LOOKBACK, -1), -1):
             j = first[u]
-            if h[j] != h[k]:
-                continue
-            same = True
-            for p in range(n):
-                for q in range(n):
-                    if a[j, p, q] != a[k, p, q]:
-                        same = False
-                        break
-                if not same:
-                    break
-            if same:
+            if h[j] == h[k] and _equal(a, j, k):
                 found = u
                 break
         if found < 0:

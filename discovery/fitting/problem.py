@@ -165,7 +165,6 @@ def make_problem(
         belief: believe positive start values within a factor exp(belief), with heavy tails; default not at
         all.
     """
-    priors = priors or {}
     model = expanded(model, campaign.channels)
     if outputs is None:
         outputs = [name for name in (*model.outputs, *model.states) if name in campaign.channels]
@@ -176,6 +175,17 @@ def make_problem(
         if grid is None or not set(inputs) <= set(grid.samples) or grid.outputs != tuple(outputs):
             grid = make_grid(campaign, recording, inputs, outputs)
         systems.append(make_system(model, grid.shifted({}) if grid.offset else grid))
+    return Problem(model, tuple(systems), tuple(_unknowns(model, systems, recordings, priors or {}, belief)))
+
+
+def _unknowns(
+    model: Model,
+    systems: Sequence[System],
+    recordings: Sequence[str],
+    priors: Mapping[str, tuple[float, float]],
+    belief: float | None,
+) -> list[Unknown]:
+    """Parameters in the order of the model, then starts and offsets recording by recording."""
     unknowns = []
     for name in model.free:
         p = model.parameters[name]
@@ -198,7 +208,7 @@ def make_problem(
             for n in uncertain(system)
             if (sd := system.grid.spread[n])
         ]
-    return Problem(model, tuple(systems), tuple(unknowns))
+    return unknowns
 
 
 def _belief(value: float, start: float, width: float) -> tuple[float, float]:
