@@ -13,7 +13,7 @@ from discovery.dynamics import Grid
 from discovery.fitting import fit_model
 from discovery.recordings import Campaign
 from discovery.sparse.discovery import Discovery, PathPoint
-from discovery.sparse.folds import PREDICT, Blocks, bootstraps, choose, make_folds
+from discovery.sparse.folds import PREDICT, Blocks, Ints, bootstraps, choose, make_folds
 from discovery.sparse.gram import Gram, solve
 from discovery.sparse.masses import MassLibrary, Response, block_grams, free_run, mass_model, pooled
 from discovery.sparse.optimisers import pysindy_path
@@ -148,22 +148,22 @@ def _left_out(problem: _Problem, options: SparseOptions) -> Array:
         weights = np.ones(data.blocks.count)
         weights[fold] = 0.0
         g = problem.gram(weights)
-        errors = []
-        for support in _path(g, problem, options):
-            theta = solve(g, support, problem.low, problem.high)
-            row = np.full(data.blocks.count, np.nan)
-            for i, (response, readings) in enumerate(zip(data.responses, problem.readings, strict=True)):
-                mine = [b for b in fold if data.blocks.recording[b] == i]
-                if mine:
-                    left = (
-                        readings - free_run(data.library, response, theta, readings, problem.start_sd)
-                    ) ** 2
-                    for b in mine:
-                        row[b] = np.nanmean(left[data.blocks.of[i] == b])
-            errors.append(row)
-        found.append(np.array(errors))
+        thetas = [solve(g, support, problem.low, problem.high) for support in _path(g, problem, options)]
+        found.append(np.array([_missed(problem, theta, fold) for theta in thetas]))
     rows = min(len(errors) for errors in found)
     return np.asarray(np.nansum([errors[:rows] for errors in found], axis=0))
+
+
+def _missed(problem: _Problem, theta: Array, fold: Ints) -> Array:
+    """Mean squared error (B,) of the free run on the blocks of a fold, NaN elsewhere."""
+    blocks = problem.data.blocks
+    row = np.full(blocks.count, np.nan)
+    for i in dict.fromkeys(blocks.recording[fold].tolist()):
+        response, readings = problem.data.responses[i], problem.readings[i]
+        run = free_run(problem.data.library, response, theta, readings, problem.start_sd)
+        for b in fold[blocks.recording[fold] == i]:
+            row[b] = np.nanmean((readings - run)[blocks.of[i] == b] ** 2)
+    return row
 
 
 def _stability(
