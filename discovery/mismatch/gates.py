@@ -33,6 +33,7 @@ def objections(best: Assessment, h: Hypothesis, gain: float) -> list[str]:
         _untold(best, h),
         _no_jump(best, h),
         _is_an_input(best, h),
+        _no_window(h),
         _unsteady(best, h, 1, limit, "from recording to recording"),
         _unsteady(best, h, BLOCKS, limit, "with time"),
     )
@@ -140,6 +141,16 @@ def _is_an_input(best: Assessment, h: Hypothesis) -> str | None:
         if np.ptp(series) > 0 and np.ptp(window) > 0 and np.corrcoef(series, window)[0, 1] ** 2 > ALIKE:
             return f"{h.effect.word} acts just while {name} does: no event"
     return None
+
+
+def _no_window(h: Hypothesis) -> str | None:
+    """A sentence when the readings leave open whether a window had begun before it could have ended."""
+    if len(h.spans) != 2:
+        return None
+    begins, ends = (h.spans[name] for name in h.shapes)
+    if begins[1] < ends[0]:
+        return None
+    return f"{h.effect.word} at {h.where}: these data do not tell when it began and ended"
 
 
 def matters(context: Context, attempt: Assessment, h: Hypothesis) -> bool:

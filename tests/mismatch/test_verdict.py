@@ -14,6 +14,7 @@ from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
 from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing
+from discovery.mismatch.gates import objections
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.look import look
@@ -201,3 +202,15 @@ def test_heat_where_a_law_acts_is_no_second_event() -> None:
     found = fitted()[2]
     heat = score(claim("unmeasured_heat", "table", recording="r2"), 2.5, 0.0)
     assert not any("another recording" in text for text in said(replace(found, looks=((), (heat,)))).reasons)
+
+
+@pytest.mark.parametrize(("latest", "told"), [(61000.0, True), (41000.0, False)])
+def test_a_window_without_edges_is_no_event(latest: float, told: bool) -> None:
+    """What may have begun after it may have ended: the heat of a whole recording, not of some hours."""
+    context, _, _ = fitted()
+    h = claim("unmeasured_heat", "bed", context, "r1")
+    edges = dict(zip(h.shapes, (40000.0, 70000.0), strict=True))
+    ranges = ((39000.0, latest), (60000.0, 71000.0))
+    h = replace(h.at(edges), spans=dict(zip(h.shapes, ranges, strict=True)))
+    found = objections(assess(context, (h,)), h, 100.0)
+    assert ("unmeasured_heat at bed: these data do not tell when it began and ended" in found) == told
