@@ -120,7 +120,7 @@ def test_what_is_bent_to_its_limit_objects_less(
     claim = replace(whole.claims[0], hypothesis=h, gain=20.0, size=tuple(context.spread(h)))
     both = replace(assess(context, (*answer.hypotheses, h)), evidence=answer.evidence + 28.0)
     found = Search(before, answer, (both,), whole.board, ((claim,), (claim,)))
-    monkeypatch.setattr("discovery.mismatch.verdict.bent", lambda _, o: pressed and o.key == h.key)
+    monkeypatch.setattr("discovery.mismatch.doubts.bent", lambda _, o: pressed and o.key == h.key)
     assert decide(context, found, (), (), answer).word == word
 
 
