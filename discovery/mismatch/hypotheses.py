@@ -12,7 +12,7 @@ from discovery.mismatch.places import places
 from discovery.models import Model
 from discovery.models.units import differences, same_dimension
 from discovery.recordings import Channel
-from discovery.terms import Apply, Expression, Name, Term, names, parse, substitute
+from discovery.terms import Apply, Expression, Name, Term, delays_at, names, parse, substitute
 
 
 def hypotheses(
@@ -189,7 +189,8 @@ def _replacing(
         variable = next(v for v in ("fluid", "cooling", "flow") if v in place.binding)
         fresh = substitute(formula, known)
         swaps = {n: fresh for n in names(term.expression) if Name(n) == place.binding[variable]}
-    difference = Apply("-", (substitute(term.expression, swaps), term.expression))
+    replaced = delays_at(inputs, substitute(term.expression, swaps))  # the term may delay the channel itself
+    difference = Apply("-", (replaced, term.expression))
     if effect.amplitude.name not in names(formula):  # then it switches the replacement on
         difference = Apply("*", (known[effect.amplitude.name], difference))
     return Term(f"{effect.title}: {term.name}", term.into, difference, term.source, effect.word)

@@ -1,5 +1,6 @@
 """Terms: safe expressions with exact derivatives, the letters every model is written in."""
 
+from discovery.terms.delays import delays_at
 from discovery.terms.dual import Dual, evaluate
 from discovery.terms.expression import Apply, Expression, Name, Number, degree, names, substitute
 from discovery.terms.parsing import parse
@@ -14,6 +15,7 @@ __all__ = [
     "Number",
     "Term",
     "degree",
+    "delays_at",
     "evaluate",
     "names",
     "parse",
