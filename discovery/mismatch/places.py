@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from discovery.mismatch.catalogue.effect import Effect
 from discovery.models import Model
 from discovery.recordings import Channel
-from discovery.terms import Name, Term, names
+from discovery.terms import Name, Term, names, parse
 
 
 def places(
@@ -34,6 +34,12 @@ def places(
             )
         ]
 
+    loaded = fed("heat load")
+    turned = [b for b in bodies if any(t.into == b and _is_friction(t, model, role) for t in hand_written)]
+    # a share of a recorded heat is asked for where that heat goes alone
+    needs_load = "load" in names(parse(effect.formula))
+    driven = loaded if needs_load else [b for b in bodies if b in loaded or b in turned]
+
     match effect.place:
         case "body":
             yield from (((b,), (), ()) for b in bodies)
@@ -43,7 +49,9 @@ def places(
         case "wet body":
             yield from (((b,), (), ()) for b in fed("fluid temperature"))
         case "driven body":
-            yield from (((b,), (), ()) for b in fed("heat load"))
+            yield from (((b,), (), ()) for b in driven)
+        case "speed-driven body":
+            yield from (((b,), (), ()) for b in turned if b not in loaded)
         case "air body":
             yield from (((b,), (), ()) for b in fed("ambient temperature"))
         case "pair" | "any pair" | "link":
@@ -54,10 +62,7 @@ def places(
                         yield (a, b), (), ()
         case "neighbour":
             yield from (
-                ((a, b), (), ())
-                for a in fed("heat load")
-                for b in bodies
-                if a != b and frozenset((a, b)) in linked
+                ((a, b), (), ()) for a in driven for b in bodies if a != b and frozenset((a, b)) in linked
             )
         case "fluid terms" | "cooling terms":
             wanted = "fluid temperature" if effect.place == "fluid terms" else "cooling power"
@@ -77,6 +82,14 @@ def places(
                     yield (b,), (), moved
         case "recording":
             yield (), (), outputs
+
+
+def _is_friction(term: Term, model: Model, role: Mapping[str, str]) -> bool:
+    """Whether a term is a loss that follows the speed; with a temperature in it, it is an exchange."""
+    used = names(term.expression)
+    roles = {role[n] for n in used if n in role}
+    warm = not used.isdisjoint(model.states) or any("temperature" in r for r in roles)
+    return "rotation speed" in roles and not warm
 
 
 def _has_bodies(model: Model) -> bool:

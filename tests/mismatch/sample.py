@@ -34,9 +34,10 @@ TERMS = (
     Term("drive", "motor", parse("loss*drive")),
     Term("chiller", "motor", parse("-cold*chiller")),
     Term("air", "bed", parse("hA*(room - bed)")),
+    Term("bearing", "table", parse("P_b*(rpm/1000)**1.5")),
     Term("fluid", "table", parse("hF*pump*(emulsion - table)")),
 )
-UNITS = {"G_mt": "W/K", "loss": "1", "cold": "1", "hA": "W/K", "hF": "W/K"}
+UNITS = {"G_mt": "W/K", "loss": "1", "cold": "1", "P_b": "W", "hA": "W/K", "hF": "W/K"}
 RUNS = ("one", "two")
 
 

@@ -40,8 +40,7 @@ GROUP_OF = {word: group for group, words in WORDS.items() for word in words.spli
 # What a place needs in the model besides the roles of the formula
 PLACE_NEEDS = {
     "wet body": "fluid temperature",
-    "driven body": "heat load",
-    "neighbour": "heat load",
+    "speed-driven body": "rotation speed",
     "air body": "ambient temperature",
     "fluid terms": "fluid temperature",
     "cooling terms": "cooling power",

@@ -29,6 +29,7 @@ from tests.mismatch.machine import (
     CHANNELS,
     NOISE,
     SEEN,
+    SIZES,
     Array,
     Inputs,
     campaign,
@@ -300,6 +301,30 @@ def test_two_effects_are_found_together() -> None:
     assert found["verdict"] == "missing physics"
     assert {p["effect"] for p in found["physics"]} == {"fluid_convection", "flooded_gap"}
     assert found["improvement"]["explained"] > 0.95
+
+
+def test_friction_that_ages_is_named_without_a_recorded_power() -> None:
+    """Losses that the model reckons from the speed alone, a third less in the second recording."""
+
+    def bearings(watts: float) -> Callable[[float, Array, Inputs], tuple[float, float, float]]:
+        return lambda _, __, u: (
+            watts * (u["speed"] / 1000) ** 1.5 - SIZES["loss"] * u["P_drive"],  # no drive but them
+            0.0,
+            0.0,
+        )
+
+    watts = {1: 180.0, 2: 120.0, 3: 120.0}
+    runs = [simulated(seed, concealed=bearings(size)) for seed, size in watts.items()]
+    recorded = replace(campaign(*runs), channels={n: c for n, c in CHANNELS.items() if n != "P_drive"})
+    law = Term("bearings", "motor", parse("P_b*(speed/1000)**1.5"))
+    terms = tuple(law if t.name == "drive loss" else t for t in model().terms)
+    sizes = {n: p for n, p in model().parameters.items() if n != "loss"}
+    baseline = replace(model(), terms=terms, parameters={**sizes, "P_b": Parameter(160.0, "W", 0.0)})
+    found = diagnose(baseline, recorded, ["r1", "r2"], ["r3"]).document()
+    assert found["verdict"] == "missing physics"
+    (wear,) = found["physics"]
+    assert (wear["effect"], wear["states"], wear["recording"]) == ("wear", ["motor"], "r2")
+    assert next(iter(wear["parameters"].values()))["value"] == pytest.approx(-60.0, rel=0.2)
 
 
 def test_a_law_that_no_entry_has_is_not_given_a_name() -> None:

@@ -15,7 +15,8 @@ Place = Literal[
     "body",  # any body
     "fluid-free body",  # a body that the model leaves dry
     "wet body",  # a body that the model couples to the fluid
-    "driven body",  # a body that receives drive losses
+    "driven body",  # a body that receives drive losses: of a heat load, or by a law of the speed
+    "speed-driven body",  # one that receives them by a law of the speed alone
     "air body",  # a body that the model couples to the air
     "pair",  # two bodies without a path between them in the model
     "any pair",  # two bodies, linked or not
