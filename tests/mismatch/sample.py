@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 CHANNELS = {
     "room": Channel("room", "ambient temperature", "degC", None, "linear"),
     "emulsion": Channel("emulsion", "fluid temperature", "degC", None, "linear"),
+    "water": Channel("water", "coolant temperature", "degC", None, "linear"),
     "pump": Channel("pump", "fluid flow", "1", None, "held"),
     "rpm": Channel("rpm", "rotation speed", "rpm", None, "held"),
     "drive": Channel("drive", "heat load", "W", None, "held"),
@@ -58,7 +59,9 @@ def campaign() -> Campaign:
     recordings = {}
     for k, run in enumerate(RUNS):
         rng, time = np.random.default_rng(k), np.arange(0.0, 10801.0, 60.0)
-        walk = {name: 22 + np.cumsum(rng.normal(0, 0.09, len(time))) for name in ("room", "emulsion")}
+        walk = {
+            name: 22 + np.cumsum(rng.normal(0, 0.09, len(time))) for name in ("room", "emulsion", "water")
+        }
         high = {"pump": 4.0, "rpm": 1000.0, "drive": 500.0, "chiller": 300.0, "cut": 2000.0}
         switched = {
             name: size * np.repeat(rng.choice([0.0, 0.5, 1.0], 19), 10)[: len(time)]
