@@ -20,7 +20,7 @@ from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
 from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.locate import Location, locate
-from discovery.mismatch.prove import Improvement, compare, explained, improvements
+from discovery.mismatch.prove import Improvement, compare, explained, improvements, size_of
 from discovery.mismatch.search import Search, search
 from discovery.mismatch.selfcheck import false_alarm, named_again
 from discovery.mismatch.verdict import FAULT, NO_MISMATCH, RIVAL, UNEXPLAINED, Verdict, decide
@@ -141,7 +141,7 @@ def diagnose(
         verdict=verdict,
         location=location,
         forcings=tuple(before),
-        fit=_on_fit(old, new),
+        fit=_on_fit(old, new, size_of(campaign, new.best_view.noise)),
         held_out=proof,
         p_value=false_alarm(found.board, int(np.argmax(levels)), top),
         repaired=repaired,
@@ -179,9 +179,9 @@ def _question(context: Context, found: Search, verdict: Verdict) -> str:
     return next_experiment(context, found.best.fit.model, rival, white, purpose)
 
 
-def _on_fit(before: Assessment, after: Assessment) -> Improvement:
+def _on_fit(before: Assessment, after: Assessment, one: float) -> Improvement:
     parts = [
-        compare(old, new, after.best_view.noise)
+        compare(old, new, after.best_view.noise, one)
         for old, new in zip(before.fit.trajectories, after.fit.trajectories, strict=True)
     ]
 

@@ -9,10 +9,10 @@ import numpy as np
 from discovery.mismatch.describe import heat_over_time
 from discovery.mismatch.forcing import alike
 from discovery.mismatch.hypothesis import Hypothesis
+from discovery.mismatch.prove import unit_of
 from discovery.mismatch.rows import claim, number, outliers, physics
 from discovery.mismatch.verdict import UNEXPLAINED, Named
 from discovery.mismatch.when import instants
-from discovery.models.units import differences
 
 if TYPE_CHECKING:
     from discovery.mismatch.diagnosis import Diagnosis
@@ -115,10 +115,9 @@ def _location(d: Diagnosis) -> dict[str, Any]:
 
 
 def _improvement(d: Diagnosis) -> dict[str, Any]:
-    """The proof; `unit` of its figures, where all outputs have the same."""
-    units = {differences(d.context.campaign.channels[name].unit) for name in d.context.outputs}
+    """The proof, and the unit of its figures."""
     return {
-        "unit": units.pop() if len(units) == 1 else None,
+        "unit": unit_of(d.context.campaign, d.context.outputs),
         "fit": {
             "rms_before": number(d.fit.before),
             "rms_after": number(d.fit.after),

@@ -15,10 +15,12 @@ from discovery.errors import RunsAwayError
 from discovery.fitting import Noise, predict_recording
 from discovery.mismatch.events import heat_steps
 from discovery.models import Model
+from discovery.models.units import differences
 from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
 
+MULTIPLES = "times the reading noise"  # the unit of a proof over outputs of several units
 CLOSABLE = 1.03  # rms over the noise floor from which a recording holds a mismatch worth closing
 
 
@@ -52,19 +54,31 @@ def improvements(
 ) -> dict[str, Improvement]:
     """Free runs on each recording, zeroed on the first reading alone.
 
-    rms is over all outputs, each weighed by its reading noise and scaled back to the mean noise, so that um
-    and um/m count alike. A recording on which the model runs away before the repair proves nothing and is
-    left out.
+    rms is over all outputs, each weighed by its reading noise, in `unit_of` them. A recording on which the
+    model runs away before the repair proves nothing and is left out.
     """
-    out = {}
+    out, one = {}, size_of(campaign, noise)
     for run in recordings:
         old = _free_run(before, campaign, run, outputs, noise)
         new = _free_run(after, campaign, run, outputs, noise)
         if old and new:
-            out[run] = compare(old, new, noise)
+            out[run] = compare(old, new, noise, one)
         elif old:
-            out[run] = replace(compare(old, old, noise), after=inf, low=-inf, high=-inf)
+            out[run] = replace(compare(old, old, noise, one), after=inf, low=-inf, high=-inf)
     return out
+
+
+def unit_of(campaign: Campaign, outputs: Sequence[str]) -> str:
+    """The unit of a proof: that of all outputs, or, where they have several, multiples of the noise."""
+    units = {differences(campaign.channels[name].unit) for name in outputs}
+    return units.pop() if len(units) == 1 else MULTIPLES
+
+
+def size_of(campaign: Campaign, noise: Noise) -> float:
+    """What one reading noise is in the unit of a proof: the mean noise of outputs of one unit, else 1."""
+    if unit_of(campaign, noise.outputs) == MULTIPLES:
+        return 1.0
+    return float(np.sqrt(np.mean(np.square(noise.white))))
 
 
 def _free_run(
@@ -79,12 +93,11 @@ def _free_run(
     return trajectory
 
 
-def compare(old: Trajectory, new: Trajectory, noise: Noise) -> Improvement:
-    """Two trajectories of one recording against its readings."""
+def compare(old: Trajectory, new: Trajectory, noise: Noise, one: float) -> Improvement:
+    """Two trajectories of one recording against its readings; `one`: what one reading noise is."""
     white = np.array(noise.white)
-    unit = float(np.sqrt(np.mean(white**2)))
-    a = (old.system.grid.readings - predict(old)) / white * unit
-    b = (new.system.grid.readings - predict(new)) / white * unit
+    a = (old.system.grid.readings - predict(old)) / white * one
+    b = (new.system.grid.readings - predict(new)) / white * one
     rng = np.random.default_rng(0)
     count, size = len(a), max(1, len(a) // 24)
     starts = np.arange(0, count, size)
@@ -97,16 +110,15 @@ def compare(old: Trajectory, new: Trajectory, noise: Noise) -> Improvement:
     return Improvement(
         float(np.sqrt(np.nanmean(a**2))),
         float(np.sqrt(np.nanmean(b**2))),
-        noise_floor(new, noise),
+        one * noise_floor(new, noise),
         float(np.quantile(gain, 0.025)),
         float(np.quantile(gain, 0.975)),
     )
 
 
 def noise_floor(trajectory: Trajectory, noise: Noise) -> float:
-    """rms that reading noise, slow noise and everyday heat leave in a free run, as in `improvements`."""
+    """rms that reading noise, slow noise and everyday heat leave in a free run, in reading noises."""
     white = np.array(noise.white)
-    unit = float(np.sqrt(np.mean(white**2)))
     slow = np.array(noise.slow or np.zeros(len(white)))
     variance = np.tile(1.0 + (slow / white) ** 2, (len(trajectory.system.grid.read), 1))
     time = trajectory.system.grid.time
@@ -118,7 +130,7 @@ def noise_floor(trajectory: Trajectory, noise: Noise) -> float:
             blocks = (steps[:, :, :-1] - steps[:, :, 1:]) / white[None, :, None] * sd
             kernel = np.exp(-lag / noise.heat_time)
             variance = variance + np.einsum("ryk,kl,ryl->ry", blocks, kernel, blocks, optimize=True)
-    return unit * float(np.sqrt(np.mean(variance)))
+    return float(np.sqrt(np.mean(variance)))
 
 
 def explained(found: Mapping[str, Improvement]) -> float | None:

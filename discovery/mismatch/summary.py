@@ -35,9 +35,9 @@ def summary(folder: Path) -> list[str]:
 
 
 def _unit(improvement: dict[str, Any]) -> str:
-    """The unit of the proof; outputs of several units count alike, as multiples of their noise."""
-    unit = improvement.get("unit")
-    return ", weighed by their noise" if not unit else "" if unit == "1" else f" {unit}"
+    """The unit of the proof as it stands behind a number."""
+    unit = improvement.get("unit") or "1"
+    return "" if unit == "1" else f" {unit}"
 
 
 def _place(claim: dict[str, Any]) -> str:

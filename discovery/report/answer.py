@@ -20,7 +20,7 @@ from discovery.report.ranking import (
     ratio,
     rms_by_unit,
 )
-from discovery.report.run import Run
+from discovery.report.run import Run, pretty_unit
 from discovery.report.text import counted, listed, number, percent, words
 
 _VERDICTS = {
@@ -202,7 +202,11 @@ def _proof(diagnosis: Mapping[str, Any]) -> list[str]:
         if s.get("rms_before") is not None and s.get("rms_after") is not None
     }
     if held:
-        each = [f"{number(s['rms_before'])} → {number(s['rms_after'])} on {name}" for name, s in held.items()]
+        unit = pretty_unit(improvement.get("unit") or "")
+        each = [
+            f"{number(s['rms_before'])} → {number(s['rms_after'])} {unit}".rstrip() + f" on {name}"
+            for name, s in held.items()
+        ]
         points.append(
             "Repaired and run freely on unseen recordings it leaves (rms, errors weighed by "
             f"their noise): {listed(each)}."

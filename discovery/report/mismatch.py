@@ -121,9 +121,12 @@ def _proof(d: Mapping[str, Any]) -> Printed:
         for name, one in parts.items()
         if one.get("rms_before") is not None and one.get("rms_before") != one.get("rms_after")
     ]
+    unit = pretty_unit(improvement.get("unit") or "")
     header = ("Recording", "rms before", "rms repaired", "Noise floor", "Improvement (95 %)")
     return Printed(
-        "The proof: free runs before and after the repair, all errors weighed by their noise",
+        with_unit(
+            "The proof: free runs before and after the repair, all errors weighed by their noise", unit
+        ),
         header,
         tuple(rows),
     )

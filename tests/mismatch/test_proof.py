@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import exp, inf, sqrt
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.stats import binom
 
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
 from discovery.fitting import Noise
-from discovery.mismatch.prove import Improvement, compare, explained, noise_floor
+from discovery.mismatch.prove import Improvement, compare, explained, improvements, noise_floor, unit_of
 from discovery.models import Model, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import parse
@@ -38,16 +39,29 @@ def says(readings: dict[str, Array], **formulas: str) -> Trajectory:
 def test_each_output_counts_in_units_of_its_noise() -> None:
     """Two noises off before the repair and one after it, in every reading: each draw is the same."""
     readings = {"E": np.full(240, 3.0), "F": np.where(np.arange(240) % 3 == 0, 9.0, np.nan)}
-    found = compare(says(readings, E="x + 1", F="x + 3"), says(readings, E="x + 2", F="x + 6"), WHITE)
     unit = sqrt((1.0**2 + 3.0**2) / 2)
+    found = compare(says(readings, E="x + 1", F="x + 3"), says(readings, E="x + 2", F="x + 6"), WHITE, unit)
     assert (found.before, found.after, found.floor) == pytest.approx((2 * unit, unit, unit))
     assert (found.low, found.high) == pytest.approx((unit, unit))
+
+
+@pytest.mark.parametrize(("unit", "said"), [("um", "um"), ("degC", "times the reading noise")])
+def test_outputs_of_several_units_are_told_in_multiples_of_their_noise(unit: str, said: str) -> None:
+    """A mean of um and K is neither; the mean noise of outputs of one unit is a size in it."""
+    channels = {**CHANNELS, "F": replace(CHANNELS["F"], unit=unit)}
+    mixed = Campaign("c", channels, {"r": Recording("r", TIME, {"E": np.full(240, 2.0), "F": np.zeros(240)})})
+    formulas = {"E": parse("x"), "F": parse("x")}
+    model = Model("m", {}, {"x": State("x", "degC", 1000.0, parse("0"), 0.0, 1e-3)}, (), formulas)
+    found = improvements(mixed, ["r"], ["E", "F"], model, model, WHITE)["r"]
+    one = sqrt((1.0**2 + 3.0**2) / 2) if unit == "um" else 1.0
+    assert unit_of(mixed, ["E", "F"]) == said
+    assert (found.before, found.floor) == pytest.approx((sqrt(2.0) * one, one))
 
 
 def test_the_bounds_are_those_of_a_draw_of_24_blocks() -> None:
     """Better in half of the blocks, worse in the others: how many of each are drawn is binomial."""
     readings = {"E": np.repeat([1.0, -1.0], 120)}
-    found = compare(says(readings, E="x"), says(readings, E="x + 0.5"), Noise(("E",), (1.0,)))
+    found = compare(says(readings, E="x"), says(readings, E="x + 0.5"), Noise(("E",), (1.0,)), 1.0)
     better = binom.ppf([0.025, 0.975], 24, 0.5) / 24
     low, high = 1 - np.sqrt(0.25 * better + 2.25 * (1 - better))
     assert (found.low, found.high) == pytest.approx((low, high), abs=0.05)
@@ -56,7 +70,7 @@ def test_the_bounds_are_those_of_a_draw_of_24_blocks() -> None:
 
 def test_slow_noise_adds_to_the_floor() -> None:
     run = says({"E": np.zeros(240)}, E="x")
-    assert noise_floor(run, Noise(("E",), (3.0,), (4.0,))) == pytest.approx(5.0)
+    assert noise_floor(run, Noise(("E",), (3.0,), (4.0,))) == pytest.approx(5.0 / 3.0)
 
 
 def test_everyday_heat_adds_to_the_floor_what_a_body_makes_of_it() -> None:

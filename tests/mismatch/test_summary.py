@@ -44,7 +44,7 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
     ]
 
 
-def test_the_proof_has_a_unit_or_is_weighed_and_a_jump_that_may_be_none_is_not_told(tmp_path: Path) -> None:
+def test_the_proof_has_a_unit_or_is_in_noises_and_a_jump_that_may_be_none_is_not_told(tmp_path: Path) -> None:
     jumps = {
         "zero_T": {**number(-0.01, -0.03, 0.01, "K"), "output": "T"},
         "zero_dZ": {**number(2.1, 2.0, 2.2, "um"), "output": "dZ"},
@@ -64,7 +64,7 @@ def test_the_proof_has_a_unit_or_is_weighed_and_a_jump_that_may_be_none_is_not_t
     for unit, said in (
         ("K", "0.861 -> 0.412 K ("),
         ("1", "0.861 -> 0.412 ("),
-        (None, "0.861 -> 0.412, weighed by their noise ("),
+        ("times the reading noise", "0.861 -> 0.412 times the reading noise ("),
     ):
         improvement: dict[str, Any] = {"unit": unit, "held_out": held_out, "contradicted_by": []}
         (tmp_path / "diagnosis.json").write_text(

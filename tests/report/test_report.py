@@ -203,6 +203,17 @@ def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path
     assert "The repair closes nothing of the gap" in page
 
 
+@pytest.mark.parametrize(("unit", "said"), [("um", "µm"), ("times the reading noise",) * 2])
+def test_the_proof_says_what_its_figures_are(tmp_path: Path, unit: str, said: str) -> None:
+    folder = sample.write_sample(tmp_path / "run")
+    diagnosis = json.loads((folder / "diagnosis.json").read_text())
+    diagnosis["improvement"]["unit"] = unit
+    (folder / "diagnosis.json").write_text(json.dumps(diagnosis))
+    page = write_report(folder).read_text("utf-8")
+    assert f"0.6 → 0.5 {said} on validation" in page
+    assert f"all errors weighed by their noise [{said}]" in page
+
+
 def test_what_came_closest_has_its_recording_and_hours_and_stands_once(tmp_path: Path) -> None:
     heat = {"effect": "unmeasured_heat", "states": ["head"], "decidable": True}
     considered = [
