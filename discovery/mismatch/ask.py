@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory, make_system, simulate
 from discovery.dynamics.grid import Grid, Samples
-from discovery.dynamics.system import predict
 from discovery.errors import RunsAwayError
-from discovery.mismatch.context import Context
+from discovery.fitting import Noise
+from discovery.mismatch.context import BELIEF, Context
 from discovery.mismatch.hypothesis import Hypothesis
+from discovery.mismatch.separation import separation
 from discovery.mismatch.when import instants, told
 from discovery.models import Model
 from discovery.terms import Name
@@ -79,28 +81,41 @@ def _called(shown: Sequence[Hypothesis]) -> str:
     return " and ".join(f"{h.effect.word} at {h.where}" for h in shown)
 
 
-def next_experiment(
-    context: Context, answer: Model, rival: Model | None, white: Array, purpose: Aim | None = None
-) -> str:
-    """A sentence: the inputs that separate two fitted models most, for how long, and the best new sensor.
+def believed(context: Context) -> dict[str, float]:
+    """How far the baseline's own parameters may be off: a recording that they explain proves no effect."""
+    fitted = context.baseline.model.parameters
+    return {
+        name: BELIEF * max(abs(fitted[name].value), abs(context.model.parameters[name].value))
+        for name in context.model.free
+    }
 
-    Without a rival the answer is compared with the refitted baseline, as a confirmation.
+
+def next_experiment(
+    context: Context,
+    answer: Model,
+    other: Model,
+    noise: Noise,
+    purpose: Aim,
+    known: Mapping[str, float] | None = None,
+) -> str:
+    """A sentence: the inputs that separate two models best, how soon, and the best new sensor.
+
+    Args:
+        other: a rival, or, for a confirmation, the answer without its effects: the refitted baseline is bent
+            to stand in for them, and would differ most where they do not act.
+        known: parameters that the recording would determine anew, with what they may be off by.
     """
-    purpose = purpose or (APART if rival else CONFIRM)
-    other = rival or context.baseline.model
     length = min(LONGEST, max(float(g.time[-1] - g.time[0]) for g in context.grids.values()))
-    results: list[tuple[float, str, Trajectory, Trajectory]] = []
+    results: list[tuple[Array, str, Trajectory, Trajectory]] = []
     for text, inputs in _designs(context, length).items():
         try:
             a, b = _run(context, answer, inputs, length), _run(context, other, inputs, length)
         except RunsAwayError:
             continue
-        separation = 0.5 * float(np.sum(((predict(a) - predict(b)) / white) ** 2))
-        results.append((separation, text, a, b))
+        results.append((separation(a, b, noise, known), text, a, b))
     if not results:
         return "record the machine longer, with every input moving on its own"
-    separation, text, a, b = max(results, key=lambda r: r[0])
-    needed = length * DECISIVE / max(separation, 1e-9)
+    gained, text, a, b = max(results, key=lambda r: float(r[0][-1]))
     read = _read(context)
     shared = [
         s
@@ -113,11 +128,16 @@ def next_experiment(
     }
     sensor = max(spread, key=lambda s: spread[s]) if spread else None
     every = length / READINGS
-    if needed > HOPELESS * length:
+    times = ceil(DECISIVE / max(float(gained[-1]), 1e-9))
+    if times > HOPELESS:
         sentence = f"no input pattern of {_told(length)} {purpose.does} with these outputs alone"
+    elif times > 1:
+        often = f"{times} recordings of {_told(length)}, readings every {_told(every)}"
+        sentence = f"{text}: {purpose.does} with {often}"
     else:
-        soon = f"within about {_told(max(needed, every))} of readings every {_told(every)}"
-        sentence = f"{text}: {purpose.does} {soon}"
+        instants = a.system.grid.time[a.system.grid.read]
+        soon = max(float(instants[np.argmax(gained >= DECISIVE)]), every)
+        sentence = f"{text}: {purpose.does} within about {_told(soon)} of readings every {_told(every)}"
     if sensor and spread[sensor] > 0.02:
         apart = f"{purpose.differ} by {spread[sensor]:.2f} K rms"
         sentence += f"; a temperature sensor on {sensor} helps most ({apart})"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from discovery.errors import UserError
-from discovery.mismatch.ask import NOTHING_CLOSE, aim, look_back, next_experiment
+from discovery.mismatch.ask import NOTHING_CLOSE, aim, believed, look_back, next_experiment
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.catalogue import Effect, catalogue
 from discovery.mismatch.context import Context, make_context, seen_beside
@@ -174,9 +174,9 @@ def _question(context: Context, found: Search, verdict: Verdict) -> str:
     claims = [n.hypothesis for n in shown]
     if rival is None and all(h.recording for h in claims):
         return look_back(context, claims)
-    white = np.array(found.best.best_view.noise.white)
     purpose = aim(claims, rivals[0] if rival else None, bool(verdict.named))
-    return next_experiment(context, found.best.fit.model, rival, white, purpose)
+    noise, answer = found.best.best_view.noise, found.best.fit.model
+    return next_experiment(context, answer, rival or _without(found.best), noise, purpose, believed(context))
 
 
 def _on_fit(before: Assessment, after: Assessment, one: float) -> Improvement:
@@ -195,6 +195,11 @@ def _on_fit(before: Assessment, after: Assessment, one: float) -> Improvement:
         min(p.low for p in parts),
         max(p.high for p in parts),
     )
+
+
+def _without(best: Assessment) -> Model:
+    """The model with its effects switched off and everything else as it is with them."""
+    return best.fit.model.with_values({name: 0.0 for h in best.hypotheses for name in h.amplitudes})
 
 
 def _rival_model(found: Search, rival: Hypothesis) -> Model | None:

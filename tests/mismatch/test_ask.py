@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from discovery.mismatch.ask import aim, look_back, next_experiment
+from discovery.fitting import Noise
+from discovery.mismatch.ask import APART, CONFIRM, aim, believed, look_back, next_experiment
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
 from discovery.mismatch.diagnosis import diagnose
@@ -61,7 +63,7 @@ def test_a_heated_plate_is_not_sent_to_pump_for_hours() -> None:
     where = make_context(ten_minutes(), plate(0.04), ["a"], ["T"], [])
     fitted = where.baseline.model
     other = fitted.with_values({"gain": 1.3 * fitted.parameters["gain"].value})
-    said = next_experiment(where, other, None, np.array([0.1]))
+    said = next_experiment(where, other, fitted, Noise(("T",), (0.1,)), CONFIRM)
     for word in ("dry", "pump", "speed", "fluid", " h "):
         assert word not in said
     assert "load" in said
@@ -74,7 +76,7 @@ def test_a_pattern_starts_where_the_machine_was_read() -> None:
     fitted = where.baseline.model
     still = replace(fitted, parameters={**fitted.parameters, "gain": Parameter(0.0, "K/W/s", fixed=True)})
     faster = still.with_values({"loss": 2 * still.parameters["loss"].value})
-    said = next_experiment(where, faster, still, np.array([0.1]))
+    said = next_experiment(where, faster, still, Noise(("T",), (0.1,)), APART)
     assert "tells the rivals apart within about" in said
 
 
@@ -84,7 +86,7 @@ def test_a_machine_with_a_pump_is_asked_to_run_it_or_to_stay_dry(wet: bool) -> N
     fitted = where.baseline.model
     name = "hF" if wet else "loss"
     other = fitted.with_values({name: 1.5 * fitted.parameters[name].value})
-    said = next_experiment(where, other, None, np.full(3, NOISE))
+    said = next_experiment(where, other, fitted, Noise(tuple(SEEN), (NOISE,) * 3), CONFIRM)
     assert ("pump" in said) == wet
     assert ("dry" in said) != wet
 
@@ -110,9 +112,33 @@ def test_no_sensor_is_asked_for_where_one_is(shown: bool) -> None:
     where = make_context(ten_minutes(), two, ["a"], ["T"], [])
     fitted = where.baseline.model
     other = fitted.with_values({"gain": 1.3 * fitted.parameters["gain"].value})
-    said = next_experiment(where, other, None, np.array([0.1]))
+    said = next_experiment(where, other, fitted, Noise(("T",), (0.1,)), CONFIRM)
     assert ("sensor on plate" in said) != shown
     assert ("sensor on foot" in said) == shown
+
+
+def test_a_pattern_confirms_an_effect_where_it_acts_and_takes_its_time() -> None:
+    """Heat that comes late: half of the pattern says nothing, nor does what a gain explains."""
+    where = make_context(ten_minutes(), plate(0.04), ["a"], ["T"], [])
+    fitted = where.baseline.model
+    late = Term("late", "T", parse("0.02*heater*(time > 330)"))
+    more = fitted.with_values({"gain": 1.1 * fitted.parameters["gain"].value})
+    noise = Noise(("T",), (0.1,))
+    said = next_experiment(where, fitted.with_terms(late), fitted, noise, CONFIRM, believed(where))
+    minutes = re.search(r"within about ([\d.]+) min", said)
+    assert minutes
+    assert 5.5 <= float(minutes[1]) < 8.0
+    assert "within about 8.3 s" in next_experiment(where, more, fitted, noise, CONFIRM)
+    assert "no input pattern" in next_experiment(where, more, fitted, noise, CONFIRM, believed(where))
+
+
+def test_an_effect_of_the_fluid_is_not_confirmed_dry() -> None:
+    """The baseline that was fitted without it is bent: it would differ most where no fluid flows."""
+    runs = campaign(simulated(1), simulated(2))
+    answer = diagnose(model(wet=False), runs, ["r1", "r2"])
+    assert [n.hypothesis.effect.word for n in answer.verdict.named] == ["fluid_convection"]
+    assert "pump" in answer.question
+    assert "dry" not in answer.question
 
 
 def claims(where: Context) -> dict[str, Hypothesis]:
