@@ -15,6 +15,7 @@ from discovery.errors import RunsAwayError
 from discovery.fitting import Noise
 from discovery.mismatch.context import BELIEF, Context
 from discovery.mismatch.hypothesis import Hypothesis
+from discovery.mismatch.printed import printed
 from discovery.mismatch.separation import separation
 from discovery.mismatch.when import instants, told
 from discovery.models import Model
@@ -154,8 +155,8 @@ def _told(seconds: float) -> str:
     """A duration as one says it."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds >= size:
-            return f"{seconds / size:.2g} {unit}"
-    return f"{seconds:.2g} s"
+            return f"{printed(seconds / size, 2)} {unit}"
+    return f"{printed(seconds, 2)} s"
 
 
 def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:

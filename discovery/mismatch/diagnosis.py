@@ -20,6 +20,7 @@ from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
 from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.locate import Location, locate
+from discovery.mismatch.printed import printed
 from discovery.mismatch.prove import Improvement, compare, explained, improvements, size_of
 from discovery.mismatch.search import Search, search
 from discovery.mismatch.selfcheck import false_alarm, named_again
@@ -230,7 +231,8 @@ def _smallest(found: Search) -> str:
         places = list(dict.fromkeys(" and ".join(c.hypothesis.places) for c in seen))
         everywhere = len(seen) == len(claims) and len(places) > 1 and h.effect.place in _ANYWHERE
         where = _ANYWHERE[h.effect.place] if everywhere else f"at {'; '.join(places)}"
-        texts.append(f"{word} of {size:.2g} {h.units.get(h.amplitudes[0], '')}{speed} {where}")
+        unit = h.units.get(h.amplitudes[0], "")
+        texts.append(f"{word} of {printed(size, 2)} {unit}{speed} {where}")
     return (
         "these recordings would have shown " + ", ".join(texts)
         if texts

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from discovery.mismatch.printed import printed
 from discovery.mismatch.verdict import RIVAL
 from discovery.runfolder import read_diagnosis
 
@@ -25,8 +26,8 @@ def summary(folder: Path) -> list[str]:
         lines.append(f"  {what} (a description, not a cause)")
     worse, unit = d["improvement"]["contradicted_by"], _unit(d["improvement"])
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
-        after = "runs away" if i["rms_after"] is None else f"{i['rms_after']:.3g}"
-        rms = f"rms {i['rms_before']:.3g} -> {after}{unit} (noise {i['noise_floor']:.3g})"
+        after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
+        rms = f"rms {printed(i['rms_before'])} -> {after}{unit} (noise {printed(i['noise_floor'])})"
         lines.append(f"  unseen recording {run}: {rms}{', worse than without' if run in worse else ''}")
     if worse:
         lines.append("  do not use the repaired model: unseen recordings contradict it; fit more recordings")
@@ -61,5 +62,5 @@ def _size(name: str, q: dict[str, Any]) -> str:
     """A number with its unit, the speed it is a size at, and its 95 % interval."""
     unit = "" if q["unit"] == "1" else f" {q['unit']}"
     unit += f" at {q['at']}" if q.get("at") else ""
-    interval = f" ({q['low']:.4g} to {q['high']:.4g})" if q["low"] != q["high"] else ""
-    return f"{name} = {q['value']:.4g}{unit}{interval}"
+    interval = f" ({printed(q['low'], 4)} to {printed(q['high'], 4)})" if q["low"] != q["high"] else ""
+    return f"{name} = {printed(q['value'], 4)}{unit}{interval}"

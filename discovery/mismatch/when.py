@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from discovery.mismatch.hypothesis import Hypothesis
+from discovery.mismatch.printed import printed
 from discovery.recordings import Campaign
 
 
@@ -25,7 +26,7 @@ def told(campaign: Campaign, h: Hypothesis) -> str:
     unit, size = next(
         (u, s) for u, s in (("h", 3600.0), ("min", 60.0), ("s", 0.0)) if max(times, default=0) >= s
     )
-    hours = [f"{t / (size or 1.0):.3g}" for t in times]
+    hours = [printed(t / (size or 1.0)) for t in times]
     when = (
         f" from {hours[0]} to {hours[1]} {unit}"
         if len(hours) == 2

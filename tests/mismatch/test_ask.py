@@ -15,10 +15,11 @@ from discovery.mismatch.context import Context, make_context
 from discovery.mismatch.diagnosis import diagnose
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.hypothesis import Hypothesis
+from discovery.mismatch.printed import printed
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
-from tests.mismatch.machine import NOISE, SEEN, Array, Inputs, campaign, model, simulated
+from tests.mismatch.machine import NOISE, SEEN, Array, Inputs, campaign, changed, model, simulated
 
 PLATE = {
     "T_env": Channel("T_env", "ambient temperature", "degC", None, "linear"),
@@ -179,3 +180,11 @@ def test_a_loss_that_is_another_was_changed_before() -> None:
     )
     said = look_back(where, [claims(where)["wear motor r2"]])
     assert said.startswith("look at what was changed at motor before r2; repeat r2")
+
+
+def test_large_sizes_are_written_out() -> None:
+    assert (printed(174.0, 2), printed(73701.4, 4), printed(2e-9)) == ("170", "73700", "2e-09")
+    runs = [changed(simulated(s), speed=simulated(s).values["speed"] / 30) for s in (1, 2)]
+    said = diagnose(model(), campaign(*runs), ["r1", "r2"]).question
+    assert "would have shown" in said
+    assert "e+" not in said

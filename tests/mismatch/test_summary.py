@@ -18,7 +18,9 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
         return {"effect": effect, "states": ["T1"], "probability": 0.9, "parameters": parameters}
 
     physics = [
-        named("sensor_lag", on_T1=number(1.0, 1.0, 1.0, "1"), t_lag_T1=number(18.0, 17.0, 19.0, "s")),
+        named(
+            "sensor_lag", on_T1=number(1.0, 1.0, 1.0, "1"), t_lag_T1=number(73701.4, 57024.0, 90383.0, "s")
+        ),
         named("cooling_hysteresis", on=number(1.0, 1.0, 1.0, "1")),
         named("thermal_preload", k=number(0.03, 0.02, 0.04, "1/K"), share=number(0.5, 0.4, 0.6, "1")),
         named("friction_speed", P_f={**number(0.686, 0.487, 0.905, "W"), "at": "1000 rpm"}),
@@ -36,7 +38,7 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
     }
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
     assert summary(tmp_path)[1:-1] == [
-        "  sensor_lag at T1, probability 0.90: t_lag_T1 = 18 s (17 to 19)",
+        "  sensor_lag at T1, probability 0.90: t_lag_T1 = 73700 s (57020 to 90380)",
         "  cooling_hysteresis at T1, probability 0.90",
         "  thermal_preload at T1, probability 0.90: k = 0.03 1/K (0.02 to 0.04), share = 0.5 (0.4 to 0.6)",
         "  friction_speed at T1, probability 0.90: P_f = 0.686 W at 1000 rpm (0.487 to 0.905)",

@@ -1,0 +1,12 @@
+"""Numbers as the sentences of a diagnosis print them."""
+
+from __future__ import annotations
+
+
+def printed(value: float, digits: int = 3) -> str:
+    """So many digits, and a power of ten only where nobody would write the number out.
+
+    >>> printed(174.0, 2), printed(73701.4, 4), printed(0.01234), printed(2e-9)
+    ('170', '73700', '0.0123', '2e-09')
+    """
+    return f"{float(f'{value:.{digits}g}'):.12g}"
