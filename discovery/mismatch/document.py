@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discovery.mismatch.describe import heat_over_time
 from discovery.mismatch.forcing import alike
@@ -75,7 +76,7 @@ def _detection(d: Diagnosis) -> dict[str, Any]:
     noise = d.search.best.best_view.noise
     known = d.search.baseline.views[0].noise
     left = {
-        name: float(np.sqrt(np.nanmean(np.concatenate([r[:, y] for r in d.before.lens.residuals]) ** 2)))
+        name: _rms(np.concatenate([r[:, y] for r in d.before.lens.residuals]))
         for y, name in enumerate(d.context.outputs)
     }
     return {
@@ -87,6 +88,12 @@ def _detection(d: Diagnosis) -> dict[str, Any]:
         "everyday_heat_W": {n: number(v) for n, v in (noise.heat or {}).items()},
         "residual_rms": {name: number(rms) for name, rms in left.items()},
     }
+
+
+def _rms(residual: NDArray[np.float64]) -> float | None:
+    """None of an output that was never read."""
+    read = residual[np.isfinite(residual)]
+    return float(np.sqrt(np.mean(read**2))) if len(read) else None
 
 
 def _location(d: Diagnosis) -> dict[str, Any]:
