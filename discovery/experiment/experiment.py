@@ -166,10 +166,7 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
     for name in outputs:
         if name not in measured:
             raise _mistake(path, ("outputs",), f"'{name}' is no measured channel; {suggest(name, measured)}")
-    if not any(np.isfinite(campaign.recordings[r].values[y]).any() for r in form.fit for y in outputs):
-        what = (
-            f"no reading of {' or '.join(outputs)} in {', '.join(form.fit)}; name recordings that hold some"
-        )
+    if what := campaign.unread(form.fit, outputs):
         raise _mistake(path, ("fit",), what)
     for model, entry in form.models.items():
         key = ("models", model)

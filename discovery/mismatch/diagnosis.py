@@ -101,6 +101,8 @@ def diagnose(
     outputs = tuple(n for n in outputs if n in model.outputs or n in model.states)
     if not outputs:
         raise UserError(f"model '{model.name}' predicts no measured channel; name one under [outputs]")
+    if what := campaign.unread(fit, outputs):
+        raise UserError(what)
     own = {e.word for e in effects}
     entries = [*(e for e in catalogue().values() if e.word not in own), *effects]
     seen = replace(campaign, recordings={r: campaign.recordings[r] for r in fit})  # nothing else can leak in
@@ -125,8 +127,9 @@ def diagnose(
     noise = found.best.best_view.noise
     repaired = written(new) if verdict.named else None
     tell("proving on held-out recordings")
-    proof = improvements(campaign, held_out, outputs, old.fit.model, new.fit.model, noise)
-    if lost := ", ".join(r for r in held_out if r not in proof):
+    read = [r for r in held_out if not campaign.unread([r], outputs)]
+    proof = improvements(campaign, read, outputs, old.fit.model, new.fit.model, noise)
+    if lost := ", ".join(r for r in read if r not in proof):
         reason = f"the model itself runs away on unseen recording {lost}: nothing can be proved there"
         verdict = replace(verdict, reasons=(*verdict.reasons, reason))
     tell("asking for the next experiment")

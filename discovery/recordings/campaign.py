@@ -74,6 +74,15 @@ class Campaign:
     recordings: Mapping[str, Recording]
     path: Path = field(default=Path())
 
+    def unread(self, recordings: Collection[str], outputs: Collection[str]) -> str:
+        """What to say where no recording holds a reading of any of the outputs; empty where one does."""
+        values = (self.recordings[r].values.get(y, np.empty(0)) for r in recordings for y in outputs)
+        if any(np.isfinite(v).any() for v in values):
+            return ""
+        return (
+            f"no reading of {' or '.join(outputs)} in {', '.join(recordings)}; name recordings that hold some"
+        )
+
 
 def load_campaign(path: str | os.PathLike[str], only: Collection[str] | None = None) -> Campaign:
     """The campaign at `path` (the file or its folder) in canonical units; with `only`, those recordings.
