@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from difflib import get_close_matches
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from discovery.fitting.solve import Loss
 from discovery.mismatch.catalogue.form import EffectForm
-from discovery.schema import Strict
+from discovery.schema import Strict, suggest
 from discovery.sparse.options import SparseOptions
 from discovery.targets import Target
 
@@ -20,6 +21,8 @@ def _file_name(name: str) -> str:
         raise ValueError(f"'{name}' becomes the name of a file: use letters, digits, space, _ . + -")
     return name
 
+
+_BUILT = ["reduced", "superposition", "sindy"]  # kinds of models; one in a file needs no kind
 
 # What several kinds of models may say
 Inputs = Annotated[list[str] | None, Field(min_length=1, description="default by role, as in the paper")]
@@ -62,6 +65,17 @@ class SuperpositionEntry(Strict):
     loss: Pull = "linear"
 
 
+def _said(entry: Any) -> Any:
+    """What a model is: a file of its own, or a kind that is built."""
+    if not isinstance(entry, Mapping):
+        return entry
+    if "kind" in entry and (kind := str(entry["kind"])) not in ("file", *_BUILT):
+        raise ValueError(f'kind {kind!r} is not known; {suggest(kind, _BUILT)}, or file = "my_model.toml"')
+    if not any(get_close_matches(key, ["kind", "file"]) for key in entry):
+        raise ValueError(f'say file = "my_model.toml", or kind = one of {", ".join(_BUILT)}')
+    return entry
+
+
 def _kind(entry: Any) -> str:
     return str(entry.get("kind", "file") if isinstance(entry, Mapping) else getattr(entry, "kind", "file"))
 
@@ -73,6 +87,7 @@ TaggedEntry = Annotated[
     | Annotated[SuperpositionEntry, Tag("superposition")]
     | Annotated[SparseOptions, Tag("sindy")],
     Discriminator(_kind),
+    BeforeValidator(_said),
 ]
 
 
