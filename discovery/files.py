@@ -19,6 +19,12 @@ Key = tuple[str | int, ...]  # the way to a value: ("recordings", "fit", "file")
 _WORD = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
 _DOTTED = rf"{_WORD}(?:\s*\.\s*{_WORD})*"
 _HEADER = re.compile(rf"\s*(\[\[?)\s*({_DOTTED})\s*\]")
+_TABLES = (".csv", ".csv.gz", ".parquet")
+_KINDS = {  # the keys that tell a file of each kind, and the command that takes it
+    "a campaign": ({"channels", "recordings"}, "check {path}"),
+    "an experiment": ({"campaign", "models"}, "run {path}"),
+    "a model": ({"states", "terms"}, "check CAMPAIGN --model {path}"),
+}
 _ASSIGNMENT = re.compile(rf"\s*({_DOTTED})\s*=")
 
 
@@ -52,14 +58,35 @@ def read_toml(path: str | os.PathLike[str], schema: type[Schema]) -> Schema:
 
     from discovery.schema import sentences
 
-    text = read_text(path)
+    text = read_file(path)
     data = parse_toml(text, path)
+    check_kind(path, data, schema)
     try:
         return schema.model_validate(data)
     except ValidationError as error:
         key, what = sentences(schema, data, error)[0]
         name = f"{dotted(key)}: " if key else ""
         raise UserError(f"{path}, line {locate(text, key)}: {name}{what}") from None
+
+
+def read_file(path: str | os.PathLike[str]) -> str:
+    """The text of a file to write by hand. Raises UserError as `read_text`, and for a recording."""
+    if Path(path).name.lower().endswith(_TABLES) and Path(path).is_file():
+        raise UserError(
+            f"{path}: this is a recording, where a TOML file is wanted; `discovery new DIR --from {path}` "
+            "makes campaign, model and experiment of it"
+        )
+    return read_text(path)
+
+
+def check_kind(path: str | os.PathLike[str], data: Mapping[str, Any], schema: type["BaseModel"]) -> None:
+    """Raises UserError where a file of another kind than that of `schema` was named."""
+    of = {kind: schema.model_fields.keys() >= keys for kind, (keys, _) in _KINDS.items()}
+    wanted = next((kind for kind, fits in of.items() if fits), "a file of another kind")
+    for kind, (keys, command) in _KINDS.items():
+        if keys <= data.keys() and not keys & schema.model_fields.keys():
+            say = command.format(path=path)
+            raise UserError(f"{path}: this is {kind}, where {wanted} is wanted; say `discovery {say}`")
 
 
 def parse_toml(text: str, path: str | os.PathLike[str]) -> dict[str, Any]:

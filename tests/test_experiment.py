@@ -5,6 +5,7 @@ into a fit.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -20,7 +21,8 @@ from discovery.experiment.fitted import offset_notes
 from discovery.experiment.summary import comparison, rms_table
 from discovery.fitting import Fit
 from discovery.models import read_model
-from discovery.recordings import Channel
+from discovery.recordings import Channel, load_campaign
+from discovery.recordings.check import check_campaign
 from discovery.report.ranking import ranked
 from discovery.report.run import load_run
 from tests.small import CAMPAIGN, EXPERIMENT, MODEL, write_recording, write_small
@@ -216,6 +218,27 @@ def test_a_model_may_be_fitted_to_more_than_the_others(folder: Path) -> None:
     assert found["more"]["fit"] == ["a"]
     assert got["one_body"]["notes"][0] == "is fitted to b besides"
     assert set(got["reduced"]["recordings"]) == {"a", "c"}
+
+
+@pytest.mark.parametrize(
+    ("reads", "name", "kinds", "say"),
+    [
+        (load_experiment, "campaign.toml", "a campaign, where an experiment", "check {}"),
+        (load_experiment, "model.toml", "a model, where an experiment", "check CAMPAIGN --model {}"),
+        (load_experiment, "a.csv", "a recording, where a TOML file", "new DIR --from {}"),
+        (read_model, "campaign.toml", "a campaign, where a model", "check {}"),
+        (check_campaign, "experiment.toml", "an experiment, where a campaign", "run {}"),
+        (check_campaign, "a.csv", "a recording, where a TOML file", "new DIR --from {}"),
+        (load_campaign, "model.toml", "a model, where a campaign", "check CAMPAIGN --model {}"),
+    ],
+)
+def test_files_mixed_up_are_called_by_their_kind(
+    folder: Path, reads: Callable[[Path], object], name: str, kinds: str, say: str
+) -> None:
+    with pytest.raises(UserError) as caught:
+        reads(folder / name)
+    assert f"{folder / name}: this is {kinds} is wanted; " in str(caught.value)
+    assert f"`discovery {say.format(folder / name)}`" in str(caught.value)
 
 
 @pytest.mark.parametrize(

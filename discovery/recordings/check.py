@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from discovery.files import Key, dotted, locate, parse_toml, read_text
+from discovery.files import Key, check_kind, dotted, locate, parse_toml, read_file
 from discovery.recordings.campaign import Channel, channel_values, make_channel, wanted_columns
 from discovery.recordings.campaignfile import CampaignForm, RecordingForm, campaign_path
 from discovery.recordings.clockcheck import clock_findings
@@ -32,11 +32,12 @@ from discovery.schema import sentences, suggest
 def check_campaign(path: str | os.PathLike[str]) -> list[Finding]:
     """All findings about the campaign at `path` (the file or its folder), in the order of the files.
 
-    Raises UserError when the campaign file itself is missing, no text or no TOML.
+    Raises UserError when the campaign file itself is missing, no text, no TOML, or of another kind.
     """
     path = campaign_path(Path(path))
-    text = read_text(path)
+    text = read_file(path)
     data = parse_toml(text, path)
+    check_kind(path, data, CampaignForm)
     form, findings = _form(path, text, data)
     if form is None:
         return findings
