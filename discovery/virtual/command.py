@@ -98,10 +98,24 @@ def _refuse_another_campaign(out: Path, orders: Sequence[Order]) -> None:
 
 def effect_list() -> str:
     """The effects and faults with unit, default place and law, one a line."""
-    lines = ["choose an effect, then give its size:"]
-    for name, e in EFFECTS.items():
-        lines.append(f"  {name:24s} {e.low:g} to {e.high:g} {e.unit:5s} at {'+'.join(e.at):20s} {e.law}")
-    lines.append("or a fault of the measuring chain:")
-    for name, (_, channel, unit, example) in FAULTS.items():
-        lines.append(f"  {name:24s} e.g. {example:g} {unit}" + (f" on {channel}" if channel else ""))
-    return "\n".join(lines)
+    effects = [
+        (name, f"{e.low:g} to {e.high:g} {e.unit}".removesuffix(" 1"), f"at {'+'.join(e.at)}", e.law)
+        for name, e in EFFECTS.items()
+    ]
+    faults = [
+        (name, f"e.g. {example:g} {unit}", f"on {channel}" if channel else "", "")
+        for name, (_, channel, unit, example) in FAULTS.items()
+    ]
+    widths = [max(map(len, column)) for column in zip(*effects, *faults, strict=True)]
+    lines = [
+        "  " + "  ".join(f"{cell:{w}}" for cell, w in zip(row, widths, strict=True)).rstrip()
+        for row in (*effects, *faults)
+    ]
+    return "\n".join(
+        [
+            "choose an effect, then give its size:",
+            *lines[: len(effects)],
+            "or a fault of the measuring chain:",
+            *lines[len(effects) :],
+        ]
+    )

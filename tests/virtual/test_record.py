@@ -3,6 +3,7 @@
 import gzip
 import hashlib
 import json
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from typer.testing import CliRunner
 
 from discovery.cli import app
 from discovery.errors import UserError
+from discovery.virtual.command import effect_list
 from discovery.virtual.effects import parse_request
 from discovery.virtual.faults import clock_shift, outlier, parse_fault, rezero, sensor_drift, sensor_lag
 from discovery.virtual.nmv5000 import ORDERS, TITLE
@@ -105,6 +107,13 @@ def test_help_lists_effects_and_faults(words: list[str]) -> None:
     assert result.exit_code == 0
     assert "radiation" in result.stdout
     assert "clock_shift" in result.stdout
+
+
+def test_the_columns_of_the_help_line_up() -> None:
+    rows = [line for line in effect_list().splitlines() if line.startswith("  ")]
+    places = [re.search(r" {2}(at|on)", row) for row in rows]
+    assert len({place.start() for place in places if place}) == 1
+    assert sum(place is None for place in places) == 2  # a clock and a device have no place
 
 
 def test_a_folder_with_other_recordings_is_left_alone(tmp_path: Path) -> None:
