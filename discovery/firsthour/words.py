@@ -146,11 +146,13 @@ def role_of(name: str, unit: str | None, values: Array) -> Named:
     for pattern, role in _WORDS:
         found = _found(pattern, words)
         if found and (limits is None or _fits(limits, role)):
-            return Named(role, f"'{found}' in its name")
+            return Named(role, f"'{_spelled(found, name)}' in its name")
     if unit in _ROLE_OF_UNIT:
         return Named(_ROLE_OF_UNIT[unit], "by its unit")
     if share := _share(words, limits, values):
-        return Named("heat load", f"'{share}' in its name, as of what goes to a heater", sure=False)
+        return Named(
+            "heat load", f"'{_spelled(share, name)}' in its name, as of what goes to a heater", sure=False
+        )
     return Named("other input", "nothing in its name says what it is")
 
 
@@ -191,6 +193,12 @@ def _found(pattern: str, words: str) -> str:
     spaced = re.sub(r"(?<=[a-z])(?=\d)", " ", words)
     found = re.search(whole, words) or re.search(whole, spaced)
     return found[0].strip() if found else ""
+
+
+def _spelled(found: str, name: str) -> str:
+    """What was found in small letters, as the name spells it."""
+    spelled = re.search(r"[\W_]*".join(map(re.escape, found.split())), name, re.IGNORECASE)
+    return spelled[0] if spelled else found
 
 
 def _share(words: str, unit: str | None, values: Array) -> str:

@@ -11,6 +11,7 @@ import pytest
 from discovery.errors import UserError
 from discovery.firsthour.guess import Guess, drives, guess, guess_all
 from discovery.firsthour.table import Column, read_own
+from discovery.firsthour.words import role_of
 
 CASES = [
     ("T_room", "", np.linspace(20, 23, 50), "ambient temperature", "degC"),
@@ -317,3 +318,11 @@ def test_a_date_that_reads_one_way_is_not_asked_about(tmp_path: Path) -> None:
         table = read_own(_file(tmp_path, *_stamped(first, "%m/%d/%Y %H:%M", minutes)))
         assert table.time[-1] == pytest.approx(39 * 300.0)
         assert "?" not in table.about_time
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("T1", "'T' in its name"), ("T_Ambient", "'T_Ambient'"), ("DutyCycle", "'DutyCycle' in")],
+)
+def test_a_name_is_quoted_as_it_is_spelled(name: str, why: str) -> None:
+    assert role_of(name, None, np.array([0.0, 1.0])).why.startswith(why)
