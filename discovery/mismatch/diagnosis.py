@@ -19,6 +19,7 @@ from discovery.mismatch.describe import Curve, Description, curves, describe
 from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
 from discovery.mismatch.hypothesis import Hypothesis
+from discovery.mismatch.idle import not_offered
 from discovery.mismatch.locate import Location, locate
 from discovery.mismatch.printed import printed
 from discovery.mismatch.prove import Improvement, compare, explained, improvements, size_of
@@ -123,6 +124,7 @@ def diagnose(
     new = delivered(context, found.best) if found.best.hypotheses else old
     verdict = decide(context, found, before, after, new)
     new = new if verdict.named else old
+    verdict = replace(verdict, reasons=(*verdict.reasons, *not_offered(context, effects)))
     location = locate(context, found.baseline, found.best, verdict.named, before)
     noise = found.best.best_view.noise
     repaired = written(new) if verdict.named else None

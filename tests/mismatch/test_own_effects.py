@@ -108,6 +108,26 @@ def test_the_repaired_model_that_is_written_is_the_one_that_was_proved(tmp_path:
     assert said["improvement"]["held_out"]["r3"]["rms_after"] == pytest.approx(rms, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("*exp(", "*height*exp(", "no channel has the role 'nozzle height'"),
+        ("driven body", "cooling terms", "no channel has the role 'cooling power'"),
+        ("driven body", "link", None),
+    ],
+)
+def test_an_effect_that_has_no_place_is_told(old: str, new: str, why: str | None, tmp_path: Path) -> None:
+    text = RUB.replace(old, new)
+    if new == "cooling terms":
+        text = text.replace('unit = "W/rpm"', 'unit = "1"').replace(
+            "k_rub*speed*", "cooling + k_rub*cooling*"
+        )
+    answer = diagnosis(load_experiment(experiment(tmp_path, text)))
+    assert answer is not None
+    told = [reason for reason in answer.document()["reasons"] if reason.startswith("rub was not looked for")]
+    assert told == ([f"rub was not looked for: {why}"] if why else [])
+
+
 MISTAKES = {
     "k_rub*sped": "effect 'rub': 'sped' means nothing in its formula; known: .*speed",
     "0.1*speed": "effect 'rub': the amplitude 'k_rub' does not stand in the formula",

@@ -1,0 +1,40 @@
+"""Effects of the user's own that can act nowhere, and why: nobody should wait for an answer about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from discovery.mismatch.catalogue.effect import ROLE_OF, Effect
+from discovery.mismatch.context import Context
+from discovery.mismatch.hypotheses import hypotheses
+from discovery.terms import names, parse
+
+_FED = {  # places that are bodies or terms which the model couples to a channel of a role
+    "wet body": "fluid temperature",
+    "fluid terms": "fluid temperature",
+    "driven body": "heat load",
+    "neighbour": "heat load",
+    "air body": "ambient temperature",
+    "cooling terms": "cooling power",
+}
+
+
+def not_offered(context: Context, own: Sequence[Effect]) -> list[str]:
+    """A sentence for each effect that has no place in the model."""
+    model, channels = context.baseline.problem.model, context.campaign.channels
+    there = {channel.role for channel in channels.values()}
+    said = []
+    for effect in own:
+        if hypotheses(model, channels, context.outputs, context.recordings, [effect]):
+            continue
+        used = names(parse(effect.formula, f"effect {effect.word}"))
+        roles = [role for variable, role in ROLE_OF.items() if variable in used]
+        fed = [_FED[effect.place]] if effect.place in _FED else []
+        lacking = [role for role in dict.fromkeys([*roles, *fed]) if role not in there]
+        why = (
+            f"no channel has the role {' or '.join(repr(role) for role in lacking)}"
+            if lacking
+            else f"the model has no place of the kind '{effect.place}' where its channels could act"
+        )
+        said.append(f"{effect.word} was not looked for: {why}")
+    return said
