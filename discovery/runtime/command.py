@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TextIO
 
@@ -86,7 +87,8 @@ def compensate_rows(
     With `folder` the state is kept there: a restart goes on after the last state saved, and ticks done again
     stand twice in `out`; the later ones count.
 
-    `out` is opened with the first tick: inputs that cannot be read leave an older one as it was.
+    `out` is opened with the first tick, `folder` with the first row: inputs that cannot be read leave both as
+    they were.
 
     Raises:
         UserError: `out` is the file of the inputs or of the model, or inputs that cannot be read.
@@ -96,15 +98,20 @@ def compensate_rows(
             raise UserError(f"{out}: --out names the same file as {option}; name another file")
     step = exported.compiled.step_s
     settings, rule = Settings(tick_s=step), Rule(hours=shadow_hours)
-    session = Session(
-        exported, model=model, folder=folder, trusted=trusted, settings=settings, rule=rule, say=say
-    )
     with ExitStack() as stack:
         lines: Iterable[str] = sys.stdin if source == "-" else stack.enter_context(_open(Path(source)))
+        rows = csv_rows(lines, exported.compiled.inputs, say)
+        first = next(rows, None)  # inputs that are refused leave no trace in the folder
+        if first is None:
+            say("no row with a time came; nothing was done")
+            return
+        session = Session(
+            exported, model=model, folder=folder, trusted=trusted, settings=settings, rule=rule, say=say
+        )
         goes_on = out is not None and out.exists() and session.resumed is not None
         stream: TextIO | None = None
         last = None
-        for now, newest in ticks(csv_rows(lines, exported.compiled.inputs, say), step, session.resumed):
+        for now, newest in ticks(chain([first], rows), step, session.resumed):
             found = session.tick(newest, now)
             if stream is None:
                 stream = _output(out, stack, "a" if goes_on else "w")

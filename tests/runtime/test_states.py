@@ -340,6 +340,20 @@ def test_a_column_that_is_not_there_is_told(model_file: Path) -> None:
     assert none.stdout == ""
 
 
+@pytest.mark.parametrize(
+    ("text", "status"), [("time;T_env\n0;20\n", 1), ("time,a\n0,20\n", 1), ("time,T_env\n", 0)]
+)
+def test_inputs_that_are_refused_leave_no_state(
+    model_file: Path, tmp_path: Path, text: str, status: int
+) -> None:
+    memory = tmp_path / "mem"
+    command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", "-", "--state", str(memory)]
+    assert CliRunner().invoke(app, command, input=text).exit_code == status
+    assert not memory.exists()
+    assert CliRunner().invoke(app, command, input="time,T_env\n0,20\n").exit_code == 0
+    assert (memory / "active.json").exists()
+
+
 def test_the_output_may_not_be_what_is_read(model_file: Path, tmp_path: Path) -> None:
     inputs = tmp_path / "in.csv"
     inputs.write_text("time,T_env\n0,20\n")
