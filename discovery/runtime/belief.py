@@ -69,6 +69,10 @@ class Finding:
     moved: Mapping[str, tuple[float, float]]  # parameter: from, to
 
     def __str__(self) -> str:
+        if self.verdict == "noise" and self.p_value < SIGNIFICANT:
+            text = f"{self.recording}: noise (residual {self.before:.2f} of the fit's, {self.readings} "
+            text += "readings: as good as new, whatever all recordings so far say of its parameters, "
+            return f"{text}p = {self.p_value:.2g})"
         text = f"{self.recording}: {self.verdict} (p = {self.p_value:.2g}, {self.readings} readings, "
         text += f"residual {self.before:.2f}{f' -> {self.after:.2f}' if self.moved else ''} of the fit's)"
         moved = ", ".join(f"{name} {old:.4g} -> {new:.4g}" for name, (old, new) in self.moved.items())

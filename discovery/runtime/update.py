@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from discovery.export.document import Exported, read_document, write_document
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.runtime.belief import Belief, Finding, belief_of, residual_levels, update_belief
+from discovery.runtime.belief import AS_NEW, Belief, Finding, belief_of, residual_levels, update_belief
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -34,13 +34,29 @@ class Update:
             )
             lines.append(f"the mismatch method says: {self.diagnosis['verdict']}{named and ': ' + named}")
         if self.path is None:
-            lines.append("the model stays as it is")
+            lines.append(f"the model stays as it is{self._dropped()}")
         else:
             lines.append(
                 f"{self.path}: the next revision; `discovery compensate` runs it in the "
                 "shadow of the one at work first"
             )
         return lines
+
+    def _dropped(self) -> str:
+        """Why a drift of earlier recordings makes no revision: the last one is the machine of today."""
+        drifted = [f.recording for f in self.findings if f.verdict == "drift"]
+        if not drifted:
+            return ""
+        last = self.findings[-1]
+        why = (
+            "asks for a new effect, which no parameters stand in for"
+            if last.verdict == "new effect"
+            else "is predicted as well as when the model was fitted"
+            if last.before <= AS_NEW
+            else "shows none"
+        )
+        left = f"the drift in {', '.join(drifted)} is not taken up"
+        return f": the last recording decides, and {last.recording} {why}; {left}"
 
 
 def update_file(

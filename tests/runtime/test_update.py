@@ -17,8 +17,8 @@ from discovery.export.document import Exported, read_document, write_document
 from discovery.export.knowledge import stretch
 from discovery.recordings import Campaign, Recording
 from discovery.runtime import update as module
-from discovery.runtime.belief import belief_of
-from discovery.runtime.update import next_name, update_file
+from discovery.runtime.belief import Finding, belief_of
+from discovery.runtime.update import Update, next_name, update_file
 from discovery.virtual.effects import Request
 from discovery.virtual.machine import Machine
 from discovery.virtual.record import Order, take
@@ -152,3 +152,28 @@ def test_the_command(at_work: Path) -> None:
     assert done.exit_code == 0, done.output
     assert "validation: noise" in done.output
     assert "the model stays as it is" in done.output
+
+
+def test_a_drift_that_is_dropped_is_told_why() -> None:
+    drift = Finding("dry", "drift", 90, 2.1, 1.2, 1e-34, {"hA": (4.0, 5.0)})
+    for last, why in (
+        (
+            Finding("load", "noise", 50, 1.02, 1.0, 1e-34, {}),
+            "load is predicted as well as when the model was",
+        ),
+        (Finding("load", "noise", 50, 1.3, 1.2, 0.3, {}), "load shows none"),
+        (Finding("load", "new effect", 50, 3.0, 2.0, 1e-9, {}), "load asks for a new effect"),
+    ):
+        said = Update((drift, last), None, None).lines()[-1]
+        assert said.startswith(f"the model stays as it is: the last recording decides, and {why}")
+        assert said.endswith("; the drift in dry is not taken up")
+
+
+def test_noise_is_not_told_by_a_p_value_that_denies_it() -> None:
+    """The p value counts all recordings; this one is predicted as well as ever."""
+    said = str(Finding("load", "noise", 50, 1.02, 1.0, 1e-34, {}))
+    assert said.startswith("load: noise (residual 1.02 of the fit's, 50 readings: as good as new")
+    assert "all recordings so far" in said
+    assert str(Finding("load", "noise", 50, 1.3, 1.2, 0.3, {})).startswith(
+        "load: noise (p = 0.3, 50 readings"
+    )
