@@ -204,6 +204,13 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
     if speed and load:
         wanted[f"run at half speed and full load{dry}"] = build(0.5 * one, one, zero, False)
     wanted[f"{still} and follow the room"] = build(zero, zero, zero, False)
+    for n in (n for n, role in roles.items() if role == "other input"):
+        low, high = np.quantile(series[n], (0.05, 0.95))
+        if high > low:
+            wanted[f"step {n} every {hour}{dry}"] = {
+                **build(zero, zero, zero, False),
+                n: low + (high - low) * twelfth,
+            }
     return wanted
 
 

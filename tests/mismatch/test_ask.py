@@ -133,6 +133,22 @@ def test_a_pattern_confirms_an_effect_where_it_acts_and_takes_its_time() -> None
     assert "no input pattern" in next_experiment(where, more, fitted, noise, CONFIRM, believed(where))
 
 
+def test_an_input_of_no_known_role_is_moved_where_it_is_what_acts() -> None:
+    runs = ten_minutes()
+    one = runs.recordings["a"]
+    lamp = np.where(one.time % 200 < 20, 40.0, 0.0)  # off at its median
+    runs = replace(
+        runs,
+        channels={**PLATE, "lamp": Channel("lamp", "other input", "W", None, "held")},
+        recordings={"a": replace(one, values={**one.values, "lamp": lamp})},
+    )
+    where = make_context(runs, plate(0.04), ["a"], ["T"], [])
+    fitted = where.baseline.model
+    lit = fitted.with_terms(Term("lamp", "T", parse("0.02*lamp")))
+    said = next_experiment(where, lit, fitted, Noise(("T",), (0.1,)), CONFIRM, believed(where))
+    assert said.startswith("step lamp every 50 s: would confirm the answer within about")
+
+
 def test_an_effect_of_the_fluid_is_not_confirmed_dry() -> None:
     """The baseline that was fitted without it is bent: it would differ most where no fluid flows."""
     runs = campaign(simulated(1), simulated(2))
