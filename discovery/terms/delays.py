@@ -11,7 +11,7 @@ def delays_at(channels: Collection[str], expression: Expression) -> Expression:
     """The same with every delay at a channel: what a formula gave a while ago is the formula of what its
     channels were then. Other names than channels and `time` are constants.
 
-    >>> from discovery.terms.expression import parse, substitute, text
+    >>> from discovery.terms import parse, substitute, text
     >>> late = substitute(parse("hF*delay(T, 60)"), {"T": parse("lag(T, tau) + rise*(time > 0)")})
     >>> text(delays_at({"T"}, late))
     'hF*(lag(delay(T, 60), tau) + rise*(time - 60 > 0))'
