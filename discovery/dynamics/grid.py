@@ -52,11 +52,11 @@ class Samples:
             if len(self.time) <= len(nodes):
                 return self
             return Samples(
-                nodes, self._means(np.r_[nodes[0], 0.5 * (nodes[1:] + nodes[:-1]), nodes[-1]]), True
+                nodes, self.means(np.r_[nodes[0], 0.5 * (nodes[1:] + nodes[:-1]), nodes[-1]]), True
             )
-        return Samples(nodes[:-1], self._means(nodes), False)
+        return Samples(nodes[:-1], self.means(nodes), False)
 
-    def _means(self, edges: Array) -> Array:
+    def means(self, edges: Array) -> Array:
         """Mean between each two edges; exactly the value where it stays one, so that what is constant in the
         recording is constant to the last bit and equal intervals share their transition matrices.
         """
@@ -84,11 +84,15 @@ class Grid:
     readings: Array  # (R, Y), NaN where an output was not read
     spread: Mapping[str, float] = field(default_factory=dict)  # of channels known only within one
     offset: Mapping[str, float] = field(default_factory=dict)  # what `ends` and `nodes` have on the samples
+    unsure: Mapping[str, float] = field(default_factory=dict)  # s, of held channels perhaps logged late
+    late: Mapping[str, float] = field(default_factory=dict)  # s, which `ends` has them earlier than stamped
     instants: int = 0  # nodes that there were before it was coarsened; 0: it was not
 
-    def shifted(self, offset: Mapping[str, float]) -> Grid:
-        """The grid with channels moved by constants from what was recorded (whatever moved them before)."""
-        return replace(self, offset=dict(offset))
+    def shifted(self, offset: Mapping[str, float], late: Mapping[str, float] | None = None) -> Grid:
+        """The grid with channels moved by constants from what was recorded, in value and, held ones, in time
+        (whatever moved them before).
+        """
+        return replace(self, offset=dict(offset), late=dict(late or {}))
 
     @cached_property
     def step(self) -> Array:
@@ -99,7 +103,12 @@ class Grid:
     def ends(self) -> dict[str, Array]:
         """Channels and `time` at the interval ends, each (2(T - 1),)."""
         left, right = self.time[:-1], self.time[1:]
-        values = {name: interleaved(s.at(left), s.at(right, "left")) for name, s in self.samples.items()}
+        values = {
+            name: np.repeat(s.means(self.time + self.late[name]), 2)
+            if name in self.late
+            else interleaved(s.at(left), s.at(right, "left"))
+            for name, s in self.samples.items()
+        }
         return {**self._moved(values), "time": interleaved(left, right)}
 
     @cached_property

@@ -29,7 +29,8 @@ class Memory:
         A held channel is averaged over each interval, which keeps switches inside an interval exact in the
         mean and the delay differentiable.
         """
-        samples, time = self.grid.samples[channel], self.grid.time - seconds
+        samples = self.grid.samples[channel]
+        time = self.grid.time + self.grid.late.get(channel, 0.0) - seconds
         offset = self.grid.offset.get(channel, 0.0)
         if samples.linear:
             values = samples.at(time) + offset

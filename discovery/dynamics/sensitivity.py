@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import kernel
-from discovery.dynamics.system import Trajectory, first_values, output_matrix, outputs
+from discovery.dynamics.system import Trajectory, first_values, output_matrix, outputs, shifted
 from discovery.terms import evaluate, names
 
 Array = NDArray[np.float64]
+
+_PART = 0.01  # of what an input is expected to be late, the step of a difference
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,28 @@ def sensitivities(
                 system.grid.read
             ]
     return dy
+
+
+def moved_in_time(trajectory: Trajectory, late: Sequence[str]) -> list[Column]:
+    """What each term changes by for a second by which a channel is logged later, owners in order.
+
+    By differences: where a channel is held, its mean over an interval is a straight line of the shift but
+    where a step comes past a node, and expressions with memory are no case of their own.
+    """
+    system, now = trajectory.system, trajectory.system.grid.late
+    found = []
+    for owner, channel in enumerate(late):
+        width = _PART * system.grid.unsure[channel]
+        sides = []
+        for by in (width, -width):
+            moved = shifted(system, system.grid.offset, {**now, channel: now[channel] + by})
+            sides.append((moved, {**trajectory.at_ends(), channel: moved.grid.ends[channel]}))
+        for term in system.model.terms:
+            if channel in names(term.expression):
+                above, below = (evaluate(term.expression, env, memory=s.ends).value for s, env in sides)
+                change = np.asarray((above - below) / (2 * width))
+                found.append(Column(owner, term.into, change, term.source))
+    return found
 
 
 def _moved_terms(trajectory: Trajectory, parameters: Sequence[str]) -> list[Column]:

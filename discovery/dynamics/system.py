@@ -101,9 +101,12 @@ def start_values(system: System, values: Mapping[str, float]) -> Array:
     return out
 
 
-def shifted(system: System, offset: Mapping[str, float]) -> System:
-    """The system with channels moved by constants from what was recorded; all that reads them follows."""
-    grid = system.grid.shifted(offset)
+def shifted(system: System, offset: Mapping[str, float], late: Mapping[str, float] | None = None) -> System:
+    """The system with channels moved by constants from what was recorded; all that reads them follows.
+
+    Held channels may move in time, too: the terms follow.
+    """
+    grid = system.grid.shifted(offset, late)
     return replace(system, grid=grid, ends=Memory(grid, True), nodes=Memory(grid, False))
 
 

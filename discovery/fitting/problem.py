@@ -18,17 +18,21 @@ from discovery.dynamics import (
     simulate,
     start_values,
 )
+from discovery.dynamics.sensitivity import moved_in_time
 from discovery.dynamics.system import inputs_of, predict, shifted, uncertain
 from discovery.models import Model, expanded
 from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
 
+MOST = 2.0  # of what is expected, the most that an input is logged late
+
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
     """One number to find: a parameter (of one recording, or common: ``recording=None``), how far a state
-    begins from its declared start, or the offset of an input known only within a spread.
+    begins from its declared start, the offset of an input known only within a spread, or the seconds by
+    which a held input was logged late.
 
     A start that is declared by a formula moves with the parameters and inputs in it; the priors of all stay
     independent.
@@ -43,16 +47,17 @@ class Unknown:
     prior: tuple[float, float] | None = None  # mean and standard deviation
     belief: float | None = None  # the start value is believed within a factor exp(belief), with heavy tails
     is_offset: bool = False  # `name` is the channel
+    is_late: bool = False  # likewise
 
     @property
-    def key(self) -> tuple[str, str | None, bool, bool]:
+    def key(self) -> tuple[str, str | None, bool, bool, bool]:
         """What tells it from the others."""
-        return self.name, self.recording, self.is_start, self.is_offset
+        return self.name, self.recording, self.is_start, self.is_offset, self.is_late
 
     @property
     def is_nuisance(self) -> bool:
         """Whether this is of one recording's circumstances, not of the model."""
-        return self.is_start or self.is_offset
+        return self.is_start or self.is_offset or self.is_late
 
 
 @dataclass(frozen=True)
@@ -119,8 +124,10 @@ class Problem:
         """Free run of a recording with the unknowns at `theta`."""
         values = self.values(system, theta)
         mine = [(self.unknowns[i], float(theta[i])) for i in self.concerns(system)]
-        if offset := {u.name: value for u, value in mine if u.is_offset}:
-            system = shifted(system, offset)
+        offset = {u.name: value for u, value in mine if u.is_offset}
+        late = {u.name: value for u, value in mine if u.is_late}
+        if offset or late:
+            system = shifted(system, offset, late)
         start = start_values(system, values)
         for u, value in mine:
             if u.is_start:
@@ -135,13 +142,18 @@ class Problem:
         """dy/d(unknowns) of a recording, (R, Y, U), zero for unknowns of other recordings."""
         system = trajectory.system
         mine = self.concerns(system)
+        late = [i for i in mine if self.unknowns[i].is_late]
+        starts = [i for i in mine if self.unknowns[i].is_start]
         # sensitivities() takes the channel of an offset like a parameter
-        parameters = [self.unknowns[i].name for i in mine if not self.unknowns[i].is_start]
-        starts = [self.unknowns[i].name for i in mine if self.unknowns[i].is_start]
-        dy = sensitivities(trajectory, parameters, starts)
-        ordered = [i for i in mine if not self.unknowns[i].is_start] + [
-            i for i in mine if self.unknowns[i].is_start
-        ]
+        parameters = [i for i in mine if i not in starts and i not in late]
+        ordered = [*parameters, *starts, *late]
+        dy = sensitivities(
+            trajectory,
+            [self.unknowns[i].name for i in parameters],
+            [self.unknowns[i].name for i in starts],
+            moved_in_time(trajectory, [self.unknowns[i].name for i in late]),
+            len(late),
+        )
         out = np.zeros((*dy.shape[:2], len(self.unknowns)))
         out[:, :, ordered] = dy
         return out
@@ -174,7 +186,7 @@ def make_problem(
         grid = grids.get(recording) if grids else None
         if grid is None or not set(inputs) <= set(grid.samples) or grid.outputs != tuple(outputs):
             grid = make_grid(campaign, recording, inputs, outputs)
-        systems.append(make_system(model, grid.shifted({}) if grid.offset else grid))
+        systems.append(make_system(model, grid.shifted({}) if grid.offset or grid.late else grid))
     return Problem(model, tuple(systems), tuple(_unknowns(model, systems, recordings, priors or {}, belief)))
 
 
@@ -185,7 +197,7 @@ def _unknowns(
     priors: Mapping[str, tuple[float, float]],
     belief: float | None,
 ) -> list[Unknown]:
-    """Parameters in the order of the model, then starts and offsets recording by recording."""
+    """Parameters in the order of the model, then starts, offsets and lateness recording by recording."""
     unknowns = []
     for name in model.free:
         p = model.parameters[name]
@@ -207,6 +219,11 @@ def _unknowns(
             Unknown(n, system.grid.recording, False, 0.0, -np.inf, np.inf, (0.0, sd), is_offset=True)
             for n in uncertain(system)
             if (sd := system.grid.spread[n])
+        ]
+        unknowns += [
+            Unknown(n, system.grid.recording, False, 0.0, -MOST * sd, MOST * sd, (0.0, sd), is_late=True)
+            for n, sd in system.grid.unsure.items()
+            if n in system.model.inputs
         ]
     return unknowns
 

@@ -13,6 +13,7 @@ from discovery.fitting import Fit, Noise, fit_model
 from discovery.fitting.noise import resolution
 from discovery.mismatch.catalogue.effect import Effect
 from discovery.mismatch.hypothesis import Hypothesis
+from discovery.mismatch.late import perhaps_late
 from discovery.mismatch.lens import Lens
 from discovery.mismatch.outliers import Outlier, find_outliers, without
 from discovery.mismatch.scales import scaled
@@ -128,6 +129,10 @@ def make_context(
     grids = thinned(whole)
     belief = BELIEF if physical and any(state.capacity for state in model.states.values()) else None
     fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
+    whole = perhaps_late(fit, whole)
+    if any(g.unsure for g in whole.values()):
+        grids = thinned(whole)
+        fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief, begin=fit)
     flows = _flows(fit)
     limit = _everyday_heat(fit.problem.model, flows)
     duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())

@@ -20,6 +20,7 @@ from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
 from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.idle import not_offered
+from discovery.mismatch.late import told
 from discovery.mismatch.locate import Location, locate
 from discovery.mismatch.printed import printed
 from discovery.mismatch.prove import Improvement, compare, explained, improvements, size_of
@@ -134,6 +135,7 @@ def diagnose(
     if lost := ", ".join(r for r in read if r not in proof):
         reason = f"the model itself runs away on unseen recording {lost}: nothing can be proved there"
         verdict = replace(verdict, reasons=(*verdict.reasons, reason))
+    verdict = replace(verdict, reasons=(*verdict.reasons, *told(found.best.fit)))
     tell("asking for the next experiment")
     question = _question(context, found, verdict)
     levels = [v.level for v in found.baseline.views]
