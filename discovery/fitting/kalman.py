@@ -7,7 +7,8 @@ model around a trajectory,
 
 so a Kalman filter whitens residuals and sensitivity columns alike in one pass (Sarkka & Solin, Applied
 Stochastic Differential Equations, 2019, ch. 10) and gives the likelihood of the variances. `w` is held
-between readings: its time constant is hours, readings come in minutes.
+between readings: its time constant is hours, readings come in minutes. An input that switches a little before
+or after its stamp leaves an impulse at the bodies, each time another one.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
 from discovery.dynamics.kernel import between
+from discovery.dynamics.sensitivity import moved_in_time
 from discovery.dynamics.system import output_matrix
 from discovery.fitting.noise import Noise
 
@@ -46,7 +48,7 @@ def _propagate(f, b, heat_decay, slow_decay, x, top):  # type: ignore[no-untyped
 
 
 @njit(cache=True)
-def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay):  # type: ignore[no-untyped-def]
+def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, jumps):  # type: ignore[no-untyped-def]
     """Kalman gains (R, Y, size) and standard deviations (R, Y) of the innovations, half the log-determinant.
 
     They do not depend on the data: columns that are whitened later under the same noise share them.
@@ -68,6 +70,8 @@ def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay):  # typ
             _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], p, top_p)
             p = p.T.copy()  # symmetric: the other side is the same step on the transpose
             _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], p, top_p)
+            if len(jumps):
+                p[:n, :n] += jumps[r - 1]
             for j in range(nh):
                 p[n + j, n + j] += heat[j] ** 2 * (1.0 - heat_decay[r - 1] ** 2)
             for j in range(nv):
@@ -136,6 +140,7 @@ class Filter:
     h: Array
     step: Array
     measured: NDArray[np.bool_]
+    jumps: Array  # covariance of impulses between readings for a jitter of one, none where none can be
     last: dict[str, tuple[Noise, tuple[Array, Array, float]]] = field(default_factory=dict, repr=False)
 
     def gains(self, noise: Noise) -> tuple[Array, Array, float]:
@@ -144,8 +149,9 @@ class Filter:
         """
         if "gains" not in self.last or self.last["gains"][0] != noise:
             heat, slow, response, decays = self._parts(noise)
+            white, jumps = np.array(noise.white), self.jumps if noise.jitter else self.jumps[:0]
             found = _gains(
-                self.f, response, self.h, self.measured, np.array(noise.white), slow, heat, *decays
+                self.f, response, self.h, self.measured, white, slow, heat, *decays, noise.jitter**2 * jumps
             )
             self.last["gains"] = (noise, found)
         return self.last["gains"][1]
@@ -198,7 +204,29 @@ def make_filter(trajectory: Trajectory) -> Filter:
         output_matrix(trajectory),
         np.diff(system.grid.time[read]),
         system.grid.measured,
+        _jumps(trajectory),
     )
+
+
+def _jumps(trajectory: Trajectory) -> Array:
+    """Covariance (R - 1, n, n) of what the states get between two readings where each switch comes before or
+    after its stamp by as much as the input may be logged late; empty where no input may.
+    """
+    system, n = trajectory.system, len(trajectory.system.states)
+    channels = tuple(system.grid.late)
+    if not channels:
+        return np.zeros((0, n, n))
+    impulse = np.zeros((len(channels), len(system.grid.step), n))
+    for piece in moved_in_time(trajectory, channels):
+        size = np.broadcast_to(piece.series, (2 * len(system.grid.step),)).reshape(-1, 2).mean(axis=1)
+        size = size * system.grid.step * system.grid.unsure[channels[piece.owner]]
+        for state, sign in ((piece.into, 1.0), (piece.source, -1.0)):
+            if state:
+                i = system.states.index(state)
+                impulse[piece.owner, :, i] += sign * system.scale[i] * size
+    sums = np.zeros((len(system.grid.time), n, n))
+    np.cumsum(np.einsum("cki,ckj->kij", impulse, impulse), axis=0, out=sums[1:])
+    return np.diff(sums[system.grid.read], axis=0)
 
 
 def whiten(trajectory: Trajectory, noise: Noise, data: Array, part: Filter | None = None) -> Array:

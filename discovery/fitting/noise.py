@@ -28,11 +28,12 @@ class Noise:
     heat: Mapping[str, float] | None = None
     slow_time: float = SLOW_TIME
     heat_time: float = HEAT_TIME
+    jitter: float = 0.0  # of single switches of inputs that may be logged late, as a share of `Grid.unsure`
 
     @property
     def is_white(self) -> bool:
         """Whether whitening is a plain division."""
-        return not any(self.slow) and not any((self.heat or {}).values())
+        return not any(self.slow) and not any((self.heat or {}).values()) and not self.jitter
 
 
 def white_noise(

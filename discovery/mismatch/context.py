@@ -31,6 +31,7 @@ BUSY_FLOW = 100.0  # W; a model whose largest heat flow is smaller has a smaller
 MOST_READINGS = 6000  # instants, over all recordings
 COARSE_READINGS = 4000  # of them, and of nodes, where recordings are so fine that they are coarsened anyway
 COARSE_LINK = 0.5  # of what a link carries, below which another exchange beside it is its coarseness
+JITTER = 12**-0.5  # of a logging interval: a switch that comes anywhere in it
 SLOW_LIMIT = 0.55  # everyday slow sensor noise, as a share of the reading noise
 
 
@@ -142,7 +143,7 @@ def make_context(
         grids = thinned(without(whole, outliers))
         fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
         white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)
-    settings = everyday(white, limit)
+    settings = everyday(white, limit, any(g.unsure for g in grids.values()))
     return Context(
         campaign,
         model,
@@ -173,17 +174,22 @@ def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:
     return {r: replace(g, read=g.read[::every], readings=g.readings[::every]) for r, g in grids.items()}
 
 
-def everyday(white: Noise, limit: Mapping[str, float]) -> tuple[Noise, ...]:
+def everyday(white: Noise, limit: Mapping[str, float], unsure: bool = False) -> tuple[Noise, ...]:
     """The noise settings that evidence is integrated over: slow noise from none and heat from next to none
     to the everyday limit. None at all there is not: a few bodies never stand for a machine to the last
     fraction of a watt, and readings without other noise would call what is left an effect.
+
+    Args:
+        unsure: inputs may be logged late, each switch by another time, or all by the same.
     """
     return tuple(
         replace(
             white,
             slow=tuple(share * w for w in white.white),
             heat={name: level * value for name, value in limit.items()},
+            jitter=jitter,
         )
+        for jitter in ((0.0, JITTER) if unsure else (0.0,))
         for share in (0.0, 0.5 * SLOW_LIMIT, SLOW_LIMIT)
         for level in (LEAST_HEAT, 0.35, 0.9)
     )
@@ -197,7 +203,8 @@ def seen_beside(context: Context, fit: Fit) -> Context:
     stated = {name: channels[name].noise for name in context.outputs}
     duration = max(float(g.time[-1] - g.time[0]) for g in context.grids.values())
     white = reading_noise(fit, stated, context.heat_limit, duration)
-    return replace(context, settings=everyday(white, context.heat_limit))
+    unsure = any(g.unsure for g in context.grids.values())
+    return replace(context, settings=everyday(white, context.heat_limit, unsure))
 
 
 def _everyday_heat(model: Model, flows: Mapping[str, float]) -> dict[str, float]:

@@ -4,6 +4,8 @@ seconds before its stamp looks like missing heat.
 A logger that holds what it sampled, or smooths it, is late by up to about one of its intervals. That is an
 unknown of each recording, like the offset of an input known only within a spread. Where the fastest body
 takes many intervals to answer, or readings come too rarely to follow it, nothing is asked.
+
+That each switch is late by another time is noise (`context.JITTER`).
 """
 
 from __future__ import annotations
@@ -12,8 +14,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
+from discovery.dynamics.grid import MOVED
 from discovery.fitting import Fit
 
 FAST = 10.0  # intervals of an input within which a body answers, for a late stamp to matter
@@ -26,6 +30,18 @@ def perhaps_late(fit: Fit, grids: Mapping[str, Grid]) -> dict[str, Grid]:
     """The grids with what inputs may be logged late by, where it can matter to the model of a fit."""
     fastest = min(_fastest(t) for t in fit.trajectories)
     return {name: replace(grid, unsure=_unsure(grid, fastest)) for name, grid in grids.items()}
+
+
+def beside_switches(grid: Grid) -> NDArray[np.bool_]:
+    """Which readings (R,) come within a logging interval of a switch of an input that may be logged late."""
+    read = grid.time[grid.read]
+    beside = np.zeros(len(read), dtype=bool)
+    for name, interval in grid.unsure.items():
+        samples = grid.samples[name]
+        switches = samples.time[1:][np.abs(np.diff(samples.value)) > MOVED * np.ptp(samples.value)]
+        before = np.searchsorted(switches, read - interval, side="left")
+        beside |= np.searchsorted(switches, read + interval, side="right") > before
+    return beside
 
 
 def _unsure(grid: Grid, fastest: float) -> dict[str, float]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, make_system
 from discovery.fitting import Fit
+from discovery.mismatch.late import beside_switches
 
 Array = NDArray[np.float64]
 
@@ -43,6 +44,7 @@ def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Out
     for grid in grids.values():
         trajectory = fit.problem.run(make_system(fit.problem.model, grid), fit.theta)
         residual = fit.problem.residual(trajectory)
+        switched = beside_switches(grid)
         for y, name in enumerate(grid.outputs):
             rows = np.flatnonzero(np.isfinite(residual[:, y]))
             r = residual[rows, y]
@@ -58,6 +60,7 @@ def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Out
             near &= np.abs(r[2:] - middle[1:-1]) < NEXT * noise
             # at its ends a recording may just have begun to move
             alone &= np.concatenate([[False], near, [False]])
+            alone &= ~switched[rows]  # a short pulse that is logged late shows in one reading
             for k in np.flatnonzero((np.abs(jump) > FAR * noise) & alone):
                 at = float(grid.time[grid.read[rows[k]]])
                 found.append(Outlier(name, grid.recording, at, float(jump[k]), noise))

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, make_grid
 from discovery.dynamics.system import predict
-from discovery.fitting import fit_model, make_problem
+from discovery.fitting import Noise, fit_model, make_problem
+from discovery.fitting.kalman import make_filter
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -94,3 +95,20 @@ def test_an_input_that_stands_still_is_the_same_to_the_last_bit() -> None:
     assert np.array_equal(moved.ends["fan"][still], grid.ends["fan"][still])
     assert np.array_equal(moved.ends["load"], grid.ends["load"])
     assert np.array_equal(moved.nodes["fan"], grid.nodes["fan"])
+
+
+def test_switches_that_come_each_by_another_time_are_whitened_as_a_dense_covariance_says() -> None:
+    """An impulse of g times step times jitter at the reading behind it, which dies as the body cools."""
+    r, jitter, white = logged(5, 0.0, 120), 0.3, 0.2
+    problem = make_problem(model().with_values(TRUTH), campaign(r), ["r5"], grids=grids(campaign(r)))
+    theta = np.array([23.0 if u.is_late else u.start for u in problem.unknowns])
+    part = make_filter(problem.run(problem.systems[0], theta))
+    keep = np.exp(-TRUTH["h"] * INTERVAL * r.values["fan"][:-1])
+    answer = np.diag(np.diff(r.values["load"], prepend=r.values["load"][0]) * TRUTH["g"] * INTERVAL * jitter)
+    for k in range(1, len(keep) + 1):
+        answer[k] += keep[k - 1] * answer[k - 1]
+    triangle = np.linalg.cholesky(answer @ answer.T + white**2 * np.eye(len(answer)))
+    data = np.random.default_rng(0).standard_normal((len(answer), 1, 2))
+    found, logdet = part.apply(Noise(("T",), (white,), jitter=jitter), data)
+    assert found == pytest.approx(np.linalg.solve(triangle, data[:, 0]), abs=1e-7)
+    assert logdet == pytest.approx(np.log(np.diag(triangle)).sum())

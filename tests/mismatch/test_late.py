@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from discovery.dynamics import make_grid
 from discovery.mismatch import context as contexts
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import make_context
-from discovery.mismatch.late import perhaps_late
+from discovery.mismatch.late import beside_switches, perhaps_late
 from discovery.mismatch.search import search
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
@@ -81,6 +83,14 @@ def test_a_power_that_is_logged_late_is_no_missing_physics(monkeypatch: pytest.M
     assert found(seen) != ()
 
 
+def test_switches_off_the_grid_of_the_logger_are_no_missing_physics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is logged at the next stamp: 0 to 60 s late."""
+    seen = campaign(light(1, 30.0, 30.0), light(2, 30.0, 30.0))
+    assert found(seen) == ()
+    monkeypatch.setattr(contexts, "JITTER", 0.0)
+    assert found(seen) != ()
+
+
 def test_stamps_that_are_exact_stay_so() -> None:
     seen = campaign(light(3, 0.0), light(4, 0.0))
     context = make_context(seen, model(), ["r3", "r4"], ("coil", "frame"), [])
@@ -102,3 +112,12 @@ def test_it_is_asked_only_where_bodies_and_readings_are_fast() -> None:
     slow = machine.campaign(machine.simulated(1), machine.simulated(2))
     context = make_context(slow, machine.model(), ["r1", "r2"], tuple(machine.SEEN), [])
     assert not any(g.unsure for g in context.grids.values())
+
+
+def test_readings_beside_a_switch_that_may_be_late() -> None:
+    grid = make_grid(campaign(light(6, 0.0)), "r6", ["P", "room"], ["coil", "frame"])
+    assert not beside_switches(grid).any()
+    beside = beside_switches(replace(grid, unsure={"P": INTERVAL}))
+    switched = np.diff(grid.samples["P"].value, prepend=grid.samples["P"].value[0]) != 0
+    near = switched | np.roll(switched, 1) | np.roll(switched, -1)
+    assert np.array_equal(beside, near)
