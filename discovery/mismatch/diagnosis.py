@@ -10,28 +10,23 @@ from typing import Any
 import numpy as np
 
 from discovery.errors import UserError
-from discovery.mismatch.ask import NOTHING_CLOSE, aim, believed, look_back, next_experiment
+from discovery.mismatch.ask import ask
 from discovery.mismatch.assess import Assessment
 from discovery.mismatch.catalogue import Effect, catalogue
 from discovery.mismatch.context import Context, make_context, seen_beside
 from discovery.mismatch.deliver import delivered, written
 from discovery.mismatch.describe import Curve, Description, curves, describe
-from discovery.mismatch.evidence import Score
 from discovery.mismatch.forcing import Forcing, free_forcing
-from discovery.mismatch.hypothesis import Hypothesis
 from discovery.mismatch.idle import not_offered
 from discovery.mismatch.late import told
 from discovery.mismatch.locate import Location, locate
-from discovery.mismatch.printed import printed
-from discovery.mismatch.prove import Improvement, compare, explained, improvements, size_of
+from discovery.mismatch.prove import Improvement, explained, improvements, on_fit, size_of
 from discovery.mismatch.search import Search, search
 from discovery.mismatch.selfcheck import false_alarm, named_again
-from discovery.mismatch.verdict import FAULT, NO_MISMATCH, RIVAL, UNEXPLAINED, Verdict, decide
+from discovery.mismatch.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.threads import one_thread
-
-INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
 
 ANOTHER_NOISE = 0.05  # relative change of a channel's reading noise that calls for another search
 
@@ -137,7 +132,7 @@ def diagnose(
         verdict = replace(verdict, reasons=(*verdict.reasons, reason))
     verdict = replace(verdict, reasons=(*verdict.reasons, *told(found.best.fit)))
     tell("asking for the next experiment")
-    question = _question(context, found, verdict)
+    question = ask(context, found, verdict)
     levels = [v.level for v in found.baseline.views]
     top = found.looks[0][0].gain if found.looks[0] else 0.0
     unexplained = verdict.word == UNEXPLAINED and bool(before)
@@ -149,7 +144,7 @@ def diagnose(
         verdict=verdict,
         location=location,
         forcings=tuple(before),
-        fit=_on_fit(old, new, size_of(campaign, new.best_view.noise)),
+        fit=on_fit(old, new, size_of(campaign, new.best_view.noise)),
         held_out=proof,
         p_value=false_alarm(found.board, int(np.argmax(levels)), top),
         repaired=repaired,
@@ -159,103 +154,3 @@ def diagnose(
         question=question,
         seconds=clock.perf_counter() - began,
     )
-
-
-def _question(context: Context, found: Search, verdict: Verdict) -> str:
-    """What to do next."""
-    if verdict.word == NO_MISMATCH:
-        return _smallest(found)
-    if verdict.word == FAULT:
-        return (
-            "check the device and repeat the recording; a fault of the measuring chain needs no new physics"
-        )
-    shown = verdict.named or verdict.candidates
-    if not shown:
-        return NOTHING_CLOSE
-    rivals = [
-        r.hypothesis
-        for n in shown
-        for r in n.rivals
-        if r.below <= RIVAL and not (r.hypothesis.recording and n.hypothesis.recording)
-    ]  # no pattern tells two events of the past apart
-    rival = _rival_model(found, rivals[0]) if rivals else None
-    claims = [n.hypothesis for n in shown]
-    if rival is None and all(h.recording for h in claims):
-        return look_back(context, claims)
-    purpose = aim(claims, rivals[0] if rival else None, bool(verdict.named))
-    noise, answer = found.best.best_view.noise, found.best.fit.model
-    return next_experiment(context, answer, rival or _without(found.best), noise, purpose, believed(context))
-
-
-def _on_fit(before: Assessment, after: Assessment, one: float) -> Improvement:
-    parts = [
-        compare(old, new, after.best_view.noise, one)
-        for old, new in zip(before.fit.trajectories, after.fit.trajectories, strict=True)
-    ]
-
-    def together(values: Sequence[float]) -> float:
-        return float(np.sqrt(np.mean(np.square(values))))
-
-    return Improvement(
-        together([p.before for p in parts]),
-        together([p.after for p in parts]),
-        together([p.floor for p in parts]),
-        min(p.low for p in parts),
-        max(p.high for p in parts),
-    )
-
-
-def _without(best: Assessment) -> Model:
-    """The model with its effects switched off and everything else as it is with them."""
-    return best.fit.model.with_values({name: 0.0 for h in best.hypotheses for name in h.amplitudes})
-
-
-def _rival_model(found: Search, rival: Hypothesis) -> Model | None:
-    for attempt in found.tried:
-        as_many = len(attempt.hypotheses) == len(found.best.hypotheses)
-        if as_many and any(h.key == rival.key for h in attempt.hypotheses):
-            return attempt.fit.model
-    return None
-
-
-def _smallest(found: Search) -> str:
-    """What would have been seen: the size at which usual effects reach the threshold, and where."""
-    texts = []
-    for word in (
-        "fluid_convection",
-        "friction_speed",
-        "evaporation_drying",
-        "flooded_gap",
-        "second_thermal_mass",
-    ):
-        claims = [c for c in found.looks[0] if c.hypothesis.effect.word == word]
-        seen = [c for c in claims if _size_is_told(c)]
-        if not seen:
-            continue
-        size, c = max(((4.5 * abs(c.size[0] / c.t), c) for c in seen), key=lambda item: item[0])
-        h = c.hypothesis
-        speed = f" at {h.effect.at}" if h.effect.at else ""
-        places = list(dict.fromkeys(" and ".join(c.hypothesis.places) for c in seen))
-        everywhere = len(seen) == len(claims) and len(places) > 1 and h.effect.place in _ANYWHERE
-        where = _ANYWHERE[h.effect.place] if everywhere else f"at {'; '.join(places)}"
-        unit = h.units.get(h.amplitudes[0], "")
-        texts.append(f"{word} of {printed(size, 2)} {unit}{speed} {where}")
-    return (
-        "these recordings would have shown " + ", ".join(texts)
-        if texts
-        else "nothing is missing that these recordings could show"
-    )
-
-
-def _size_is_told(claim: Score) -> bool:
-    h = claim.hypothesis
-    is_size = h.effect.amplitude.fixed is None and h.recording is None
-    return is_size and claim.t != 0 and claim.share > INVISIBLE
-
-
-_ANYWHERE = {
-    "body": "at any body",
-    "fluid-free body": "at any body without fluid",
-    "driven body": "at any driven body",
-    "any pair": "between any two bodies",
-}

@@ -5,7 +5,7 @@ A logger that holds what it sampled, or smooths it, is late by up to about one o
 unknown of each recording, like the offset of an input known only within a spread. Where the fastest body
 takes many intervals to answer, or readings come too rarely to follow it, nothing is asked.
 
-That each switch is late by another time is noise (`context.JITTER`).
+That each switch is late by another time is noise (`everyday.JITTER`).
 """
 
 from __future__ import annotations

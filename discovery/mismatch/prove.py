@@ -13,6 +13,7 @@ from discovery.dynamics import Trajectory
 from discovery.dynamics.system import predict
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise, predict_recording
+from discovery.mismatch.assess import Assessment
 from discovery.mismatch.events import heat_steps
 from discovery.models import Model
 from discovery.models.units import differences
@@ -141,3 +142,22 @@ def explained(found: Mapping[str, Improvement]) -> float | None:
             gap += i.before**2 - i.floor**2
             gain += i.before**2 - max(i.after, i.floor) ** 2
     return float(np.clip(gain / gap, -1.0, 1.0)) if gap > 0 else None
+
+
+def on_fit(before: Assessment, after: Assessment, one: float) -> Improvement:
+    """The same of the recordings of the fit, all together."""
+    parts = [
+        compare(old, new, after.best_view.noise, one)
+        for old, new in zip(before.fit.trajectories, after.fit.trajectories, strict=True)
+    ]
+
+    def together(values: Sequence[float]) -> float:
+        return float(np.sqrt(np.mean(np.square(values))))
+
+    return Improvement(
+        together([p.before for p in parts]),
+        together([p.after for p in parts]),
+        together([p.floor for p in parts]),
+        min(p.low for p in parts),
+        max(p.high for p in parts),
+    )

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from discovery.fitting import Noise
-from discovery.mismatch.ask import APART, CONFIRM, aim, believed, look_back, next_experiment
+from discovery.mismatch.ask import APART, CONFIRM, aim, look_back
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import Context, make_context
 from discovery.mismatch.diagnosis import diagnose
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.mismatch.hypothesis import Hypothesis
+from discovery.mismatch.pattern import believed, next_experiment
 from discovery.mismatch.printed import printed
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording

@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from discovery.dynamics import make_grid
-from discovery.mismatch import context as contexts
 from discovery.mismatch.catalogue import catalogue
 from discovery.mismatch.context import make_context
 from discovery.mismatch.late import beside_switches, perhaps_late
@@ -79,7 +78,7 @@ def found(seen: Campaign) -> tuple[str, ...]:
 def test_a_power_that_is_logged_late_is_no_missing_physics(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = campaign(light(1, 40.0), light(2, 35.0))
     assert found(seen) == ()
-    monkeypatch.setattr(contexts, "perhaps_late", lambda _, grids: grids)
+    monkeypatch.setattr("discovery.mismatch.context.perhaps_late", lambda _, grids: grids)
     assert found(seen) != ()
 
 
@@ -87,7 +86,7 @@ def test_switches_off_the_grid_of_the_logger_are_no_missing_physics(monkeypatch:
     """Each is logged at the next stamp: 0 to 60 s late."""
     seen = campaign(light(1, 30.0, 30.0), light(2, 30.0, 30.0))
     assert found(seen) == ()
-    monkeypatch.setattr(contexts, "JITTER", 0.0)
+    monkeypatch.setattr("discovery.mismatch.everyday.JITTER", 0.0)
     assert found(seen) != ()
 
 
