@@ -16,9 +16,9 @@ from discovery.terms import text
 if TYPE_CHECKING:
     from discovery.mismatch.diagnosis import Diagnosis
 
-# relative half-width that a model of few bodies adds to every size: on machines of many nodes estimates
-# scatter by 6 % about the truth beyond what the noise of the readings explains
-FORM = 0.12
+# relative half-width that a model of few bodies adds to every size: with it, 95 % of 548 intervals on
+# machines of many nodes hold the true size (72 % without any, 93 % with 0.12)
+FORM = 0.15
 
 
 def number(value: float | None, digits: int = 5) -> float | None:
