@@ -61,7 +61,7 @@ class Context:
         usual = h.effect.amplitude.plausible
         return tuple((0.02 + 0.13 * min(1.0, 2 * sd / usual)) * sd for sd in self.spread(h))
 
-    def of_a_link(self, h: Hypothesis) -> tuple[float, ...]:
+    def half_a_link(self, h: Hypothesis) -> tuple[float, ...]:
         """Size of each amplitude of an exchange at which it carries half of what the model's own link between
         the two bodies does; zero where there is none.
 

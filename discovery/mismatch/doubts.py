@@ -88,7 +88,7 @@ def _left(context: Context, found: Search) -> Hypothesis | None:
         bar = max(NAMED + trace(found.gain + more), 0.05 * found.gain)
         if refit and any(bent(refit, o) for o in refit.hypotheses if o.key == h.key):
             bar = max(bar, BLUNT, SMALL * found.gain)  # with less it would be dropped, were it in the model
-        if abs(c.size[0]) < context.of_a_link(h)[0]:
+        if abs(c.size[0]) < context.half_a_link(h)[0]:
             bar = max(bar, BLUNT)
         if echoes(h, found.looks[-1]):
             bar = max(bar, SMALL * found.gain)

@@ -168,7 +168,7 @@ def matters(context: Context, attempt: Assessment, h: Hypothesis) -> bool:
 
 def of_a_link(context: Context, attempt: Assessment, h: Hypothesis) -> bool:
     """Whether an exchange carries less than half of what the model's own link does, as an attempt fits it."""
-    return all(size < half for size, half in zip(_sizes(attempt, h), context.of_a_link(h), strict=True))
+    return all(size < half for size, half in zip(_sizes(attempt, h), context.half_a_link(h), strict=True))
 
 
 def _sizes(attempt: Assessment, h: Hypothesis) -> list[float]:

@@ -9,13 +9,14 @@ from discovery.mismatch.context import Context
 from discovery.mismatch.hypotheses import hypotheses
 from discovery.terms import names, parse
 
-_FED = {  # places that are bodies or terms which the model couples to a channel of a role
-    "wet body": "fluid temperature",
-    "fluid terms": "fluid temperature",
-    "driven body": "heat load",
-    "neighbour": "heat load",
-    "air body": "ambient temperature",
-    "cooling terms": "cooling power",
+_FED = {  # roles of which a place needs one: of bodies or terms that the model couples to such a channel
+    "wet body": ("fluid temperature",),
+    "fluid terms": ("fluid temperature",),
+    "driven body": ("heat load", "rotation speed"),
+    "speed-driven body": ("rotation speed",),
+    "neighbour": ("heat load", "rotation speed"),
+    "air body": ("ambient temperature",),
+    "cooling terms": ("cooling power",),
 }
 
 
@@ -28,9 +29,10 @@ def not_offered(context: Context, own: Sequence[Effect]) -> list[str]:
         if hypotheses(model, channels, context.outputs, context.recordings, [effect]):
             continue
         used = names(parse(effect.formula, f"effect {effect.word}"))
-        roles = [role for variable, role in ROLE_OF.items() if variable in used]
-        fed = [_FED[effect.place]] if effect.place in _FED else []
-        lacking = [role for role in dict.fromkeys([*roles, *fed]) if role not in there]
+        lacking = [role for variable, role in ROLE_OF.items() if variable in used and role not in there]
+        fed = _FED.get(effect.place, ())
+        if fed and not there & set(fed):
+            lacking += [role for role in fed if role not in lacking]
         why = (
             f"no channel has the role {' or '.join(repr(role) for role in lacking)}"
             if lacking

@@ -151,7 +151,7 @@ def test_an_exchange_is_held_against_the_link_that_the_model_has() -> None:
         machine.campaign(*runs), machine.model(), ["r1", "r2"], tuple(machine.SEEN), effects
     )
     claims = hypotheses(context.model, context.campaign.channels, tuple(machine.SEEN), ("r1", "r2"), effects)
-    half = {h.states: context.of_a_link(h) for h in claims}
+    half = {h.states: context.half_a_link(h) for h in claims}
     fitted = context.baseline.model.parameters
     assert half["motor", "table"] == pytest.approx((0.5 * fitted["G_mt"].value,))
     assert half["table", "bed"] == pytest.approx((0.5 * fitted["G_tb"].value,))

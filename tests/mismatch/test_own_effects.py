@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,11 @@ import pytest
 from discovery.errors import UserError
 from discovery.experiment import diagnose, load_experiment
 from discovery.experiment.pipeline import diagnosis
+from discovery.mismatch.catalogue import catalogue
+from discovery.mismatch.context import make_context
+from discovery.mismatch.idle import not_offered
 from discovery.models import read_model, write_model
+from tests.mismatch import machine
 from tests.mismatch.machine import CHANNELS, Array, Inputs, model, simulated
 
 RUB = """
@@ -174,3 +179,14 @@ def test_a_mistake_in_a_key_names_it(line: str, wrong: str, said: str, tmp_path:
     path = experiment(tmp_path, RUB.replace(line, wrong))
     with pytest.raises(UserError, match=rf"experiment.toml, line \d+.*{said}"):
         load_experiment(path)
+
+
+def test_a_drive_may_be_known_by_its_speed_alone() -> None:
+    """Where no channel is a heat load but one a speed, it is the model that lacks a law of it."""
+    seen = machine.campaign(machine.simulated(1))
+    power = replace(seen.channels["P_drive"], role="other input")
+    seen = replace(seen, channels={**seen.channels, "P_drive": power})
+    context = make_context(seen, machine.model(), ["r1"], tuple(machine.SEEN), [])
+    effect = replace(catalogue()["windage"], word="rub")
+    why = "the model has no place of the kind 'driven body' where its channels could act"
+    assert not_offered(context, [effect]) == [f"rub was not looked for: {why}"]
