@@ -9,14 +9,15 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.design.separation import separation
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.thresholds import BELIEF
 from discovery.dynamics import Trajectory, make_system, simulate
 from discovery.dynamics.grid import Grid, Samples
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise
-from discovery.mismatch.context import BELIEF, Context
-from discovery.mismatch.printed import printed
-from discovery.mismatch.separation import separation
 from discovery.models import Model
+from discovery.printed import printed
 from discovery.terms import Name
 
 Array = NDArray[np.float64]

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from discovery.mismatch.assess import Assessment
-from discovery.mismatch.context import Context
-from discovery.mismatch.evidence import Score
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.pattern import Aim, believed, next_experiment
-from discovery.mismatch.printed import printed
-from discovery.mismatch.search import Search
-from discovery.mismatch.verdict import FAULT, NO_MISMATCH, RIVAL, Verdict
-from discovery.mismatch.when import instants, told
+from discovery.design.next_experiment import Aim, believed, next_experiment
+from discovery.design.when import instants, told
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.selection import Search
+from discovery.diagnosis.thresholds import RIVAL
+from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, Verdict
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.bayes import Score
 from discovery.models import Model
+from discovery.printed import printed
 
 INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
 
@@ -43,13 +44,15 @@ def ask(context: Context, found: Search, verdict: Verdict) -> str:
         for r in n.rivals
         if r.below <= RIVAL and not (r.hypothesis.recording and n.hypothesis.recording)
     ]  # no pattern tells two events of the past apart
-    rival = _rival_model(found, rivals[0]) if rivals else None
+    answer = verdict.answer
+    rival = _rival_model(found, answer, rivals[0]) if rivals else None
     claims = [n.hypothesis for n in shown]
     if rival is None and all(h.recording for h in claims):
         return look_back(context, claims)
     purpose = aim(claims, rivals[0] if rival else None, bool(verdict.named))
-    noise, answer = found.best.best_view.noise, found.best.fit.model
-    return next_experiment(context, answer, rival or _without(found.best), noise, purpose, believed(context))
+    noise = answer.noise
+    other = rival or _without(answer)
+    return next_experiment(context, answer.fit.model, other, noise, purpose, believed(context))
 
 
 def aim(shown: Sequence[Hypothesis], rival: Hypothesis | None, answered: bool) -> Aim:
@@ -87,22 +90,21 @@ def _called(shown: Sequence[Hypothesis]) -> str:
     return " and ".join(f"{h.effect.word} at {h.where}" for h in shown)
 
 
-def _without(best: Assessment) -> Model:
+def _without(best: Scored) -> Model:
     """The model with its effects switched off and everything else as it is with them."""
     return best.fit.model.with_values({name: 0.0 for h in best.hypotheses for name in h.amplitudes})
 
 
-def _rival_model(found: Search, rival: Hypothesis) -> Model | None:
-    for attempt in found.tried:
-        as_many = len(attempt.hypotheses) == len(found.best.hypotheses)
-        if as_many and any(h.key == rival.key for h in attempt.hypotheses):
-            return attempt.fit.model
+def _rival_model(found: Search, answer: Scored, rival: Hypothesis) -> Model | None:
+    for one in found.tried.values():
+        if len(one.hypotheses) == len(answer.hypotheses) and rival.key in one.keys:
+            return one.fit.model
     return None
 
 
 def _smallest(found: Search) -> str:
     """What would have been seen: the size at which usual effects reach the threshold, and where."""
-    texts = []
+    texts, scanned = [], found.claims
     for word in (
         "fluid_convection",
         "friction_speed",
@@ -110,7 +112,7 @@ def _smallest(found: Search) -> str:
         "flooded_gap",
         "second_thermal_mass",
     ):
-        claims = [c for c in found.looks[0] if c.hypothesis.effect.word == word]
+        claims = [c for c in scanned if c.hypothesis.effect.word == word]
         seen = [c for c in claims if _size_is_told(c)]
         if not seen:
             continue

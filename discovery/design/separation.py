@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory, sensitivities
-from discovery.dynamics.system import predict
+from discovery.dynamics.system import flows, predict
+from discovery.evidence.events import heat_steps
 from discovery.fitting import Noise
-from discovery.mismatch.events import heat_steps
 
 Array = NDArray[np.float64]
 
-BLOCKS = 36  # of everyday heat
+BLOCKS = 36  # of a recording, in each of which process noise is one number
 
 
 def separation(
@@ -22,16 +22,16 @@ def separation(
 ) -> Array:
     """Log evidence (R,) for the right model that the readings up to each instant are expected to give.
 
-    Nothing that noise, everyday heat, the start of the wrong model or its own parameters would explain as
+    Nothing that noise, process noise, the start of the wrong model or its own parameters would explain as
     well counts: each of `believed` is known within a standard deviation.
     """
     white = np.array(noise.white)
     gap = ((predict(right) - predict(wrong)) / white).ravel()
     known = {n: sd for n, sd in (believed or {}).items() if n in wrong.values and sd > 0}
     states = wrong.system.model.states
-    starts = [n for n in wrong.system.states if states[n].start_sd > 0]
-    sizes = [*known.values(), *(states[n].start_sd for n in starts)]
-    absorbed = sensitivities(wrong, list(known), starts) / white[None, :, None] * np.array(sizes)
+    spreads = {n: sd for n in wrong.system.states if (sd := states[n].start_sd) is not None and sd > 0}
+    sizes = [*known.values(), *spreads.values()]
+    absorbed = sensitivities(wrong, list(known), list(spreads)) / white[None, :, None] * np.array(sizes)
     absorbed = absorbed.reshape(len(gap), -1)
     covariance = np.eye(len(gap)) + _slow(wrong, noise) + _heat(wrong, noise) + absorbed @ absorbed.T
     z = np.linalg.solve(np.linalg.cholesky(covariance), gap)
@@ -47,15 +47,17 @@ def _slow(run: Trajectory, noise: Noise) -> Array:
 
 
 def _heat(run: Trajectory, noise: Noise) -> Array:
-    """Covariance of what everyday heat shows over reading noise, (R*Y, R*Y)."""
+    """Covariance of what process noise shows over reading noise, (R*Y, R*Y)."""
     white, time = np.array(noise.white), run.system.grid.time
     edges = np.linspace(time[0], time[-1], BLOCKS + 1)
     over = np.exp(-np.abs(np.subtract.outer(edges[:-1], edges[:-1])) / noise.heat_time)
-    size = len(run.system.grid.read) * len(white)
-    total = np.zeros((size, size))
-    for state, sd in (noise.heat or {}).items():
-        if sd > 0 and state in run.system.states:
+    count = len(run.system.grid.read) * len(white)
+    total = np.zeros((count, count))
+    size = flows(run).mean(axis=0)
+    for state, floor in (noise.heat or {}).items():
+        if state in run.system.states:
+            sd = float(np.hypot(floor, noise.share * size[run.system.states.index(state)]))
             steps = heat_steps(run, state, edges)
-            blocks = ((steps[:, :, :-1] - steps[:, :, 1:]) / white[None, :, None] * sd).reshape(size, -1)
+            blocks = ((steps[:, :, :-1] - steps[:, :, 1:]) / white[None, :, None] * sd).reshape(count, -1)
             total += blocks @ over @ blocks.T
     return total

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.printed import printed
+from discovery.effects.hypothesis import Hypothesis
+from discovery.printed import printed
 from discovery.recordings import Campaign
 
 

@@ -1,32 +1,43 @@
-"""What a diagnosis works on: recordings that it may see, noise to expect, and how large effects can be."""
+"""What a diagnosis works on: recordings that it may see, noise to reckon with, and how large effects can be."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.diagnosis import thresholds
 from discovery.dynamics import Grid, make_grid
+from discovery.effects.candidates import Scene, candidates
+from discovery.effects.form import Effect
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.bayes import Slab
+from discovery.evidence.form_error import model_form
+from discovery.evidence.late import perhaps_late
+from discovery.evidence.outliers import Outlier, find_outliers, without
+from discovery.evidence.process_noise import Prior, Setting, floors, flow_sizes, reading_noise, settings
+from discovery.evidence.signatures import signatures
 from discovery.fitting import Fit, Noise, fit_model
-from discovery.mismatch.catalogue.effect import Effect
-from discovery.mismatch.everyday import everyday, heat_limit, reading_noise
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.late import perhaps_late
-from discovery.mismatch.outliers import Outlier, find_outliers, without
-from discovery.mismatch.scales import scaled
-from discovery.mismatch.signatures import heat_rms
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.terms import evaluate
 
 Array = NDArray[np.float64]
 
-BELIEF = 0.5  # a hand-built model's start values are believed within a factor of about two
 MOST_READINGS = 6000  # instants, over all recordings
-COARSE_READINGS = 4000  # of them, and of nodes, where recordings are so fine that they are coarsened anyway
-COARSE_LINK = 0.5  # of what a link carries, below which another exchange beside it is its coarseness
+NODES = 1000  # of a recording, about, and its readings: inputs are their means in between
+
+PROCESS = Prior(
+    thresholds.FLOOR,
+    thresholds.SHARE,
+    thresholds.LEVELS,
+    thresholds.LEVEL_WEIGHTS,
+    thresholds.SLOW,
+    thresholds.SLOW_WEIGHTS,
+)
 
 
 @dataclass(frozen=True)
@@ -39,63 +50,79 @@ class Context:
     outputs: tuple[str, ...]
     grids: Mapping[str, Grid]
     effects: tuple[Effect, ...]
+    scene: Scene
     baseline: Fit
-    settings: tuple[Noise, ...]  # everyday noise, from none to the limit
-    heat_limit: Mapping[str, float]
-    flows: Mapping[str, float]  # largest heat flow (or rate) by state, rms
-    links: Mapping[frozenset[str], float]  # the same by pair of bodies that the model links
+    settings: tuple[Setting, ...]
+    floor: Mapping[str, float]  # of the process noise of each state at level one
     belief: float | None
     outliers: tuple[Outlier, ...]  # set aside
+    form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
+    known: dict[tuple[str, ...], list[tuple[float, float, float]]] = field(default_factory=dict, repr=False)
 
     @property
-    def fit_states(self) -> tuple[str, ...]:
-        """States at which heat can be missing."""
-        return tuple(self.heat_limit)
+    def white(self) -> Noise:
+        """The reading noise."""
+        return self.settings[0].noise
 
-    def minor(self, h: Hypothesis) -> tuple[float, ...]:
-        """Size of each amplitude below which an effect is the coarseness of a model with few bodies.
+    @cached_property
+    def candidates(self) -> list[Hypothesis]:
+        """Every effect at every place where it could act in the model."""
+        return candidates(self.model, self.effects, self.scene)
 
-        A seventh of the usual size; the smaller the model is than the catalogue's machines (its flows bound
-        the spread), the less of that bound, down to a fiftieth.
+    def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:
+        """Prior of the size of each amplitude: usual on machines of the catalogue, but no more than a share of
+        what flows in the model; of what an output shows more, some reading noises.
         """
-        usual = h.effect.amplitude.plausible
-        return tuple((0.02 + 0.13 * min(1.0, 2 * sd / usual)) * sd for sd in self.spread(h))
+        for h in hypotheses:
+            if h.amplitudes not in self.known:
+                self.known[h.amplitudes] = self._sizes(h)
+        found = [one for h in hypotheses for one in self.known[h.amplitudes]]
+        median, factor, sign = (np.array(column, dtype=float) for column in zip(*found, strict=True))
+        return Slab(median, factor, sign)
 
-    def half_a_link(self, h: Hypothesis) -> tuple[float, ...]:
-        """Size of each amplitude of an exchange at which it carries half of what the model's own link between
-        the two bodies does; zero where there is none.
-
-        A body is not of one temperature: what its joints conduct differs from one way of heating to another.
-        """
-        carried = self.links.get(frozenset(h.states), 0.0) if any(t.source for t in h.terms) else 0.0
-        return (COARSE_LINK * carried / self._unit_flow(h) if carried else 0.0,) * len(h.amplitudes)
-
-    def spread(self, h: Hypothesis) -> tuple[float, ...]:
-        """Prior standard deviation of each amplitude: plausible, but no more than the model's own flows."""
-        size = h.effect.amplitude.plausible
-        if h.effect.amplitude.fixed is not None:
-            return (size,) * len(h.amplitudes)
+    def _sizes(self, h: Hypothesis) -> list[tuple[float, float, float]]:
+        amplitude, count = h.effect.amplitude, len(h.amplitudes)
+        if amplitude.most < np.inf or (h.terms and not h.effect.is_physics):
+            return [(amplitude.plausible, thresholds.FACTOR, float(amplitude.sign))] * count
         if h.shown:
-            unit = [self.campaign.channels[name].unit for name in h.shown]
-            level = dict(zip(self.settings[0].outputs, self.settings[0].white, strict=True))
-            return tuple(
-                size if u in ("um", "um/m") or h.effect.amplitude.unit == "1" else min(size, 10 * level[name])
-                for u, name in zip(unit, h.shown, strict=True)
-            )[: len(h.amplitudes)]
-        unit_flow, largest = self._unit_flow(h), max(self.flows.values())
-        return (min(size, largest / unit_flow) if unit_flow > 0 else size,) * len(h.amplitudes)
+            return [
+                (thresholds.JUMP * noise / max(size, 1e-12), thresholds.JUMP_FACTOR, float(amplitude.sign))
+                for size, noise in self._shown(h)
+            ]
+        states = {t.into for t in h.terms}
+        kind = any(self.model.states[s].capacity for s in states if s in self.model.states)
+        largest = max(v for n, v in self.flows.items() if bool(self.model.states[n].capacity) == kind)
+        usual = min(amplitude.plausible, thresholds.USUAL * largest / max(self._unit_flow(h), 1e-300))
+        return [(usual, thresholds.FACTOR, float(amplitude.sign))] * count
+
+    @cached_property
+    def flows(self) -> dict[str, float]:
+        """rms of what flows through each state of the baseline."""
+        return {n: v for n, v in flow_sizes(self.baseline).items() if n in self.model.states}
+
+    def _shown(self, h: Hypothesis) -> list[tuple[float, float]]:
+        """For each amplitude: rms of what one of it shows, and the reading noise there."""
+        white = dict(zip(self.outputs, self.white.white, strict=True))
+        several = len(h.amplitudes) > 1
+        names = list(h.shown) if several else [list(h.shown)[0]]
+        size = np.zeros(len(names))
+        for run in self.baseline.trajectories:
+            for k, name in enumerate(names):
+                column = signatures(run, [h])[:, self.outputs.index(name), k]
+                size[k] = max(size[k], float(np.sqrt(np.mean(column**2))))
+        return [(float(size[k]), white[name]) for k, name in enumerate(names)]
 
     def _unit_flow(self, h: Hypothesis) -> float:
-        """rms of what an effect of size one makes flow along the baseline. The largest recording counts: one
+        """rms of what an effect of size one lets flow along the baseline. The largest recording counts: one
         may be dry, and which comes first says nothing.
         """
-        ones = {**h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
-        return max(
-            _rms(evaluate(t.expression, {**run.at_ends(), **ones}, memory=run.system.ends).value)
-            for run in self.baseline.trajectories
-            if h.recording in (None, run.system.grid.recording)
-            for t in h.terms
-        )
+        found = 0.0
+        for run in self.baseline.trajectories:
+            values = {**run.at_ends(), **h.values(run.system.grid.recording)}
+            for term in h.terms:
+                series = evaluate(term.expression, values, memory=run.system.ends).value
+                found = max(found, float(np.sqrt(np.mean(np.square(series)))))
+        return found
 
 
 def make_context(
@@ -104,59 +131,74 @@ def make_context(
     recordings: Sequence[str],
     outputs: Sequence[str],
     effects: Sequence[Effect],
+    after: Mapping[str, tuple[str, ...]],
     physical: bool = True,
 ) -> Context:
     """Fit the baseline jointly and find the noise levels that tests must reckon with.
 
     Only `recordings` are looked at.
+
+    Args:
+        after: by recording, those of the whole campaign that were made then or later.
+        physical: the start values of the model are an engineer's beliefs.
     """
-    inputs = [
-        name
-        for name, channel in campaign.channels.items()
-        if name not in outputs
-        and channel.role not in ("error", "applied correction")
-        and all(
-            np.isfinite(campaign.recordings[r].values.get(name, np.array([np.nan]))).any() for r in recordings
-        )
-    ]
-    coarse = COARSE_READINGS // len(recordings)
-    whole = {r: make_grid(campaign, r, inputs, outputs, coarse=coarse) for r in recordings}
+    inputs = _inputs(campaign, recordings, outputs)
+    whole = {r: make_grid(campaign, r, inputs, outputs, coarse=NODES, most=2 * NODES) for r in recordings}
+    belief = thresholds.BELIEF if physical and any(s.capacity for s in model.states.values()) else None
+    stated = {name: campaign.channels[name].noise for name in outputs}
+
+    def fitted(grids: Mapping[str, Grid], begin: Fit | None = None) -> Fit:
+        return fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief, begin=begin)
+
     grids = thinned(whole)
-    belief = BELIEF if physical and any(state.capacity for state in model.states.values()) else None
-    fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
+    fit = fitted(grids)
     whole = perhaps_late(fit, whole)
     if any(g.unsure for g in whole.values()):
         grids = thinned(whole)
-        fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief, begin=fit)
-    flows = _flows(fit)
-    limit = heat_limit(fit.problem.model, flows)
-    duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
-    white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)
+        fit = fitted(grids, fit)
+    floor = floors(fit, PROCESS.floor)
+    white = reading_noise(fit, stated, floor, PROCESS)
     outliers = find_outliers(fit, whole, np.array(white.white))
     if outliers:
         grids = thinned(without(whole, outliers))
-        fit = fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief)
-        white = reading_noise(fit, {name: campaign.channels[name].noise for name in outputs}, limit, duration)
-    settings = everyday(white, limit, any(g.unsure for g in grids.values()))
+        fit = fitted(grids, fit)
+        white = reading_noise(fit, stated, floor, PROCESS)
+    own = {n: replace(s, start_sd=fit.model.states[n].start_sd) for n, s in model.states.items()}
+    scene = Scene(
+        campaign.channels,
+        tuple(outputs),
+        tuple(recordings),
+        after,
+        {n: size for n in inputs if (size := _largest(campaign, recordings, n)) > 0},
+        frozenset(set(inputs) - set(model.inputs)),
+        thresholds.ODDS,
+        thresholds.EVENT_ODDS,
+    )
+    duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
+    spacing = min(float(np.median(np.diff(g.time[g.read]))) for g in grids.values() if len(g.read) > 1)
     return Context(
         campaign,
-        model,
+        replace(model, states=own),  # how far states begin from their starts is found once
         tuple(recordings),
         tuple(outputs),
         grids,
-        tuple(scaled(e, duration) for e in effects),
+        tuple(_within(e, spacing, duration) for e in effects),
+        scene,
         fit,
-        settings,
-        limit,
-        flows,
-        _links(fit),
+        settings(white, floor, PROCESS, any(g.unsure for g in grids.values())),
+        floor,
         belief,
         tuple(outliers),
+        tuple(model_form(fit.trajectories, np.array(white.white))),
     )
 
 
-def _rms(series: Array | float) -> float:
-    return float(np.sqrt(np.mean(np.square(series))))
+def with_noise_of(context: Context, fit: Fit) -> Context:
+    """The context with the reading noise as it stands with a better fit, where the campaign does not state it."""
+    stated = {name: context.campaign.channels[name].noise for name in context.outputs}
+    white = reading_noise(fit, stated, context.floor, PROCESS)
+    unsure = any(g.unsure for g in context.grids.values())
+    return replace(context, settings=settings(white, context.floor, PROCESS, unsure))
 
 
 def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:
@@ -168,34 +210,27 @@ def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:
     return {r: replace(g, read=g.read[::every], readings=g.readings[::every]) for r, g in grids.items()}
 
 
-def seen_beside(context: Context, fit: Fit) -> Context:
-    """The context with the reading noise as it stands beside a better fit, where the campaign does not
-    state it.
-    """
-    channels = context.campaign.channels
-    stated = {name: channels[name].noise for name in context.outputs}
-    duration = max(float(g.time[-1] - g.time[0]) for g in context.grids.values())
-    white = reading_noise(fit, stated, context.heat_limit, duration)
-    unsure = any(g.unsure for g in context.grids.values())
-    return replace(context, settings=everyday(white, context.heat_limit, unsure))
+def _inputs(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> list[str]:
+    """Channels that could drive a model: recorded in every recording."""
+
+    def known(name: str) -> bool:
+        values = (campaign.recordings[r].values.get(name, np.array([np.nan])) for r in recordings)
+        return all(np.isfinite(v).any() for v in values)
+
+    return [
+        name
+        for name, channel in campaign.channels.items()
+        if name not in outputs and channel.role not in ("error", "applied correction") and known(name)
+    ]
 
 
-def _flows(fit: Fit) -> dict[str, float]:
-    flows: dict[str, float] = {}
-    for trajectory in fit.trajectories:
-        for term in trajectory.system.model.terms:
-            size = heat_rms(trajectory, term.expression)
-            for state in (term.into, term.source):
-                if state:
-                    flows[state] = max(flows.get(state, 0.0), size)
-    return flows
+def _largest(campaign: Campaign, recordings: Sequence[str], name: str) -> float:
+    """Largest magnitude of an input that moves, over some recordings; zero of one that stands still."""
+    series = np.concatenate([campaign.recordings[r].values[name] for r in recordings])
+    series = series[np.isfinite(series)]
+    return float(np.abs(series).max()) if np.ptp(series) > 0 else 0.0
 
 
-def _links(fit: Fit) -> dict[frozenset[str], float]:
-    links: dict[frozenset[str], float] = {}
-    for trajectory in fit.trajectories:
-        for term in trajectory.system.model.terms:
-            if term.source:
-                pair, size = frozenset((term.into, term.source)), heat_rms(trajectory, term.expression)
-                links[pair] = max(links.get(pair, 0.0), size)
-    return links
+def _within(effect: Effect, spacing: float, duration: float) -> Effect:
+    """The effect with generic time constants within what the recordings can show."""
+    return replace(effect, shapes=tuple(s.within(0.5 * spacing, duration) for s in effect.shapes))

@@ -1,86 +1,64 @@
-"""Free runs on recordings left out of the fit: what evidence on the recordings themselves cannot say."""
+"""Free runs on recordings left out of the fit: a name has to hold where the fit has not been."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import replace
-from math import inf
 
 import numpy as np
+from numpy.typing import NDArray
 
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.proof import FreeRuns, Improvement, improvement
+from discovery.diagnosis.scored import Scored, with_effects
 from discovery.dynamics.system import predict
+from discovery.effects.hypothesis import Hypothesis
 from discovery.errors import RunsAwayError
 from discovery.evaluation.crossvalidation import folds
-from discovery.fitting import Noise, predict_recording
-from discovery.mismatch.assess import Assessment, assess, misfits, refit
-from discovery.mismatch.context import Context
-from discovery.mismatch.hypothesis import Hypothesis
+from discovery.fitting import fit_model, predict_recording
+
+Array = NDArray[np.float64]
 
 
-def left_out(context: Context, answer: Assessment, noise: Noise) -> float:
-    """rms of free runs, in units of the reading noise, with the effects of an answer.
+def left_out(context: Context, answer: Scored, h: Hypothesis) -> Improvement | None:
+    """What an effect changes of free runs on recordings that are left out of the fit in turn.
 
-    Each recording of the diagnosis in turn (or a quarter of them) is left out, the model fitted anew to the
-    others under a noise setting, and run freely on what was left out. A recording with an event of its own
-    cannot be predicted and is not run. nan where nothing can be left out, inf where a fit or a free run
-    runs away.
-
-    Quarters of a single recording do not serve: how the level at their ends is met outweighs what an effect
-    does (true sensor lags of two real heaters had shares of -0.8 and -25).
+    Models are fitted anew to the others, and start, as those of an experiment are; rms in reading noises. None where nothing can be left out, or where recordings left out can say
+    nothing of an effect because it does not act in all of them.
     """
-    events = {h.recording for h in answer.hypotheses if h.recording}
-    white = np.array(noise.white)
-    squares, count = 0.0, 0
-    for left, seen in _folds(context):
-        try:
-            model = refit(seen, _known(answer, seen), noise, answer).model
-            for name in (r for r in left if r not in events):
-                run = predict_recording(
-                    model, context.campaign, name, context.outputs, noise.white, context.grids[name]
-                )
-                z = (run.system.grid.readings - predict(run)) / white
-                squares, count = squares + float(np.nansum(z**2)), count + int(np.isfinite(z).sum())
-        except RunsAwayError:  # the others alone do not hold it: it runs away
-            return inf
-    return float(np.sqrt(squares / count)) if count else float("nan")
+    if len(context.recordings) < 2 or h.recording is not None:
+        return None
+    rest = tuple(o for o in answer.hypotheses if o.key != h.key)
+    without = _residuals(context, answer, rest)
+    with_it = _residuals(context, answer, answer.hypotheses)
+    one = np.ones(len(context.outputs))
+    runs = [
+        FreeRuns(without[run], with_it.get(run), 1.0, one) for run in context.recordings if run in without
+    ]
+    return improvement(runs, context.outputs) if runs else None
 
 
-def least_added(context: Context, answer: Assessment, without: Assessment, noise: Noise) -> float:
-    """Log evidence for what an answer has and another has not that comes from each left-out recording, the
-    least of them: evidence of all recordings less evidence of the others is how likely they make it.
-
-    The mean square of a free run drowns in everyday heat where a Kalman filter still sees an effect. -inf
-    where a fit runs away.
-    """
-    gain = answer.evidence - without.evidence
-    added = [inf]
-    for _, seen in _folds(context):
-        try:
-            a, b = (assess(seen, _known(o, seen), noise, o).evidence for o in (answer, without))
-        except RunsAwayError:
-            return -inf
-        added.append(gain - (a - b))
-    return min(added)
-
-
-def least_taken(context: Context, answer: Assessment, without: Assessment, noise: Noise) -> float:
-    """What an answer takes off the negative log-likelihood of each group of recordings that would be left
-    out, in the fit to all of them, the least.
-
-    No leaving out is needed where this is large: a few sizes that are common to all recordings cannot follow
-    each of them by chance.
-    """
-    before, after = misfits(without, noise), misfits(answer, noise)
-    return min((sum(before[r] - after[r] for r in left) for left, _ in _folds(context)), default=-inf)
-
-
-def _folds(context: Context) -> Iterator[tuple[tuple[str, ...], Context]]:
-    """What is left out, and the context that sees the others."""
+def _residuals(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> dict[str, Array]:
+    """Readings minus free run (R, Y) over the reading noise, of each recording that does not run away."""
+    model, found = with_effects(context.model, chosen), answer.fit.model.parameters
+    model = model.with_values({n: found[n].value for n in model.free if n in found})
+    white, out = np.array(context.white.white), {}
     for fold in folds(context.campaign, context.recordings, blocks=0):
-        kept = tuple(r for r in context.recordings if r not in fold.recordings)
-        yield fold.recordings, replace(context, recordings=kept, grids={r: context.grids[r] for r in kept})
-
-
-def _known(answer: Assessment, seen: Context) -> tuple[Hypothesis, ...]:
-    """What of an answer acts in the recordings of a context."""
-    return tuple(h for h in answer.hypotheses if h.recording is None or h.recording in seen.recordings)
+        kept = [r for r in context.recordings if r not in fold.recordings]
+        seen = replace(context.campaign, recordings={r: context.campaign.recordings[r] for r in kept})
+        grids = {r: context.grids[r] for r in kept}
+        try:
+            fit = fit_model(model, seen, kept, context.outputs, grids=grids, belief=context.belief)
+            for name in fold.recordings:
+                run = predict_recording(
+                    fit.model,
+                    context.campaign,
+                    name,
+                    context.outputs,
+                    answer.noise.white,
+                    context.grids[name],
+                )
+                out[name] = (run.system.grid.readings - predict(run)) / white
+        except RunsAwayError:
+            continue
+    return out

@@ -6,22 +6,23 @@ of the body's own temperature, each seen through the model, chosen one after the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.scored import Scored
 from discovery.dynamics import Column, sensitivities
-from discovery.mismatch.assess import Assessment
-from discovery.mismatch.context import Context
-from discovery.mismatch.forcing import Forcing
-from discovery.mismatch.scales import lags
+from discovery.evidence.bayes import project
+from discovery.evidence.latent_force import Force
 from discovery.terms import Expression, evaluate, parse
 
 Array = NDArray[np.float64]
 
 MOST_TERMS = 3
+LAGS = (1 / 150, 1 / 40)  # of the longest recording: time constants of a description
 
 
 @dataclass(frozen=True)
@@ -43,17 +44,17 @@ class Curve:
     error: tuple[float, ...]
 
 
-def describe(context: Context, current: Assessment, forcing: Forcing) -> Description | None:
-    """The best short formula for the heat of a forcing; None when no term adds evidence."""
-    library = _library(context, current, forcing.state)
-    view = current.best_view
+def describe(context: Context, current: Scored, force: Force) -> Description | None:
+    """The best short formula for the heat of a force; None when no term adds evidence."""
+    library = _library(context, current, force.state)
+    setting = current.settings[current.best]
     columns = []
     for trajectory in current.fit.trajectories:
         env = trajectory.at_ends()
         pieces = [
             Column(
                 k,
-                forcing.state,
+                force.state,
                 np.broadcast_to(
                     evaluate(e, env, memory=trajectory.system.ends).value,
                     (2 * len(trajectory.system.grid.step),),
@@ -68,8 +69,8 @@ def describe(context: Context, current: Assessment, forcing: Forcing) -> Descrip
             for k in range(len(library))
         ]
     )
-    white, _ = current.lens.whiten(view.noise, [c / scale for c in columns])
-    z = view.project(white)
+    part = project(current.seen, setting, [c / scale for c in columns])
+    gram, dot, count = part.block(range(len(library))), part.dot, len(part.columns)
     chosen: list[int] = []
     total = 0.0
     for _ in range(MOST_TERMS):
@@ -77,7 +78,7 @@ def describe(context: Context, current: Assessment, forcing: Forcing) -> Descrip
         for k in range(len(library)):
             if k in chosen:
                 continue
-            trial = _evidence(z[:, [*chosen, k]], view.residual)
+            trial = _evidence(gram, dot, [*chosen, k], count)
             if trial > gain:
                 best, gain = k, trial
         if best < 0:
@@ -86,23 +87,27 @@ def describe(context: Context, current: Assessment, forcing: Forcing) -> Descrip
         total = gain
     if not chosen:
         return None
-    weights = np.linalg.lstsq(z[:, chosen], view.residual, rcond=None)[0] / scale[chosen]
+    weights = _solved(gram, dot, chosen) / scale[chosen]
     formula = " ".join(f"{w:+.4g}*{library[k][0]}" for w, k in zip(weights, chosen, strict=True))
-    return Description(forcing.state, formula.removeprefix("+"), float(total))
+    return Description(force.state, formula.removeprefix("+"), float(total))
 
 
-def _evidence(z: Array, residual: Array) -> float:
-    """BIC-like log evidence of a linear model with a unit-information prior."""
-    solved = np.linalg.lstsq(z, residual, rcond=1e-10)[0]
-    return float(0.5 * (residual @ z @ solved) - 0.5 * z.shape[1] * np.log(len(residual)))
+def _solved(gram: Array, dot: Array, chosen: Sequence[int]) -> Array:
+    return np.asarray(np.linalg.lstsq(gram[np.ix_(chosen, chosen)], dot[list(chosen)], rcond=1e-10)[0])
 
 
-def _library(context: Context, current: Assessment, state: str) -> list[tuple[str, Expression]]:
+def _evidence(gram: Array, dot: Array, chosen: Sequence[int], count: int) -> float:
+    """BIC-like log evidence of a linear model with a unit-information prior on `count` readings."""
+    found = 0.5 * dot[list(chosen)] @ _solved(gram, dot, chosen)
+    return float(found - 0.5 * len(chosen) * np.log(count))
+
+
+def _library(context: Context, current: Scored, state: str) -> list[tuple[str, Expression]]:
     channels = [n for n in current.fit.trajectories[0].system.grid.samples if n in context.campaign.channels]
     nodes = current.fit.trajectories[0].at_nodes()
     moving = [n for n in channels if np.ptp(np.asarray(nodes[n])) > 1e-9]
     duration = max(float(grid.time[-1] - grid.time[0]) for grid in context.grids.values())
-    slow = [f"{lag:.4g}" for lag in lags(duration)]
+    slow = [f"{share * duration:.4g}" for share in LAGS]
     texts: list[str] = []
     for name in moving:
         series = np.concatenate(
@@ -142,21 +147,21 @@ def _library(context: Context, current: Assessment, state: str) -> list[tuple[st
     return [(text, parse(text)) for text in dict.fromkeys(texts)]
 
 
-def curves(current: Assessment, forcing: Forcing, bins: int = 8) -> list[Curve]:
+def curves(current: Scored, force: Force, bins: int = 8) -> list[Curve]:
     """The missing heat against every input and state, in bins of equal count, with standard errors."""
     values: dict[str, list[Array]] = {}
     heat, sd = [], []
     for trajectory in current.fit.trajectories:
         run = trajectory.system.grid.recording
-        edges, time = forcing.edges[run], trajectory.system.grid.time
+        edges, time = force.edges[run], trajectory.system.grid.time
         block = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2)
         counts = np.maximum(np.bincount(block, minlength=len(edges) - 1), 1)
         for name, series in trajectory.at_nodes().items():
             if np.ndim(series) and name != "time":
                 mean = np.bincount(block, np.asarray(series), minlength=len(edges) - 1) / counts
                 values.setdefault(name, []).append(mean)
-        heat.append(forcing.heat[run])
-        sd.append(forcing.sd[run])
+        heat.append(force.heat[run])
+        sd.append(force.sd[run])
     y, error = np.concatenate(heat), np.concatenate(sd)
     found = []
     for name, parts in values.items():
@@ -176,18 +181,3 @@ def curves(current: Assessment, forcing: Forcing, bins: int = 8) -> list[Curve]:
         ]
         found.append(Curve(name, *zip(*rows, strict=True)))
     return found
-
-
-def heat_over_time(
-    forcing: Forcing, offsets: Mapping[str, float], recordings: Sequence[str]
-) -> dict[str, dict[str, list[float]]]:
-    """The missing heat by recording: block centres [s], mean and standard deviation."""
-    out = {}
-    for run in recordings:
-        centre = offsets[run] + 0.5 * (forcing.edges[run][1:] + forcing.edges[run][:-1])
-        out[run] = {
-            "time_s": [round(float(v), 1) for v in centre],
-            "heat": [float(f"{v:.4g}") for v in forcing.heat[run]],
-            "sd": [float(f"{v:.4g}") for v in forcing.sd[run]],
-        }
-    return out

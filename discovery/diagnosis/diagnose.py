@@ -1,32 +1,39 @@
-"""The diagnosis from start to end: fit, noise, detect, locate, name, model, prove, check, ask."""
+"""The diagnosis from start to end: fit, noise, search, posterior, verdict, proof, location, next experiment."""
 
 from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from discovery.design.question import ask
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.context import Context, make_context, with_noise_of
+from discovery.diagnosis.description import Curve, Description, curves, describe
+from discovery.diagnosis.location import Location, locate
+from discovery.diagnosis.posterior import Posterior, posterior
+from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement
+from discovery.diagnosis.repair import written
+from discovery.diagnosis.scored import Scored, with_effects, with_force
+from discovery.diagnosis.selection import Search
+from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide, idle, refuted
+from discovery.effects.catalogue import catalogue
+from discovery.effects.form import Effect
+from discovery.effects.hypothesis import Hypothesis
+from discovery.effects.not_offered import not_offered
 from discovery.errors import UserError
-from discovery.mismatch.ask import ask
-from discovery.mismatch.assess import Assessment
-from discovery.mismatch.catalogue import Effect, catalogue
-from discovery.mismatch.context import Context, make_context, seen_beside
-from discovery.mismatch.deliver import delivered, written
-from discovery.mismatch.describe import Curve, Description, curves, describe
-from discovery.mismatch.forcing import Forcing, free_forcing
-from discovery.mismatch.idle import not_offered
-from discovery.mismatch.late import told
-from discovery.mismatch.locate import Location, locate
-from discovery.mismatch.prove import Improvement, explained, improvements, on_fit, size_of
-from discovery.mismatch.search import Search, search
-from discovery.mismatch.selfcheck import false_alarm, named_again
-from discovery.mismatch.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide
+from discovery.evidence.late import told
+from discovery.evidence.latent_force import Force, latent_forces
+from discovery.fitting import Fit, fit_model
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.threads import one_thread
+
+if TYPE_CHECKING:
+    from discovery.diagnosis.document import DiagnosisDocument
 
 ANOTHER_NOISE = 0.05  # relative change of a channel's reading noise that calls for another search
 
@@ -37,31 +44,47 @@ class Diagnosis:
 
     context: Context
     search: Search
-    before: Assessment  # the baseline as it runs freely best
-    after: Assessment  # with what was found, as it runs freely best; the baseline where nothing is named
+    posterior: Posterior
     verdict: Verdict
+    before: Fit  # the model as the user gave it, fitted as any model of an experiment
+    after: Fit | None  # with what was named; None where nothing is
     location: Location
-    forcings: tuple[Forcing, ...]  # on what the baseline leaves
-    fit: Improvement
+    forces: tuple[Force, ...]  # on what the baseline leaves
+    fit: Improvement  # free runs of the recordings to fit
     held_out: dict[str, Improvement]
-    p_value: float
-    repaired: Model | None  # the baseline with what was found, fitted; None where nothing is named
     description: Description | None
     curves: tuple[Curve, ...]
-    checked: tuple[float | None, ...]  # share of blind repetitions that name each effect again
     question: str
     seconds: float
 
     @property
+    def repaired(self) -> Model | None:
+        """The model with what was named, fitted and written plainly; None where nothing is named."""
+        return written(self.after.model, [n.hypothesis for n in self.verdict.named]) if self.after else None
+
+    @property
     def explained(self) -> float | None:
         """Share of the closable mismatch of the held-out recordings that the repair removes."""
-        if self.repaired is None or all(n.hypothesis.recording for n in self.verdict.named):
+        if self.after is None or all(n.hypothesis.effect.is_event for n in self.verdict.named):
             return None
         return explained(self.held_out)
 
-    def document(self) -> dict[str, Any]:
+    def interval(self, h: Hypothesis, name: str) -> tuple[float | None, float | None]:
+        """95 % interval of a parameter of what was named: of the diagnosis and of the fit that goes out, which
+        need not agree, each wider by what a law slightly off in form leaves open.
+        """
+        assert self.after is not None
+        p = self.after.model.parameters[name]
+        wider = thresholds.FORM * abs(p.value) if h.effect.is_physics and name in h.amplitudes else 0.0
+        known = [s for s in (self.verdict.answer.interval(name), (p.low, p.high)) if s and None not in s]
+        lows = [p.value - np.hypot(p.value - s[0], wider) for s in known if s[0] is not None]
+        highs = [p.value + np.hypot(s[1] - p.value, wider) for s in known if s[1] is not None]
+        low, high = min(lows, default=None), max(highs, default=None)
+        return None if low is None else max(low, p.min), None if high is None else min(high, p.max)
+
+    def document(self) -> DiagnosisDocument:
         """The content of diagnosis.json, contract section 6."""
-        from discovery.mismatch.document import document
+        from discovery.diagnosis.document import document
 
         return document(self)
 
@@ -76,6 +99,7 @@ def diagnose(
     effects: Sequence[Effect] = (),
     *,
     physical: bool = True,
+    fitted: Fit | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """Find what a model leaves out.
@@ -85,9 +109,10 @@ def diagnose(
         fit: recordings that fits and searches see.
         held_out: recordings for the proof at the end, touched by nothing before.
         outputs: measured channels; default all that model and campaign share.
-        effects: entries beside the catalogue's, or replacing those of the same word.
+        effects: entries added to the catalogue's, or replacing those of the same word.
         physical: the start values of the model are an engineer's beliefs (not those of a builder).
-        tell: told what begins.
+        fitted: the baseline as an experiment has fitted it already.
+        tell: receives what begins.
 
     Raises:
         UserError: a model that does not run, or recordings without readings.
@@ -104,53 +129,86 @@ def diagnose(
     entries = [*(e for e in catalogue().values() if e.word not in own), *effects]
     seen = replace(campaign, recordings={r: campaign.recordings[r] for r in fit})  # nothing else can leak in
     tell("fitting the baseline and its noise")
-    context = make_context(seen, model, fit, outputs, entries, physical)
+    context = make_context(seen, model, fit, outputs, entries, _after(campaign, fit), physical)
     tell("scoring the catalogue")
-    found = search(context, tell=lambda what: tell(f"found so far: {what}"))
-    beside = seen_beside(context, found.best.fit)
-    change = np.log(np.array(beside.settings[0].white) / np.array(context.settings[0].white))
+    found = Search(context, lambda what: tell(f"found so far: {what}")).run()
+    other = with_noise_of(context, found.best.fit)
+    change = np.log(np.array(other.white.white) / np.array(context.white.white))
     if found.best.hypotheses and np.max(np.abs(change)) > ANOTHER_NOISE:
-        tell("once more, with the reading noise as it stands beside the answer")
-        context, found = beside, search(beside, tell=lambda what: tell(f"found so far: {what}"), begun=found)
-    tell("locating")
-    before = free_forcing(context, found.baseline)
-    after = free_forcing(context, found.best) if found.best is not found.baseline else before
-    tell("fitting what was found for free runs")
-    old = delivered(context, found.baseline)
-    new = delivered(context, found.best) if found.best.hypotheses else old
-    verdict = decide(context, found, before, after, new)
-    new = new if verdict.named else old
-    verdict = replace(verdict, reasons=(*verdict.reasons, *not_offered(context, effects)))
-    location = locate(context, found.baseline, found.best, verdict.named, before)
-    noise = found.best.best_view.noise
-    repaired = written(new) if verdict.named else None
-    tell("proving on held-out recordings")
+        tell("once more, with the reading noise that the answer leaves")
+        context, found = other, found.again(other)
+    tell("weighing the answers")
+    chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
+    verdict = decide(context, found, chances)
+    tell("proving in free runs")
+    before = fitted or fit_model(model, seen, fit, outputs)
+    after = _repaired(context, verdict, model, seen, before) if verdict.named else None
+    noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
-    proof = improvements(campaign, read, outputs, old.fit.model, new.fit.model, noise)
-    if lost := ", ".join(r for r in read if r not in proof):
-        reason = f"the model itself runs away on unseen recording {lost}: nothing can be proved there"
-        verdict = replace(verdict, reasons=(*verdict.reasons, reason))
-    verdict = replace(verdict, reasons=(*verdict.reasons, *told(found.best.fit)))
-    tell("asking for the next experiment")
-    question = ask(context, found, verdict)
-    levels = [v.level for v in found.baseline.views]
-    top = found.looks[0][0].gain if found.looks[0] else 0.0
-    unexplained = verdict.word == UNEXPLAINED and bool(before)
+    runs = free_runs(campaign, [*fit, *read], before, after or before, noise)
+    fitting = improvement([runs[r] for r in fit if r in runs], outputs)
+    proof = {r: improvement([runs[r]], outputs) for r in read if r in runs}
+    verdict = refuted(idle(verdict, fitting), proof)
+    if not verdict.named and after is not None:
+        after = None
+    verdict = replace(verdict, reasons=(*verdict.reasons, *_reasons(context, verdict, read, proof, effects)))
+    tell("locating")
+    setting = found.baseline.settings[found.baseline.best]
+    forces = latent_forces(found.baseline.seen, setting, context.floor)
+    unexplained = verdict.word == UNEXPLAINED and bool(forces)
     return Diagnosis(
         context=context,
         search=found,
-        before=old,
-        after=new,
+        posterior=chances,
         verdict=verdict,
-        location=location,
-        forcings=tuple(before),
-        fit=on_fit(old, new, size_of(campaign, new.best_view.noise)),
+        before=before,
+        after=after,
+        location=locate(context, found.baseline, verdict, chances, forces),
+        forces=tuple(forces),
+        fit=fitting,
         held_out=proof,
-        p_value=false_alarm(found.board, int(np.argmax(levels)), top),
-        repaired=repaired,
-        description=describe(context, found.baseline, before[0]) if unexplained else None,
-        curves=tuple(curves(found.baseline, before[0])) if before and verdict.word != NO_MISMATCH else (),
-        checked=tuple(named_again(found, n.hypothesis) for n in verdict.named),
-        question=question,
+        description=describe(context, found.baseline, forces[0]) if unexplained else None,
+        curves=tuple(curves(found.baseline, forces[0])) if forces and verdict.word != NO_MISMATCH else (),
+        question=ask(context, found, verdict),
         seconds=clock.perf_counter() - began,
     )
+
+
+def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """By recording to fit, the recordings of the campaign made then or later: by their dates where all have
+    one, else in the order of the campaign.
+    """
+    origin = {name: recording.origin for name, recording in campaign.recordings.items()}
+    names = list(campaign.recordings)
+    if all(origin.values()):
+        names.sort(key=lambda name: str(origin[name]))
+    return {run: tuple(names[names.index(run) :]) for run in fit}
+
+
+def _unknown(context: Context, found: Search) -> list[Scored]:
+    """A latent force at each state: instead of everything, and with the best answer."""
+    models = {one.keys: one for one in (found.baseline, found.best)}.values()
+    return [with_force(context, one, state) for one in models for state in context.floor]
+
+
+def _repaired(context: Context, verdict: Verdict, model: Model, seen: Campaign, before: Fit) -> Fit:
+    """The model with what was named, fitted as the baseline of the proof is."""
+    grown = with_effects(model, [n.hypothesis for n in verdict.named])
+    values = verdict.answer.fit.model.parameters
+    start = {n: values[n].value for n in grown.free if n in values}
+    return fit_model(grown, seen, context.recordings, context.outputs, guess=start, begin=before)
+
+
+def _reasons(
+    context: Context,
+    verdict: Verdict,
+    read: Sequence[str],
+    proof: dict[str, Improvement],
+    effects: Sequence[Effect],
+) -> list[str]:
+    """What a reader should know of the recordings and of what was asked for."""
+    said = []
+    if lost := ", ".join(r for r in read if r not in proof):
+        said.append(f"the model itself runs away on unseen recording {lost}: nothing can be proved there")
+    said += not_offered(context.model, context.scene, effects)
+    return [*said, *told(verdict.answer.fit)]

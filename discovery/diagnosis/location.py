@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.mismatch.assess import Assessment
-from discovery.mismatch.context import Context
-from discovery.mismatch.forcing import Forcing
-from discovery.mismatch.regime import heat_of, of_effects, of_free_heat
-from discovery.mismatch.verdict import Named
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.posterior import Posterior
+from discovery.diagnosis.regime import heat_of, of_effects, of_free_heat
+from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.verdict import Verdict
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.latent_force import Force
 
 Array = NDArray[np.float64]
 
@@ -41,25 +43,22 @@ class Location:
 
 
 def locate(
-    context: Context,
-    baseline: Assessment,
-    best: Assessment,
-    named: Sequence[Named],
-    before: Sequence[Forcing],
+    context: Context, baseline: Scored, verdict: Verdict, posterior: Posterior, forces: Sequence[Force]
 ) -> Location:
     """Location of what the baseline leaves.
 
-    Outputs by the excess of its residual over the reading noise, states by free forcing (and by the named
-    effects where there are some), windows and regime from the missing heat itself.
+    Outputs by what the answer removes of their residual, states by the posterior, windows and regime from the
+    missing heat itself.
     """
-    acting = [n.hypothesis for n in named if n.hypothesis.terms and n.hypothesis.recording is None]
+    best, named = verdict.answer, [n.hypothesis for n in verdict.named]
+    acting = [h for h in named if h.terms and h.recording is None]
     rule = of_effects(best, acting, baseline.fit.problem.model) if acting else None
-    if not named and before and before[0].gain > 0:
-        rule = of_free_heat(baseline, before[0])
+    if not named and forces and forces[0].gain > 0:
+        rule = of_free_heat(baseline, forces[0])
     return Location(
         _outputs(baseline, best),
-        _states(before, named),
-        _windows(context, best, named, before),
+        _states(posterior, forces),
+        _windows(context, best, named, forces),
         rule,
     )
 
@@ -69,50 +68,47 @@ def _shares(values: Mapping[str, float]) -> dict[str, float]:
     return {name: round(v / total, 3) for name, v in values.items()} if total > 0 else {}
 
 
-def _outputs(baseline: Assessment, best: Assessment) -> dict[str, float]:
-    names, white = baseline.fit.problem.outputs, np.array(baseline.views[0].noise.white)
+def _outputs(baseline: Scored, best: Scored) -> dict[str, float]:
+    names, white = baseline.fit.problem.outputs, np.array(baseline.grams[0].noise.white)
     squares = np.zeros(len(names))
-    for old, new in zip(baseline.lens.residuals, best.lens.residuals, strict=True):
-        rest = np.nansum((new / white) ** 2, axis=0) if best is not baseline else np.isfinite(old).sum(axis=0)
+    for old, new in zip(baseline.seen.residuals, best.seen.residuals, strict=True):
+        rest = np.nansum((new / white) ** 2, axis=0) if best.hypotheses else np.isfinite(old).sum(axis=0)
         squares += np.nansum((old / white) ** 2, axis=0) - rest
     return _shares({name: max(float(s), 0.0) for name, s in zip(names, squares, strict=True)})
 
 
-def _states(before: Sequence[Forcing], named: Sequence[Named]) -> dict[str, float]:
-    if not before:
-        return {}
-    top = before[0].gain
-    free = _shares({f.state: float(np.exp(0.5 * (f.gain - top))) for f in before})
-    physical = [n for n in named if n.hypothesis.states]
-    if not physical:
-        return dict(sorted(free.items(), key=lambda item: -item[1]))
-    weight: dict[str, float] = dict.fromkeys(free, 0.0)
-    for n in physical:
-        answers = [(n.hypothesis, 0.0), *((r.hypothesis, r.below) for r in n.rivals)]
-        odds = [float(np.exp(-gap)) for _, gap in answers]
-        for (h, _), odd in zip(answers, odds, strict=True):
-            for state in h.states:
-                weight[state] = weight.get(state, 0.0) + odd / sum(odds) / len(h.states)
+def _states(posterior: Posterior, forces: Sequence[Force]) -> dict[str, float]:
+    """Share of each state in the posterior of what acts; of the latent force where nothing does."""
+    weight: dict[str, float] = {f.state: 0.0 for f in forces}
+    for model, p in zip(posterior.models, posterior.shares, strict=True):
+        places = [h.states for h in model.hypotheses if h.states]
+        places += [(model.forced,)] if model.forced else []
+        for states in places:
+            for state in states:
+                weight[state] = weight.get(state, 0.0) + float(p) / len(states) / len(places)
+    if not any(weight.values()) and forces:
+        top = forces[0].gain
+        weight = {f.state: float(np.exp(0.5 * (f.gain - top))) for f in forces}
     return dict(sorted(_shares(weight).items(), key=lambda item: -item[1]))
 
 
 def _windows(
-    context: Context, best: Assessment, named: Sequence[Named], before: Sequence[Forcing]
+    context: Context, best: Scored, named: Sequence[Hypothesis], forces: Sequence[Force]
 ) -> tuple[Window, ...]:
     found: list[tuple[float, Window]] = []
-    values = [n.hypothesis for n in named if n.hypothesis.terms]
+    values = [h for h in named if h.terms]
     for trajectory in best.fit.trajectories:
         run, time = trajectory.system.grid.recording, trajectory.system.grid.time
         offset = context.campaign.recordings[run].start
         for h in values:
-            if h.recording not in (None, run):
+            if not h.acts_in(run):
                 continue
             place = h.states[0] if h.states else ""
             heat = heat_of(best, trajectory, h)
             series = 0.5 * (heat[0::2] + heat[1::2])
             found += _spans(time, series, 0.5 * float(np.percentile(np.abs(series), 95)), run, place, offset)
-    if not values and before and before[0].gain > 0:
-        f = before[0]
+    if not values and forces and forces[0].gain > 0:
+        f = forces[0]
         for run, heat in f.heat.items():
             level = np.maximum(2 * f.sd[run], 0.3 * np.max(np.abs(heat)))
             found += _spans(f.edges[run], heat, level, run, f.state, context.campaign.recordings[run].start)

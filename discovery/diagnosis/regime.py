@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.diagnosis.scored import Scored
 from discovery.dynamics import Trajectory
-from discovery.mismatch.assess import Assessment
-from discovery.mismatch.forcing import Forcing
-from discovery.mismatch.hypothesis import Hypothesis
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.latent_force import Force
 from discovery.models import Model
 from discovery.terms import evaluate
 
@@ -28,7 +28,7 @@ HOLDS = 0.9  # share of a rule's instants at which the heat acts, of the others 
 # the heat that lies within
 
 
-def of_effects(best: Assessment, effects: Sequence[Hypothesis], baseline: Model) -> str | None:
+def of_effects(best: Scored, effects: Sequence[Hypothesis], baseline: Model) -> str | None:
     """When the lasting effects of an answer act, by what drives the baseline; None where they always do, or
     where no rule of two conditions says it.
     """
@@ -62,7 +62,7 @@ def of_effects(best: Assessment, effects: Sequence[Hypothesis], baseline: Model)
     return None
 
 
-def of_free_heat(baseline: Assessment, f: Forcing, seed: int = 0) -> str | None:
+def of_free_heat(baseline: Scored, f: Force, seed: int = 0) -> str | None:
     """When heat of unknown cause acts; None where no rule of two conditions says it.
 
     The tree must beat 95 % of trees grown on heat whose days were shuffled.
@@ -99,7 +99,7 @@ def of_free_heat(baseline: Assessment, f: Forcing, seed: int = 0) -> str | None:
     return _rule(_path(tree, names), switches or set())
 
 
-def heat_of(best: Assessment, trajectory: Trajectory, h: Hypothesis) -> Array:
+def heat_of(best: Scored, trajectory: Trajectory, h: Hypothesis) -> Array:
     """What an effect lets flow into its first body, or into all where it has none, at the ends of the steps
     (2 K,), W or rate.
     """

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from discovery.mismatch.printed import printed
-from discovery.mismatch.verdict import RIVAL
+from discovery.diagnosis.thresholds import RIVAL
+from discovery.printed import printed
 from discovery.runfolder import read_diagnosis
 
 

@@ -4,29 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from discovery.mismatch.catalogue.effect import ROLE_OF, Effect
-from discovery.mismatch.context import Context
-from discovery.mismatch.hypotheses import hypotheses
+from discovery.effects.candidates import Scene, candidates
+from discovery.effects.form import ROLE_OF, Effect
+from discovery.models import Model
 from discovery.terms import names, parse
 
 _FED = {  # roles of which a place needs one: of bodies or terms that the model couples to such a channel
     "wet body": ("fluid temperature",),
     "fluid terms": ("fluid temperature",),
     "driven body": ("heat load", "rotation speed"),
-    "speed-driven body": ("rotation speed",),
-    "neighbour": ("heat load", "rotation speed"),
+    "driven and another": ("heat load", "rotation speed"),
+    "loss terms": ("heat load", "rotation speed"),
     "air body": ("ambient temperature",),
+    "air terms": ("ambient temperature",),
     "cooling terms": ("cooling power",),
 }
 
 
-def not_offered(context: Context, own: Sequence[Effect]) -> list[str]:
+def not_offered(model: Model, scene: Scene, own: Sequence[Effect]) -> list[str]:
     """A sentence for each effect that has no place in the model."""
-    model, channels = context.baseline.problem.model, context.campaign.channels
-    there = {channel.role for channel in channels.values()}
+    there = {channel.role for channel in scene.channels.values()}
     said = []
     for effect in own:
-        if hypotheses(model, channels, context.outputs, context.recordings, [effect]):
+        if candidates(model, [effect], scene):
             continue
         used = names(parse(effect.formula, f"effect {effect.word}"))
         lacking = [role for variable, role in ROLE_OF.items() if variable in used and role not in there]

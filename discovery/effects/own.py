@@ -8,8 +8,8 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
+from discovery.effects.form import ROLE_OF, Amplitude, Effect, Place, Shape
 from discovery.errors import UserError
-from discovery.mismatch.catalogue.effect import ROLE_OF, Amplitude, Effect, Place, Shape
 from discovery.models import Parameter
 from discovery.models.memory import check_memory
 from discovery.models.units import known as known_unit

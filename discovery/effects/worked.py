@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.mismatch.catalogue.effect import Example
+from discovery.effects.form import Example
 from discovery.terms import evaluate, parse
 
 Array = NDArray[np.float64]

@@ -1,67 +1,183 @@
-"""Events: when did an unknown heat act, when did a sensor jump, which single reading is wrong.
+"""The search of events: when did an unknown heat act, when did a sensor jump.
 
 Steps at many instants are seen through the model at once; a window is the difference of two of them, so all
-windows of a recording are scored from one Gram matrix and only the best edges are refined.
+windows of a recording are scored from one Gram matrix. Every instant is as likely as any other before the
+recordings are read; a claim keeps, as the weight of its best instants, what share of all of them the readings
+leave.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, sensitivities
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.lens import Lens, View
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.bayes import Projected, Slab, project
+from discovery.evidence.process_noise import Setting
+from discovery.evidence.whitening import Whitened, log_sum_exp
 
 Array = NDArray[np.float64]
 
 COARSE = 60  # steps per recording in the first look
 LEAST = 4  # readings before and after a jump, while heat acts and after it began: fewer may be wrong ones
-FINE = 8  # steps on each side of an edge in the second, and in a third, closer one
+FINE = 8  # steps on each side of an edge in the second, closer look
+CLOSER = 6  # claims that get one
 
 
 def place_events(
-    lens: Lens, view: View, claims: Iterable[Hypothesis], spread: dict[str, float]
+    seen: Whitened, setting: Setting, claims: Sequence[Hypothesis], slabs: Sequence[Slab]
 ) -> list[Hypothesis]:
-    """Claims about events with the instants that speak for them most; claims of other kinds as they are.
+    """Claims with the instants that the readings make most likely.
 
     Args:
-        spread: prior standard deviation by amplitude name.
+        setting: noise under which they are sought.
+        claims: events (`search` "window" or "step"), each of one recording.
+        slabs: prior of the amplitudes of each claim.
     """
-    out: list[Hypothesis] = []
-    heat: dict[str, list[Hypothesis]] = {}
-    jumps: dict[str, list[Hypothesis]] = {}
-    for h in claims:
-        if h.effect.word == "unmeasured_heat" and h.recording:
-            heat.setdefault(h.recording, []).append(h)
-        elif h.effect.word in ("sensor_offset", "rezero") and h.recording:
-            jumps.setdefault(h.recording, []).append(h)
-        elif h.effect.word != "outlier":
-            out.append(h)
-    for run, group in heat.items():
-        out += _windows(lens, view, run, group, spread)
-    for run, group in jumps.items():
-        out += _jumps(lens, view, run, group, spread)
-    return out
+    rough: list[tuple[float, _Search, Hypothesis, Slab]] = []
+    for run in dict.fromkeys(h.recording for h in claims):
+        search = _Search(seen, setting, str(run))
+        for h, slab in zip(claims, slabs, strict=True):
+            if h.recording == run and (found := search.rough(h, slab)):
+                rough.append((found[0] + h.log_odds, search, found[1], slab))
+    rough.sort(key=lambda one: -one[0])
+    return [search.close(h, slab) for _, search, h, slab in rough[:CLOSER]] + [
+        h for _, _, h, _ in rough[CLOSER:]
+    ]
 
 
-def _index(lens: Lens, run: str) -> int:
-    return next(i for i, t in enumerate(lens.fit.trajectories) if t.system.grid.recording == run)
+class _Search:
+    """Instants of one recording under one noise."""
+
+    def __init__(self, seen: Whitened, setting: Setting, run: str) -> None:
+        self.seen, self.setting = seen, setting
+        self.index = [t.system.grid.recording for t in seen.fit.trajectories].index(run)
+        self.trajectory = seen.fit.trajectories[self.index]
+        grid = self.trajectory.system.grid
+        self.read = grid.time[grid.read]
+        self.every = max(1, len(self.read) // (2 * COARSE))
+        self.known: dict[str, Projected] = {}
+
+    def projected(self, columns: Array) -> Projected:
+        """Columns (R, Y, M) of the recording, seen through what a refit absorbs."""
+        shapes = [t.system.grid.readings.shape for t in self.seen.fit.trajectories]
+        padded = [np.zeros((*shape, columns.shape[2])) for shape in shapes]
+        padded[self.index] = columns
+        return project(self.seen, self.setting, padded)
+
+    def rough(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+        """The claim at the best of evenly spread instants, with what share of them the readings leave, and its
+        log Bayes factor; None where the recording is too short.
+        """
+        return self._rough_window(h, slab) if h.effect.search == "window" else self._rough_step(h, slab)
+
+    def close(self, h: Hypothesis, slab: Slab) -> Hypothesis:
+        """The claim at the best instants near those where it stands."""
+        return self._close_window(h, slab) if h.effect.search == "window" else self._close_step(h, slab)
+
+    def _rough_window(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+        """Heat at a body between two instants; it may begin before the recording and end after it."""
+        if len(self.read) < 2 * LEAST:
+            return None
+        coarse = self._coarse()
+        body = h.states[0]
+        if body not in self.known:
+            self.known[body] = self.projected(heat_steps(self.trajectory, body, coarse))
+        gains = self._allowed(self._of_windows(self.known[body], slab), coarse)
+        possible = int(np.isfinite(gains).sum())
+        if not possible:
+            return None
+        weight = float(log_sum_exp(gains.ravel()) - np.max(gains)) - float(np.log(possible))
+        edges = dict(zip(h.shapes, _best(gains, coarse), strict=True))
+        spans = {n: (t - coarse[1] + coarse[0], t + coarse[1] - coarse[0]) for n, t in edges.items()}
+        return float(np.max(gains)) + weight, replace(h.at(edges, weight), spans=spans)
+
+    def _close_window(self, h: Hypothesis, slab: Slab) -> Hypothesis:
+        coarse = self._coarse()
+        width, body = float(coarse[1] - coarse[0]), h.states[0]
+        begin, end = h.shapes
+
+        def gains(instants: Array) -> Array:
+            return self._allowed(self._windows(body, instants, slab), instants)
+
+        near = _around(h.shapes[begin], h.shapes[end], width, coarse[0], coarse[-1])
+        found = gains(near)
+        closer = _around(*_best(found, near), width / FINE, coarse[0], coarse[-1])
+        on, off = _best(gains(closer), closer)
+        with np.errstate(over="ignore"):
+            spans = {n: _span(log_sum_exp(found, axis), near) for n, axis in ((begin, 1), (end, 0))}
+        return replace(h.at({begin: on, end: off}, h.log_weight), spans=spans)
+
+    def _coarse(self) -> Array:
+        time = self.trajectory.system.grid.time
+        return np.linspace(time[0], time[-1], COARSE + 1)
+
+    def _allowed(self, gains: Array, instants: Array) -> Array:
+        """Windows that some readings see begin and end."""
+        gains[instants[None, :] - instants[:, None] < LEAST * float(np.median(np.diff(self.read)))] = -np.inf
+        gains[instants > float(self.read[-2 * LEAST])] = -np.inf
+        return gains
+
+    def _windows(self, body: str, instants: Array, slab: Slab) -> Array:
+        return self._of_windows(self.projected(heat_steps(self.trajectory, body, instants)), slab)
+
+    def _of_windows(self, part: Projected, slab: Slab) -> Array:
+        """Log Bayes factor of heat between each two instants."""
+        count = len(part.dot)
+        matrix = part.block(range(count))
+        diagonal = np.diag(matrix)
+        gram = np.maximum(diagonal[:, None] + diagonal[None, :] - 2 * matrix, 1e-30)
+        dot = np.subtract.outer(part.dot, part.dot)
+        upper = np.triu_indices(count, 1)
+        flat = Slab(*(np.broadcast_to(v, len(upper[0])) for v in (slab.median, slab.factor, slab.sign)))
+        out = np.full((count, count), -np.inf)
+        out[upper] = _log_bayes(dot[upper], gram[upper], flat)
+        return out
+
+    def _rough_step(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+        """A jump of one output, or of all, at an instant."""
+        coarse = self.read[max(self.every, LEAST) : len(self.read) - LEAST : self.every]
+        if not len(coarse):
+            return None
+        (name,) = h.shapes
+        gains = self._steps(h, coarse, slab)
+        weight = float(log_sum_exp(gains) - np.max(gains)) - float(np.log(len(gains)))
+        best = float(coarse[int(np.argmax(gains))])
+        around = {
+            name: (best - float(np.ptp(coarse)) / len(coarse), best + float(np.ptp(coarse)) / len(coarse))
+        }
+        return float(np.max(gains)) + weight, replace(h.at({name: best}, weight), spans=around)
+
+    def _close_step(self, h: Hypothesis, slab: Slab) -> Hypothesis:
+        (name,) = h.shapes
+        centre = int(np.searchsorted(self.read, h.shapes[name]))
+        last = len(self.read) - LEAST
+        near = self.read[max(LEAST, centre - self.every) : min(centre + self.every + 1, last)]
+        gains = self._steps(h, near, slab)
+        best = float(near[int(np.argmax(gains))])
+        return replace(h.at({name: best}, h.log_weight), spans={name: _span(gains, near)})
+
+    def _steps(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
+        """Log Bayes factor of a jump at each of the instants."""
+        outputs = self.trajectory.system.grid.outputs
+        steps = (self.read[:, None] >= instants[None, :]).astype(float)
+        count, total = len(instants), np.zeros(len(instants))
+        for k, output in enumerate(h.shown):
+            columns = np.zeros((len(self.read), len(outputs), count))
+            columns[:, outputs.index(output), :] = steps
+            part = self.projected(columns)
+            one = slab.take(np.full(count, min(k, len(slab.median) - 1)))
+            total += _log_bayes(part.dot, np.maximum(part.gram, 1e-30), one)
+        return total
 
 
-def whiten_one(lens: Lens, view: View, run: str, columns: Array) -> Array:
-    """Projected whitened columns of one recording (N, M)."""
-    parts = []
-    for t, part in zip(lens.fit.trajectories, lens.filters, strict=True):
-        if t.system.grid.recording == run:
-            parts.append(part.apply(view.noise, columns)[0])
-        else:
-            parts.append(np.zeros((int(t.system.grid.measured.sum()), columns.shape[2])))
-    parts.append(np.zeros((len(lens.priors[0]), columns.shape[2])))
-    return view.project(np.concatenate(parts))
+def _log_bayes(dot: Array, gram: Array, slab: Slab) -> Array:
+    mean, variance = dot / gram, 1.0 / gram
+    return np.asarray(0.5 * dot**2 / gram + slab.average(mean, variance) + 0.5 * np.log(2 * np.pi * variance))
 
 
 def heat_steps(trajectory: Trajectory, body: str, instants: Array) -> Array:
@@ -74,41 +190,8 @@ def heat_steps(trajectory: Trajectory, body: str, instants: Array) -> Array:
     return sensitivities(trajectory, (), (), columns)
 
 
-def _windows(
-    lens: Lens, view: View, run: str, group: list[Hypothesis], spread: dict[str, float]
-) -> list[Hypothesis]:
-    trajectory = lens.fit.trajectories[_index(lens, run)]
-    time = trajectory.system.grid.time
-    read_time = time[trajectory.system.grid.read]
-    if len(read_time) < 2 * LEAST:
-        return []
-    latest = float(read_time[-2 * LEAST])
-    coarse = np.linspace(time[0], time[-1], COARSE + 1)
-    shortest = LEAST * float(np.median(np.diff(read_time)))
-    width, found = coarse[1] - coarse[0], []
-    for h in group:
-
-        def seen(instants: Array, h: Hypothesis = h) -> Array:
-            steps, sd = heat_steps(trajectory, h.states[0], instants), spread[h.amplitudes[0]]
-            gains = _window_gains(lens, view, run, steps, instants <= latest, sd)
-            gains[instants[None, :] - instants[:, None] < shortest] = -np.inf
-            return gains
-
-        on, off = _best(seen(coarse), coarse)
-        near = _around(on, off, width, time[0], time[-1])
-        gains = seen(near)
-        on, off = _best(gains, near)
-        closer = _around(on, off, width / FINE, time[0], time[-1])
-        edges = dict(zip(h.shapes, _best(seen(closer), closer), strict=True))
-        with np.errstate(over="ignore"):
-            ranges = [_span(np.logaddexp.reduce(gains, axis=axis), near) for axis in (1, 0)]
-        claim = replace(h.at(edges), spans=dict(zip(h.shapes, ranges, strict=True)))
-        found.append(replace(claim, cost=float(2 * np.log(COARSE))))  # two edges were searched
-    return found
-
-
 def _best(gains: Array, instants: Array) -> tuple[float, float]:
-    """The two edges for which most speaks."""
+    """The two edges that are most likely."""
     i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
     return float(instants[i]), float(instants[j])
 
@@ -119,77 +202,8 @@ def _around(on: float, off: float, width: float, first: float, last: float) -> A
     return np.unique(np.clip(np.concatenate([on + steps, off + steps]), first, last))
 
 
-def meets(one: Hypothesis, other: Hypothesis) -> bool:
-    """Whether two claims of heat without a record speak of the same hours of a recording, or of hours that
-    follow each other.
-    """
-    if one.recording != other.recording:
-        return False
-    (on, off), (start, end) = one.shapes.values(), other.shapes.values()
-    return on <= end and start <= off
-
-
 def _span(gains: Array, instants: Array) -> tuple[float, float]:
     """Where an instant lies at 95 %, by its log evidence: from one tried instant outside to another."""
     share = np.cumsum(np.exp(gains - np.max(gains)))
     first, last = np.searchsorted(share / share[-1], (0.025, 0.975))
     return float(instants[max(first - 1, 0)]), float(instants[min(last + 1, len(instants) - 1)])
-
-
-def _window_gains(
-    lens: Lens, view: View, run: str, steps: Array, starts: NDArray[np.bool_], sd: float
-) -> Array:
-    """Log evidence for a window between each two edges, on at the first; it begins where `starts` allows."""
-    z = whiten_one(lens, view, run, steps)
-    dot = z.T @ view.residual
-    gram = z.T @ z
-    size = np.maximum(np.diag(gram)[:, None] + np.diag(gram)[None, :] - 2 * gram, 0.0) + sd**-2
-    gain = 0.5 * np.subtract.outer(dot, dot) ** 2 / size - 0.5 * np.log(size * sd**2)
-    gain[np.tril_indices(len(dot))] = -np.inf
-    gain[~starts] = -np.inf
-    return np.asarray(gain)
-
-
-def _jumps(
-    lens: Lens, view: View, run: str, group: list[Hypothesis], spread: dict[str, float]
-) -> list[Hypothesis]:
-    grid = lens.fit.trajectories[_index(lens, run)].system.grid
-    read_time = grid.time[grid.read]
-    every = max(1, len(read_time) // (2 * COARSE))
-    outs = len(grid.outputs)
-
-    def columns(instants: Array) -> Array:
-        steps = (read_time[:, None] >= instants[None, :]).astype(float)
-        out = np.zeros((len(read_time), outs, outs * len(instants)))
-        for y in range(outs):
-            out[:, y, y * len(instants) : (y + 1) * len(instants)] = steps
-        return whiten_one(lens, view, run, out)
-
-    found: list[Hypothesis] = []
-    last = len(read_time) - LEAST
-    coarse = read_time[max(every, LEAST) : last : every]
-    if not len(coarse):
-        return found
-    first = columns(coarse)
-    for h in group:
-        rows = [grid.outputs.index(name) for name in h.shown]
-        sd = [spread[a] for a in h.amplitudes]
-        k = int(np.argmax(_jump_gains(view, first, rows, len(coarse), sd)))
-        centre = int(np.searchsorted(read_time, coarse[k]))
-        near = read_time[max(LEAST, centre - every) : min(centre + every + 1, last)]
-        gains = _jump_gains(view, columns(near), rows, len(near), sd)
-        (name,) = h.shapes
-        claim = h.at({name: float(near[int(np.argmax(gains))])})
-        found.append(replace(claim, spans={name: _span(gains, near)}, cost=float(np.log(COARSE))))
-    return found
-
-
-def _jump_gains(view: View, z: Array, rows: list[int], count: int, sd: list[float]) -> Array:
-    """Log evidence for a jump at each of the instants of `z`."""
-    gains = np.zeros(count)
-    for k in range(count):
-        mine = z[:, [row * count + k for row in rows]]
-        precision = mine.T @ mine + np.diag(np.array(sd) ** -2.0)
-        dot = mine.T @ view.residual
-        gains[k] = 0.5 * dot @ np.linalg.solve(precision, dot) - 0.5 * np.linalg.slogdet(precision)[1]
-    return gains

@@ -51,7 +51,7 @@ def _unsure(grid: Grid, fastest: float) -> dict[str, float]:
     for name, samples in grid.samples.items():
         if samples.linear or not np.ptp(samples.value) > 0:
             continue
-        interval = float(np.median(np.diff(samples.time)))
+        interval = grid.logged.get(name, np.inf)
         if fastest <= FAST * interval and spacing <= OFTEN * interval:
             found[name] = interval
     return found

@@ -1,33 +1,33 @@
-"""Free forcing: smooth heat of unknown cause at one body, and what the readings say of it.
+"""A latent force: smooth heat of unknown cause at one body, and what the readings say of it over time.
 
-The heat is piecewise constant over blocks with a first-order covariance of unknown size; evidence and the
-curve follow in closed form. It asks for no catalogue: it says where something is missing, when, and how much
-any explanation can gain.
+The heat is piecewise constant over blocks with a first-order covariance of unknown size; its curve follows in
+closed form. It asks for no catalogue: it says where something is missing, when, and how much any explanation
+can gain (Alvarez, Luengo & Lawrence, Latent force models, AISTATS 2009).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.mismatch.assess import Assessment
-from discovery.mismatch.context import Context
-from discovery.mismatch.events import heat_steps
-from discovery.mismatch.lens import log_mean_exp
+from discovery.evidence.bayes import project
+from discovery.evidence.events import heat_steps
+from discovery.evidence.process_noise import Setting
+from discovery.evidence.whitening import Whitened, log_sum_exp
 
 Array = NDArray[np.float64]
 
 BLOCKS = 72  # per recording
-LEVELS = (2.5, 8.0, 25.0, 80.0)  # free heat over the everyday limit, rms
-MEMORY_BLOCKS = 3.0  # correlation length of the free heat
+SIZES = (2.5, 8.0, 25.0, 80.0)  # rms of the heat, over the process noise that every body has
+MEMORY_BLOCKS = 3.0  # correlation length of the heat
 
 
 @dataclass(frozen=True)
-class Forcing:
-    """Free heat at one body: log evidence over none, and its curve by recording.
+class Force:
+    """Heat of unknown cause at one state: log evidence over none, and its curve by recording.
 
     `edges` (B + 1,) in s, `heat` and `sd` (B,) in W (or rate) by recording.
     """
@@ -40,64 +40,57 @@ class Forcing:
     signature: Array  # (N,) whitened response to the curve
 
 
-def free_forcing(context: Context, current: Assessment) -> list[Forcing]:
-    """Free forcing at every body, the best first."""
-    view = current.best_view
-    base = np.array([v.level for v in current.views])
-    # relative to the best everyday setting: a body must need more than everyday heat
-    offset = float(np.max(base) - log_mean_exp(base))
-    found = []
-    for state in context.heat_limit:
-        limit = context.heat_limit[state]
-        if limit <= 0 or state not in current.fit.trajectories[0].system.states:
-            continue
-        columns, edges = [], {}
-        for trajectory in current.fit.trajectories:
-            time = trajectory.system.grid.time
-            run = trajectory.system.grid.recording
-            edges[run] = np.linspace(time[0], time[-1], BLOCKS + 1)
-            steps = heat_steps(trajectory, state, edges[run])
-            columns.append(steps[:, :, :-1] - steps[:, :, 1:])
-        padded = []
-        for k, column in enumerate(columns):
-            full = np.zeros((*column.shape[:2], BLOCKS * len(columns)))
-            full[:, :, k * BLOCKS : (k + 1) * BLOCKS] = column
-            padded.append(full)
-        white, _ = current.lens.whiten(view.noise, padded)
-        z = view.project(white)
-        gram, dot = z.T @ z, z.T @ view.residual
-        lag = np.abs(np.subtract.outer(np.arange(BLOCKS), np.arange(BLOCKS)))
-        kernel = np.kron(np.eye(len(columns)), np.exp(-lag / MEMORY_BLOCKS))
-        root = np.linalg.cholesky(kernel + 1e-9 * np.eye(len(kernel)))
-        gains, curves = [], []
-        for level in LEVELS:
-            half = level * limit * root
-            inner = np.eye(len(kernel)) + half.T @ gram @ half
-            chol = np.linalg.cholesky(inner)
-            solved = np.linalg.solve(chol, half.T @ dot)
-            gains.append(0.5 * float(solved @ solved) - float(np.sum(np.log(np.diag(chol)))))
-            inverse = np.linalg.solve(chol, half.T)
-            curves.append((inverse.T @ solved, np.sqrt(np.sum(inverse**2, axis=0))))
-        best = int(np.argmax(gains))
-        heat, sd = curves[best]
-        split = {run: slice(k * BLOCKS, (k + 1) * BLOCKS) for k, run in enumerate(edges)}
-        found.append(
-            Forcing(
-                state,
-                float(log_mean_exp(np.array(gains))) + offset,
-                edges,
-                {run: heat[s] for run, s in split.items()},
-                {run: sd[s] for run, s in split.items()},
-                z @ heat,
-            )
-        )
+def latent_forces(seen: Whitened, setting: Setting, floor: Mapping[str, float]) -> list[Force]:
+    """The latent force at every state, the most likely one first.
+
+    Args:
+        seen: what a fit leaves.
+        setting: noise under which it is sought; level one of the process noise counts as usual.
+        floor: by state, the process noise at level one.
+    """
+    found = [_at(seen, setting, state, size) for state, size in floor.items() if size > 0]
     return sorted(found, key=lambda f: -f.gain)
 
 
-def alike(forcings: list[Forcing], limit: float = 0.9) -> list[tuple[str, ...]]:
-    """Bodies whose free heat looks the same in the readings, as places that cannot be told apart."""
-    groups: list[list[Forcing]] = []
-    for f in forcings:
+def _at(seen: Whitened, setting: Setting, state: str, usual: float) -> Force:
+    trajectories = seen.fit.trajectories
+    count, edges, columns = len(trajectories), {}, []
+    for k, run in enumerate(trajectories):
+        time = run.system.grid.time
+        edge = edges[run.system.grid.recording] = np.linspace(time[0], time[-1], BLOCKS + 1)
+        steps = heat_steps(run, state, edge)
+        full = np.zeros((*steps.shape[:2], BLOCKS * count))
+        full[:, :, k * BLOCKS : (k + 1) * BLOCKS] = steps[:, :, :-1] - steps[:, :, 1:]
+        columns.append(full)
+    part = project(seen, setting, columns)
+    gram, dot = part.block(range(BLOCKS * count)), part.dot
+    lag = np.abs(np.subtract.outer(np.arange(BLOCKS), np.arange(BLOCKS)))
+    kernel = np.kron(np.eye(count), np.exp(-lag / MEMORY_BLOCKS))
+    root = np.linalg.cholesky(kernel + 1e-9 * np.eye(len(kernel)))
+    gains, curves = [], []
+    for size in SIZES:
+        half = size * usual * root
+        chol = np.linalg.cholesky(np.eye(len(kernel)) + half.T @ gram @ half)
+        solved = np.linalg.solve(chol, half.T @ dot)
+        gains.append(0.5 * float(solved @ solved) - float(np.sum(np.log(np.diag(chol)))))
+        inverse = np.linalg.solve(chol, half.T)
+        curves.append((inverse.T @ solved, np.sqrt(np.sum(inverse**2, axis=0))))
+    heat, sd = curves[int(np.argmax(gains))]
+    split = {run: slice(k * BLOCKS, (k + 1) * BLOCKS) for k, run in enumerate(edges)}
+    return Force(
+        state,
+        float(log_sum_exp(np.array(gains)) - np.log(len(SIZES))),
+        edges,
+        {run: heat[s] for run, s in split.items()},
+        {run: sd[s] for run, s in split.items()},
+        part.columns @ heat,
+    )
+
+
+def alike(forces: Sequence[Force], limit: float = 0.9) -> list[tuple[str, ...]]:
+    """States whose latent force looks the same in the readings: places that cannot be told apart."""
+    groups: list[list[Force]] = []
+    for f in forces:
         for group in groups:
             cosine = abs(float(f.signature @ group[0].signature))
             cosine /= float(np.linalg.norm(f.signature) * np.linalg.norm(group[0].signature)) or 1.0
@@ -107,3 +100,18 @@ def alike(forcings: list[Forcing], limit: float = 0.9) -> list[tuple[str, ...]]:
         else:
             groups.append([f])
     return [tuple(f.state for f in group) for group in groups]
+
+
+def heat_over_time(
+    force: Force, offsets: Mapping[str, float], recordings: Collection[str]
+) -> dict[str, dict[str, list[float]]]:
+    """The heat by recording: block centres [s], mean and standard deviation."""
+    out = {}
+    for run in recordings:
+        centre = offsets[run] + 0.5 * (force.edges[run][1:] + force.edges[run][:-1])
+        out[run] = {
+            "time_s": [round(float(v), 1) for v in centre],
+            "heat": [float(f"{v:.4g}") for v in force.heat[run]],
+            "sd": [float(f"{v:.4g}") for v in force.sd[run]],
+        }
+    return out

@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, make_system
+from discovery.evidence.late import beside_switches
 from discovery.fitting import Fit
-from discovery.mismatch.late import beside_switches
 
 Array = NDArray[np.float64]
 
 FAR = 6.5  # reading noises from the median of the readings around
 AROUND = 3  # readings on each side that a reading is compared with
 LONELY = 0.25  # these agree with each other within this share of the distance (median deviation)
-NEXT = (
-    4.0  # reading noises from that median within which both neighbours lie: what decays is no wrong reading
-)
+NEXT = 4.0  # reading noises from that median within which both neighbours lie ...
+CLOSE = 0.1  # ... or this share of the distance: what decays is no wrong reading
+MOST = 2  # wrong readings in a row
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,30 @@ def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Out
             steps = np.diff(r)
             noise = max(float(white[y]), float(np.median(np.abs(steps - np.median(steps)))) / 0.954)
             alone = scatter < LONELY * np.abs(jump)
-            near = np.abs(r[:-2] - middle[1:-1]) < NEXT * noise
-            near &= np.abs(r[2:] - middle[1:-1]) < NEXT * noise
-            # at its ends a recording may just have begun to move
-            alone &= np.concatenate([[False], near, [False]])
+            suspect = np.abs(jump) > FAR * noise
+            limit = np.maximum(NEXT * noise, CLOSE * np.abs(jump))
+            alone &= _returns(r, middle, limit, suspect)
             alone &= ~switched[rows]  # a short pulse that is logged late shows in one reading
-            for k in np.flatnonzero((np.abs(jump) > FAR * noise) & alone):
+            for k in np.flatnonzero(suspect & alone):
                 at = float(grid.time[grid.read[rows[k]]])
                 found.append(Outlier(name, grid.recording, at, float(jump[k]), noise))
+    return found
+
+
+def _returns(r: Array, middle: Array, limit: Array, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether the readings (N,) next to each one, on both sides, are near the median of those around it; of
+    `MOST` suspects in a row, those next to the row. At its ends a recording may just have begun to move.
+    """
+    found = np.zeros(len(r), dtype=bool)
+    for k in np.flatnonzero(suspect):
+        before, after = k - 1, k + 1
+        while before > 0 and suspect[before] and after - before <= MOST:
+            before -= 1
+        while after < len(r) - 1 and suspect[after] and after - before <= MOST:
+            after += 1
+        if before < 0 or after >= len(r):
+            continue
+        found[k] = max(abs(r[before] - middle[k]), abs(r[after] - middle[k])) < limit[k]
     return found
 
 

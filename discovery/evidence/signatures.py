@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, sensitivities
-from discovery.mismatch.hypothesis import Hypothesis
+from discovery.effects.hypothesis import Hypothesis
 from discovery.terms import Expression, evaluate, names
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
     """dy/d(amplitude) at the reading instants, (R, Y, A), A amplitudes in the order of the hypotheses.
 
     To first order in the amplitude: bodies answer through the model's own dynamics, memories (lag, delay,
-    play) are taken along the present trajectory. What belongs to another recording is zero.
+    play) are taken along the present trajectory. What does not act in this recording is zero.
     """
     system = trajectory.system
     run = system.grid.recording
@@ -29,10 +29,10 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
     direct: list[tuple[int, int, Array]] = []
     owner = 0
     for h in hypotheses:
-        if h.recording not in (None, run):
+        if not h.acts_in(run):
             owner += len(h.amplitudes)
             continue
-        values = {**h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
+        values = h.values(run)
         for term in h.terms:
             series = evaluate(term.expression, {**ends, **values}, memory=system.ends).value
             mine = owner + next(
@@ -53,24 +53,6 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
     for column, y, series in direct:
         out[:, y, column] += series
     return out
-
-
-def block_signatures(trajectory: Trajectory, h: Hypothesis, blocks: int, first: int, total: int) -> Array:
-    """Signature (R, Y, total) in blocks of time; block k of this recording is column first + k."""
-    system = trajectory.system
-    values = {**trajectory.at_ends(), **h.shapes, **dict.fromkeys(h.amplitudes, 1.0)}
-    steps = len(system.grid.step)
-    middle = 0.5 * (system.grid.time[1:] + system.grid.time[:-1])
-    edges = np.linspace(system.grid.time[0], system.grid.time[-1], blocks + 1)
-    block = np.clip(np.searchsorted(edges, middle, side="right") - 1, 0, blocks - 1)
-    columns = []
-    for term in h.terms:
-        series = np.broadcast_to(evaluate(term.expression, values, memory=system.ends).value, (2 * steps,))
-        columns += [
-            Column(first + k, term.into, series * np.repeat(block == k, 2), term.source)
-            for k in range(blocks)
-        ]
-    return sensitivities(trajectory, (), (), columns, count=total)
 
 
 def heat_rms(trajectory: Trajectory, expression: Expression) -> float:

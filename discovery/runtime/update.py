@@ -113,6 +113,6 @@ def next_revision(exported: Exported, belief: Belief, findings: Sequence[Finding
 
 
 def _diagnosis(model: Model, campaign: Campaign, recordings: Sequence[str]) -> dict[str, Any]:
-    from discovery.mismatch import diagnose
+    from discovery.diagnosis import diagnose
 
     return dict(diagnose(model, campaign, recordings).document())

@@ -6,7 +6,7 @@ from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 __all__ = ["Amplitude", "Effect", "Example", "Shape", "catalogue"]
 

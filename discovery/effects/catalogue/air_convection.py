@@ -7,7 +7,7 @@ Newton's law of cooling. Limits: one coefficient for still and moved air; where 
 path to the air at this body, a refit absorbs it and nothing is left to see.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="air_convection",

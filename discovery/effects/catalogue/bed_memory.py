@@ -7,7 +7,7 @@ room. Limits: the bed starts settled in the room of the first instant; a recordi
 shows little more than a drift, which `sensor_drift` follows as well.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="bed_memory",
@@ -16,14 +16,13 @@ EFFECT = Effect(
     place="body",
     formula="G_bed*(lag(ambient, t_bed) - body)",
     amplitude=Amplitude("G_bed", "W/K", 8.0),
-    shapes=(Shape("t_bed", "s", (36000.0, 108000.0), 20000.0, 300000.0),),
+    shapes=(Shape("t_bed", "s", 120000.0, factor=1.6),),
     signature="a drift over the first day, related to the room of yesterday",
     confused_with=(
         "sensor_drift",
         "air_convection",
     ),
     source="machine bed as a first-order follower of the room, 20 to 60 h (Bryan's thermal memory)",
-    prior=0.5,
     examples=(
         Example(
             {"G_bed": 8.0, "ambient": 23.0, "t_bed": 36000.0, "body": 20.0}, 8.856, {"ambient": 20.0}, 16577.0

@@ -7,7 +7,7 @@ thermal memory; the bed as one follower of the room. Limits: recordings that beg
 have no common dT_0.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="bed_memory",
@@ -16,17 +16,13 @@ EFFECT = Effect(
     place="body",
     formula="G_bed*(lag(ambient, t_bed) + dT_0*exp(-time/t_bed) - body)",
     amplitude=Amplitude("G_bed", "W/K", 8.0),
-    shapes=(
-        Shape("t_bed", "s", (36000.0, 108000.0), 20000.0, 300000.0),
-        Shape("dT_0", "K", (-3.0, 3.0), -6.0, 6.0),
-    ),
+    shapes=(Shape("t_bed", "s", 120000.0, factor=1.6), Shape("dT_0", "K", 0.0, spread=3.0)),
     signature="a drift over the first day, in the same direction in every recording",
     confused_with=(
         "sensor_drift",
         "air_convection",
     ),
     source="machine bed as a first-order follower of the room, 20 to 60 h (Bryan's thermal memory)",
-    prior=0.25,
     examples=(
         Example(
             {"G_bed": 8.0, "ambient": 23.0, "t_bed": 36000.0, "body": 23.0, "dT_0": -3.0, "time": 36000.0},

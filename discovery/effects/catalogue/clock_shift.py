@@ -7,7 +7,7 @@ what drives the model and what the readings say are apart in time. Source: two l
 their own. Limits: one shift for a whole recording; a clock that runs fast is not covered.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="clock_shift",
@@ -15,15 +15,11 @@ EFFECT = Effect(
     group="measuring chain",
     place="inputs of a recording",
     formula="delay(input, t_shift)",
-    amplitude=Amplitude("on", "1", 1.0, 1, 1.0),
-    shapes=(
-        Shape(
-            "t_shift", "s", (-3600.0, -1800.0, -900.0, -300.0, 300.0, 900.0, 1800.0, 3600.0), -7200.0, 7200.0
-        ),
-    ),
+    amplitude=Amplitude("shifted", "1", 1.0, 1, 1.0),
+    shapes=(Shape("t_shift", "s", 0.0, spread=1800.0),),
     signature="every error of a recording is late (or early) by the same time",
     confused_with=("fluid_delay", "sensor_lag"),
     source="two loggers with clocks of their own",
-    one_recording=True,
+    acts="in one recording",
     examples=(Example({"input": 400.0, "t_shift": 900.0}, 100.0, {"input": 100.0}, 600.0),),
 )

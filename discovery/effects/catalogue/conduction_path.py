@@ -6,7 +6,7 @@ G_path in W/K, 5 to 60: lambda A / L of a steel web, or a joint. Source: Fourier
 on the way; a long path answers later than this (see `second_thermal_mass`).
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="conduction_path",

@@ -7,7 +7,7 @@ conductance against contact pressure. Limits: straight in the temperature rise; 
 the model. Seldom visible.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="contact_conductance",
@@ -19,6 +19,5 @@ EFFECT = Effect(
     signature="a link between bodies gets better or worse as they warm up",
     confused_with=("natural_convection",),
     source="joint conductance changes with contact pressure: 10 to 30 % between cold and warm",
-    prior=0.5,
     examples=(Example({"G_p": 5.0, "body": 32.0, "ambient": 22.0, "other": 34.0}, 10.0),),
 )

@@ -8,7 +8,7 @@ flow is taken as constant; needs the temperature of the coolant, where its power
 share of that is the usual term. Where the model cools this body already a refit absorbs it.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="coolant_convection",

@@ -7,7 +7,7 @@ control about a set point. Limits: play stands for the loop of many cycles, not 
 single one, which readings every 5 to 15 minutes alias; +-0.5 K is below detection on most machines.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="cooling_hysteresis",
@@ -15,11 +15,10 @@ EFFECT = Effect(
     group="drive and cooling",
     place="cooling terms",
     formula="play(cooling, width)",
-    amplitude=Amplitude("on", "1", 1.0, 1, 1.0),
-    shapes=(Shape("width", "W", (10.0, 40.0), 1.0, 400.0),),
+    amplitude=Amplitude("switched", "1", 1.0, 1, 1.0),
+    shapes=(Shape("width", "W", 50.0, factor=2.5),),
     signature="the cooling acts with a dead band: it does not follow small changes of its signal",
     confused_with=("fluid_delay",),
     source="on/off chiller with a dead band of 0.5 to 2 K around its set point",
-    prior=0.5,
     examples=(Example({"cooling": 250.0, "width": 40.0}, 210.0, {"cooling": 100.0}),),
 )

@@ -7,7 +7,7 @@ degC. Limits: the winding is as warm as the body; almost always invisible (4 % o
 K).
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="copper_resistance",

@@ -8,7 +8,7 @@ constant humidity. Limits: humidity is not recorded, so q_ev is a mean over the 
 out exponentially.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="evaporation_drying",
@@ -17,7 +17,7 @@ EFFECT = Effect(
     place="body",
     formula="-q_ev*max(flow, lag(flow, t_dry))",
     amplitude=Amplitude("q_ev", "W", 60.0),
-    shapes=(Shape("t_dry", "s", (1200.0, 2400.0, 4800.0), 300.0, 14400.0),),
+    shapes=(Shape("t_dry", "s", 1800.0, factor=2.0),),
     signature=(
         "after a pump stop the body cools below the air for the drying time; while wet it stays below "
         "the fluid"
@@ -30,6 +30,7 @@ EFFECT = Effect(
         "Lewis relation: 500 to 1400 W/m2 on a spinning wet table; film of 0.05 to 0.2 kg/m2 dries "
         "within 5 to 60 min"
     ),
+    shared=True,
     examples=(
         Example({"q_ev": 60.0, "flow": 1.0, "t_dry": 2400.0}, -60.0),
         # one drying time after a pump stop

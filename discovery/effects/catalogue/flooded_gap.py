@@ -7,7 +7,7 @@ conduction through the film, Taylor-Couette flow above the critical number. Limi
 once; no clogging.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="flooded_gap",

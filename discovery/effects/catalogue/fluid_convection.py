@@ -8,7 +8,7 @@ constant can stand for it. Limits: in proportion to the flow; a body that the mo
 offered.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="fluid_convection",

@@ -6,7 +6,7 @@ t_delay in s: 5 to 50 s for the hose alone (not visible), 5 min to 1 h where a t
 between. Source: plug flow. Limits: the same for all bodies; mixing on the way is `fluid_sump`.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="fluid_delay",
@@ -14,8 +14,8 @@ EFFECT = Effect(
     group="cutting fluid",
     place="fluid terms",
     formula="delay(fluid, t_delay)",
-    amplitude=Amplitude("on", "1", 1.0, 1, 1.0),
-    shapes=(Shape("t_delay", "s", (300.0, 600.0, 1200.0, 1800.0, 2700.0, 3600.0), 30.0, 7200.0),),
+    amplitude=Amplitude("delayed", "1", 1.0, 1, 1.0),
+    shapes=(Shape("t_delay", "s", 900.0, factor=2.2),),
     signature="every wet body answers to the fluid temperature later than it is measured",
     confused_with=(
         "fluid_sump",

@@ -7,7 +7,7 @@ machine tools. Source: Prandtl-Ishlinskii play operator. Limits: one width; the 
 in the middle of its play.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="joint_hysteresis",
@@ -16,7 +16,7 @@ EFFECT = Effect(
     place="output",
     formula="slip*(play(y, width) - y)",
     amplitude=Amplitude("slip", "1", 0.5, most=1.0),
-    shapes=(Shape("width", "um", (1.0, 2.5), 0.2, 10.0),),
+    shapes=(Shape("width", "um", 1.2, factor=2.0),),
     signature="a plateau at every reversal, the same at any rate",
     confused_with=("sensor_lag",),
     source="Prandtl-Ishlinskii play operator of joints, widths of 0.5 to 2 um",

@@ -7,7 +7,7 @@ temperature. Limits: walls as warm as the air; over 10 K only 5 % of it differ f
 refit absorbs, so it takes bodies tens of kelvin above the room.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="radiation",
@@ -25,5 +25,6 @@ EFFECT = Effect(
         "air_convection",
     ),
     source="Stefan-Boltzmann; over 10 K only 5 % of it differ from a linear loss",
+    shared=True,
     examples=(Example({"A_rad": 1.0, "ambient": 20.0, "body": 30.0}, -60.13),),
 )

@@ -7,7 +7,7 @@ again within a recording. Limits: one instant a recording; what jumps in one err
 `sensor_offset`.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="rezero",
@@ -16,10 +16,11 @@ EFFECT = Effect(
     place="recording",
     formula="zero*where(time >= t_zero, 1, 0)",
     amplitude=Amplitude("zero", "um", 5.0, 0),
-    shapes=(Shape("t_zero", "s", (0.0,), 0.0, 1e9, True),),
+    shapes=(Shape("t_zero", "s", 0.0, instant=True),),
     signature="all errors jump between two readings and stay",
     confused_with=("sensor_offset",),
     source="the R-Test is set to zero again within a recording",
-    one_recording=True,
+    search="step",
+    acts="in one recording",
     examples=(Example({"zero": 3.0, "time": 700.0, "t_zero": 600.0}, 3.0),),
 )

@@ -7,7 +7,7 @@ thickness L has t_m = L^2/(pi^2 a), 14 to 28 min. Limits: one discrete mass leav
 body that conducts over a distance; settled at the first instant.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="second_thermal_mass",
@@ -16,7 +16,7 @@ EFFECT = Effect(
     place="body",
     formula="G_m*(lag(body, t_m) - body)",
     amplitude=Amplitude("G_m", "W/K", 30.0),
-    shapes=(Shape("t_m", "s", (900.0, 1800.0, 3600.0, 7200.0, 14400.0), 400.0, 40000.0),),
+    shapes=(Shape("t_m", "s", None),),
     signature="fast then slow: the body soaks up heat after each change and gives it back",
     confused_with=(
         "conduction_path",

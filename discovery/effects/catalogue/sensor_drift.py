@@ -7,7 +7,7 @@ electronics. Source: data sheets. Limits: straight; over a short recording a slo
 look the same.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="sensor_drift",
@@ -22,6 +22,6 @@ EFFECT = Effect(
         "wear",
     ),
     source="displacement sensors and their electronics: 0.5 to 1 um a day",
-    one_recording=True,
+    acts="in one recording",
     examples=(Example({"drift": 1.0, "time": 43200.0}, 0.5),),
 )

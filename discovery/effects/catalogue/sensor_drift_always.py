@@ -8,12 +8,12 @@ they are switched on. Source: data sheets. Limits: straight; a slow body looks t
 
 from dataclasses import replace
 
-from discovery.mismatch.catalogue import sensor_drift
+from discovery.effects.catalogue import sensor_drift
 
 EFFECT = replace(
     sensor_drift.EFFECT,
     title="Drift of a sensor in every recording",
     place="output",
-    one_recording=False,
+    acts="always",
     signature="one error runs away in a straight line in every recording alike, unrelated to any input",
 )

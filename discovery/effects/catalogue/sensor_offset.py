@@ -6,7 +6,7 @@ offset in the unit of the error, of either sign. Source: a nest or sensor that w
 neighbouring errors too, this does not. Limits: one jump per error and recording in the search.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example, Shape
+from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="sensor_offset",
@@ -15,13 +15,14 @@ EFFECT = Effect(
     place="output of a recording",
     formula="offset*where(time >= t_step, 1, 0)",
     amplitude=Amplitude("offset", "um", 4.0, 0),
-    shapes=(Shape("t_step", "s", (0.0,), 0.0, 1e9, True),),
+    shapes=(Shape("t_step", "s", 0.0, instant=True),),
     signature="one error jumps between two readings and stays, the others do not",
     confused_with=(
         "unmeasured_heat",
         "rezero",
     ),
     source="a nest or sensor that was touched: one direction jumps and stays",
-    one_recording=True,
+    search="step",
+    acts="in one recording",
     examples=(Example({"offset": 4.0, "time": 5000.0, "t_step": 3600.0}, 4.0),),
 )

@@ -7,7 +7,7 @@ cm3/min of steel take 4.2 kW, 5 to 15 % of which stay on table and fluid. Limits
 between the cut and the body.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="swarf_heat",

@@ -7,7 +7,7 @@ bearing preload study, Lubricants 12:185. Limits: the body's rise above the room
 between the rings.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="thermal_preload",

@@ -6,7 +6,7 @@ P_w in W at 1000 rpm, 2 to 20: 2 W at 600 rpm, 12 W at 1200 rpm. Source: von Kar
 realistic size nearly always below detection, hence the small prior; `friction_speed` follows it closely.
 """
 
-from discovery.mismatch.catalogue.effect import Amplitude, Effect, Example
+from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="windage",
@@ -18,6 +18,5 @@ EFFECT = Effect(
     signature="heat with nearly the cube of the speed, some watts",
     confused_with=("friction_speed",),
     source="von Karman disk: power with speed to the 2.8; 2 W at 600 rpm, 12 W at 1200 rpm",
-    prior=0.1,
     examples=(Example({"P_w": 8.0, "speed": 1000.0}, 8.0),),
 )
