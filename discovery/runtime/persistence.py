@@ -17,6 +17,8 @@ from discovery.export.stepper import Snapshot
 from discovery.runtime.compensator import Compensator, State
 
 NAMES = ("state.json", "state.previous.json")
+# What a guard remembers
+KEPT = ("held", "held_at", "fresh", "seen", "seen_at", "still_since", "waiting", "waiting_from", "stayed")
 
 
 def save(compensator: Compensator, folder: Path, beside: Executor | None = None) -> Future[None]:
@@ -104,7 +106,9 @@ def _content(c: Compensator) -> dict[str, Any]:
         "bump": c.bump,
         "predicted": None if c.predicted is None else c.predicted.tolist(),
         "inputs": None if c.inputs is None else c.inputs.tolist(),
-        "held": [[guard.held, guard.held_at, guard.latched, guard.fresh] for guard in c.guards],
+        "good_since": c.good_since,
+        "gain": c.gain,
+        "held": [[getattr(guard, name) for name in KEPT] for guard in c.guards],
         "snapshot": snapshot,
     }
 
@@ -137,5 +141,7 @@ def _apply(c: Compensator, content: dict[str, Any]) -> None:
     c.predicted = None if content["predicted"] is None else np.array(content["predicted"])
     c.inputs = None if content["inputs"] is None else np.array(content["inputs"])
     for guard, kept in zip(c.guards, content["held"], strict=True):
-        guard.held, guard.held_at, guard.latched, guard.fresh = kept
+        for name, value in zip(KEPT, kept, strict=True):
+            setattr(guard, name, value)
+    c.good_since, c.gain = content["good_since"], float(content["gain"])
     c.heartbeat = 1
