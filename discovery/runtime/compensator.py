@@ -311,12 +311,16 @@ class Compensator:
         if self.state is State.OFF:
             causes, remedies = ["compensation is switched off"], []
         elif not causes:
+            on = was is State.OFF and self.started_at < now
             causes = [
-                {
+                "the inputs are good again"
+                if was in TROUBLE
+                else "compensation is switched on"
+                if on
+                else {
                     State.COLD: "the model starts without a saved state",
-                    State.WARM: "the inputs are good again" if was in TROUBLE else "the model went through a gap",
-                    State.ACTIVE: "the inputs are good again" if was in TROUBLE else "the model has settled",
-                }.get(self.state, "")
+                    State.WARM: "the model went through a gap",
+                }.get(self.state, "the model has settled")
             ]
         if self.state is State.FAULT:
             remedies.append("it ends by itself once the inputs are good, or when an operator acknowledges it")

@@ -115,7 +115,7 @@ class InputGuard:
             return 0.0, Fault.AGE
         if not r.plausible_low <= value <= r.plausible_high:
             return 0.0, Fault.IMPLAUSIBLE
-        if value != self.seen:
+        if value != self.seen or self.fresh:
             self.still_since = now
         elapsed = min(max(now - self.seen_at, 0.0), r.age_s)
         before, self.seen, self.seen_at = self.seen, value, now

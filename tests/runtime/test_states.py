@@ -461,7 +461,8 @@ def test_a_column_that_is_not_there_is_told(model_file: Path) -> None:
     """A file of something else had been run, with exit status 0 and a table of zeros."""
     command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", "-"]
     some = CliRunner().invoke(app, command, input="time,T_env,speed\n0,20,0\n")
-    assert some.exit_code == 0
+    assert some.exit_code == 1
+    assert "no offset was given out: no good reading of P_drive" in some.stderr
     assert "the inputs have no column P_drive, T_cool, T_fluid" in some.stderr
     none = CliRunner().invoke(app, command, input="time,a\n0,20\n")
     assert none.exit_code == 1
@@ -470,7 +471,7 @@ def test_a_column_that_is_not_there_is_told(model_file: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "status"), [("time;T_env\n0;20\n", 1), ("time,a\n0,20\n", 1), ("time,T_env\n", 0)]
+    ("text", "status"), [("t;T_env\n0;20\n", 1), ("time,a\n0,20\n", 1), ("time,T_env\n", 0)]
 )
 def test_inputs_that_are_refused_leave_no_state(
     model_file: Path, tmp_path: Path, text: str, status: int
@@ -479,7 +480,7 @@ def test_inputs_that_are_refused_leave_no_state(
     command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", "-", "--state", str(memory)]
     assert CliRunner().invoke(app, command, input=text).exit_code == status
     assert not memory.exists()
-    assert CliRunner().invoke(app, command, input="time,T_env\n0,20\n").exit_code == 0
+    assert CliRunner().invoke(app, command, input="time,T_env\n0,20\n").exit_code == 1
     assert (memory / "active.json").exists()
 
 
@@ -496,7 +497,7 @@ def test_the_output_may_not_be_what_is_read(model_file: Path, tmp_path: Path) ->
 
 def test_inputs_that_cannot_be_read_leave_an_older_output(model_file: Path, tmp_path: Path) -> None:
     inputs, out = tmp_path / "in.csv", tmp_path / "offsets.csv"
-    inputs.write_text("time;T_env\n0;20\n")
+    inputs.write_text("t;T_env\n0;20\n")
     command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", str(inputs), "--out", str(out)]
     assert CliRunner().invoke(app, command).exit_code == 1
     assert not out.exists()
@@ -504,5 +505,5 @@ def test_inputs_that_cannot_be_read_leave_an_older_output(model_file: Path, tmp_
     assert CliRunner().invoke(app, command).exit_code == 1
     assert out.read_text() == "what was there"
     inputs.write_text("time,T_env\n0,20\n")
-    assert CliRunner().invoke(app, command).exit_code == 0
+    assert CliRunner().invoke(app, command).exit_code == 1  # no offset: the others are missing
     assert out.read_text().startswith("time,state,status")
