@@ -56,6 +56,14 @@ def compensate(
         bool, typer.Option("--allow-unsigned", help="Try a model without a key.")
     ] = False,
     shadow_hours: Annotated[float, typer.Option(help="Length of a shadow run.")] = 24.0,
+    shadow_um: Annotated[
+        float | None,
+        typer.Option(help="A new model may take over without measured errors if it differs by so little."),
+    ] = None,
+    acknowledge: Annotated[
+        bool,
+        typer.Option("--acknowledge", help="An operator has looked: end a FAULT, accept steps that wait."),
+    ] = False,
     back: Annotated[
         bool, typer.Option("--back", help="One step back to the model before, in --state.")
     ] = False,
@@ -72,6 +80,7 @@ def compensate(
     discovery compensate model.json --allow-unsigned --opcua-demo --seconds 60
     """
     from discovery.runtime.command import compensate_rows, go_back, one_source, trusted_model
+    from discovery.runtime.shadow import Rule
 
     def say(text: str) -> None:
         typer.echo(text, err=True)
@@ -83,10 +92,10 @@ def compensate(
         return
     one_source(
         {"--inputs": inputs, "--opcua": opcua, "--opcua-demo": opcua_demo or None},
-        only_inputs={"--out": out},
         only_opcua={"--seconds": seconds},
-        shadow_hours=shadow_hours,
+        shadow={"--shadow-hours": shadow_hours, "--shadow-um": shadow_um},
     )
+    rule = Rule(hours=shadow_hours, most_um=shadow_um)
     exported, key = trusted_model(model, trust, allow_unsigned=allow_unsigned)
     if opcua is not None or opcua_demo:
         from discovery.runtime.opcua import compensate_opcua
@@ -97,14 +106,24 @@ def compensate(
             model=model,
             folder=state,
             trusted=key,
+            out=out,
             seconds=seconds,
-            shadow_hours=shadow_hours,
+            rule=rule,
+            acknowledge=acknowledge,
             say=say,
         )
     else:
         assert inputs is not None
         compensate_rows(
-            exported, inputs, out, model=model, folder=state, trusted=key, shadow_hours=shadow_hours, say=say
+            exported,
+            inputs,
+            out,
+            model=model,
+            folder=state,
+            trusted=key,
+            rule=rule,
+            acknowledge=acknowledge,
+            say=say,
         )
 
 
@@ -138,3 +157,67 @@ def update(
     key = private_key(sign) if sign else None
     for line in update_file(model, loaded, names, out or next_name(model), key).lines():
         typer.echo(line)
+
+
+def opcua_certificate(
+    connection: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Folder of the connection file and its certificates.")
+    ],
+    name: Annotated[str, typer.Option(help="Name of the own files.")] = "compensator",
+    uri: Annotated[str | None, typer.Option(help="application_uri of the connection.")] = None,
+    fetch: Annotated[
+        str | None, typer.Option(metavar="URL", help="Fetch the certificate of the server at URL instead.")
+    ] = None,
+) -> None:
+    """Make the own certificate and key, or fetch the certificate of the server.
+
+    \b
+    discovery opcua certificate line3
+    discovery opcua certificate line3 --fetch opc.tcp://machine:4840
+    """
+    from discovery.runtime.opcua_form import CLIENT_URI
+    from discovery.runtime.opcua_tools import fetch_certificate, make_certificate
+
+    if fetch is None:
+        for path in make_certificate(connection, name, uri or CLIENT_URI):
+            typer.echo(path)
+        typer.echo(f"trust {name}.der at the server; application_uri is {uri or CLIENT_URI}")
+    else:
+        import asyncio
+
+        print_of_it = asyncio.run(fetch_certificate(fetch, connection / "server.der"))
+        typer.echo(
+            f"{connection / 'server.der'}: SHA-1 {print_of_it}; compare it with what the machine shows"
+        )
+
+
+def opcua_browse(
+    connection: Annotated[Path, typer.Argument(metavar="CONNECTION", help="TOML file of the connection.")],
+    node: Annotated[str, typer.Option(help="Node id to begin with.")] = "i=85",
+    depth: Annotated[int, typer.Option(help="How many levels down.")] = 6,
+) -> None:
+    """List the variables of a server: node id, type, rights, value, path."""
+    import asyncio
+
+    from discovery.files import read_toml
+    from discovery.runtime.opcua_form import ConnectionForm
+    from discovery.runtime.opcua_tools import browse
+
+    form = read_toml(connection, ConnectionForm)
+
+    async def work() -> None:
+        async for line in browse(form, connection.parent, node, depth):
+            typer.echo(line)
+
+    asyncio.run(work())
+
+
+def watch(
+    state: Annotated[Path, typer.Argument(metavar="STATE", help="Folder that --state of compensate names.")],
+    port: Annotated[int, typer.Option(help="Port of the page, on this computer alone.")] = 8467,
+    hours: Annotated[float, typer.Option(help="How far back the page shows.")] = 24.0,
+) -> None:
+    """Show a running compensation in a browser: offsets, inputs, state, events; and /metrics for Prometheus."""
+    from discovery.runtime.watch import serve
+
+    serve(state, port, hours, say=typer.echo)

@@ -52,16 +52,12 @@ def trusted_model(
 
 
 def one_source(
-    sources: Mapping[str, object],
-    *,
-    only_inputs: Mapping[str, object],
-    only_opcua: Mapping[str, object],
-    shadow_hours: float,
+    sources: Mapping[str, object], *, only_opcua: Mapping[str, object], shadow: Mapping[str, float | None]
 ) -> None:
     """Refuse options of `discovery compensate` that do not go together; None: an option was not given.
 
     Raises:
-        UsageError: no source of readings or two, an option of the other source, a time that is none.
+        UsageError: no source of readings or two, an option of the other source, a number that cannot be.
     """
     given = [name for name, value in sources.items() if value is not None]
     if not given:
@@ -70,11 +66,12 @@ def one_source(
         )
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)}: the readings come from one of them; leave the other out")
-    for name, value in (only_opcua if given == ["--inputs"] else only_inputs).items():
+    for name, value in (only_opcua if given == ["--inputs"] else {}).items():
         if value is not None:
             raise UsageError(f"{name} does not go with {given[0]}; leave it out")
-    if not 0.0 <= shadow_hours < math.inf:
-        raise UsageError(f"--shadow-hours {shadow_hours:g} is no length of time; give 0 or more hours")
+    for name, number in shadow.items():
+        if number is not None and not 0.0 <= number < math.inf:
+            raise UsageError(f"{name} {number:g} cannot be; give 0 or more")
 
 
 def compensate_rows(
@@ -85,7 +82,7 @@ def compensate_rows(
     model: Path,
     folder: Path | None = None,
     trusted: Ed25519PublicKey | None = None,
-    shadow_hours: float = 24.0,
+    rule: Rule | None = None,
     acknowledge: bool = False,
     learn: Learner | None = None,
     say: Say = lambda _: None,
@@ -106,7 +103,7 @@ def compensate_rows(
         if out is not None and out.exists() and used.exists() and out.samefile(used):
             raise UserError(f"{out}: --out names the same file as {option}; name another file")
     step, live, dropped = exported.compiled.step_s, source == "-", Dropped()
-    settings, rule = Settings(tick_s=step), Rule(hours=shadow_hours)
+    settings = Settings(tick_s=step)
     with ExitStack() as stack:
         lines: Iterable[str] = sys.stdin if live else stack.enter_context(_open(Path(source)))
         oldest = max((i.range.age_s for i in exported.inputs), default=math.inf)

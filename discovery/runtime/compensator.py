@@ -224,7 +224,9 @@ class Compensator:
             self.good_since = now
         good = self.good_since is not None and (hurry or now - self.good_since >= s.recover_s)
         settled = self.settling if now - self.started_at < s.settle_s else State.ACTIVE
-        held = max(now - guard.held_at for guard in self.guards) if replaced and self.origin is not None else 0.0
+        held = (
+            max(now - guard.held_at for guard in self.guards) if replaced and self.origin is not None else 0.0
+        )
         if not enabled:
             self.state = State.OFF
         elif self.origin is None:
@@ -285,7 +287,9 @@ class Compensator:
     def _tell_gain(self, gain: float, now: float) -> None:
         if (gain < 1.0) is not (self.gain < 1.0):
             far = [g.spec.name for g in self.guards if g.held is not None and g.gain(g.held) < 1.0]
-            cause = f"{', '.join(far)} far outside of the training" if far else "inputs are back in the training"
+            cause = (
+                f"{', '.join(far)} far outside of the training" if far else "inputs are back in the training"
+            )
             remedy = "record there and fit the model again" if far else ""
             self.events.append(Event(now, "gain falls" if far else "full gain", cause, remedy))
         self.gain = gain

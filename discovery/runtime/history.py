@@ -112,7 +112,9 @@ class History:
 
 
 def _json(values: Mapping[str, float | None]) -> str:
-    return json.dumps({n: round(v, 6) if v is not None and math.isfinite(v) else None for n, v in values.items()})
+    return json.dumps(
+        {n: round(v, 6) if v is not None and math.isfinite(v) else None for n, v in values.items()}
+    )
 
 
 def read_history(folder: Path, since_s: float = 24 * 3600.0) -> dict[str, Any]:
@@ -133,7 +135,8 @@ def read_history(folder: Path, since_s: float = 24 * 3600.0) -> dict[str, Any]:
             (last - since_s,),
         ).fetchall()
         events = base.execute(
-            "SELECT time, what, cause, remedy FROM event WHERE time >= ? ORDER BY time DESC", (last - since_s,)
+            "SELECT time, what, cause, remedy FROM event WHERE time >= ? ORDER BY time DESC",
+            (last - since_s,),
         ).fetchall()
         counts = dict(base.execute("SELECT what, count(*) FROM event GROUP BY what").fetchall())
     finally:

@@ -117,9 +117,7 @@ def _parsed(
         yield line, (stamp, read)
 
 
-def _in_order(
-    rows: Iterator[tuple[int, Row]], dropped: Dropped, say: Callable[[str], None]
-) -> Iterator[Row]:
+def _in_order(rows: Iterator[tuple[int, Row]], dropped: Dropped, say: Callable[[str], None]) -> Iterator[Row]:
     """Rows on a timeline that never goes back.
 
     A row far from the time of the one before waits for those after it: if they agree with it there was a gap,
@@ -141,7 +139,9 @@ def _in_order(
         if 0.0 < time - last < math.inf:
             usual.append(time - last)
         last = time
-        return time, {n: Reading(r.value, r.time + shift, r.good) for n, r in row[1].items()} if shift else row[1]
+        return time, {
+            n: Reading(r.value, r.time + shift, r.good) for n, r in row[1].items()
+        } if shift else row[1]
 
     def refuse() -> None:
         for line, row in waiting:

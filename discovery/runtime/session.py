@@ -85,8 +85,14 @@ class Session:
                 )
         self.compensator = Compensator(exported, self.settings)
         if folder is not None:
-            facts = {"model": exported.model.name, "sha256": exported.seal.sha256, "revision": exported.revision}
-            facts["units"] = {o.name: o.unit for o in exported.outputs} | {i.name: i.unit for i in exported.inputs}
+            facts = {
+                "model": exported.model.name,
+                "sha256": exported.seal.sha256,
+                "revision": exported.revision,
+            }
+            facts["units"] = {o.name: o.unit for o in exported.outputs} | {
+                i.name: i.unit for i in exported.inputs
+            }
             self.history = History(folder, facts)
             self._restore(folder, now)
 
@@ -140,9 +146,7 @@ class Session:
         compensator = self.compensator
         if compensator.origin is None and compensator.heartbeat == 0:
             refuse_wrong_units(compensator.exported.inputs, readings)
-        found = compensator.tick(
-            readings, now, enabled=enabled, part_done=part_done, acknowledge=acknowledge
-        )
+        found = compensator.tick(readings, now, enabled=enabled, part_done=part_done, acknowledge=acknowledge)
         for event in found.events:
             self._tell(event)
         self.counts[found.state.name] = self.counts.get(found.state.name, 0) + 1
@@ -166,7 +170,9 @@ class Session:
         if self.history is not None:
             self.history.tick(self.compensator, found, readings, now)
             error_of_history = self.history.flush(now)
-            self._heard("history", f"{self.history.path}: the history cannot be written", error_of_history, now)
+            self._heard(
+                "history", f"{self.history.path}: the history cannot be written", error_of_history, now
+            )
 
     def _heard(self, what: str, text: str, error: Exception | None, now: float) -> None:
         """Tell the first of several failures to write, and when it is over."""

@@ -53,7 +53,11 @@ def listening() -> Iterator[Asked]:
     if threading.current_thread() is not threading.main_thread():
         yield asked
         return
-    wanted = {signal.SIGTERM: asked.on_stop, signal.SIGINT: asked.on_stop, signal.SIGUSR1: asked.on_acknowledge}
+    wanted = {
+        signal.SIGTERM: asked.on_stop,
+        signal.SIGINT: asked.on_stop,
+        signal.SIGUSR1: asked.on_acknowledge,
+    }
     before = {number: signal.signal(number, handler) for number, handler in wanted.items()}
     try:
         yield asked

@@ -87,7 +87,7 @@ def begin(path: Path, folder: Path, said: list[str], rule: Rule) -> Session:
 def test_a_new_model_takes_over_without_a_step_and_can_be_taken_back(
     files: dict[str, Path], minutes: np.ndarray, tmp_path: Path
 ) -> None:
-    memory, said, rule = tmp_path / "memory", list[str](), Rule(hours=3.0)
+    memory, said, rule = tmp_path / "memory", list[str](), Rule(hours=3.0, most_um=20.0)
     first = work(begin(files["old"], memory, said, rule), minutes, 0)
     session = begin(files["near"], memory, said, rule)
     assert session.shadow is not None
@@ -115,6 +115,16 @@ def test_a_model_that_is_far_off_is_refused(
     assert "is refused" in verdict(said)
     assert session.compensator.exported.revision == 1
     assert (memory / REFUSED).read_bytes() == files["far"].read_bytes()
+
+
+def test_without_measured_errors_no_model_takes_over(
+    files: dict[str, Path], minutes: np.ndarray, tmp_path: Path
+) -> None:
+    memory, said, rule = tmp_path / "memory", list[str](), Rule(hours=3.0)
+    work(begin(files["old"], memory, said, rule), minutes, 0)
+    work(begin(files["near"], memory, said, rule), minutes, 400)
+    assert "is refused" in verdict(said)
+    assert "only 0 measured errors came, 5 are needed" in verdict(said)
 
 
 @pytest.mark.parametrize("compensated", [False, True])

@@ -65,7 +65,9 @@ def test_the_checks_come_in_order() -> None:
     assert fault(Reading(30.0, 1000.0)) is Fault.JUMP
 
 
-def minutes_until_taken(spec: Input, before: float, values: list[float], together: bool = False) -> int | None:
+def minutes_until_taken(
+    spec: Input, before: float, values: list[float], together: bool = False
+) -> int | None:
     """Minutes until the first of `values`, one a minute, is taken."""
     guard = InputGuard(spec)
     for k in range(10):
