@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.export.document import Exported
+from discovery.export.guarding import Times, compensated
 from discovery.export.stepper import Stepper
 from discovery.runtime.events import Event, why
 from discovery.runtime.fastforward import fast_forward
@@ -37,7 +38,7 @@ class State(Enum):
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Times):
     """Times of the runtime in s."""
 
     tick_s: float | None = (
@@ -45,10 +46,6 @@ class Settings:
     )
     catch_up_s: float = 600.0  # late ticks are made up for as far as this; a longer gap is fast-forwarded
     longest_gap_s: float = 30 * 24 * 3600.0  # beyond this the model starts anew
-    hold_limit_s: float = 4 * 3600.0  # longest replacement of an input
-    freeze_limit_s: float = 2 * 3600.0  # longest hold of the outputs
-    recover_s: float = 300.0  # inputs are good for so long before DEGRADED or FAULT ends
-    settle_s: float = 8 * 3600.0  # COLD and WARM last as long
     bump_s: float = 1800.0  # time constant with which the difference at a change of model fades
 
 
@@ -78,7 +75,7 @@ class Compensator:
         self.exported, self.settings = exported, settings or Settings()
         self.stepper = Stepper(exported.compiled)
         self.guards = guards(exported.inputs)
-        self.places = [k for k, output in enumerate(exported.outputs) if output.role == "error"]
+        self.places = compensated(exported)
         self.names = [exported.outputs[k].name for k in self.places]
         self.limit = [exported.outputs[k].range.limit for k in self.places]
         self.rate = [exported.outputs[k].range.rate for k in self.places]
@@ -205,6 +202,7 @@ class Compensator:
             self.predicted = y[-1]
         if len(y) == due:  # inputs that the model fails on are never held
             self.inputs = u
+        self.origin += (due - len(y)) * step  # steps that failed are left out, not made up for
         return late or due > 1, len(y) < due
 
     def _change_state(
@@ -234,6 +232,7 @@ class Compensator:
         elif failed:
             self._fail(now, part_done=part_done)
         elif held > s.hold_limit_s:
+            self.since = self.since if self.state is State.FAULT else now
             self.state = State.FAULT
         elif self.state is State.FAULT and good:
             self.settling, self.started_at = State.WARM, now

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from discovery.export.document import Input
-from discovery.runtime.guards import CONFIRM_S, FAR_S, Fault, InputGuard, Reading
+from discovery.export.guarding import CONFIRM_S, FAR_S
+from discovery.runtime.guards import Fault, InputGuard, Reading
 
 EPOCH_FROM = 1e8  # s: a time beyond is an instant, below it is the time since the start of a recording
 

@@ -5,7 +5,7 @@ costs far less than freezing the outputs: bodies are slow, inputs return.
 
 A value that steps away is held back until it has stayed: minutes where physics allows such a step (a door, a
 chiller) or another sensor steps the same way, hours where it does not. A step is never held back for good.
-The C and structured text targets carry the same checks (`discovery.export.guarding`).
+The C and structured text targets carry the same checks.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 from discovery.export.document import Input
+from discovery.export.guarding import CONFIRM_S, FADE_FROM, FADE_TO, FAR_S, FURTHER, LEAK, TOGETHER, span
 
 
 class Fault(IntFlag):
@@ -48,15 +49,6 @@ class Checked:
     value: float
     fault: Fault
     gain: float
-
-
-TEMPERATURE_SPAN = 5.0  # K beyond the trained range that half of the fade covers at least
-FADE_FROM, FADE_TO = 0.5, 2.0  # spans beyond the trained range at which the gain begins to fall, and is 0
-CONFIRM_S = 300.0  # a step that physics allows is accepted once it has stayed for so long
-TOGETHER = 0.2  # share of that time where another input steps the same way at the same time
-FAR_S = 4 * 3600.0  # ... and so long where physics does not allow it
-FURTHER = 1.25  # times as far outside the training as before: a new step of a held input
-LEAK = 0.2  # seconds forgotten for each second in which a held input is back inside its training
 
 
 class InputGuard:
@@ -164,8 +156,7 @@ class InputGuard:
     def outside(self, value: float) -> float:
         """How far a value is outside the trained range, in spans of it."""
         r = self.spec.range
-        least = TEMPERATURE_SPAN if self.spec.unit == "degC" else max(abs(r.low), abs(r.high), 1e-9)
-        return max(r.low - value, value - r.high, 0.0) / max(r.high - r.low, least)
+        return max(r.low - value, value - r.high, 0.0) / span(self.spec)
 
     def gain(self, value: float) -> float:
         """1 inside the trained range and a little beyond, 0 far beyond."""
