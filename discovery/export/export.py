@@ -25,7 +25,7 @@ from discovery.export.replay import (
     write_files,
 )
 from discovery.export.seal import open_seal
-from discovery.export.st import KINDS, prove_st, st_name, st_text
+from discovery.export.st import KINDS, plcopen_text, prove_st, scl_text, st_name, st_text
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.runfolder import read_results
@@ -145,12 +145,30 @@ def _st(exported: Exported, reference: Reference, stem: str) -> Made:  # noqa: A
     }, proofs
 
 
+def _plcopen(exported: Exported, reference: Reference, stem: str) -> Made:  # noqa: ARG001
+    texts = {
+        f"st/{st_name(exported)}_{kind}.xml": plcopen_text(exported, precision)
+        for precision, kind in KINDS.items()
+    }
+    return dict(texts), prove_st(exported, reference)
+
+
+def _scl(exported: Exported, reference: Reference, stem: str) -> Made:  # noqa: ARG001
+    texts = {
+        f"st/{st_name(exported)}_{kind}.scl": scl_text(exported, precision)
+        for precision, kind in KINDS.items()
+    }
+    return dict(texts), prove_st(exported, reference, scl_text)
+
+
 _TARGETS = {
     "json": _json,
     "c": _c,
     "fmu": lambda *a: _fmu(2, "", *a),
     "fmu3": lambda *a: _fmu(3, "_fmi3", *a),
     "st": _st,
+    "plcopen": _plcopen,
+    "scl": _scl,
 }
 
 

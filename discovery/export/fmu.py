@@ -138,7 +138,11 @@ def prove_fmu(exported: Exported, reference: Reference, version: int, data: byte
             raise UserError(f"the FMI {version}.0 unit is not valid: {problems[0]}")
         step, steps = exported.compiled.step_s, len(reference.u)
         names = exported.compiled.inputs
-        signals = np.zeros(steps, dtype=[("time", float), *((name, float) for name in names)])
+        switches = [v for v in _variables(exported) if v.kind == "Boolean" and v.causality == "input"]
+        kinds = [*((name, float) for name in names), *((v.name, bool) for v in switches)]
+        signals = np.zeros(steps, dtype=[("time", float), *kinds])
+        for v in switches:
+            signals[v.name] = v.start == "true"
         signals["time"] = np.arange(steps) * step
         for i, name in enumerate(names):
             signals[name] = reference.u[:, i]

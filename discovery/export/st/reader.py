@@ -1,4 +1,5 @@
-"""A reader of the structured text that `block.py` writes, to replay it where no compiler is installed.
+"""A reader of the structured text that `block.py` writes, and of the SCL made from it, to replay it where no
+compiler is installed.
 
 It knows the subset that is written and nothing more: assignments, IF, WHILE, arrays, calls of functions and of
 function blocks. It computes in the type that the text declares (REAL: 32 bit), and refuses an untyped real literal.
@@ -18,7 +19,7 @@ Scope = dict[str, Any]
 Compute = Callable[[Scope], Any]
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:LREAL|REAL)#-?\d+\.\d+(?:[eE][+-]?\d+)?|\d+(?!\d|\.\d))|(?P<word>[A-Za-z_]\w*)|(?P<sign>:=|<>|<=|>=|\.\.|[-+*/<>=()\[\],;:.]))"
+    r"\s*(?:(?P<number>(?:LREAL|REAL)#-?\d+\.\d+(?:[eE][+-]?\d+)?|\d+(?!\d|\.\d))|(?P<word>[A-Za-z_]\w*)|(?P<sign>:=|<>|<=|>=|\.\.|\*\*|[-+*/<>=()\[\],;:.]))"
 )
 
 
@@ -56,7 +57,9 @@ def read_structured_text(text: str) -> dict[str, Block]:
 
 class _Reader:
     def __init__(self, text: str) -> None:
-        text = re.sub(r"\(\*.*?\*\)", " ", text, flags=re.DOTALL).strip()
+        text = re.sub(r"\(\*.*?\*\)|//[^\n]*|\{.*?\}|VERSION : [\d.]+", " ", text, flags=re.DOTALL)
+        text = re.sub(r"[#\"](?=[A-Za-z_])|\"", " ", re.sub(r"(?<=REAL)#", "~", text)).replace("~", "#")
+        text = text.replace("VAR_TEMP", "VAR").strip()
         self.tokens: list[str] = []
         at = 0
         while at < len(text):
@@ -89,6 +92,8 @@ class _Reader:
             self.block = block
             while self.peek().startswith("VAR"):
                 self._declarations(block)
+            if self.peek() == "BEGIN":
+                self.take()
             statements = self._statements((f"END_{kind}",))
             self.take(f"END_{kind}")
             block.run = _sequence(statements)
@@ -183,7 +188,7 @@ class _Reader:
         self.take(";")
         return _branch(branches, otherwise)
 
-    _LEVELS = (("OR",), ("AND",), ("<", "<=", ">", ">=", "=", "<>"), ("+", "-"), ("*", "/", "MOD"))
+    _LEVELS = (("OR",), ("AND",), ("<", "<=", ">", ">=", "=", "<>"), ("+", "-"), ("*", "/", "MOD"), ("**",))
 
     def _expression(self, level: int = 0) -> Compute:
         if level == len(self._LEVELS):
@@ -216,12 +221,11 @@ class _Reader:
             whole = int(token)
             return lambda _: whole
         if self.peek() == "(":
-            self.take("(")
-            arguments = [self._expression()]
-            while self.peek() == ",":
-                self.take(",")
+            arguments = []
+            while self.take() != ")":  # "(" or "," before each
+                if self.tokens[self.at + 1] == ":=":  # SCL names its arguments, in order
+                    self.at += 2
                 arguments.append(self._expression())
-            self.take(")")
             return self._call(token, arguments)
         if self.peek() == "[":
             self.take("[")
@@ -281,6 +285,7 @@ _OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
     "*": lambda a, b: a * b,
     "/": lambda a, b: a / b,
     "MOD": lambda a, b: a % b,
+    "**": _same(math.pow),
 }
 
 
