@@ -10,8 +10,11 @@ from discovery.targets import TARGETS
 
 
 def export(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a finished run.")],
-    model: Annotated[str, typer.Option(help="Name of one of its models.")],
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Folder of a finished run, or an exported model (.json).")
+    ],
+    *,
+    model: Annotated[str | None, typer.Option(help="Name of one of the models of the run.")] = None,
     to: Annotated[list[str], typer.Option(help=f"{', '.join(TARGETS)}; may be repeated.")],
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the files [RUN/export/MODEL].")] = None,
     campaign: Annotated[Path | None, typer.Option(help="Campaign file [the one of the run].")] = None,
@@ -27,11 +30,20 @@ def export(
     \b
     discovery export "runs/cutting fluid" --model thermobalance --to c --to fmu
     discovery export "runs/cutting fluid" --model thermobalance --to json --sign machine.pem
+    discovery export thermobalance.r2.json --to c --to st
     """
-    from discovery.export import export_run
+    from discovery.export import export_document, export_run
     from discovery.export.seal import private_key
 
     key = private_key(sign) if sign else None
+    if run.suffix == ".json" and run.is_file():
+        if model or campaign or states:
+            raise UsageError("an exported model is exported as it is; leave --model, --campaign and --states out")
+        for line in export_document(run, to, out, key=key).lines():
+            typer.echo(line)
+        return
+    if model is None:
+        raise UsageError("--model is missing: name one of the models of the run")
     done = export_run(run, model, to, out, campaign=campaign, step_s=step, states=states, key=key)
     for line in done.lines():
         typer.echo(line)
@@ -72,6 +84,13 @@ def compensate(
         bool, typer.Option("--opcua-demo", help="Start a simulated machine server and compensate it.")
     ] = False,
     seconds: Annotated[float | None, typer.Option(help="Stop OPC UA after so long.")] = None,
+    learn: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="KEY",
+            help="Learn from measured errors: follow wear by revisions signed with this private key.",
+        ),
+    ] = None,
 ) -> None:
     """Run an exported model: readings in, offsets [um, um/m] with status word and heartbeat out.
 
@@ -96,6 +115,11 @@ def compensate(
         shadow={"--shadow-hours": shadow_hours, "--shadow-um": shadow_um},
     )
     rule = Rule(hours=shadow_hours, most_um=shadow_um)
+    if learn is not None and state is None:
+        raise UsageError("--learn needs --state, the folder that keeps the models")
+    from discovery.runtime.learning import learner
+
+    learns = learner(learn) if learn is not None else None
     exported, key = trusted_model(model, trust, allow_unsigned=allow_unsigned)
     if opcua is not None or opcua_demo:
         from discovery.runtime.opcua import compensate_opcua
@@ -110,6 +134,7 @@ def compensate(
             seconds=seconds,
             rule=rule,
             acknowledge=acknowledge,
+            learn=learns,
             say=say,
         )
     else:
@@ -123,6 +148,7 @@ def compensate(
             trusted=key,
             rule=rule,
             acknowledge=acknowledge,
+            learn=learns,
             say=say,
         )
 
@@ -143,10 +169,10 @@ def update(
     ] = None,
     sign: Annotated[Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs it.")] = None,
 ) -> None:
-    """Keep an exported model up with an ageing machine: noise, drift, or a new effect?
+    """Keep an exported model up with an ageing machine: no change, wear, a faulty input sensor, or new physics?
 
-    A drift becomes the next revision, with a changelog entry; `discovery compensate` runs it in the shadow
-    first.
+    Wear becomes the next revision, with a changelog entry; `discovery compensate` runs it in the shadow
+    first, and `discovery export` writes it to every target.
     """
     from discovery.export.seal import private_key
     from discovery.recordings import load_campaign

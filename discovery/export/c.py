@@ -150,7 +150,9 @@ def _sizes(exported: Exported) -> dict[str, int]:
 def _parameter_lines(exported: Exported, line: str) -> str:
     """A line for each parameter: its word, its value, what it is."""
     model, rows = exported.model, []
-    for word, (name, value) in zip(parameter_words(exported.compiled), exported.compiled.parameters, strict=True):
+    for word, (name, value) in zip(
+        parameter_words(exported.compiled), exported.compiled.parameters, strict=True
+    ):
         used = [term.name for term in model.terms if name in names(term.expression)]
         used += [output for output, expression in model.outputs.items() if name in names(expression)]
         said = f"{name} [{model.parameters[name].unit}]: {', '.join(used) or 'not used'}"
@@ -242,7 +244,9 @@ def _source(exported: Exported, prefix: str) -> str:
         STATES=n,
         NONZEROS=len(c.nonzeros),
         STEP=real(c.step_s),
-        START_VALUES=_function(c, "start_values", c.start, first + plays, "real first[], real moved[]", prefix),
+        START_VALUES=_function(
+            c, "start_values", c.start, first + plays, "real first[], real moved[]", prefix
+        ),
         RATES=_function(c, "rates", c.rates, rates + plays, "real f[], real a[], real moved[]", prefix),
         OUTPUTS=_function(c, "outputs", c.results, read + plays, "real y[], real moved[]", prefix),
         PRODUCT="\n".join(f"    w[{i}] = {row};" for i, row in enumerate(_rows(c, "a[{k}] * v[{j}]"))),

@@ -158,7 +158,11 @@ def prove_fmu(exported: Exported, reference: Reference, version: int, data: byte
         )
         y = np.column_stack([result[name] for name in exported.compiled.outputs])[1:]
         deviation = float(np.max(np.abs(y - reference.y))) if len(y) == steps else float("nan")
-    return within(Proof(f"FMI {version}.0", deviation, LIMITS["double"], "validated and simulated with FMPy, " + _where()))
+    return within(
+        Proof(
+            f"FMI {version}.0", deviation, LIMITS["double"], "validated and simulated with FMPy, " + _where()
+        )
+    )
 
 
 def _where() -> str:
@@ -214,16 +218,22 @@ def _variables(exported: Exported) -> list[_Variable]:
         _Variable(f"offset.{o.name}", "Real", "output", "discrete", f"offset that takes off {o.name}", o.unit)
         for o in errors
     ]
-    found.append(_Variable("runtime.gain", "Real", "output", "discrete", "1 in the trained range, less far outside"))
+    found.append(
+        _Variable("runtime.gain", "Real", "output", "discrete", "1 in the trained range, less far outside")
+    )
     for name, value in exported.compiled.parameters:
         p = exported.model.parameters[name]
-        found.append(_Variable(name, "Real", "parameter", "tunable", "parameter of the model", p.unit, repr(value)))
+        found.append(
+            _Variable(name, "Real", "parameter", "tunable", "parameter of the model", p.unit, repr(value))
+        )
     for word, meaning in (("limit", "limit"), ("rate", "rate_of_offset")):
         for o in errors:
             value = o.range.limit if word == "limit" else o.range.rate
             unit = o.unit if word == "limit" else ""
             found.append(
-                _Variable(f"{word}.{o.name}", "Real", "parameter", "tunable", MEANING[meaning], unit, repr(value))
+                _Variable(
+                    f"{word}.{o.name}", "Real", "parameter", "tunable", MEANING[meaning], unit, repr(value)
+                )
             )
     found += [
         _Variable(f"good.{i.name}", "Boolean", "input", "discrete", f"{i.name} is good", start="true")

@@ -153,9 +153,7 @@ class Builder:
             total = self.apply("+", total, node)
         return total
 
-    def program(
-        self, results: Sequence[int], notes: Sequence[tuple[int, str]] = ()
-    ) -> Program:
+    def program(self, results: Sequence[int], notes: Sequence[tuple[int, str]] = ()) -> Program:
         """The program of `results`, without the instructions that none of them needs; `notes` on numbers."""
         needed: set[int] = set()
         stack = list(results)

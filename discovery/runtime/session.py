@@ -19,7 +19,7 @@ from discovery.runtime.history import History
 from discovery.runtime.output import Output
 from discovery.runtime.persistence import Lock, peek, restore, save, succeed
 from discovery.runtime.shadow import Rule, Shadow, begin_shadow, take_over
-from discovery.runtime.store import open_store, refuse_candidate, replace_active
+from discovery.runtime.store import offer, open_store, refuse_candidate, replace_active
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
@@ -59,7 +59,7 @@ class Session:
         say: Say = lambda _: None,
     ) -> None:
         self.folder, self.say, self.save_every_s, self.beside = folder, say, save_every_s, beside
-        self.learn = learn
+        self.learn, self.rule = learn, rule or Rule()
         self.clock, self.settings = clock, settings or Settings()
         self.shadow: Shadow | None = None
         self.resumed: float | None = None
@@ -84,6 +84,8 @@ class Session:
                     f"revision {models.candidate.revision} runs in the shadow of revision {exported.revision}"
                 )
         self.compensator = Compensator(exported, self.settings)
+        if self.learn is not None:
+            self.learn.begin(self.compensator)
         if folder is not None:
             facts = {
                 "model": exported.model.name,
@@ -159,6 +161,8 @@ class Session:
         if self.output is None and self.opens is not None:
             self.output = self.opens()
         self._write(found, readings, now)
+        if self.learn is not None:
+            self._learn(self.learn, readings, now)
         if self.folder is not None and (self.saved is None or not 0 <= now - self.saved < self.save_every_s):
             self.save(now)
         return found
@@ -197,6 +201,8 @@ class Session:
             self.saved = None
         else:
             refuse_candidate(self.folder)
+        if self.learn is not None and passed:
+            self.learn.begin(self.compensator)
         what = "the new model takes over" if passed else "the new model is refused"
         self.tell(now, what, f"revision {new.revision} after revision {old.revision}: {why}")
         self.shadow = None
@@ -224,6 +230,41 @@ class Session:
             raise UserError(f"{self.output.path}: the last offsets are not written; make room on the disk")
         if self.found is not None and self.found.state in (State.FAULT, State.FROZEN):
             raise UserError(f"the compensation ended in {self.found.state.name}; its last event says why")
+
+    def _learn(self, learn: Learner, readings: Mapping[str, Reading], now: float) -> None:
+        """Measured errors as they come: when to measure, when to update, and the update."""
+        advised = learn.advice
+        due = learn.observe(self.compensator, readings, now)
+        if learn.advice and not advised:
+            self.tell(now, "action limit", "the errors left are beyond the action limit", learn.advice)
+        elif advised and not learn.advice:
+            self.tell(now, "action limit kept", "the errors left are within the action limit again")
+        if not due or self.shadow is not None or self.folder is None:
+            return
+        try:
+            found, revised = learn.compare(self.compensator, now)
+        except UserError as error:
+            self.learn = None
+            self.tell(now, "learning ends", str(error))
+            return
+        if found.verdict == "nothing":
+            return
+        remedy = {
+            "input sensor": f"check the sensor of {found.what}",
+            "something else": "record, and let `discovery diagnose` name what changed",
+            "undecided": "measure more often, wet and dry",
+        }.get(found.verdict, "")
+        self.tell(now, f"learning: {found.verdict}", str(found), remedy)
+        if revised is not None:
+            self._offer(revised, now)
+
+    def _offer(self, data: bytes, now: float) -> None:
+        """A new revision runs in the shadow; measured errors must confirm it."""
+        assert self.folder is not None
+        candidate = offer(self.folder, data)
+        rule = Rule(hours=self.rule.hours, most_um=None)
+        self.shadow = begin_shadow(candidate, self.settings, rule)
+        self.tell(now, "shadow run", f"revision {candidate.revision} runs beside the one at work")
 
     def save(self, now: float) -> None:
         """Write the state to disk, unless the save before is still under way; what the output holds first."""

@@ -58,7 +58,9 @@ def server(folder: Path, port: int, hours: float) -> ThreadingHTTPServer:
     try:
         return ThreadingHTTPServer(("127.0.0.1", port), Handler)
     except OSError as error:
-        raise UserError(f"port {port} cannot be opened ({error.strerror}); give another one with --port") from None
+        raise UserError(
+            f"port {port} cannot be opened ({error.strerror}); give another one with --port"
+        ) from None
 
 
 def serve(folder: Path, port: int, hours: float, say: Callable[[str], None]) -> None:
@@ -89,7 +91,11 @@ def page_data(found: dict[str, Any]) -> dict[str, Any]:
             for name, value in row[kind].items():
                 if value is not None:
                     of_kind.setdefault(name, []).append([row["time"], value])
-    states = [[row["time"], row["state"]] for k, row in enumerate(ticks) if k == 0 or row["state"] != ticks[k - 1]["state"]]
+    states = [
+        [row["time"], row["state"]]
+        for k, row in enumerate(ticks)
+        if k == 0 or row["state"] != ticks[k - 1]["state"]
+    ]
     return {
         "facts": found["facts"],
         "curves": curves,

@@ -34,7 +34,9 @@ def faulty(exported: Exported, inputs: Array, seed: int, episodes: int = 40) -> 
         start, i = int(rng.integers(1, steps)), int(rng.integers(width))
         end = start + int(rng.choice([1, 6, 40, 400, 1700]))
         spec = exported.inputs[i].range
-        kind = rng.choice(["nan", "bad", "old", "wild", "step", "far", "still", "spike", "both", "off", "ack"])
+        kind = rng.choice(
+            ["nan", "bad", "old", "wild", "step", "far", "still", "spike", "both", "off", "ack"]
+        )
         if kind == "nan":
             value[start:end, i] = rng.choice([np.nan, np.inf, -np.inf])
         elif kind == "bad":
@@ -77,6 +79,9 @@ def table(given: Faulty) -> str:
     """One row a tick: value, age, quality of each input, the three switches."""
     rows = []
     for k in range(len(given.value)):
-        cells = [f"{v!r} {a!r} {int(g)}" for v, a, g in zip(*(x[k].tolist() for x in (given.value, given.age, given.good)), strict=True)]
+        cells = [
+            f"{v!r} {a!r} {int(g)}"
+            for v, a, g in zip(*(x[k].tolist() for x in (given.value, given.age, given.good)), strict=True)
+        ]
         rows.append(" ".join([*cells, *(str(int(s)) for s in given.switches[k])]))
     return "\n".join(rows) + "\n"

@@ -108,10 +108,14 @@ def test_options_switch_guards_limits_and_fade_off(tmp_path: Path) -> None:
     assert status[400] & 1 << 12
     compiled(exported, tmp_path)
     main = (tmp_path / "main.c").read_text()
-    main = main.replace(f"{prefix}_begin(&c);", f"{prefix}_begin(&c); c.set.guards = c.set.limits = c.set.fade = 0;")
+    main = main.replace(
+        f"{prefix}_begin(&c);", f"{prefix}_begin(&c); c.set.guards = c.set.limits = c.set.fade = 0;"
+    )
     (tmp_path / "main.c").write_text(main)
     subprocess.run(["gcc", *CFLAGS, "main.c", f"{prefix}.c", "-lm", "-o", "main"], cwd=tmp_path, check=True)
-    done = subprocess.run([str(tmp_path / "main")], input=table(given), capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [str(tmp_path / "main")], input=table(given), capture_output=True, text=True, check=True
+    )
     found = np.array([row.split() for row in done.stdout.splitlines()], dtype=float)
     y = free_run(exported.compiled, given.value)
     assert np.max(np.abs(found[:, 2:] + y)) < 1e-9
@@ -123,7 +127,9 @@ def test_a_parameter_keeps_its_name_and_can_be_tuned(tmp_path: Path) -> None:
     """`G` of the model is `model.k.G` of the compensator, with its unit and terms in a comment."""
     campaign = make_campaign(hours=6.0)
     exported, changed = sealed(make_model(), campaign), make_model()
-    tuned = replace(changed, parameters={**changed.parameters, "G": replace(changed.parameters["G"], value=30.0)})
+    tuned = replace(
+        changed, parameters={**changed.parameters, "G": replace(changed.parameters["G"], value=30.0)}
+    )
     prefix = c_prefix(exported)
     header = c_files(exported)[f"{prefix}.h"]
     source = c_files(exported)[f"{prefix}.c"]
@@ -137,7 +143,9 @@ def test_a_parameter_keeps_its_name_and_can_be_tuned(tmp_path: Path) -> None:
     main = main.replace(f"{prefix}_begin(&c);", f"{prefix}_begin(&c); c.set.limits = 0; c.model.k.G = 30.0;")
     (tmp_path / "main.c").write_text(main)
     subprocess.run(["gcc", *CFLAGS, "main.c", f"{prefix}.c", "-lm", "-o", "main"], cwd=tmp_path, check=True)
-    done = subprocess.run([str(tmp_path / "main")], input=table(given), capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [str(tmp_path / "main")], input=table(given), capture_output=True, text=True, check=True
+    )
     found = np.array([row.split() for row in done.stdout.splitlines()], dtype=float)
     y = free_run(sealed(tuned, campaign).compiled, inputs)
     assert np.max(np.abs(found[:, 2:] + y)) < 1e-9

@@ -77,7 +77,9 @@ def running(path: Path) -> Iterator[Unit]:
 
 
 @needs_gcc
-def test_a_unit_guards_as_the_runtime_does(path: Path, exported: Exported, campaign_of_six_hours: Campaign) -> None:
+def test_a_unit_guards_as_the_runtime_does(
+    path: Path, exported: Exported, campaign_of_six_hours: Campaign
+) -> None:
     inputs = sampled_inputs(campaign_of_six_hours, "fit", exported.compiled.inputs, 10.0)
     given = faulty(exported, inputs, 5, episodes=15)
     given.age[:] = 0.0
@@ -90,7 +92,9 @@ def test_a_unit_guards_as_the_runtime_does(path: Path, exported: Exported, campa
             unit.set(dict(zip(names, given.value[k].tolist(), strict=True)))
             switches = {f"good.{n}": bool(v) for n, v in zip(names, given.good[k], strict=True)}
             words = ("enable", "part_done", "acknowledge")
-            unit.set(switches | {f"runtime.{w}": bool(v) for w, v in zip(words, given.switches[k], strict=True)})
+            unit.set(
+                switches | {f"runtime.{w}": bool(v) for w, v in zip(words, given.switches[k], strict=True)}
+            )
             unit.unit.doStep(10.0 * k, 10.0)
             found = unit.get(wanted)
             assert found == pytest.approx([*offsets[k], gains[k]], abs=1e-9), k

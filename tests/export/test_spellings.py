@@ -32,7 +32,9 @@ def test_every_unit_and_variable_stands_in_the_xml() -> None:
     assert [pou.get("name") for pou in pous] == [unit.name for unit in parts]
     for pou, unit in zip(pous, parts, strict=True):
         names = [v.get("name") for v in pou.findall(f".//{TC6}variable")]
-        assert names == [v.name for s in ("VAR_INPUT", "VAR_OUTPUT", "VAR") for v in unit.variables if v.section == s]
+        assert names == [
+            v.name for s in ("VAR_INPUT", "VAR_OUTPUT", "VAR") for v in unit.variables if v.section == s
+        ]
         body = "".join(pou.find(f".//{TC6}ST").itertext())  # type: ignore[union-attr]
         assert body == unit.body
 
@@ -54,7 +56,9 @@ def test_the_xml_is_valid_by_the_schema_of_plcopen() -> None:
         schema.validate(plcopen_text(sealed(make_model(), make_campaign()), precision))
 
 
-@pytest.mark.skipif(not importlib.util.find_spec("blark"), reason="a grammar of TwinCAT (blark) is not installed")
+@pytest.mark.skipif(
+    not importlib.util.find_spec("blark"), reason="a grammar of TwinCAT (blark) is not installed"
+)
 def test_a_grammar_of_another_make_reads_the_text() -> None:
     from blark.parse import parse_source_code
 

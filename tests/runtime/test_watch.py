@@ -23,7 +23,9 @@ from discovery.runtime.watch import server
 
 
 @pytest.fixture(scope="module")
-def folder(exported: Exported, model_file: Path, minutes: np.ndarray, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(
+    exported: Exported, model_file: Path, minutes: np.ndarray, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     """A day and a half with a sensor lost for half an hour and measured errors every hour."""
     folder = tmp_path_factory.mktemp("memory")
     session = Session(exported, model=model_file, folder=folder, settings=Settings(tick_s=60.0))
@@ -129,11 +131,20 @@ def test_the_page_in_a_browser(address: str, tmp_path: Path) -> None:
             )
             assert drawn == 11  # four offsets, seven inputs
         assert session.run("return document.getElementById('state').textContent") == "ACTIVE"
-        assert session.run("return document.querySelectorAll('figure[data-chart=\"offset for E_Y0C\"] circle').length") > 20
-        rows = session.run("return [...document.querySelectorAll('#events tr')].map(r => r.cells[1].textContent)")
+        assert (
+            session.run(
+                "return document.querySelectorAll('figure[data-chart=\"offset for E_Y0C\"] circle').length"
+            )
+            > 20
+        )
+        rows = session.run(
+            "return [...document.querySelectorAll('#events tr')].map(r => r.cells[1].textContent)"
+        )
         assert rows == ["DEGRADED -> ACTIVE", "ACTIVE -> DEGRADED"]
         assert not session.run("return document.documentElement.scrollWidth > innerWidth")
-        assert not session.run("return [...document.querySelectorAll('svg *')].some(e => /NaN|Infinity/.test(e.outerHTML))")
+        assert not session.run(
+            "return [...document.querySelectorAll('svg *')].some(e => /NaN|Infinity/.test(e.outerHTML))"
+        )
         wrong = [entry for entry in session.log("browser") if entry["level"] in ("SEVERE", "WARNING")]
         assert wrong == []
         session.screenshot(tmp_path / "watch.png")

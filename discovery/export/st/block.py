@@ -113,8 +113,22 @@ def _declarations(exported: Exported, kind: str) -> str:
     flags = ("running", "configured", "ticked", "known", "replaced", "recovered", "has_y")
     flags += tuple(f"bit_{k}" for k in (8, 9, 10, 11, 12, 13, 18, 19))
     lines += [f"    {name} : BOOL;\n" for name in flags]
-    lines += [f"    {name} : DINT;\n" for name in ("count", "here", "k", "j", "substeps", "settling", "settled")]
-    numbers = ("t", "norm", "sum", "tau", "part", "dt", "good_s", "fail_s", "started_s", "oldest_held", "target")
+    lines += [
+        f"    {name} : DINT;\n" for name in ("count", "here", "k", "j", "substeps", "settling", "settled")
+    ]
+    numbers = (
+        "t",
+        "norm",
+        "sum",
+        "tau",
+        "part",
+        "dt",
+        "good_s",
+        "fail_s",
+        "started_s",
+        "oldest_held",
+        "target",
+    )
     lines += [f"    {name} : {kind};\n" for name in numbers]
     used = max(len(program.instructions) for program in (c.start, c.rates, c.results))
     return "".join(lines) + "".join(f"    v{k} : {kind};\n" for k in range(used))

@@ -13,7 +13,9 @@ from discovery.export.document import Exported
 from discovery.export.st.block import st_text
 from discovery.export.st.units import Unit, Variable, units
 
-_TOKEN = re.compile(r"\(\*.*?\*\)|(?:LREAL|REAL)#[\d.]+(?:[eE][+-]?\d+)?|[A-Za-z_]\w*|\s+|\d+|:=|<>|<=|>=|.", re.DOTALL)
+_TOKEN = re.compile(
+    r"\(\*.*?\*\)|(?:LREAL|REAL)#[\d.]+(?:[eE][+-]?\d+)?|[A-Za-z_]\w*|\s+|\d+|:=|<>|<=|>=|.", re.DOTALL
+)
 _WORDS = frozenset("IF THEN ELSIF ELSE END_IF WHILE DO END_WHILE NOT AND OR MOD TRUE FALSE".split())
 _PLAIN = frozenset("ABS EXP LN SQRT".split())
 _SELECT = ("G", "IN0", "IN1")

@@ -30,7 +30,9 @@ class Unit:
 
 
 _UNIT = re.compile(r"^(FUNCTION_BLOCK|FUNCTION) (\w+)(?: : (\w+))?\n(.*?)^END_\1", re.DOTALL | re.MULTILINE)
-_SECTION = re.compile(r"^\s*(VAR_INPUT|VAR_OUTPUT|VAR)\b(?: \(\*.*?\*\))?(.*?)END_VAR", re.DOTALL | re.MULTILINE)
+_SECTION = re.compile(
+    r"^\s*(VAR_INPUT|VAR_OUTPUT|VAR)\b(?: \(\*.*?\*\))?(.*?)END_VAR", re.DOTALL | re.MULTILINE
+)
 _VARIABLE = re.compile(
     r"(\w+) : (?:ARRAY \[0\.\.(\d+)\] OF )?(\w+)(?: := (\w+))?;(?:[ \t]*\(\*[ ]?(.*?)[ ]?\*\))?"
 )
