@@ -228,7 +228,7 @@ def live(
     *,
     faults: bool,
     learn: Callable[[], Learner] | None = None,
-    save_every_s: float = TICK,
+    save_every_s: float = 5 * TICK,
 ) -> Result:
     """Run the compensation through the month, tick by tick."""
     computer, events, left, states = Computer(), list[str](), [], []

@@ -21,6 +21,7 @@ from discovery.export.guarding import (
     FAR_S,
     FURTHER,
     LEAK,
+    MEAN_S,
     MEANING,
     TOGETHER,
     GuardNumbers,
@@ -270,6 +271,7 @@ def _guard(exported: Exported, prefix: str) -> str:
         "TOGETHER": TOGETHER,
         "FURTHER": FURTHER,
         "LEAK": LEAK,
+        "MEAN_S": MEAN_S,
         "FADE_FROM": FADE_FROM,
         "FADE_TO": FADE_TO,
     }

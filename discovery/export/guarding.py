@@ -16,6 +16,7 @@ CONFIRM_S = 300.0  # a step that physics allows is accepted once it has stayed f
 TOGETHER = 0.2  # share of that time where another input steps the same way at the same time
 FAR_S = 4 * 3600.0  # ... and so long where physics does not allow it
 FURTHER = 1.25  # times as far outside the training as before: a new step of a held input
+MEAN_S = 1800.0  # s over which a held input is averaged; after `age` the mean stands in for it, not a moment
 LEAK = 0.2  # seconds forgotten for each second in which a held input is back inside its training
 
 

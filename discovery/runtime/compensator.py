@@ -20,6 +20,7 @@ from discovery.export.guarding import Times, compensated
 from discovery.export.stepper import Stepper
 from discovery.runtime.events import Event, why
 from discovery.runtime.fastforward import fast_forward
+from discovery.runtime.hindsight import LONGEST_S, Hindsight
 from discovery.runtime.guards import Checked, Fault, Reading, guards, number
 
 Array = NDArray[np.float64]
@@ -47,6 +48,7 @@ class Settings(Times):
     catch_up_s: float = 600.0  # late ticks are made up for as far as this; a longer gap is fast-forwarded
     longest_gap_s: float = 30 * 24 * 3600.0  # beyond this the model starts anew
     bump_s: float = 1800.0  # time constant with which the difference at a change of model fades
+    hindsight: bool = True  # go through a gap of an input again once it is back; controllers cannot
 
 
 BUMP, LATE, LIMITED, RATED, UNTIMELY = 1 << 16, 1 << 17, 1 << 18, 1 << 19, 1 << 20
@@ -92,6 +94,7 @@ class Compensator:
         self.started_at = 0.0
         self.heartbeat = 0
         self.gain = 1.0
+        self.hindsight: Hindsight | None = None  # since an input is replaced
         self.acknowledged = False  # an operator has looked since the last tick
         self.shift = 0.0  # added to the clock of the readings where it was set back [s]
         self.events: list[Event] = []  # of the present tick
@@ -131,7 +134,8 @@ class Compensator:
         good = [c for c in checked if c is not None]
         failed = False
         if len(good) == len(checked):
-            late, failed = self._advance(np.array([c.value for c in good]), now)
+            lost = np.array([bool(c.fault & ~Fault.UNTRAINED) for c in good])
+            late, failed = self._advance(np.array([c.value for c in good]), lost, now)
             flags |= LATE * late
         self._tell_accepted(now)
         self._tell_gain(min((c.gain for c in good), default=1.0), now)
@@ -171,7 +175,7 @@ class Compensator:
             found.append(guard.check(reading, now, others))
         return found
 
-    def _advance(self, u: Array, now: float) -> tuple[bool, bool]:
+    def _advance(self, u: Array, lost: NDArray[np.bool_], now: float) -> tuple[bool, bool]:
         """Bring the model to `now`: whether it was late, whether it failed."""
         step = self.exported.compiled.step_s
         if self.origin is None or now - self.origin - self.stepper.count * step > self.settings.longest_gap_s:
@@ -180,6 +184,7 @@ class Compensator:
             except UserError:  # these inputs give no start: stay off, try again with the next ones
                 return False, True
             self.origin, self.started_at, self.settling = now, now, State.COLD
+            self.hindsight = None
             if self.inherited is not None:
                 self._take_over(self.inherited)
         due = math.floor((now - self.origin) / step + 1e-9) + 1 - self.stepper.count
@@ -187,7 +192,7 @@ class Compensator:
         if late:
             before = self.stepper.count
             fast_forward(self.exported, self.stepper, u if self.inputs is None else self.inputs, u, due - 1)
-            self.settling, self.started_at = State.WARM, now
+            self.settling, self.started_at, self.hindsight = State.WARM, now, None
             due -= self.stepper.count - before
         if due <= 0:
             return False, False
@@ -195,6 +200,8 @@ class Compensator:
             u if self.inputs is None else self.inputs, (due, 1)
         )  # missed steps: as the inputs were
         held[-1] = u
+        if self.hindsight is None and lost.any() and self.inputs is not None and self.settings.hindsight:
+            self.hindsight = Hindsight(self.stepper.snapshot(), self.inputs)
         y = self.stepper.run(held)
         if len(y):
             if self.inherited is not None:
@@ -202,8 +209,21 @@ class Compensator:
             self.predicted = y[-1]
         if len(y) == due:  # inputs that the model fails on are never held
             self.inputs = u
+        self._look_back(held, lost, failed=len(y) < due)
         self.origin += (due - len(y)) * step  # steps that failed are left out, not made up for
         return late or due > 1, len(y) < due
+
+    def _look_back(self, rows: Array, lost: NDArray[np.bool_], *, failed: bool) -> None:
+        """Remember steps under replaced inputs; once none is, take them again with what is known now."""
+        if self.hindsight is None:
+            return
+        self.hindsight.add(rows, lost)
+        if failed or len(self.hindsight.rows) * self.exported.compiled.step_s > LONGEST_S:
+            self.hindsight = None
+        elif not lost.any():
+            found = self.hindsight.replay(self.exported, self.stepper)
+            self.predicted = self.predicted if found is None else found
+            self.hindsight = None
 
     def _change_state(
         self,

@@ -1,6 +1,7 @@
 """Input guards: what may reach the model, and what stands in for a value that may not.
 
-A bad value is replaced by the last good one and the model goes on integrating. On the virtual machine that
+A bad value is replaced by the last good one (of an input that switches, after some minutes, by its mean) and
+the model goes on integrating. On the virtual machine that
 costs far less than freezing the outputs: bodies are slow, inputs return.
 
 A value that steps away is held back until it has stayed: minutes where physics allows such a step (a door, a
@@ -16,7 +17,17 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 from discovery.export.document import Input
-from discovery.export.guarding import CONFIRM_S, FADE_FROM, FADE_TO, FAR_S, FURTHER, LEAK, TOGETHER, span
+from discovery.export.guarding import (
+    CONFIRM_S,
+    FADE_FROM,
+    FADE_TO,
+    FAR_S,
+    FURTHER,
+    LEAK,
+    MEAN_S,
+    TOGETHER,
+    span,
+)
 
 
 class Fault(IntFlag):
@@ -62,6 +73,7 @@ class InputGuard:
         self.spec = spec
         self.held: float | None = None
         self.held_at = -math.inf  # when it was taken
+        self.mean = 0.0  # of what was taken, over about MEAN_S
         self.fresh = True  # the next good value is taken without comparing: nothing recent is known
         self.seen: float | None = None  # the last value that came, good or not
         self.seen_at = -math.inf
@@ -86,11 +98,21 @@ class InputGuard:
         self.accepted = False
         value, fault = self._judge(reading, now, together)
         if fault is Fault.NONE:
+            passed = min(max(now - self.held_at, 0.0), self.spec.range.age_s)
+            self.mean = value if self.held is None else self.mean + (value - self.mean) * passed / (MEAN_S + passed)
             self.held, self.held_at, self.fresh = value, now, False
         if self.held is None:
             return None
         gain = self.gain(self.held)
-        return Checked(self.held, fault if gain == 1.0 else fault | Fault.UNTRAINED, gain)
+        return Checked(self._stand_in(now), fault if gain == 1.0 else fault | Fault.UNTRAINED, gain)
+
+    def _stand_in(self, now: float) -> float:
+        """What goes into the model: the last good value. A machine that cuts and pauses is better described by
+        its mean than by the moment in which a speed or a power was lost.
+        """
+        assert self.held is not None
+        lost = self.spec.range.step is None and now - self.held_at > self.spec.range.age_s
+        return self.mean if lost else self.held
 
     def accept(self) -> None:
         """An operator says that the next good value is right."""

@@ -20,7 +20,10 @@ from discovery.runtime.compensator import Compensator, State
 
 NAMES = ("state.json", "state.previous.json")
 # What a guard remembers
-KEPT = ("held", "held_at", "fresh", "seen", "seen_at", "still_since", "waiting", "waiting_from", "stayed")
+KEPT = (
+    *("held", "held_at", "mean", "fresh", "seen", "seen_at", "still_since"),
+    *("waiting", "waiting_from", "stayed"),
+)
 
 
 FUTURE_S = 60.0  # a saved state that claims to be later than now by more is refused

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.export.document import Exported
-from discovery.runtime.compensator import Compensator
+from discovery.runtime.compensator import Compensator, Settings
 from discovery.runtime.guards import Reading
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def faulty(exported: Exported, inputs: Array, seed: int, episodes: int = 40) -> 
 
 def by_the_runtime(exported: Exported, given: Faulty) -> tuple[Array, NDArray[np.int64], Array]:
     """Offsets (K, Y), status words (K,) and gains (K,) of the Python runtime."""
-    compensator, step = Compensator(exported), exported.compiled.step_s
+    compensator, step = Compensator(exported, Settings(hindsight=False)), exported.compiled.step_s
     names, offsets, status, gains = exported.compiled.inputs, [], [], []
     for k, (enabled, done, acknowledge) in enumerate(given.switches.tolist()):
         now = k * step

@@ -450,9 +450,9 @@ def test_the_command_says_what_is_missing(model_file: Path, tmp_path: Path) -> N
         ([model, "--back"], "--back needs --state", 2),
         ([model, *inputs, "--opcua-demo"], "--inputs and --opcua-demo: the readings come from one", 2),
         ([model, *inputs, "--seconds", "5"], "--seconds does not go with --inputs", 2),
-        ([model, "--opcua-demo", "--out", "o.csv"], "--out does not go with --opcua-demo", 2),
-        ([model, *inputs, "--shadow-hours", "-1"], "--shadow-hours -1 is no length of time", 2),
-        ([model, *inputs, "--shadow-hours", "nan"], "--shadow-hours nan is no length of time", 2),
+        ([model, *inputs, "--learn", "key.pem"], "--learn needs --state", 2),
+        ([model, *inputs, "--shadow-hours", "-1"], "--shadow-hours -1 cannot be", 2),
+        ([model, *inputs, "--shadow-um", "nan"], "--shadow-um nan cannot be", 2),
     ):
         done = runner.invoke(app, ["compensate", *words])
         assert done.exit_code == status

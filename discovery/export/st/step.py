@@ -117,7 +117,7 @@ def _guards(exported: Exported, kind: str) -> list[str]:
         lines += [
             f"guard_{word}(reading := in_{word}, good := ok_{word}, together := together[{k}], "
             f"acknowledge := acknowledge, guards := guards, fade := fade, dt := dt, {given});",
-            f"u[{k}] := guard_{word}.held;",
+            f"u[{k}] := guard_{word}.used;",
             f"IF NOT guard_{word}.known THEN known := FALSE; END_IF;",
             f"IF guard_{word}.fault <> 0 THEN replaced := TRUE; END_IF;",
             f"IF guard_{word}.gain < gain THEN gain := guard_{word}.gain; END_IF;",

@@ -92,11 +92,16 @@ static int check(@PREFIX@_compensator *c, const @PREFIX@_reading in[])
         }
         c->fault[i] = judged(c, i, &in[i], together);
         if (c->fault[i] == 0) {
+            const real passed = smaller(c->held_age[i], c->set.age[i]);
+            c->mean[i] = c->has_held[i] ? c->mean[i] + (in[i].value - c->mean[i]) * passed / (@MEAN_S@ + passed)
+                                        : in[i].value;
             c->held[i] = in[i].value;
             c->held_age[i] = R(0.0);
             c->has_held[i] = 1;
             c->fresh[i] = 0;
         }
+        /* an input that switches is better described by its mean than by the moment in which it was lost */
+        c->used[i] = c->set.step[i] < R(0.0) && c->held_age[i] > c->set.age[i] ? c->mean[i] : c->held[i];
         if (!c->has_held[i]) {
             c->fault[i] = @UP@_NOT_FINITE;
             all = 0;
@@ -200,11 +205,11 @@ void @PREFIX@_tick(@PREFIX@_compensator *c, const @PREFIX@_reading in[], int ena
     }
     if (check(c, in)) {
         if (!c->running) {
-            failed = restart(&c->model, c->held) != 0;
+            failed = restart(&c->model, c->used) != 0;
             if (!failed) { c->running = 1; c->started_s = R(0.0); c->settling = @UP@_COLD; }
         }
         if (c->running) {
-            failed = @PREFIX@_step(&c->model, c->held, c->y) != 0;
+            failed = @PREFIX@_step(&c->model, c->used, c->y) != 0;
             if (!failed) { c->has_y = 1; }
         }
     }

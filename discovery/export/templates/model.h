@@ -85,6 +85,7 @@ typedef struct {
     int fault[@UP@_INPUTS + 1];                 /* why an input is replaced, 0: it is not */
     /* what follows is memory */
     @PREFIX@_real held[@UP@_INPUTS + 1], held_age[@UP@_INPUTS + 1], seen[@UP@_INPUTS + 1], unseen[@UP@_INPUTS + 1];
+    @PREFIX@_real mean[@UP@_INPUTS + 1], used[@UP@_INPUTS + 1];
     @PREFIX@_real still_for[@UP@_INPUTS + 1], waiting[@UP@_INPUTS + 1], gap[@UP@_INPUTS + 1], stayed[@UP@_INPUTS + 1];
     int has_held[@UP@_INPUTS + 1], has_seen[@UP@_INPUTS + 1], fresh[@UP@_INPUTS + 1], waits[@UP@_INPUTS + 1];
     @PREFIX@_real good_s, fail_s, started_s;
