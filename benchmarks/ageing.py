@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from discovery.runtime.belief import belief_of, residual_levels, update_belief
 
 from discovery.dynamics.system import predict as model_outputs
 from discovery.export.document import Exported, from_document, render
@@ -26,7 +27,6 @@ from discovery.fitting import fit_model, predict_recording
 from discovery.models import Model
 from discovery.models.modelfile import read_model
 from discovery.recordings import Campaign, Recording, load_campaign
-from discovery.runtime.belief import belief_of, residual_levels, update_belief
 from discovery.runtime.update import next_revision
 from discovery.virtual.machine import Machine
 from discovery.virtual.record import Order, take

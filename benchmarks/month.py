@@ -2,10 +2,11 @@
 
     python benchmarks/month.py [days] [seed] [--learn]
 
-A hall door, a chiller step, 5 h without a sensor, a clock set by a day, a frozen server, 20 kills, a full disk
-and two power cuts; with --learn the machine ages as well (its losses fall by 1 % a day) and the compensation
-follows it. The session, its memory, guards, clock, output and history are those of `discovery compensate --opcua`;
-simulated are the machine, the two clocks of the computer, and what the disk and the power do.
+A hall door, a chiller step, 5 h without a sensor, a clock set by a day, a frozen server, 20 kills, a full
+disk and two power cuts; with --learn the machine ages as well (its losses fall by 1 % a day) and the
+compensation follows it. The session, its memory, guards, clock, output and history are those of `discovery
+compensate --opcua`; simulated are the machine, the two clocks of the computer, and what the disk and the
+power do.
 """
 
 from __future__ import annotations
@@ -347,7 +348,9 @@ def machine() -> Exported:
     return from_document(*open_seal(render(make_document(model, campaign, ["fit"])), "model"), "model")
 
 
-def compare(days: int, seed: int, folder: Path, *, learning: bool, exported: Exported | None = None) -> dict[str, Any]:
+def compare(
+    days: int, seed: int, folder: Path, *, learning: bool, exported: Exported | None = None
+) -> dict[str, Any]:
     """The month with and without its faults: figures by name."""
     exported = exported or machine()
     plan = month(days, seed)
@@ -360,7 +363,9 @@ def compare(days: int, seed: int, folder: Path, *, learning: bool, exported: Exp
     clean = live(exported, clean_world, plan, folder / "clean", faults=False, save_every_s=HOUR)
     found = live(exported, true_world, plan, folder / "true", faults=True, learn=learn)
     quiet = plan.quiet(found.times)
-    first = (found.times >= min(DAY, 0.25 * plan.hours * HOUR)) & (found.times < min(2 * DAY, 0.5 * plan.hours * HOUR))
+    first = (found.times >= min(DAY, 0.25 * plan.hours * HOUR)) & (
+        found.times < min(2 * DAY, 0.5 * plan.hours * HOUR)
+    )
     on = np.array([state != "no power" for state in found.states])
     last = found.times >= found.times[-1] - min(7 * DAY, 0.25 * plan.hours * HOUR)
     gaps = np.diff(found.rows)

@@ -38,7 +38,9 @@ def export(
     key = private_key(sign) if sign else None
     if run.suffix == ".json" and run.is_file():
         if model or campaign or states:
-            raise UsageError("an exported model is exported as it is; leave --model, --campaign and --states out")
+            raise UsageError(
+                "an exported model is exported as it is; leave --model, --campaign and --states out"
+            )
         for line in export_document(run, to, out, key=key).lines():
             typer.echo(line)
         return
@@ -169,7 +171,8 @@ def update(
     ] = None,
     sign: Annotated[Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs it.")] = None,
 ) -> None:
-    """Keep an exported model up with an ageing machine: no change, wear, a faulty input sensor, or new physics?
+    """Keep an exported model up with an ageing machine: no change, wear, a faulty input sensor, or new
+    physics?
 
     Wear becomes the next revision, with a changelog entry; `discovery compensate` runs it in the shadow
     first, and `discovery export` writes it to every target.
@@ -243,7 +246,9 @@ def watch(
     port: Annotated[int, typer.Option(help="Port of the page, on this computer alone.")] = 8467,
     hours: Annotated[float, typer.Option(help="How far back the page shows.")] = 24.0,
 ) -> None:
-    """Show a running compensation in a browser: offsets, inputs, state, events; and /metrics for Prometheus."""
+    """Show a running compensation in a browser: offsets, inputs, state, events; and /metrics for
+    Prometheus.
+    """
     from discovery.runtime.watch import serve
 
     serve(state, port, hours, say=typer.echo)

@@ -49,10 +49,13 @@ _TAKEN = frozenset(
 
 
 _KEYWORDS = frozenset(
-    "auto break case char const continue default do double else enum extern float for goto if inline int long "
-    "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile "
-    "while real".split()
-)
+    (
+        "auto", "break", "case", "char", "const", "continue", "default", "do", "double",
+        "else", "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long",
+        "register", "restrict", "return", "short", "signed", "sizeof", "static", "struct",
+        "switch", "typedef", "union", "unsigned", "void", "volatile", "while", "real",
+    )
+)  # fmt: skip
 
 
 def c_prefix(exported: Exported) -> str:
@@ -218,7 +221,8 @@ def _header(exported: Exported, prefix: str) -> str:
 def _function(
     c: Compiled, kind: str, program: Program, results: Sequence[str], outputs: str, prefix: str
 ) -> str:
-    given = f"const {prefix}_parameters *k, const real x[], const real u[], const real d[], const real p[], real t"
+    given = f"const {prefix}_parameters *k, const real x[], const real u[], const real d[], "
+    given += "const real p[], real t"
     words = [word.split()[-1].removesuffix("[]").lstrip("*") for word in f"{given}, {outputs}".split(", ")]
     body = "\n".join(statements(program, results, _language(c)))
     return f"""static void {kind}({given}, {outputs})

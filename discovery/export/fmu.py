@@ -1,5 +1,6 @@
-"""FMI 2.0 and 3.0 co-simulation units of an exported model: sources, a binary for linux64 and, where the cross
-compiler is installed, for win64. Inputs are guarded and offsets limited as in the runtime; parameters can be tuned.
+"""FMI 2.0 and 3.0 co-simulation units of an exported model: sources, a binary for linux64 and, where the
+cross compiler is installed, for win64. Inputs are guarded and offsets limited as in the runtime; parameters
+can be tuned.
 
 Inputs are declared discrete: a simulator then holds them, as the reference does, and does not interpolate.
 The headers of the standard (2-clause BSD) are taken from FMPy and travel with the sources.

@@ -26,7 +26,8 @@ RATE_MARGIN = 2.0  # times the fastest output
 AGES = 5.0  # times the usual spacing of the samples until a value is too old
 STILL_MARGIN, STILL_LEAST_S = 5.0, 3600.0  # times the longest stretch in which a temperature stood still
 WIDE = 10.0  # times the size of an input in its training: what a machine may do beyond it
-# Largest step [K] that physics allows within minutes: a hall door, a chiller, a tank filled up with cold fluid.
+# Largest step [K] that physics allows within minutes: a hall door, a chiller, a tank filled up with cold
+# fluid.
 SUDDEN = {"ambient temperature": 8.0, "fluid temperature": 12.0, "coolant temperature": 12.0}
 
 
@@ -34,7 +35,8 @@ SUDDEN = {"ambient temperature": 8.0, "fluid temperature": 12.0, "coolant temper
 class InputRange:
     """Of one input, in its unit: trained range, physically plausible range, largest step between two samples
     beyond what `rate` [1/s] explains, and the age [s] at which a value is too old. `step` is None where any
-    step is normal. `sudden`: largest step that physics allows within minutes (None: any). `still_s`: longest time [s]
+    step is normal. `sudden`: largest step that physics allows within minutes (None: any). `still_s`:
+    longest time [s]
     that a value may stand exactly still; None: for ever."""
 
     low: float

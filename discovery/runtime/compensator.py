@@ -20,8 +20,8 @@ from discovery.export.guarding import Times, compensated
 from discovery.export.stepper import Stepper
 from discovery.runtime.events import Event, why
 from discovery.runtime.fastforward import fast_forward
-from discovery.runtime.hindsight import LONGEST_S, Hindsight
 from discovery.runtime.guards import Checked, Fault, Reading, guards, number
+from discovery.runtime.hindsight import LONGEST_S, Hindsight
 
 Array = NDArray[np.float64]
 

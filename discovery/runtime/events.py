@@ -57,7 +57,8 @@ def why(guard: InputGuard, fault: Fault, reading: Reading | None) -> tuple[str, 
             hours = FAR_S if far and abs(value - guard.held) > (r.sudden or 0.0) else CONFIRM_S  # type: ignore[operator]
             return (
                 f"{name} stepped from {said(spec, guard.held)} to {shown}",
-                f"it is accepted once it has stayed for {hours / 60:g} min, or when an operator acknowledges it",
+                f"it is accepted once it has stayed for {hours / 60:g} min, or when an operator "
+                "acknowledges it",
             )
         case Fault.NONE:
             return f"{name} is good again", ""

@@ -99,7 +99,9 @@ class InputGuard:
         value, fault = self._judge(reading, now, together)
         if fault is Fault.NONE:
             passed = min(max(now - self.held_at, 0.0), self.spec.range.age_s)
-            self.mean = value if self.held is None else self.mean + (value - self.mean) * passed / (MEAN_S + passed)
+            self.mean = (
+                value if self.held is None else self.mean + (value - self.mean) * passed / (MEAN_S + passed)
+            )
             self.held, self.held_at, self.fresh = value, now, False
         if self.held is None:
             return None
@@ -107,8 +109,8 @@ class InputGuard:
         return Checked(self._stand_in(now), fault if gain == 1.0 else fault | Fault.UNTRAINED, gain)
 
     def _stand_in(self, now: float) -> float:
-        """What goes into the model: the last good value. A machine that cuts and pauses is better described by
-        its mean than by the moment in which a speed or a power was lost.
+        """What goes into the model: the last good value. A machine that cuts and pauses is better described
+        by its mean than by the moment in which a speed or a power was lost.
         """
         assert self.held is not None
         lost = self.spec.range.step is None and now - self.held_at > self.spec.range.age_s

@@ -1,8 +1,9 @@
 """Hindsight: once a lost input is back, the model goes through the gap again with what is known now.
 
-While an input is replaced, the model integrates a value that is only held. When all inputs are good again, the
-model returns to where it was before and takes the same steps once more, a lost temperature running straight from
-its last good value to the first one after the gap. The difference reaches the offsets no faster than their rate.
+While an input is replaced, the model integrates a value that is only held. When all inputs are good again,
+the model returns to where it was before and takes the same steps once more, a lost temperature running
+straight from its last good value to the first one after the gap. The difference reaches the offsets no
+faster than their rate.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ LONGEST_S = 24 * 3600.0  # of a gap that is gone through again
 
 @dataclass
 class Hindsight:
-    """The steps since an input was lost: where the model was, its inputs (one row a step), which were replaced."""
+    """The steps since an input was lost: where the model was, its inputs (one row a step), which were
+    replaced.
+    """
 
     before: Snapshot
     last: Array  # (U,) inputs of the step before
@@ -46,11 +49,13 @@ class Hindsight:
         return rows
 
     def replay(self, exported: Exported, stepper: Stepper) -> Array | None:
-        """Take the steps again; outputs (Y,) after the last one. None: a step fails, and nothing has changed."""
+        """Take the steps again; outputs (Y,) after the last one. None: a step fails, and nothing has
+        changed.
+        """
         now = stepper.snapshot()
         stepper.restore(self.before)
         y = stepper.run(self.known(exported))
         if len(y) < len(self.rows):
             stepper.restore(now)
             return None
-        return y[-1]
+        return np.asarray(y[-1])

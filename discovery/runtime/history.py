@@ -131,7 +131,8 @@ def read_history(folder: Path, since_s: float = 24 * 3600.0) -> dict[str, Any]:
         facts = {name: json.loads(value) for name, value in base.execute("SELECT name, value FROM fact")}
         last = float(facts.get("time", 0.0))
         ticks = base.execute(
-            "SELECT time, state, status, gain, offsets, inputs, errors FROM tick WHERE time >= ? ORDER BY time",
+            "SELECT time, state, status, gain, offsets, inputs, errors FROM tick WHERE time >= ? "
+            "ORDER BY time",
             (last - since_s,),
         ).fetchall()
         events = base.execute(

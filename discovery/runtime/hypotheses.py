@@ -7,10 +7,10 @@ All are hypotheses of one comparison. Around the model at work, the residual of 
 with changes dp of parameters, dc of readings of inputs (an offset of a sensor) and ds of start values, all
 Gaussian with mean zero. A hypothesis says how wide they are: under `nothing` the parameters are as uncertain
 as their fit left them; under `wear` those that can age are wider; and so on. Noise is white and slow sensor
-noise and random heat at each body in proportion to the heat flows through it, for a model of a few bodies errs
-by some percent of its flows (process noise; whitened by `discovery.fitting.kalman`). The probability of the
-residual under each hypothesis then is a Gaussian integral in closed form (marginal likelihood, e.g. Rasmussen
-& Williams, Gaussian Processes for Machine Learning, 2006, section 2.3).
+noise and random heat at each body in proportion to the heat flows through it, for a model of a few bodies
+errs by some percent of its flows (process noise; whitened by `discovery.fitting.kalman`). The probability
+of the residual under each hypothesis then is a Gaussian integral in closed form (marginal likelihood, e.g.
+Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006, section 2.3).
 """
 
 from __future__ import annotations
@@ -55,8 +55,9 @@ TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature
 @dataclass(frozen=True)
 class Comparison:
     """What the recordings say. `odds`: log of the probability of the residual under each hypothesis over that
-    under `nothing`. `verdict` and `what`: the best one, and the sensor where it is one. `rms`: residual of the
-    model at work in units of that of its fit. `change`: of the parameters that age, under wear, with standard
+    under `nothing`. `verdict` and `what`: the best one, and the sensor where it is one. `rms`: residual of
+    the model at work in units of that of its fit. `change`: of the parameters that age, under wear, with
+    standard
     deviations; `covariance` of all known parameters after it."""
 
     recordings: tuple[str, ...]
@@ -72,7 +73,8 @@ class Comparison:
         others = ", ".join(f"{name} {value:+.1f}" for name, value in self.odds.items() if name != "nothing")
         what = f" ({self.what})" if self.what else ""
         return (
-            f"{', '.join(self.recordings)}: {self.verdict}{what}; {self.readings} readings, residual {self.rms:.2f} "
+            f"{', '.join(self.recordings)}: {self.verdict}{what}; {self.readings} readings, "
+            f"residual {self.rms:.2f} "
             f"of the fit's; log odds against no change: {others}"
         )
 
@@ -119,10 +121,7 @@ def compare(
             "export it again from its run"
         )
     levels = {n: r for n, r in known["residual"].items() if r is not None}
-    outputs = [
-        n for n in levels
-        if any(np.isfinite(campaign.recordings[r].values.get(n, np.array([np.nan]))).any() for r in recordings)
-    ]  # fmt: skip
+    outputs = [n for n in levels if any(_read(campaign, r, n) for r in recordings)]
     if not outputs:
         raise UserError(
             f"{campaign.path}: recording '{recordings[0]}' holds no reading of {', '.join(levels)}; "
@@ -162,6 +161,11 @@ def compare(
     change, covariance = _change(usual, prior(WEAR[1] * old), parameters, old, p)
     count = int(sum(np.isfinite(s.grid.readings).sum() for s in problem.systems))
     return Comparison(tuple(recordings), count, verdict, what, odds, rms, change, covariance)
+
+
+def _read(campaign: Campaign, recording: str, name: str) -> bool:
+    values = campaign.recordings[recording].values
+    return name in values and bool(np.isfinite(values[name]).any())
 
 
 def _verdict(odds: Mapping[str, float]) -> tuple[Verdict, str]:
@@ -294,7 +298,7 @@ def _change(
     covariance[np.ix_(ages, cross)] = 0.0
     covariance[np.ix_(cross, ages)] = 0.0
     change = {
-        parameters[k]: (float(shift[list(index).index(k)]), float(np.sqrt(max(everything[k, k], 0.0))))
+        parameters[k]: (float(shift[index.tolist().index(k)]), float(np.sqrt(max(everything[k, k], 0.0))))
         for k in ages
     }
     return change, covariance

@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -115,22 +115,19 @@ class Learner:
             return
         first = self.marks[len(self.marks) // 2][0]
         for rows in (self.times, self.inputs, self.errors):
-            del rows[:first]  # type: ignore[attr-defined]
+            del rows[:first]
         self.marks = [(row - first, states) for row, states in self.marks if row >= first]
 
     def campaign(self, compensator: Compensator) -> Campaign:
         """What was seen since the last revision, as a campaign of one recording."""
         exported = compensator.exported
         time = np.array(self.times) - self.times[0]
-        values = {
-            name: column
-            for name, column in zip(exported.compiled.inputs, np.array(self.inputs).T, strict=True)
-        }
+        values = dict(zip(exported.compiled.inputs, np.array(self.inputs).T, strict=True))
         for name in compensator.names:
             values[name] = np.array([row.get(name, math.nan) for row in self.errors])
         channels = {
             i.name: Channel(i.name, i.role, i.unit, None, _between(i.between)) for i in exported.inputs
-        }  # type: ignore[arg-type]
+        }
         channels |= {
             o.name: Channel(o.name, "error", o.unit, None, "held")
             for o in exported.outputs
@@ -152,7 +149,7 @@ class Learner:
         return found, None if revised is None else render(revised[0], self.key)
 
 
-def _between(word: str) -> str:
+def _between(word: str) -> Literal["linear", "held"]:
     return "linear" if word == "linear" else "held"
 
 

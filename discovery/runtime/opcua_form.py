@@ -30,8 +30,8 @@ class ConnectionForm(Strict):
     tick_s: float = Field(1.0, ge=0.05, le=60.0, description="time between ticks in s")
     stamps: Literal["sample", "change"] = Field(
         "sample",
-        description="when the server renews SourceTimestamp: with each sample of the sensor, or when the value "
-        "changes; with 'change' a value is as old as the clock of the server stands still",
+        description="when the server renews SourceTimestamp: with each sample of the sensor, or when the "
+        "value changes; with 'change' a value is as old as the clock of the server stands still",
     )
     inputs: dict[str, str] = Field({}, description="node id of each input of the model")
     offsets: dict[str, str] = Field(
@@ -104,6 +104,7 @@ class ConnectionForm(Strict):
         parts = urlsplit(self.url)
         if parts.username is not None or parts.password is not None:
             raise UserError(
-                "the url of the connection holds a user or a password; name them with user and password_file or "
+                "the url of the connection holds a user or a password; name them with user and "
+                "password_file or "
                 "password_env, so that no log shows them"
             )

@@ -38,7 +38,7 @@ class Seen:
 
 
 class Link:
-    """OPC UA client that checks the server's certificate and the types of all nodes, and can connect again."""
+    """OPC UA client that checks the server's certificate and all nodes, and can connect again."""
 
     def __init__(
         self, form: ConnectionForm, folder: Path, exported: Exported, clock: Clock | None = None
@@ -133,8 +133,8 @@ class Link:
             self.alive = (seconds, now)
 
     def _reading(self, name: str, value: Any, now: float, *, measured: bool = False) -> Reading:
-        """A data value on the steady clock: as old as the server says when its stamp first came, and older with
-        every second that the stamp stands still.
+        """A data value on the steady clock: as old as the server says when its stamp first came, and older
+        with every second that the stamp stands still.
         """
         source, server = _seconds(value.SourceTimestamp), _seconds(value.ServerTimestamp)
         if source is None:
@@ -262,7 +262,8 @@ async def _check_own(form: ConnectionForm, path: Path) -> None:
         found = []
     if form.application_uri not in found:
         raise UserError(
-            f"application_uri '{form.application_uri}' is not the one in {path} ({', '.join(found) or 'none'}), "
+            f"application_uri '{form.application_uri}' is not the one in {path} "
+            f"({', '.join(found) or 'none'}), "
             "and servers refuse that; make them equal"
         )
 
@@ -300,8 +301,8 @@ _REFUSALS: Mapping[str, str] = {
     "BadUserAccessDenied": "user '{user}' or its password is refused; check both at the server",
     "BadIdentityTokenRejected": "user '{user}' or its password is refused; check both at the server",
     "BadIdentityTokenInvalid": "the server does not take this kind of login; name a user and its password",
-    "BadCertificateUriInvalid": "application_uri '{uri}' is not the one in the own certificate; make them equal",
-    "BadCertificateTimeInvalid": "a certificate is not valid at this time; check the clocks, or make a new one",
+    "BadCertificateUriInvalid": "application_uri '{uri}' is not that of the own certificate",
+    "BadCertificateTimeInvalid": "a certificate is not valid now; check the clocks, or make a new one",
 }
 
 
@@ -322,8 +323,8 @@ def _refusal(form: ConnectionForm, error: Exception) -> str:
 
 
 def need_asyncua() -> Any:
-    """The package asyncua, which says on the log what is said here in a sentence. Raises UserError where it is
-    not installed.
+    """The package asyncua, which says on the log what is said here in a sentence. Raises UserError where it
+    is not installed.
     """
     found = need("asyncua", "opcua", "OPC UA needs")
     logging.getLogger("asyncua").setLevel(logging.CRITICAL)

@@ -69,7 +69,8 @@ def make_certificate(folder: Path, name: str, uri: str = CLIENT_URI) -> tuple[Pa
 
 
 async def fetch_certificate(url: str, path: Path) -> str:
-    """The certificate that a server shows, into a file; its SHA-1 fingerprint, which the machine shows as well.
+    """The certificate that a server shows, into a file; its SHA-1 fingerprint, which the machine shows as
+    well.
 
     Raises:
         UserError: no server answers, or it shows none.
@@ -106,7 +107,8 @@ async def _below(client: Any, ua: Any, node: Any, way: str, depth: int, done: se
         children = await node.get_references(ua.ObjectIds.HierarchicalReferences, ua.BrowseDirection.Forward)
     except Exception:
         raise UserError(
-            f"there is no node {node.nodeid.to_string()} that can be browsed; begin with i=85, the Objects folder"
+            f"there is no node {node.nodeid.to_string()} that can be browsed; begin with i=85, the "
+            f"Objects folder"
         ) from None
     for child in children:
         word = child.NodeId.to_string()

@@ -106,7 +106,8 @@ def _parsed(
             continue
         if abs(stamp) > EPOCH_LIMIT and line == 2:
             raise UserError(
-                f"time {cells[place].strip()} of the inputs is no instant in seconds; give seconds or ISO 8601 "
+                f"time {cells[place].strip()} of the inputs is no instant in seconds; give seconds "
+                f"or ISO 8601 "
                 "instants, not milliseconds or nanoseconds"
             )
         read = {

@@ -309,7 +309,8 @@ class Session:
             self.tell(
                 now,
                 "state failing",
-                f"{self.folder}: the state cannot be saved ({error}); the compensation goes on, but a restart "
+                f"{self.folder}: the state cannot be saved ({error}); the compensation goes on, but "
+                f"a restart "
                 "would begin from an older state",
                 "make room, or give it another folder with --state",
             )

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 
-class Stopped(Exception):
+class Stopped(Exception):  # noqa: N818
     """SIGTERM or SIGINT came."""
 
 

@@ -23,7 +23,8 @@ MAY = 0.95  # residual after a change, as a share of that before: a revision tha
 
 @dataclass(frozen=True)
 class Update:
-    """What an update found and wrote; `path` None: nothing to change. `after`: residual of the next revision in
+    """What an update found and wrote; `path` None: nothing to change. `after`: residual of the next
+    revision in
     units of that of the fit."""
 
     comparison: Comparison
@@ -41,7 +42,8 @@ class Update:
             lines.append(f"the diagnosis says: {self.diagnosis['verdict']}{named and ': ' + named}")
         if self.path is not None:
             lines.append(
-                f"{self.path}: the next revision, residual {self.after:.2f} of the fit's; `discovery compensate` "
+                f"{self.path}: the next revision, residual {self.after:.2f} of the fit's; "
+                f"`discovery compensate` "
                 "runs it in the shadow of the one at work first"
             )
             return lines
@@ -88,8 +90,8 @@ def update_file(
 def revision_of(
     exported: Exported, campaign: Campaign, found: Comparison, begin: Mapping[str, float] | None = None
 ) -> tuple[dict[str, Any], float] | None:
-    """The document of the next revision and the residual that it leaves; None where there is no wear, or where
-    it gains nothing.
+    """The document of the next revision and the residual that it leaves; None where there is no wear, or
+    where it gains nothing.
 
     Args:
         begin: states of the model where the recordings begin; default its own start.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from discovery.export.identifiers import identifiers
@@ -12,15 +11,14 @@ from discovery.export.st.reader import read_structured_text
 from discovery.models import Model
 from tests.export.conftest import make_campaign, make_model
 from tests.export.guarded import by_the_runtime, faulty
-from tests.export.test_guarded_c import failing, sealed
+from tests.export.test_guarded_c import failing, quiet, sealed
 
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("model", [make_model(), failing()], ids=["everything", "failing"])
 def test_the_block_guards_as_the_runtime_does(model: Model, seed: int) -> None:
     campaign = make_campaign(hours=6.0, seed=3)
-    quiet = campaign.recordings["fit"].values
-    quiet["P_drive"] = np.minimum(quiet["P_drive"], 690.0)
+    campaign = quiet(campaign)
     exported = sealed(model, campaign)
     inputs = sampled_inputs(campaign, "fit", exported.compiled.inputs, 10.0)[:1200]
     given = faulty(exported, inputs, seed, episodes=20)

@@ -240,7 +240,9 @@ def compensated(model_file: Path, source: Path | str, out: Path, folder: Path) -
 
 
 def test_a_stop_is_safe_and_goes_on(model_file: Path, day: Path, tmp_path: Path) -> None:
-    """SIGTERM while rows come by a pipe: state OFF is the last line, exit status 0, and the next run goes on."""
+    """SIGTERM while rows come by a pipe: state OFF is the last line, exit status 0, and the next run goes
+    on.
+    """
     lines, out, folder = day.read_text().splitlines(keepends=True), tmp_path / "o.csv", tmp_path / "memory"
     command = compensated(model_file, "-", out, folder)
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -17,8 +17,8 @@ from discovery.export.document import Exported
 from discovery.files import read_toml
 from discovery.runtime.clock import Clock
 from discovery.runtime.compensator import Settings
-from discovery.runtime.opcua import Punctuality, _first_connection, run_loop
 from discovery.runtime.guards import Reading
+from discovery.runtime.opcua import Punctuality, _first_connection, run_loop
 from discovery.runtime.opcua_form import CLIENT_URI, ConnectionForm
 from discovery.runtime.opcua_link import Link
 from discovery.runtime.opcua_machine import simulated_machine
@@ -53,9 +53,7 @@ def form(place: Path) -> ConnectionForm:
     return read_toml(place / "connection.toml", ConnectionForm)
 
 
-def test_the_loop_reads_compensates_and_writes(
-    exported: Exported, model_file: Path, place: Path, form: ConnectionForm
-) -> None:
+def test_the_loop_reads_compensates_and_writes(exported: Exported, place: Path, form: ConnectionForm) -> None:
     said: list[str] = []
     form = form.model_copy(update={"tick_s": 0.2})
 
@@ -217,7 +215,7 @@ def test_stamps_of_changes_are_as_old_as_the_server_is_silent(
     assert clock.now() - 60.0 - found.time == pytest.approx(60.0)  # alive until the third of four ticks
 
 
-def test_the_wall_clock_may_be_set(exported: Exported, place: Path, form: ConnectionForm) -> None:
+def test_the_wall_clock_may_be_set() -> None:
     clock, times = stepped_clock()
     clock.jumped()
     before = clock.now()
@@ -254,7 +252,7 @@ def test_errors_under_the_offsets_stand_with_what_was_taken_off(
             kept.update(readings)
             return tick(readings, now, **options)
 
-        session.tick = spy  # type: ignore[method-assign, assignment]
+        session.tick = spy  # type: ignore[method-assign]
         await run_loop(link, session, 0.3)
         return kept
 

@@ -21,6 +21,7 @@ from discovery.export.stepper import Stepper
 from discovery.models import Model, State
 from discovery.runtime.compensator import Compensator, Settings
 from discovery.runtime.compensator import State as Mode
+from discovery.runtime.events import Event
 from discovery.runtime.fastforward import fast_forward
 from discovery.runtime.guards import Fault, InputGuard, Reading
 from discovery.runtime.rows import csv_rows, ticks
@@ -106,7 +107,7 @@ def test_a_value_that_comes_back_is_taken_at_once() -> None:
     guard = InputGuard(TEMPERATURE)
     for k, value in enumerate([22.0, 25.0, 25.0, 22.1, 25.0]):
         found = guard.check(Reading(value, 60.0 * k), 60.0 * k)
-        assert found is not None
+    assert found is not None
     assert (found.value, found.fault) == (22.1, Fault.JUMP)
     assert guard.stayed == 0.0
 
@@ -206,7 +207,7 @@ def test_a_fault_ends_by_itself_and_each_change_is_told_once() -> None:
 
 def test_an_event_says_cause_and_remedy() -> None:
     compensator = Compensator(small("0*T", (TEMPERATURE,)), Settings(tick_s=60.0))
-    events = []
+    events: list[Event] = []
     for k, value in enumerate([22.0, 22.0, 24.6, 24.6, 24.6, 24.6, 24.6, 24.6, 24.6]):
         events += compensator.tick({"T": Reading(value, 60.0 * k)}, 60.0 * k).events
     degraded, accepted = events[1:3]
@@ -228,7 +229,7 @@ def test_an_operator_may_say_that_a_step_is_right() -> None:
 def test_a_clock_that_is_set_back_is_followed_and_told() -> None:
     """A day back: the model goes on at once, its stamps are not from the past."""
     compensator = Compensator(small(), Settings(tick_s=60.0, settle_s=60.0))
-    events, states = [], []
+    events, states = list[Event](), []
     for k in range(40):
         now = 60.0 * k + (1e5 if k < 20 else 1e5 - 86400.0)
         tick = compensator.tick({"P": Reading(100.0, now)}, now)

@@ -1,4 +1,4 @@
-"""Update by evidence: an unchanged machine is left alone, wear is followed, all else is handed on unsigned."""
+"""Update by evidence: an unchanged machine is left alone, wear is followed, nothing else is signed."""
 
 from __future__ import annotations
 
@@ -150,7 +150,10 @@ def test_new_physics_is_handed_to_the_diagnosis_and_nothing_is_signed(
 
     def diagnosis(_: object, __: object, recordings: list[str]) -> dict[str, object]:
         asked.append(list(recordings))
-        return {"verdict": verdict, "physics": [{"effect": "flooded_gap", "states": ["c_body_1", "b_body_1"]}]}
+        return {
+            "verdict": verdict,
+            "physics": [{"effect": "flooded_gap", "states": ["c_body_1", "b_body_1"]}],
+        }
 
     monkeypatch.setattr(module, "_diagnosis", diagnosis)
     campaign = days(machine, 3, plant, effects)

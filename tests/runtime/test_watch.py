@@ -125,8 +125,10 @@ def test_the_page_in_a_browser(address: str, tmp_path: Path) -> None:
             session.size(1000, 800, scheme)
             session.send("POST", "/url", {"url": f"{address}/"})
             drawn = session.run_async(
-                "const done = arguments[0]; const wait = n => document.querySelectorAll('figure svg polyline').length >= 11"
-                " || n > 100 ? done(document.querySelectorAll('figure svg polyline').length) : setTimeout(() => wait(n + 1), 50);"
+                "const done = arguments[0]; const wait = n => document.querySelectorAll('figure svg "
+                "polyline').length >= 11"
+                " || n > 100 ? done(document.querySelectorAll('figure svg polyline').length) : "
+                "setTimeout(() => wait(n + 1), 50);"
                 "wait(0);"
             )
             assert drawn == 11  # four offsets, seven inputs

@@ -113,8 +113,8 @@ def _declarations(exported: Exported, kind: str) -> str:
     lines += [f"    together : ARRAY [0..{len(c.inputs)}] OF BOOL;\n"]
     lines += [f"    position : ARRAY [0..{len(c.delays)}] OF DINT;\n"]
     flags = ("running", "configured", "ticked", "known", "replaced", "recovered", "has_y")
-    flags += tuple(f"bit_{k}" for k in (8, 9, 10, 11, 12, 13, 18, 19))
-    lines += [f"    {name} : BOOL;\n" for name in flags]
+    bits = [f"bit_{k}" for k in (8, 9, 10, 11, 12, 13, 18, 19)]
+    lines += [f"    {name} : BOOL;\n" for name in (*flags, *bits)]
     lines += [
         f"    {name} : DINT;\n" for name in ("count", "here", "k", "j", "substeps", "settling", "settled")
     ]

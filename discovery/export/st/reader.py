@@ -1,8 +1,9 @@
 """A reader of the structured text that `block.py` writes, and of the SCL made from it, to replay it where no
 compiler is installed.
 
-It knows the subset that is written and nothing more: assignments, IF, WHILE, arrays, calls of functions and of
-function blocks. It computes in the type that the text declares (REAL: 32 bit), and refuses an untyped real literal.
+It knows the subset that is written and nothing more: assignments, IF, WHILE, arrays, calls of functions and
+of function blocks. It computes in the type that the text declares (REAL: 32 bit), and refuses an untyped
+real literal.
 """
 
 from __future__ import annotations

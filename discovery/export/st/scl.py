@@ -16,8 +16,6 @@ from discovery.export.st.units import Unit, Variable, units
 _TOKEN = re.compile(
     r"\(\*.*?\*\)|(?:LREAL|REAL)#[\d.]+(?:[eE][+-]?\d+)?|[A-Za-z_]\w*|\s+|\d+|:=|<>|<=|>=|.", re.DOTALL
 )
-_WORDS = frozenset("IF THEN ELSIF ELSE END_IF WHILE DO END_WHILE NOT AND OR MOD TRUE FALSE".split())
-_PLAIN = frozenset("ABS EXP LN SQRT".split())
 _SELECT = ("G", "IN0", "IN1")
 
 
@@ -92,7 +90,8 @@ class _Writer:
     def given(self) -> list[str]:
         """Arguments by place; the parenthesis after them is passed."""
         self.at += 1
-        found, depth, word = [], 0, ""
+        found: list[str] = []
+        depth, word = 0, ""
         while True:
             token = self.tokens[self.at]
             if token == ")" and depth == 0:
