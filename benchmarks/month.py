@@ -36,12 +36,13 @@ from discovery.runtime import persistence
 from discovery.runtime.clock import Clock
 from discovery.runtime.compensator import Settings
 from discovery.runtime.guards import Reading
+from discovery.runtime.history import History, read_history
 from discovery.runtime.learning import Learner
 from discovery.runtime.opcua import _tell_jump
 from discovery.runtime.output import Output
 from discovery.runtime.session import Session, header
 from discovery.runtime.shadow import Rule
-from discovery.virtual import laws
+from discovery.virtual import physics as laws
 from discovery.virtual.cycles import make_cycle
 from discovery.virtual.machine import Machine
 from discovery.virtual.measurement import Chain, observe
@@ -180,9 +181,7 @@ class Computer:
 @contextmanager
 def disk(computer: Computer) -> Iterator[None]:
     """Writing to the state, the output and the history fails while the disk is full."""
-    written, opened, flushed = persistence._write, Output.flush, None
-    from discovery.runtime.history import History
-
+    written, opened = persistence._write, Output.flush
     flushed = History.flush
 
     def write(body: str, folder: Path) -> None:
@@ -240,7 +239,6 @@ def live(
     next_kill, session, probes, last_probe = next(kills), None, 0, -np.inf
     names = exported.compiled.inputs
     teacher = learn() if learn is not None else None
-    told: Counter[str] = Counter()
 
     def hear(text: str) -> None:
         events.append(text)
@@ -297,8 +295,6 @@ def live(
                     readings[name] = Reading(value + offset, inside)
                     readings[f"{name}_applied"] = Reading(-offset, inside)
             tick = session.tick(readings, inside)
-            for event in session.told:
-                told[event.what] += 1
             left.append([happening.errors[k, j] + tick.offsets[n] for j, n in enumerate(ERRORS)])
             states.append(tick.state.name)
         assert session is not None
@@ -313,7 +309,7 @@ def live(
         [float(line.split(",")[0]) for line in lines],
         active.revision,
         probes,
-        told,
+        Counter(read_history(folder / "memory")["counts"]),
     )
 
 
