@@ -47,6 +47,8 @@ OTHER = (0.1, 0.4)  # relative change of a parameter that cannot age: something 
 OFFSET = (0.5, 2.0)  # K, of the sensor of an input
 LEAST_ODDS = 3.0  # log of the odds against `nothing`, below which nothing has changed
 LEAST_LEAD = 1.5  # log of the odds against each rival, below which it is undecided
+RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
+MEMORY_S = 2 * 24 * 3600.0  # in which what was read counts less and less: wear goes on meanwhile
 AGES = ("heat load", "rotation speed", "fluid flow", "cooling power", "coolant temperature")
 START_SD = 0.5  # K, um: of states that are known where a recording begins
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
@@ -81,11 +83,13 @@ class Comparison:
 
 @dataclass(frozen=True)
 class _Linear:
-    """Whitened residual (N,) and its slopes (N, K) over all recordings, half the log-determinant."""
+    """Whitened residual (N,) and its slopes (N, K) over all recordings, half the log-determinant, and how long
+    before the end [s] each was read (N,)."""
 
     r: Array
     j: Array
     logdet: float
+    age: Array
 
 
 def ageing(exported: Exported) -> tuple[str, ...]:
@@ -155,7 +159,10 @@ def compare(
             _log_probability(strange, prior()),
         ]
     )
-    odds = {name: value - logs["nothing"] for name, value in logs.items()}
+    odds = {
+        name: value - logs["nothing"] - (0.0 if name in ("nothing", "wear") else RARE)
+        for name, value in logs.items()
+    }
     verdict, what = _verdict(odds)
     rms = _rms(problem, levels, outputs)
     change, covariance = _change(usual, prior(WEAR[1] * old), parameters, old, p)
@@ -192,7 +199,8 @@ def _linear(
 ) -> _Linear:
     theta = problem.start
     nuisance = [i for i, u in enumerate(problem.unknowns) if u.is_start]
-    residuals, slopes, logdet = [], [], 0.0
+    residuals, slopes, ages, logdet = [], [], [], 0.0
+    after = sum(float(system.grid.time[-1]) for system in problem.systems)
     for system in problem.systems:
         trajectory = problem.run(system, theta)
         part = make_filter(trajectory)
@@ -210,10 +218,13 @@ def _linear(
         own[:, :shared] = white[:, 1 : 1 + shared]
         places = [k for k, i in enumerate(nuisance) if problem.unknowns[i].recording == system.grid.recording]
         own[:, [shared + k for k in places]] = white[:, 1 + shared :]
+        rows = np.broadcast_to(system.grid.time[system.grid.read][:, None], system.grid.measured.shape)
+        ages.append(after - rows[system.grid.measured])
+        after -= float(system.grid.time[-1])
         residuals.append(white[:, 0])
         slopes.append(own)
         logdet += half
-    return _Linear(np.concatenate(residuals), np.concatenate(slopes), logdet)
+    return _Linear(np.concatenate(residuals), np.concatenate(slopes), logdet, np.concatenate(ages))
 
 
 def _noise(trajectory: Trajectory, known: Mapping[str, Any], outputs: Sequence[str], process: float) -> Noise:
@@ -278,18 +289,20 @@ def _change(
     linear: _Linear, wide: Array, parameters: Sequence[str], old: NDArray[np.bool_], p: Array
 ) -> tuple[dict[str, tuple[float, float]], Array]:
     """Change and standard deviation of each parameter that ages, and the covariance afterwards; the others
-    stay where they are.
+    stay where they are. Wear goes on while it is measured, so the last readings count most.
     """
+    fade = np.exp(-linear.age / MEMORY_S)
+    recent_j, recent_r = linear.j * fade[:, None], linear.r * fade
     count = len(parameters)
     free = np.concatenate([old, np.zeros(len(wide) - count, dtype=bool)])
     free[count:] = np.diag(wide)[count:] > 0.0
     index = np.flatnonzero(free)
     root = _root(wide[np.ix_(index, index)])
-    a = linear.j[:, index] @ root
+    a = recent_j[:, index] @ root
     posterior = root @ np.linalg.inv(a.T @ a + np.eye(root.shape[1])) @ root.T
-    shift = posterior @ (linear.j[:, index].T @ linear.r)
+    shift = posterior @ (recent_j[:, index].T @ recent_r)
     whole_root = _root(wide)
-    b = linear.j @ whole_root
+    b = recent_j @ whole_root
     everything = whole_root @ np.linalg.inv(b.T @ b + np.eye(whole_root.shape[1])) @ whole_root.T
     ages = [k for k in range(count) if old[k]]
     covariance = p.copy()

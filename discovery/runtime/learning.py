@@ -9,8 +9,10 @@ for thermal error compensation).
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -19,6 +21,7 @@ import numpy as np
 
 from discovery.errors import UserError
 from discovery.export.document import render
+from discovery.files import write_atomic
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.runtime.compensator import Compensator, State
 from discovery.runtime.guards import Reading, number
@@ -31,10 +34,14 @@ if TYPE_CHECKING:
 
 ROW_S = 60.0  # between two rows of the recording that an update learns from
 ACTION = 1.6  # rms of the last errors left, in units of the residual of the fit: measure
-RECENT = 16  # errors that the action limit looks at
-LEAST = 12  # new errors of at least one output before hypotheses are compared
-EVERY_S = 24 * 3600.0  # between two comparisons where the action limit is kept ...
+RECENT = 32  # errors that the action limit looks at
+FILE = "learning.json"
+KEPT = ("times", "inputs", "errors", "marks", "left", "counted", "new", "compared", "advice")
+LEAST = 6  # new errors of at least one output before hypotheses are compared
+EVERY_S = 12 * 3600.0  # between two comparisons where the action limit is kept ...
 SOON_S = 4 * 3600.0  # ... and where it is not
+GAP_S = 3600.0  # after a longer gap the recording begins anew
+SAVE_S = 3600.0  # between two copies on disk
 LONGEST_S = 8 * 24 * 3600.0  # of the recording; the older half is forgotten then
 
 
@@ -53,9 +60,9 @@ class Learner:
     marks: list[tuple[int, dict[str, float]]] = field(default_factory=list)  # row, states of the model there
     left: list[float] = field(default_factory=list)  # errors left, in units of the residual of the fit
     counted: dict[str, float] = field(default_factory=dict)  # instant of the last reading of each error
-    zero: dict[str, list[float]] = field(default_factory=dict)
     new: int = 0  # rows with errors since the last comparison
-    compared: float = -math.inf
+    compared: float = -1e30
+    saved: float = -math.inf
     levels: dict[str, float] = field(default_factory=dict)
 
     def begin(self, compensator: Compensator) -> None:
@@ -68,9 +75,14 @@ class Learner:
 
     def observe(self, compensator: Compensator, readings: Mapping[str, Reading], now: float) -> bool:
         """Take in a tick; whether hypotheses should be compared now."""
-        if compensator.inputs is None or compensator.state in (State.FROZEN, State.FAULT):
+        if compensator.inputs is None or compensator.state not in (State.ACTIVE, State.DEGRADED):
+            self._interrupt(compensator, now)
             return False
+        if self.times and now - self.times[-1] > GAP_S:
+            self.begin(compensator)
         found = self._errors(compensator, readings)
+        if compensator.state is State.DEGRADED:  # under inputs that are only held an error says little
+            found = {}
         if not self.times or now - self.times[-1] >= ROW_S - 1e-6 or found:
             if not self.marks or now - self.times[self.marks[-1][0]] >= EVERY_S:
                 self.marks.append((len(self.times), compensator.states()))
@@ -91,6 +103,11 @@ class Learner:
         self.advice = "measure the errors every half hour for the next 8 h" if beyond else ""
         wait = SOON_S if beyond else EVERY_S
         return self.new >= LEAST and now - self.compared >= wait
+
+    def _interrupt(self, compensator: Compensator, now: float) -> None:
+        """The model has not settled, or has failed: after more than GAP_S of it the recording begins anew."""
+        if self.times and now - self.times[-1] > GAP_S:
+            self.begin(compensator)
 
     def beyond(self) -> bool:
         """Whether the errors left are beyond the action limit."""
@@ -134,6 +151,26 @@ class Learner:
             if o.role == "error"
         }
         return Campaign("running", channels, {"running": Recording("running", time, values)}, Path("running"))
+
+    def save(self, compensator: Compensator, folder: Path, now: float) -> None:
+        """Keep what was seen on disk, once an hour. A disk that fails costs what was learnt since, no more."""
+        if 0.0 <= now - self.saved < SAVE_S:
+            return
+        self.saved = now
+        kept = {name: getattr(self, name) for name in KEPT} | {"model": compensator.exported.seal.sha256}
+        with suppress(OSError):
+            write_atomic(folder / FILE, json.dumps(kept).encode())
+
+    def load(self, compensator: Compensator, folder: Path) -> None:
+        """Go on with what was seen before a restart, if it is of the same model."""
+        try:
+            kept = json.loads((folder / FILE).read_text())
+            if kept["model"] != compensator.exported.seal.sha256:
+                return
+            for name in KEPT:
+                setattr(self, name, kept[name])
+        except (OSError, ValueError, KeyError):
+            return
 
     def compare(self, compensator: Compensator, now: float) -> tuple[Comparison, bytes | None]:
         """The hypotheses on what was seen, and the signed next revision where it is wear.

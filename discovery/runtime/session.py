@@ -86,6 +86,8 @@ class Session:
         self.compensator = Compensator(exported, self.settings)
         if self.learn is not None:
             self.learn.begin(self.compensator)
+            if folder is not None:
+                self.learn.load(self.compensator, folder)
         if folder is not None:
             facts = {
                 "model": exported.model.name,
@@ -235,6 +237,8 @@ class Session:
         """Measured errors as they come: when to measure, when to update, and the update."""
         advised = learn.advice
         due = learn.observe(self.compensator, readings, now)
+        if self.folder is not None:
+            learn.save(self.compensator, self.folder, now)
         if learn.advice and not advised:
             self.tell(now, "action limit", "the errors left are beyond the action limit", learn.advice)
         elif advised and not learn.advice:

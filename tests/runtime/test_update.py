@@ -175,7 +175,7 @@ def test_the_marginal_likelihood_is_that_of_the_joint_gaussian() -> None:
     root = rng.normal(size=(5, 5))
     for prior in (root @ root.T, np.diag([1.0, 0.0, 4.0, 0.0, 1e-3])):
         whole = multivariate_normal(np.zeros(40), np.eye(40) + j @ prior @ j.T).logpdf(r)
-        found = _log_probability(_Linear(r, j, 0.7), prior) - 40 / 2 * np.log(2 * np.pi) + 0.7
+        found = _log_probability(_Linear(r, j, 0.7, np.zeros(40)), prior) - 40 / 2 * np.log(2 * np.pi) + 0.7
         assert found == pytest.approx(whole)
 
 
