@@ -45,9 +45,8 @@ from discovery.runtime.shadow import Rule
 from discovery.virtual import physics as laws
 from discovery.virtual.cycles import make_cycle
 from discovery.virtual.machine import Machine
-from discovery.virtual.measurement import Chain, observe
+from discovery.virtual.measurement import Chain, everyday_heat, observe
 from discovery.virtual.plant import simulate
-from discovery.virtual.record import everyday_heat
 
 Array = NDArray[np.float64]
 DATA = Path(__file__).parents[1] / "datasets" / "nmv5000"

@@ -7,28 +7,13 @@ a controller calls is `<name>_begin` once and `<name>_tick` each step (guarded i
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import fields
 
 from discovery import __version__
+from discovery.export.c_guard import guard_source, real, settings
 from discovery.export.compiled import Compiled, Delay
 from discovery.export.document import Exported
-from discovery.export.guarding import (
-    CONFIRM_S,
-    FADE_FROM,
-    FADE_TO,
-    FAR_S,
-    FURTHER,
-    LEAK,
-    MEAN_S,
-    MEANING,
-    TOGETHER,
-    GuardNumbers,
-    compensated,
-    guard_numbers,
-    times,
-)
+from discovery.export.guarding import compensated
 from discovery.export.identifiers import comment, formula, identifier, identifiers
 from discovery.export.kernel import LARGEST_NORM, LARGEST_SUBSTEPS, ORDER
 from discovery.export.program import Instruction, Program
@@ -62,19 +47,6 @@ def c_prefix(exported: Exported) -> str:
     """Beginning of every name in the C files of a model, and name of its files."""
     word = identifier(exported.model.name).lower()
     return f"{word}_model" if word in _TAKEN else word
-
-
-def real(value: float) -> str:
-    """A number as the macro R() takes it.
-
-    >>> real(0.1), real(-3.0)
-    ('R(0.1)', 'R(-3.0)')
-    """
-    if math.isnan(value):
-        return "(R(0.0)/R(0.0))"
-    if math.isinf(value):
-        return "R_HUGE" if value > 0 else "(-R_HUGE)"
-    return f"R({float(value)!r})"
 
 
 def _expression(instruction: Instruction, words: Sequence[str]) -> str:
@@ -164,27 +136,6 @@ def _parameter_lines(exported: Exported, line: str) -> str:
     return "\n".join(rows) or line.format(word="none", value=real(0.0), note="this model has no parameters")
 
 
-def _setting_arrays(exported: Exported) -> dict[str, list[float]]:
-    """Numbers of the guards by input, limits of the offsets, by name."""
-    guards = [guard_numbers(spec) for spec in exported.inputs]
-    found = {f.name: [float(getattr(g, f.name)) for g in guards] for f in fields(GuardNumbers)}
-    ranges = [exported.outputs[k].range for k in compensated(exported)]
-    return found | {"limit": [r.limit for r in ranges], "rate_of_offset": [r.rate for r in ranges]}
-
-
-def _settings(exported: Exported, prefix: str) -> tuple[str, str]:
-    """Declaration and default values of the settings."""
-    up, declared, values = prefix.upper(), [], []
-    for name, numbers in _setting_arrays(exported).items():
-        size = "OFFSETS" if name in ("limit", "rate_of_offset") else "INPUTS"
-        declared.append(f"    {prefix}_real {name}[{up}_{size} + 1]; /* {MEANING[name]} */")
-        values.append(f"    {{{', '.join([*map(real, numbers), 'R(0.0)'])}}},")
-    for name, value in times().items():
-        declared.append(f"    {prefix}_real {name}; /* {MEANING[name]} */")
-        values.append(f"    {real(value)},")
-    return "\n".join(declared), "\n".join(values).rstrip(",")
-
-
 def _header(exported: Exported, prefix: str) -> str:
     c, up = exported.compiled, prefix.upper()
     units = {i.name: i.unit for i in exported.inputs} | {o.name: o.unit for o in exported.outputs}
@@ -213,7 +164,7 @@ def _header(exported: Exported, prefix: str) -> str:
         PLACES="\n".join(places),
         FIXED=", except durations of delays" if c.delays else "",
         PARAMETERS=_parameter_lines(exported, f"    {prefix}_real {{word}}; /* {{note}} */"),
-        SETTINGS=_settings(exported, prefix)[0],
+        SETTINGS=settings(exported, prefix)[0],
         OFFSET_PLACES=f"enum {prefix}_offset {{\n{offsets}\n}};" if errors else "",
     )
 
@@ -264,27 +215,7 @@ def _source(exported: Exported, prefix: str) -> str:
         HERE="    uint32_t here;\n" if c.delays else "",
         DELAYED="\n".join(map(_delayed, range(len(c.delays)), c.delays, c.offsets)),
         MOVED_ON="\n".join(map(_moved_on, range(len(c.delays)), c.delays)),
-        GUARD=_guard(exported, prefix),
-    )
-
-
-def _guard(exported: Exported, prefix: str) -> str:
-    constants = {
-        "CONFIRM_S": CONFIRM_S,
-        "FAR_S": FAR_S,
-        "TOGETHER": TOGETHER,
-        "FURTHER": FURTHER,
-        "LEAK": LEAK,
-        "MEAN_S": MEAN_S,
-        "FADE_FROM": FADE_FROM,
-        "FADE_TO": FADE_TO,
-    }
-    return templated(
-        "guard.c",
-        prefix,
-        SETTINGS=_settings(exported, prefix)[1],
-        PLACES="".join(f"{k}, " for k in compensated(exported)),
-        **{name: real(value) for name, value in constants.items()},
+        GUARD=guard_source(exported, prefix),
     )
 
 

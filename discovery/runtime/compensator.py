@@ -18,7 +18,7 @@ from discovery.errors import UserError
 from discovery.export.document import Exported
 from discovery.export.guarding import Times, compensated
 from discovery.export.stepper import Stepper
-from discovery.runtime.events import Event, why
+from discovery.runtime.events import Change, Event, state_event
 from discovery.runtime.fastforward import fast_forward
 from discovery.runtime.guards import Checked, Fault, Reading, guards, number
 from discovery.runtime.hindsight import LONGEST_S, Hindsight
@@ -142,7 +142,9 @@ class Compensator:
         was = self.state
         self._change_state(faults, failed, now, enabled=enabled, part_done=part_done, hurry=hurry)
         if self.state is not was:
-            self._tell_state(was, faults, failed, readings, now)
+            on = was is State.OFF and self.started_at < now
+            change = Change(was.name, self.state.name, failed=failed, switched_on=on)
+            self.events.append(state_event(change, self.guards, faults, readings, now))
         flags |= self._move(elapsed)
         for fault in faults.values():
             flags |= int(fault)
@@ -312,43 +314,6 @@ class Compensator:
             remedy = "record there and fit the model again" if far else ""
             self.events.append(Event(now, "gain falls" if far else "full gain", cause, remedy))
         self.gain = gain
-
-    def _tell_state(
-        self,
-        was: State,
-        faults: Mapping[str, Fault],
-        failed: bool,
-        readings: Mapping[str, Reading],
-        now: float,
-    ) -> None:
-        causes, remedies = [], []
-        for guard in self.guards:
-            fault = faults[guard.spec.name]
-            if fault & ~Fault.UNTRAINED:
-                cause, remedy = why(guard, fault, readings.get(guard.spec.name))
-                causes.append(cause)
-                remedies.append(remedy)
-        if failed:
-            causes.append("the model gives no finite number for these inputs")
-            remedies.append("check the inputs; export the model again if they are right")
-        if self.state is State.OFF:
-            causes, remedies = ["compensation is switched off"], []
-        elif not causes:
-            on = was is State.OFF and self.started_at < now
-            causes = [
-                "the inputs are good again"
-                if was in TROUBLE
-                else "compensation is switched on"
-                if on
-                else {
-                    State.COLD: "the model starts without a saved state",
-                    State.WARM: "the model went through a gap",
-                }.get(self.state, "the model has settled")
-            ]
-        if self.state is State.FAULT:
-            remedies.append("it ends by itself once the inputs are good, or when an operator acknowledges it")
-        what = f"{was.name} -> {self.state.name}"
-        self.events.append(Event(now, what, ", ".join(causes), "; ".join(dict.fromkeys(remedies))))
 
     def states(self) -> dict[str, float]:
         """States of the model by name."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -64,6 +65,58 @@ def why(guard: InputGuard, fault: Fault, reading: Reading | None) -> tuple[str, 
             return f"{name} is good again", ""
         case _:
             return f"{name} is {shown}", ""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change of state by names. `failed`: the model gave no number; `switched_on`: by the operator."""
+
+    before: str
+    after: str
+    failed: bool = False
+    switched_on: bool = False
+
+
+TROUBLE = ("DEGRADED", "FROZEN", "FAULT")
+
+
+def state_event(
+    change: Change,
+    guards: Sequence[InputGuard],
+    faults: Mapping[str, Fault],
+    readings: Mapping[str, Reading],
+    now: float,
+) -> Event:
+    """What a change of state tells: what is wrong with which input, and what to do."""
+    found = [
+        why(guard, faults[guard.spec.name], readings.get(guard.spec.name))
+        for guard in guards
+        if faults[guard.spec.name] & ~Fault.UNTRAINED
+    ]
+    causes, remedies = [cause for cause, _ in found], [remedy for _, remedy in found]
+    if change.failed:
+        causes.append("the model gives no finite number for these inputs")
+        remedies.append("check the inputs; export the model again if they are right")
+    if change.after == "OFF":
+        causes, remedies = ["compensation is switched off"], []
+    elif not causes:
+        causes = [_calm(change)]
+    if change.after == "FAULT":
+        remedies.append("it ends by itself once the inputs are good, or when an operator acknowledges it")
+    what = f"{change.before} -> {change.after}"
+    return Event(now, what, ", ".join(causes), "; ".join(dict.fromkeys(remedies)))
+
+
+def _calm(change: Change) -> str:
+    """Why the state changes where nothing is wrong."""
+    if change.before in TROUBLE:
+        return "the inputs are good again"
+    if change.switched_on:
+        return "compensation is switched on"
+    return {
+        "COLD": "the model starts without a saved state",
+        "WARM": "the model went through a gap",
+    }.get(change.after, "the model has settled")
 
 
 def said(spec: Input, value: object) -> str:

@@ -84,7 +84,8 @@ class Comparison:
 
 @dataclass(frozen=True)
 class _Linear:
-    """Whitened residual (N,) and its slopes (N, K) over all recordings, half the log-determinant, and how long
+    """Whitened residual (N,) and its slopes (N, K) over all recordings, half the log-determinant, and how
+    long
     before the end [s] each was read (N,)."""
 
     r: Array

@@ -153,7 +153,7 @@ class Learner:
         return Campaign("running", channels, {"running": Recording("running", time, values)}, Path("running"))
 
     def save(self, compensator: Compensator, folder: Path, now: float) -> None:
-        """Keep what was seen on disk, once an hour. A disk that fails costs what was learnt since, no more."""
+        """Keep what was seen on disk, once an hour; a disk that fails costs what was learnt since."""
         if 0.0 <= now - self.saved < SAVE_S:
             return
         self.saved = now

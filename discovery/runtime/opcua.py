@@ -24,8 +24,9 @@ from discovery.runtime.clock import Clock
 from discovery.runtime.compensator import Settings
 from discovery.runtime.guards import Reading
 from discovery.runtime.notify import notify
+from discovery.runtime.opcua_connect import UnreachableError
 from discovery.runtime.opcua_form import ConnectionForm
-from discovery.runtime.opcua_link import Link, Seen, UnreachableError
+from discovery.runtime.opcua_link import Link, Seen
 from discovery.runtime.output import Output
 from discovery.runtime.session import Say, Session, header
 from discovery.runtime.signals import Asked

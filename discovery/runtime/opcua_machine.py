@@ -14,8 +14,8 @@ from typing import Any
 
 from discovery.export.document import Exported, Input
 from discovery.files import write_toml
+from discovery.runtime.opcua_connect import need_asyncua
 from discovery.runtime.opcua_form import CLIENT_URI
-from discovery.runtime.opcua_link import need_asyncua
 from discovery.runtime.opcua_tools import make_certificate
 
 NAMESPACE = "urn:discovery:offsets"

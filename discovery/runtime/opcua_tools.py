@@ -13,8 +13,8 @@ from typing import Any
 from discovery.errors import UserError
 from discovery.extras import need
 from discovery.files import write_atomic
+from discovery.runtime.opcua_connect import connected, need_asyncua, server_certificates
 from discovery.runtime.opcua_form import CLIENT_URI, ConnectionForm
-from discovery.runtime.opcua_link import connected, need_asyncua, server_certificates
 
 VALID_DAYS = 3650
 _SKIPPED = {"i=2253"}  # the server's own diagnostics

@@ -1,4 +1,4 @@
-"""A month in three days: every fault of benchmarks/month.py, on the same session, clocks, disk and history."""
+"""A month in three days: the faults of benchmarks/month.py on the same session, clocks, disk and history."""
 
 from __future__ import annotations
 

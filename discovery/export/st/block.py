@@ -25,8 +25,9 @@ from discovery.export.guarding import (
     compensated,
 )
 from discovery.export.identifiers import comment, formula, identifier, identifiers
+from discovery.export.st.guards import settable
 from discovery.export.st.language import KINDS, literal
-from discovery.export.st.step import settable, step_text
+from discovery.export.st.step import step_text
 from discovery.export.templated import templated
 from discovery.terms import names as names_in
 
