@@ -1,12 +1,12 @@
 """Thirty days of a compensated machine with everything that an ordinary month brings, on a simulated clock.
 
-    python benchmarks/month.py [days] [seed] [--learn]
+    python benchmarks/month.py [days] [seed] [--learn [--alone]]
 
 A hall door, a chiller step, 5 h without a sensor, a clock set by a day, a frozen server, 20 kills, a full
 disk and two power cuts; with --learn the machine ages as well (its losses fall by 1 % a day) and the
-compensation follows it. The session, its memory, guards, clock, output and history are those of `discovery
-compensate --opcua`; simulated are the machine, the two clocks of the computer, and what the disk and the
-power do.
+compensation follows it; --alone runs it once more without learning. The session, its memory, guards, clock,
+output and history are those of `discovery compensate --opcua`; simulated are the machine, the two clocks of
+the computer, and what the disk and the power do.
 """
 
 from __future__ import annotations
@@ -351,32 +351,41 @@ def machine() -> Exported:
 
 
 def compare(
-    days: int, seed: int, folder: Path, *, learning: bool, exported: Exported | None = None
+    days: int,
+    seed: int,
+    folder: Path,
+    *,
+    learning: bool,
+    alone: bool = False,
+    exported: Exported | None = None,
 ) -> dict[str, Any]:
     """The month with and without its faults: figures by name."""
     exported = exported or machine()
     plan = month(days, seed)
     key = private_key(folder / "key.pem")
     learn = (lambda: Learner(key)) if learning else None
-    clean_world = world(plan, seed, faults=False, ageing=False)
+    calm = replace(plan, hours=min(plan.hours, 72.0)) if learning else plan
+    clean_world = world(calm, seed, faults=False, ageing=False)
     true_world = world(plan, seed, faults=True, ageing=learning)
     (folder / "clean").mkdir()
     (folder / "true").mkdir()
     clean = live(exported, clean_world, plan, folder / "clean", faults=False, save_every_s=HOUR)
     found = live(exported, true_world, plan, folder / "true", faults=True, learn=learn)
     quiet = plan.quiet(found.times)
-    first = (found.times >= min(DAY, 0.25 * plan.hours * HOUR)) & (
-        found.times < min(2 * DAY, 0.5 * plan.hours * HOUR)
+    first = (clean.times >= min(DAY, 0.25 * plan.hours * HOUR)) & (
+        clean.times < min(2 * DAY, 0.5 * plan.hours * HOUR)
     )
     on = np.array([state != "no power" for state in found.states])
     last = found.times >= found.times[-1] - min(7 * DAY, 0.25 * plan.hours * HOUR)
     gaps = np.diff(found.rows)
     read = happening_noise(seed, found.left.shape)
     figures = {
-        "clean, day two, by readings with their noise, um": rms((clean.left + read)[first]),
+        "clean, day two, by readings with their noise, um": rms(
+            (clean.left + read[: len(clean.left)])[first]
+        ),
         "with faults, last week, by readings, um": rms((found.left + read)[quiet & last]),
         "state at the end": found.states[-1],
-        "clean, the same instants, um": rms(clean.left[quiet]),
+        "clean, the same instants, um": None if learning else rms(clean.left[quiet]),
         "clean, day two, um": rms(clean.left[first]),
         "with faults, outside of them, um": rms(found.left[quiet]),
         "all of the month, um": rms(found.left),
@@ -390,7 +399,7 @@ def compare(
         "probes": found.probes,
         "states": dict(Counter(found.states)),
     }
-    if learning:
+    if alone:
         (folder / "left").mkdir()
         left_alone = live(exported, true_world, plan, folder / "left", faults=True)
         figures["without learning, last week, um"] = rms(left_alone.left[quiet & last])
@@ -406,7 +415,7 @@ def main(words: list[str]) -> None:
     days, seed = itertools.chain(numbers, (30, 4000)[len(numbers) :])
     fast = "/dev/shm" if Path("/dev/shm").is_dir() else None  # 40 000 flushes to a real disk take 20 min
     with tempfile.TemporaryDirectory(dir=fast) as name:
-        found = compare(days, seed, Path(name), learning="--learn" in words)
+        found = compare(days, seed, Path(name), learning="--learn" in words, alone="--alone" in words)
     for text in found.pop("said"):
         print(f"  {text}"[:260])
     for title, value in found.items():

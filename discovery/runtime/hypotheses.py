@@ -46,8 +46,9 @@ FAST_S = 1200.0  # ... or in minutes: a chiller that swings, a joint that slips
 WEAR = (0.05, 0.2)  # relative change of a parameter that ages; both widths count half
 OTHER = (0.1, 0.4)  # relative change of a parameter that cannot age: something else changed
 OFFSET = (0.5, 2.0)  # K, of the sensor of an input
-LEAST_ODDS = 3.0  # log of the odds against `nothing`, below which nothing has changed
-LEAST_LEAD = 1.5  # log of the odds against each rival, below which it is undecided
+LEAST_ODDS = 2.5  # log of the odds against `nothing`, below which nothing has changed
+LEAST_LEAD = 1.0  # log of the odds against each rival, below which it is undecided
+WORN = 2.0  # log of how much more often a machine wears that has worn before
 RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
 MEMORY_S = 2 * 24 * 3600.0  # in which what was read counts less and less: wear goes on meanwhile
 AGES = ("heat load", "rotation speed", "fluid flow", "cooling power", "coolant temperature")
@@ -70,7 +71,6 @@ class Comparison:
     odds: Mapping[str, float]
     rms: float
     change: Mapping[str, tuple[float, float]]
-    covariance: Array
 
     def __str__(self) -> str:
         others = ", ".join(f"{name} {value:+.1f}" for name, value in self.odds.items() if name != "nothing")
@@ -135,9 +135,8 @@ def compare(
         )
     problem = make_problem(exported.model, campaign, recordings, outputs)
     channels = tuple(i.name for i in exported.inputs if i.role in TEMPERATURES)
-    usual = _linear(problem, parameters, channels, known, outputs, process)
-    strange = _linear(problem, parameters, channels, known, outputs, STRANGE * process)
-    fast = _linear(problem, parameters, channels, known, outputs, STRANGE * process, FAST_S)
+    settings = ((process, HEAT_TIME), (STRANGE * process, HEAT_TIME), (STRANGE * process, FAST_S))
+    usual, strange, fast = _linear(problem, parameters, channels, known, outputs, settings)
     model, ages = exported.model, ageing(exported)
     p = np.array(known["covariance"])
     starts = _start_spreads(problem)
@@ -163,15 +162,14 @@ def compare(
             _log_probability(fast, prior()),
         ]
     )
-    odds = {
-        name: value - logs["nothing"] - (0.0 if name in ("nothing", "wear") else RARE)
-        for name, value in logs.items()
-    }
+    worn = any("of" in entry for entry in exported.changelog)  # revisions are written for wear alone
+    before = {"nothing": 0.0, "wear": WORN * worn}
+    odds = {name: value - logs["nothing"] + before.get(name, -RARE) for name, value in logs.items()}
     verdict, what = _verdict(odds)
     rms = _rms(problem, levels, outputs)
-    change, covariance = _change(usual, prior(WEAR[1] * old), parameters, old, p)
+    change = _change(usual, prior(WEAR[1] * old), parameters, old)
     count = int(sum(np.isfinite(s.grid.readings).sum() for s in problem.systems))
-    return Comparison(tuple(recordings), count, verdict, what, odds, rms, change, covariance)
+    return Comparison(tuple(recordings), count, verdict, what, odds, rms, change)
 
 
 def _read(campaign: Campaign, recording: str, name: str) -> bool:
@@ -199,47 +197,52 @@ def _linear(
     channels: tuple[str, ...],
     known: Mapping[str, Any],
     outputs: Sequence[str],
-    process: float,
-    heat_time: float = HEAT_TIME,
-) -> _Linear:
-    theta = problem.start
-    nuisance = [i for i, u in enumerate(problem.unknowns) if u.is_start]
-    residuals, slopes, ages, logdet = [], [], [], 0.0
-    after = sum(float(system.grid.time[-1]) for system in problem.systems)
+    settings: Sequence[tuple[float, float]],
+) -> list[_Linear]:
+    """The linearised residual over all recordings under each setting of the process noise (share, time
+    [s]).
+    """
+    nuisance = [u for u in problem.unknowns if u.is_start]
+    shared = len(parameters) + len(channels)
+    blocks: list[list[tuple[Array, Array, float]]] = [[] for _ in settings]
+    ages, after = [], sum(float(system.grid.time[-1]) for system in problem.systems)
     for system in problem.systems:
-        trajectory = problem.run(system, theta)
+        trajectory = problem.run(system, problem.start)
         part = make_filter(trajectory)
-        noise = replace(_noise(trajectory, known, outputs, process), heat_time=heat_time)
-        residual = problem.residual(trajectory)
-        mine = [
-            problem.unknowns[i].name
-            for i in nuisance
-            if problem.unknowns[i].recording == system.grid.recording
-        ]
-        dy = sensitivities(trajectory, [*parameters, *channels], mine)
-        white, half = part.apply(noise, np.concatenate([residual[:, :, None], dy], axis=2))
-        own = np.zeros((len(white), len(parameters) + len(channels) + len(nuisance)))
-        shared = len(parameters) + len(channels)
-        own[:, :shared] = white[:, 1 : 1 + shared]
-        places = [k for k, i in enumerate(nuisance) if problem.unknowns[i].recording == system.grid.recording]
-        own[:, [shared + k for k in places]] = white[:, 1 + shared :]
+        places = [k for k, u in enumerate(nuisance) if u.recording == system.grid.recording]
+        dy = sensitivities(trajectory, [*parameters, *channels], [nuisance[k].name for k in places])
+        data = np.concatenate([problem.residual(trajectory)[:, :, None], dy], axis=2)
+        flows = heat_flows(trajectory)
+        for found, (share, time) in zip(blocks, settings, strict=True):
+            white, half = part.apply(_noise(flows, known, outputs, share, time), data)
+            own = np.zeros((len(white), shared + len(nuisance)))
+            own[:, :shared] = white[:, 1 : 1 + shared]
+            own[:, [shared + k for k in places]] = white[:, 1 + shared :]
+            found.append((white[:, 0], own, half))
         rows = np.broadcast_to(system.grid.time[system.grid.read][:, None], system.grid.measured.shape)
         ages.append(after - rows[system.grid.measured])
         after -= float(system.grid.time[-1])
-        residuals.append(white[:, 0])
-        slopes.append(own)
-        logdet += half
-    return _Linear(np.concatenate(residuals), np.concatenate(slopes), logdet, np.concatenate(ages))
+    age = np.concatenate(ages)
+    return [
+        _Linear(
+            np.concatenate([r for r, _, _ in one]),
+            np.concatenate([j for _, j, _ in one]),
+            sum(half for _, _, half in one),
+            age,
+        )
+        for one in blocks
+    ]
 
 
-def _noise(trajectory: Trajectory, known: Mapping[str, Any], outputs: Sequence[str], process: float) -> Noise:
+def _noise(
+    flows: Mapping[str, float], known: Mapping[str, Any], outputs: Sequence[str], process: float, time: float
+) -> Noise:
     """White and slow noise of the readings as the fit left them, heat in proportion to the flows."""
-    residual = known["residual"]
-    share = float(known["slow_share"])
+    residual, share = known["residual"], float(known["slow_share"])
     white = tuple(float(residual[n]) * np.sqrt(1.0 - share) for n in outputs)
     slow = tuple(float(residual[n]) * np.sqrt(share) for n in outputs)
-    flows = heat_flows(trajectory)
-    return Noise(tuple(outputs), white, slow, {n: process * value for n, value in flows.items()})
+    heat = {name: process * value for name, value in flows.items()}
+    return Noise(tuple(outputs), white, slow, heat, heat_time=time)
 
 
 def heat_flows(trajectory: Trajectory) -> dict[str, float]:
@@ -291,35 +294,25 @@ def _mean(logs: Sequence[float]) -> float:
 
 
 def _change(
-    linear: _Linear, wide: Array, parameters: Sequence[str], old: NDArray[np.bool_], p: Array
-) -> tuple[dict[str, tuple[float, float]], Array]:
-    """Change and standard deviation of each parameter that ages, and the covariance afterwards; the others
-    stay where they are. Wear goes on while it is measured, so the last readings count most.
+    linear: _Linear, wide: Array, parameters: Sequence[str], old: NDArray[np.bool_]
+) -> dict[str, tuple[float, float]]:
+    """Change of each parameter that ages where all others stay as they are, and its standard deviation where
+    they do not. Wear goes on while it is measured, so the last readings count most.
     """
     fade = np.exp(-linear.age / MEMORY_S)
-    recent_j, recent_r = linear.j * fade[:, None], linear.r * fade
+    j, r = linear.j * fade[:, None], linear.r * fade
     count = len(parameters)
-    free = np.concatenate([old, np.zeros(len(wide) - count, dtype=bool)])
-    free[count:] = np.diag(wide)[count:] > 0.0
+    free = np.concatenate([old, np.diag(wide)[count:] > 0.0])
     index = np.flatnonzero(free)
-    root = _root(wide[np.ix_(index, index)])
-    a = recent_j[:, index] @ root
-    posterior = root @ np.linalg.inv(a.T @ a + np.eye(root.shape[1])) @ root.T
-    shift = posterior @ (recent_j[:, index].T @ recent_r)
-    whole_root = _root(wide)
-    b = recent_j @ whole_root
-    everything = whole_root @ np.linalg.inv(b.T @ b + np.eye(whole_root.shape[1])) @ whole_root.T
-    ages = [k for k in range(count) if old[k]]
-    covariance = p.copy()
-    covariance[np.ix_(ages, ages)] = everything[np.ix_(ages, ages)]
-    cross = [k for k in range(count) if not old[k]]
-    covariance[np.ix_(ages, cross)] = 0.0
-    covariance[np.ix_(cross, ages)] = 0.0
-    change = {
-        parameters[k]: (float(shift[index.tolist().index(k)]), float(np.sqrt(max(everything[k, k], 0.0))))
-        for k in ages
+    root, whole = _root(wide[np.ix_(index, index)]), _root(wide)
+    a, b = j[:, index] @ root, j @ whole
+    shift = root @ np.linalg.solve(a.T @ a + np.eye(root.shape[1]), a.T @ r)
+    spread = whole @ np.linalg.solve(b.T @ b + np.eye(whole.shape[1]), whole.T)
+    return {
+        parameters[k]: (float(value), float(np.sqrt(max(spread[k, k], 0.0))))
+        for k, value in zip(index.tolist(), shift.tolist(), strict=True)
+        if k < count
     }
-    return change, covariance
 
 
 def _rms(problem: Problem, levels: Mapping[str, float], outputs: Sequence[str]) -> float:

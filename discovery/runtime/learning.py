@@ -32,7 +32,7 @@ from discovery.runtime.update import revision_of
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-ROW_S = 60.0  # between two rows of the recording that an update learns from
+ROW_S = 300.0  # between two rows of the recording that an update learns from
 ACTION = 1.6  # rms of the last errors left, in units of the residual of the fit: measure
 RECENT = 32  # errors that the action limit looks at
 FILE = "learning.json"
@@ -60,6 +60,7 @@ class Learner:
     marks: list[tuple[int, dict[str, float]]] = field(default_factory=list)  # row, states of the model there
     left: list[float] = field(default_factory=list)  # errors left, in units of the residual of the fit
     counted: dict[str, float] = field(default_factory=dict)  # instant of the last reading of each error
+    merged: int = 1  # ticks in the last row
     new: int = 0  # rows with errors since the last comparison
     compared: float = -1e30
     saved: float = -math.inf
@@ -90,8 +91,11 @@ class Learner:
                 return False
             self.times.append(now)
             self.inputs.append(compensator.inputs.tolist())
+            self.merged = 1
             self.errors.append(found)
             self._forget(now)
+        else:
+            self._merge(compensator)
         if found:
             self.new += 1
             predicted = predictions(compensator)
@@ -103,6 +107,15 @@ class Learner:
         self.advice = "measure the errors every half hour for the next 8 h" if beyond else ""
         wait = SOON_S if beyond else EVERY_S
         return self.new >= LEAST and now - self.compared >= wait
+
+    def _merge(self, compensator: Compensator) -> None:
+        """An input that switches stands in a row by its mean until the next one."""
+        assert compensator.inputs is not None
+        self.merged += 1
+        row = self.inputs[-1]
+        for k, spec in enumerate(compensator.exported.inputs):
+            if spec.between == "held":
+                row[k] += (float(compensator.inputs[k]) - row[k]) / self.merged
 
     def _interrupt(self, compensator: Compensator, now: float) -> None:
         """The model has not settled, or has failed: after more than GAP_S of it the recording begins anew."""

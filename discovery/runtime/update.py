@@ -116,7 +116,7 @@ def next_name(path: Path) -> Path:
 
 def next_revision(exported: Exported, found: Comparison) -> dict[str, Any]:
     """The document of the updated model with its changelog entry; only what wear can change has moved, and
-    ranges and limits stay those of the fit.
+    ranges, limits and what the fit knew of its parameters stay: the next comparison holds the revision to it.
     """
     document, model = {**exported.document}, model_with(exported.model, found.change)
     entries = []
@@ -134,11 +134,9 @@ def next_revision(exported: Exported, found: Comparison) -> dict[str, Any]:
         "text": f"{found}; {moved}",
         "of": exported.seal.sha256,
     }
-    known = {**document["knowledge"], "covariance": found.covariance.tolist()}
     return document | {
         "revision": revision,
         "parameters": entries,
-        "knowledge": known,
         "changelog": [*document["changelog"], note],
     }
 

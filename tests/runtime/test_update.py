@@ -224,5 +224,5 @@ def test_what_cannot_be_told_apart_is_not_signed() -> None:
     assert _verdict(odds) == ("undecided", "wear or sensor of T")
     assert _verdict({**odds, "sensor of T": 1.0}) == ("wear", "")
     assert _verdict({**odds, "wear": 2.0, "sensor of T": 1.0}) == ("nothing", "")
-    said = Comparison(("a",), 9, "undecided", "wear or sensor of T", odds, 1.4, {}, np.zeros((0, 0)))
+    said = Comparison(("a",), 9, "undecided", "wear or sensor of T", odds, 1.4, {})
     assert "measure more often, wet and dry" in Update(said, None, None, None).lines()[-1]
