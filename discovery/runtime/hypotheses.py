@@ -39,7 +39,7 @@ from discovery.terms.dual import evaluate
 Array = NDArray[np.float64]
 Verdict = Literal["nothing", "wear", "input sensor", "something else", "undecided"]
 
-# Chosen on seeds set aside for it and confirmed on others, see benchmarks/update.md
+# Chosen on seeds set aside for it and confirmed on others, see benchmarks/runtime.md
 PROCESS = 0.03  # of the heat flows through a body: everyday error of a lumped model
 STRANGE = 5.0  # times that: something else, in hours ...
 FAST_S = 1200.0  # ... or in minutes: a chiller that swings, a joint that slips
@@ -48,9 +48,9 @@ OTHER = (0.1, 0.4)  # relative change of a parameter that cannot age: something 
 OFFSET = (0.5, 2.0)  # K, of the sensor of an input
 LEAST_ODDS = 2.5  # log of the odds against `nothing`, below which nothing has changed
 LEAST_LEAD = 1.0  # log of the odds against each rival, below which it is undecided
-WORN = 2.0  # log of how much more often a machine wears that has worn before
+WORN = 3.0  # log of how much more often a machine wears that has worn before
 RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
-MEMORY_S = 2 * 24 * 3600.0  # in which what was read counts less and less: wear goes on meanwhile
+MEMORY_S = 24 * 3600.0  # in which what was read counts less and less: wear goes on meanwhile
 AGES = ("heat load", "rotation speed", "fluid flow", "cooling power", "coolant temperature")
 START_SD = 0.5  # K, um: of states that are known where a recording begins
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
-import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,11 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from discovery.export.c import c_files, c_prefix
 from discovery.export.document import Exported
-from discovery.export.fmu import WINDOWS, fmu_bytes
+from discovery.export.fmu import fmu_bytes
 from discovery.export.ranges import sampled_inputs
-from discovery.export.replay import CFLAGS, make_reference, reference_files, replay_source
 from discovery.export.stepper import Stepper
 from discovery.recordings import Campaign
 from tests.export.conftest import make_campaign, make_model, needs_gcc
@@ -154,41 +148,3 @@ def test_a_parameter_can_be_tuned_by_its_name(path: Path, exported: Exported) ->
         unit.unit.exitInitializationMode()
         unit.unit.doStep(0.0, 600.0)
         assert unit.get([o.name for o in exported.outputs]) != pytest.approx(tuned, abs=1e-6)
-
-
-@pytest.mark.skipif(shutil.which(WINDOWS) is None, reason=f"no compiler for Windows ({WINDOWS}) is installed")
-def test_a_unit_has_a_binary_for_windows(path: Path) -> None:
-    """It is a 64 bit library and has the functions of the standard."""
-    with zipfile.ZipFile(path) as archive:
-        [name] = [n for n in archive.namelist() if n.endswith(".dll")]
-        data = archive.read(name)
-    assert name.split("/")[1] in ("win64", "x86_64-windows")
-    assert data[:2] == b"MZ"
-    start = int.from_bytes(data[0x3C:0x40], "little")
-    assert data[start : start + 6] == b"PE\0\0\x64\x86"
-    assert b"DoStep" in data
-
-
-@pytest.mark.skipif(
-    shutil.which(WINDOWS) is None or not Path("/usr/lib/wine/wine64").exists(),
-    reason="no compiler for Windows, or no wine, is installed",
-)
-def test_the_c_code_is_the_model_on_windows(
-    exported: Exported, campaign_of_six_hours: Campaign, tmp_path: Path
-) -> None:
-    inputs = sampled_inputs(campaign_of_six_hours, "fit", exported.compiled.inputs, 10.0)
-    reference = make_reference(exported.compiled, inputs)
-    files = {**c_files(exported), **replay_source(exported), **reference_files(exported.compiled, reference)}
-    for name, text in files.items():
-        (tmp_path / name).write_text(text)
-    source = ["replay.c", f"{c_prefix(exported)}.c"]
-    subprocess.run(
-        [WINDOWS, *CFLAGS, *source, "-static", "-lm", "-o", "replay.exe"], cwd=tmp_path, check=True
-    )
-    done = subprocess.run(
-        ["/usr/lib/wine/wine64", "replay.exe", "reference_inputs.csv", "reference_outputs.csv"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-        env=os.environ | {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert float(done.stdout.split()[-1]) < 1e-9
