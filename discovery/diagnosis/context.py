@@ -37,6 +37,8 @@ PROCESS = Prior(
     thresholds.LEVEL_WEIGHTS,
     thresholds.SLOW,
     thresholds.SLOW_WEIGHTS,
+    thresholds.FORMS,
+    thresholds.FORM_WEIGHTS,
 )
 
 
@@ -63,6 +65,11 @@ class Context:
     def white(self) -> Noise:
         """The reading noise."""
         return self.settings[0].noise
+
+    @property
+    def usual(self) -> Noise:
+        """The noise that is most likely before the recordings are read."""
+        return max(self.settings, key=lambda s: s.log_weight).noise
 
     @cached_property
     def candidates(self) -> list[Hypothesis]:
@@ -189,7 +196,7 @@ def make_context(
         floor,
         belief,
         tuple(outliers),
-        tuple(model_form(fit.trajectories, np.array(white.white))),
+        tuple(model_form(fit, np.array(white.white))),
     )
 
 

@@ -23,8 +23,8 @@ from discovery.evidence.whitening import log_sum_exp
 Array = NDArray[np.float64]
 
 WIDTHS = (1 / 3, 1.0, 3.0)  # of the priors, relative to what they are
-FAR = 40.0  # log evidence below the best from which a model takes no part
-MOST = 40  # models that take part
+FAR = 25.0  # log evidence below the best from which a model takes no part
+MOST = 25  # models that take part
 IN_PLAY = 8.0  # log evidence below the best of a model within which a noise setting counts
 SETTINGS = 3  # of these, at most
 

@@ -250,7 +250,7 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
         return float(known[k].levels[0])
 
     # a force on top of form error that is larger than usual would be the same noise once more
-    usual = [k for k, s in enumerate(context.settings) if not force or s.noise.share <= thresholds.SHARE]
+    usual = [k for k, s in enumerate(context.settings) if not force or _is_usual(s.noise)]
     start = min(usual, key=lambda k: _distance(context.settings[k].noise, bare.fit.noise))
     queue = [start]
     while queue:
@@ -274,7 +274,12 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
 def _distance(one: Noise, other: Noise) -> float:
     """How far two noises are apart in slow noise, form error and jitter."""
     slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
-    return slow + abs(one.share - other.share) + abs(one.jitter - other.jitter)
+    form = abs(one.share - other.share) + abs(one.form - other.form)
+    return slow + form + abs(one.jitter - other.jitter)
+
+
+def _is_usual(noise: Noise) -> bool:
+    return max(noise.share, noise.form) <= thresholds.SHARE
 
 
 def with_force(context: Context, one: Scored, state: str) -> Scored:
@@ -343,8 +348,7 @@ def _in_play(context: Context, current: Scored) -> list[Setting]:
     what is missing may have passed.
     """
     best = current.settings[current.best]
-    quiet = min(s.noise.share for s in context.settings)
-    other = next(s for s in context.settings if s.noise.share == quiet and s.place[:2] == best.place[:2])
+    other = next(s for s in context.settings if s.place == (*best.place[:2], 0, 0))
     return [best] if other.place == best.place else [best, other]
 
 
