@@ -67,6 +67,11 @@ class Context:
         return self.settings[0].noise
 
     @property
+    def blocks(self) -> int:
+        """Blocks of time in each recording."""
+        return max(3, round(thresholds.BLOCKS / len(self.recordings)))
+
+    @property
     def usual(self) -> Noise:
         """The noise that is most likely before the recordings are read."""
         return max(self.settings, key=lambda s: s.log_weight).noise

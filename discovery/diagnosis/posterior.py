@@ -73,14 +73,14 @@ def posterior(context: Context, models: Collection[Scored], seed: int = 0) -> Po
     """The posterior of models over bootstrap draws of blocks and over prior widths."""
     best = max(m.evidence for m in models)
     taking = sorted((m for m in models if m.evidence > best - FAR), key=lambda m: -m.evidence)[:MOST]
-    draws, widths = _draws(len(context.recordings), seed)
+    draws, widths = _draws(len(context.recordings), context.blocks, seed)
     return Posterior(tuple(taking), np.array([_evidence(m, draws, widths) for m in taking]))
 
 
-def _draws(recordings: int, seed: int) -> tuple[Array, Array]:
+def _draws(recordings: int, blocks: int, seed: int) -> tuple[Array, Array]:
     """How often each block counts (D, B), the number in each recording kept; the width of priors (D,)."""
     rng = np.random.default_rng(seed)
-    blocks, count = thresholds.BLOCKS, thresholds.DRAWS
+    count = thresholds.DRAWS
     one = [rng.multinomial(blocks, np.full(blocks, 1 / blocks), count) for _ in range(recordings)]
     return np.concatenate(one, axis=1).astype(float), rng.choice(WIDTHS, count)
 

@@ -28,6 +28,7 @@ from discovery.models import Model
 Array = NDArray[np.float64]
 
 ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
+KEPT = 4  # noise settings of a model, the most likely ones
 NEAR = 4.0  # log evidence below the best within which a noise setting leads to its neighbours
 
 
@@ -218,7 +219,7 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     extra = tuple(np.concatenate(parts, axis=2) for parts in zip(context.form, own, strict=True))
     model, effects = context.form[0].shape[2], own[0].shape[2]
     spread = np.concatenate([np.ones(model), np.full(effects, thresholds.FORM)])
-    seen = Whitened(fit, thresholds.BLOCKS, extra, spread, model)
+    seen = Whitened(fit, context.blocks, extra, spread, model)
     free = [h for h in chosen if h.effect.amplitude.fixed is None]
     place = {u.name: i for i, u in enumerate(fit.problem.unknowns) if not u.is_nuisance}
     index = np.array([place[name] for h in free for name in h.amplitudes], dtype=np.intp)
@@ -263,7 +264,7 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
             if k not in known and k not in queue
             if context.settings[k].is_next_to(context.settings[here])
         ]
-    order = sorted(known)
+    order = sorted(known, key=lambda k: -level(k))[:KEPT]
     return replace(
         bare,
         settings=tuple(context.settings[k] for k in order),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import copysign, inf, isfinite, log, sqrt
+from math import inf, isfinite, log
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
@@ -57,8 +57,12 @@ class Verdict:
     reasons: tuple[str, ...]
 
 
-def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
-    """What the recordings to fit say."""
+def decide(context: Context, found: Search, posterior: Posterior, gain: float) -> Verdict:
+    """What the recordings to fit say.
+
+    Args:
+        gain: what the best answer explains of the free runs of the fitted recordings, rms in reading noises.
+    """
     answer = found.best
     candidates = tuple(
         sorted(
@@ -68,7 +72,7 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     )
     if posterior.nothing > 1 - thresholds.DETECTED:
         return _nothing(context, answer, candidates)
-    if _explained(found.baseline.rms(), answer.rms()) < thresholds.MATTERS and not posterior.best.forced:
+    if gain < thresholds.MATTERS:
         return _nothing(context, answer, candidates)
     sure = [n for n in candidates if n.probability >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in sure if (text := _refused(context, answer, n.hypothesis))}
@@ -94,21 +98,13 @@ def _refused(context: Context, answer: Scored, h: Hypothesis) -> str | None:
     if veto := vetoed(context, answer, h):
         return veto
     outside = left_out(context, answer, h)
-    if outside is None or _explained(outside.before, outside.after) >= thresholds.MATTERS:
+    if outside is None or outside.explained >= thresholds.MATTERS:
         return None
     rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
     return (
         f"{h.effect.word} at {h.where} does not make free runs better by what would matter on recordings that "
         f"are left out of the fit (rms over the reading noise: {rms})"
     )
-
-
-def _explained(before: float, after: float) -> float:
-    """What a model explains of the readings that another one leaves, rms in reading noises; less than nothing
-    where it leaves more.
-    """
-    square = before**2 - after**2
-    return float(copysign(sqrt(abs(square)), square)) if isfinite(square) else -inf
 
 
 def _short(
