@@ -27,19 +27,22 @@ from discovery.terms import evaluate
 
 Array = NDArray[np.float64]
 
-MOST_READINGS = 6000  # instants, over all recordings
+MOST_READINGS = 4000  # instants, over all recordings
 NODES = 1000  # of a recording, about, and its readings: inputs are their means in between
 
-PROCESS = Prior(
-    thresholds.FLOOR,
-    thresholds.SHARE,
-    thresholds.LEVELS,
-    thresholds.LEVEL_WEIGHTS,
-    thresholds.SLOW,
-    thresholds.SLOW_WEIGHTS,
-    thresholds.FORMS,
-    thresholds.FORM_WEIGHTS,
-)
+
+def process_prior() -> Prior:
+    """What is believed of process noise before the recordings are read."""
+    return Prior(
+        thresholds.FLOOR,
+        thresholds.SHARE,
+        thresholds.LEVELS,
+        thresholds.LEVEL_WEIGHTS,
+        thresholds.SLOW,
+        thresholds.SLOW_WEIGHTS,
+        thresholds.FORMS,
+        thresholds.FORM_WEIGHTS,
+    )
 
 
 @dataclass(frozen=True)
@@ -168,13 +171,13 @@ def make_context(
     if any(g.unsure for g in whole.values()):
         grids = thinned(whole)
         fit = fitted(grids, fit)
-    floor = floors(fit, PROCESS.floor)
-    white = reading_noise(fit, stated, floor, PROCESS)
+    floor = floors(fit, thresholds.FLOOR)
+    white = reading_noise(fit, stated, floor, process_prior())
     outliers = find_outliers(fit, whole, np.array(white.white))
     if outliers:
         grids = thinned(without(whole, outliers))
         fit = fitted(grids, fit)
-        white = reading_noise(fit, stated, floor, PROCESS)
+        white = reading_noise(fit, stated, floor, process_prior())
     own = {n: replace(s, start_sd=fit.model.states[n].start_sd) for n, s in model.states.items()}
     scene = Scene(
         campaign.channels,
@@ -197,7 +200,7 @@ def make_context(
         tuple(_within(e, spacing, duration) for e in effects),
         scene,
         fit,
-        settings(white, floor, PROCESS, any(g.unsure for g in grids.values())),
+        settings(white, floor, process_prior(), any(g.unsure for g in grids.values())),
         floor,
         belief,
         tuple(outliers),
@@ -208,9 +211,9 @@ def make_context(
 def with_noise_of(context: Context, fit: Fit) -> Context:
     """The context with the reading noise as it stands with a better fit, where the campaign does not state it."""
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
-    white = reading_noise(fit, stated, context.floor, PROCESS)
+    white = reading_noise(fit, stated, context.floor, process_prior())
     unsure = any(g.unsure for g in context.grids.values())
-    return replace(context, settings=settings(white, context.floor, PROCESS, unsure))
+    return replace(context, settings=settings(white, context.floor, process_prior(), unsure))
 
 
 def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:
