@@ -1,4 +1,4 @@
-"""The diagnosis from start to end: fit, noise, search, posterior, verdict, proof, location, next experiment."""
+"""The diagnosis from start to end: fit, noise, search, posterior, verdict, proof, location, what to do."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ class Diagnosis:
         return explained(self.held_out)
 
     def interval(self, h: Hypothesis, name: str) -> tuple[float | None, float | None]:
-        """95 % interval of a parameter of what was named: of the diagnosis and of the fit that goes out, which
-        need not agree, each wider by what a law slightly off in form leaves open.
+        """95 % interval of a parameter of what was named: of the diagnosis and of the fit that goes out,
+        which need not agree, each wider by what a law slightly off in form leaves open.
         """
         assert self.after is not None
         p = self.after.model.parameters[name]

@@ -1,7 +1,7 @@
 """The verdict: what is named, how sure it is, what else it could be, and when to say that nothing is known.
 
-An effect is named where its probability says so, where it also predicts recordings that a fit has not seen, and
-where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
+An effect is named where its probability says so, where it also predicts recordings that a fit has not seen,
+and where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
             named = ()
             rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
             reasons.append(
-                f"{n.hypothesis.effect.word} at {n.hypothesis.where} makes free runs worse on recordings that "
-                f"are left out of the fit (rms over the reading noise: {rms})"
+                f"{n.hypothesis.effect.word} at {n.hypothesis.where} makes free runs worse on recordings "
+                f"that are left out of the fit (rms over the reading noise: {rms})"
             )
     reasons += _apart(candidates, (*named, *sure))
     if not named:

@@ -33,7 +33,7 @@ _NARROW = 4.0  # standard deviations from zero beyond which the posterior is tak
 
 @dataclass(frozen=True)
 class Slab:
-    """Prior of sizes: `median` (A,) of their magnitudes, 68 % within `factor` (A,), sign +1, -1 or 0 (either)."""
+    """Prior of sizes (A,): `median` of their magnitudes, 68 % within `factor`, sign +1, -1 or 0 (either)."""
 
     median: Array
     factor: Array
@@ -117,7 +117,7 @@ class Projected:
     gram: Array
     length: Array
 
-    def block(self, index: Sequence[int]) -> Array:
+    def block(self, index: Sequence[int] | NDArray[np.intp]) -> Array:
         """Gram matrix of some of the signatures."""
         z = self.columns[:, list(index)]
         inside = self.basis.T @ z
@@ -153,8 +153,8 @@ def scan(
     slab: Slab,
     without: Sequence[Without] = (),
 ) -> list[list[Score]]:
-    """Every claim among the hypotheses scored on what a fit leaves, the best odds first; then on what it leaves
-    with one of its own effects taken out, to first order, for each of `without`.
+    """Every claim among the hypotheses scored on what a fit leaves, the best odds first; then on what it
+    leaves with one of its own effects taken out, to first order, for each of `without`.
 
     Args:
         hypotheses: claims at all their shape values.

@@ -3,9 +3,9 @@
     q_k (1 + sum_m e_km psi_m),   e_km ~ N(0, share^2)
 
 for each flow of the model, and likewise for what each output shows. psi_m are the inputs, the body and the
-recording, each less its mean and over its spread, scaled so that a flow is off by the share in all. The part of form error that wanders with time is process noise
-(`process_noise.py`); this one does not average out over a long recording (Kennedy & O'Hagan, J. R. Stat. Soc. B
-63, 2001).
+recording, each less its mean and over its spread, scaled so that a flow is off by the share in all. The part
+of form error that wanders with time is process noise (`process_noise.py`); this one does not average out over
+a long recording (Kennedy & O'Hagan, J. R. Stat. Soc. B 63, 2001).
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -205,8 +206,8 @@ class Whitened:
         order = np.argsort(self.block, kind="stable")
         edges = np.searchsorted(self.block[order], np.arange(count + 1))
         rows, log = rows[order], log[order]
-        pieces = [rows[a:b].T @ rows[a:b] for a, b in zip(edges[:-1], edges[1:], strict=True)]
-        logdet = np.array([float(np.sum(log[a:b])) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+        pieces = [rows[a:b].T @ rows[a:b] for a, b in pairwise(edges)]
+        logdet = np.array([float(np.sum(log[a:b])) for a, b in pairwise(edges)])
         prior, constant = self.prior
         return Grams(noise, np.array(pieces), logdet, prior, constant)
 
