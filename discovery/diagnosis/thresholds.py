@@ -23,9 +23,7 @@ SLOW = (
     10.0,
 )  # slow noise of outputs, as shares of the reading noise, integrated over ...
 SLOW_WEIGHTS = (0.35, 0.35, 0.2, 0.08, 0.02)  # ... with these weights
-FORM = (
-    0.2  # of the flow of a named effect, at each operating point: no law is quite that of nature
-)
+FORM = 0.2  # of the flow of a named effect, at each operating point: no law is quite that of nature
 UNKNOWN_FORCE = 10.0  # of the process noise of a body: a latent force, "none of these"
 
 # --- effects ----------------------------------------------------------------------------------------------

@@ -17,8 +17,8 @@ from discovery.diagnosis.scored import assess
 from discovery.effects.candidates import hypotheses
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.latent_force import BLOCKS, Forcing, free_forcing
-from tests.mismatch.machine import SEEN, Array, campaign, model, simulated
-from tests.mismatch.test_ask import plate, ten_minutes
+from tests.machine import SEEN, Array, campaign, model, simulated
+from tests.design.test_ask import plate, ten_minutes
 
 
 def ruled(heat: Callable[[Array, Array], Array]) -> str:

@@ -20,7 +20,7 @@ from discovery.fitting import Noise
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
-from tests.mismatch.machine import NOISE, SEEN, Array, Inputs, campaign, changed, model, simulated
+from tests.machine import NOISE, SEEN, Array, Inputs, campaign, changed, model, simulated
 
 PLATE = {
     "T_env": Channel("T_env", "ambient temperature", "degC", None, "linear"),

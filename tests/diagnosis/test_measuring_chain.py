@@ -17,7 +17,7 @@ from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.recordings import Recording
 from discovery.terms import Apply, Expression, names
-from tests.mismatch.machine import SEEN, campaign, changed, model, simulated
+from tests.machine import SEEN, campaign, changed, model, simulated
 
 
 def context(*words: str) -> Context:

@@ -13,7 +13,7 @@ from discovery.diagnosis.diagnose import diagnose
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
-from tests.mismatch import machine
+from tests import machine
 
 EVERY = 300.0  # s
 INTO_MOTOR, INTO_COLUMN = 6e-4, 1.2e-4  # 1/s: the column has five times the capacity of the motor

@@ -20,7 +20,7 @@ from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Score
 from discovery.evidence.latent_force import Forcing
-from tests.mismatch.machine import SEEN, campaign, model, simulated
+from tests.machine import SEEN, campaign, model, simulated
 
 RUNS = ("r1", "r2")
 

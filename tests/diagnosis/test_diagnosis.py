@@ -25,7 +25,7 @@ from discovery.models import Model, Parameter, read_model, write_model
 from discovery.models.reduced import reduced
 from discovery.recordings import Recording
 from discovery.terms import Term, parse
-from tests.mismatch.machine import (
+from tests.machine import (
     CHANNELS,
     NOISE,
     SEEN,

@@ -16,7 +16,7 @@ from discovery.evidence.late import beside_switches, perhaps_late
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
-from tests.mismatch import machine
+from tests import machine
 
 Array = NDArray[np.float64]
 COIL, FRAME, LINK, AIR = 3000.0, 30000.0, 14.0, 6.0  # J/K, W/K

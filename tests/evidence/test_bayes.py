@@ -19,7 +19,7 @@ from discovery.evidence.bayes import Board, by_claim, make_board, scores
 from discovery.evidence.signatures import signatures
 from discovery.evidence.whitening import Lens, View
 from discovery.fitting import Noise
-from tests.mismatch import machine
+from tests import machine
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from discovery.effects.catalogue import Effect, catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.events import heat_steps
 from discovery.evidence.signatures import signatures
-from tests.mismatch import machine
-from tests.mismatch.sample import expand, inside, sample, trajectory
+from tests import machine
+from tests.effects.sample import expand, inside, sample, trajectory
 
 
 def _times(h: Hypothesis) -> dict[str, float]:

@@ -7,7 +7,7 @@ import pytest
 
 from discovery import UserError, diagnose
 from discovery.recordings import Recording
-from tests.mismatch.machine import SEEN, campaign, changed, model, simulated
+from tests.machine import SEEN, campaign, changed, model, simulated
 
 pytestmark = pytest.mark.filterwarnings("error")
 
