@@ -8,17 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from discovery.diagnosis.scales import lags
 
 from discovery.diagnosis.context import make_context
 from discovery.diagnosis.description import describe
 from discovery.diagnosis.regime import of_effects, of_free_heat
-from discovery.diagnosis.scales import lags
 from discovery.diagnosis.scored import assess
 from discovery.effects.candidates import hypotheses
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.latent_force import BLOCKS, Forcing, free_forcing
-from tests.machine import SEEN, Array, campaign, model, simulated
 from tests.design.test_ask import plate, ten_minutes
+from tests.machine import SEEN, Array, campaign, model, simulated
 
 
 def ruled(heat: Callable[[Array, Array], Array]) -> str:

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from discovery.diagnosis.scan import look
 
 from discovery.diagnosis.context import Context, make_context
 from discovery.diagnosis.diagnose import diagnose
-from discovery.diagnosis.scan import look
 from discovery.diagnosis.scored import assess, refit
 from discovery.diagnosis.vetoes import objections
 from discovery.effects.candidates import hypotheses

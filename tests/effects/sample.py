@@ -1,5 +1,5 @@
-"""A sample machine with every kind of place where an effect can act, as a balance of heat and as a model whose
-states are its errors; two short recordings of it.
+"""A sample machine with every kind of place where an effect can act, as a balance of heat and as a model of
+its errors; two short recordings of it.
 """
 
 from __future__ import annotations

@@ -1,158 +1,182 @@
-"""Evidence in closed form against integration by brute force, and what a refit leaves of a signature."""
+"""Bayes factors against integration by brute force, and what a refit leaves of a signature."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import cast
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import quad
-from scipy.stats import norm
+from scipy.stats import lognorm, norm
 
-from discovery.diagnosis.context import make_context
-from discovery.effects.candidates import hypotheses
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
-from discovery.evidence.bayes import Board, by_claim, make_board, scores
+from discovery.evidence.bayes import Projected, Slab, _ranked, scan
+from discovery.evidence.process_noise import Setting
 from discovery.evidence.signatures import signatures
-from discovery.evidence.whitening import Lens, View
-from discovery.fitting import Noise
+from discovery.evidence.whitening import Whitened
+from discovery.fitting import Noise, fit_model
 from tests import machine
 
 Array = NDArray[np.float64]
 
 RNG = np.random.default_rng(3)
-Z = RNG.standard_normal((30, 2))
-RESIDUAL = Z @ [0.5, -0.2] + RNG.standard_normal(30)
+Z = np.linalg.qr(RNG.standard_normal((30, 3)))[0] * [4.0, 3.0, 6.0]
+RESIDUAL = Z @ [0.5, -0.2, 0.1] + RNG.standard_normal(30)
 
 
-def board(word: str, amplitudes: int, spread: float, levels: tuple[float, ...] = (0.0,)) -> Board:
-    """One hypothesis with the first columns of Z for signature, longer under each further noise level."""
+def slab(median: float = 0.4, factor: float = 3.5, sign: float = 0.0, count: int = 1) -> Slab:
+    return Slab(np.full(count, median), np.full(count, factor), np.full(count, sign))
+
+
+def prior(size: float, median: float = 0.4, factor: float = 3.5, sign: float = 0.0) -> float:
+    """Density of a size, by scipy: log-normal in magnitude."""
+    share = 0.5 if sign == 0 else float(np.sign(size) == sign)
+    return share * float(lognorm.pdf(abs(size), np.log(factor), scale=median))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0, 0.0])
+def test_the_prior_of_a_size_is_log_normal_and_zero_at_zero(sign: float) -> None:
+    sizes = np.array([-3.0, -0.4, -1e-3, 1e-3, 0.2, 5.0])
+    expected = [prior(size, sign=sign) for size in sizes]
+    assert slab(sign=sign, count=6).density(sizes) == pytest.approx(expected)
+    assert slab(sign=sign).density(np.array([1e-12]))[0] < 1e-6
+
+
+@pytest.mark.parametrize("factor", [1.5, 3.5, 6.0])
+@pytest.mark.parametrize("sign", [1.0, 0.0])
+@pytest.mark.parametrize(
+    ("mean", "sd"),
+    [(0.4, 0.01), (0.4, 0.09), (0.4, 0.11), (1.5, 0.5), (0.0, 0.3), (0.2, 0.3), (0.1, 3.0), (-0.2, 0.3)],
+)
+def test_the_average_of_the_prior_is_that_of_quadrature(
+    mean: float, sd: float, sign: float, factor: float
+) -> None:
+    """Narrow and wide likelihoods, and both sides of where one form takes over from the other."""
+
+    def integrand(size: float) -> float:
+        return prior(size, factor=factor, sign=sign) * float(norm.pdf(size, mean, sd))
+
+    edges = sorted({mean - 9 * sd, 0.0, mean + 9 * sd, 1e-3, -1e-3, 0.1, 1.0})
+    whole = sum(quad(integrand, a, b, limit=400)[0] for a, b in pairwise(edges))
+    found = slab(factor=factor, sign=sign).average(np.array([mean]), np.array([sd**2]))
+    assert found == pytest.approx(np.log(whole), abs=0.03)
+
+
+def projected(*which: int, scale: float = 1.0) -> Projected:
+    """Some columns of Z as signatures, nothing absorbed."""
+    z = scale * Z[:, which]
+    gram = np.einsum("na,na->a", z, z)
+    return Projected(z, np.zeros((30, 0)), z.T @ RESIDUAL, gram, np.sqrt(gram))
+
+
+def gain_of(word: str, part: Projected, amplitudes: int, prior_of: Slab) -> float:
     h = Hypothesis(catalogue()[word], (), tuple(f"a{k}" for k in range(amplitudes)))
-    noise, unused = Noise(("y",), (1.0,)), cast(Lens, None)
-    views = tuple(View(unused, noise, RESIDUAL, level, np.zeros((0, 0))) for level in levels)
-    columns = tuple(Z[:, :amplitudes] * (1 + 0.3 * k) for k in range(len(levels)))
-    lengths = tuple(np.linalg.norm(c, axis=0) for c in columns)
-    return Board(
-        (h,), np.full(amplitudes, spread), views, columns, lengths, np.zeros(amplitudes, dtype=np.intp)
-    )
+    (found,) = _ranked([h], prior_of, np.zeros(1), [part])
+    return found.gain
 
 
-def factor(z: Array, *sizes: float) -> float:
-    """Likelihood ratio of given amplitudes against none."""
-    left = RESIDUAL - z @ np.array(sizes)
-    return float(np.exp(0.5 * RESIDUAL @ RESIDUAL - 0.5 * left @ left))
+def factor_of(z: Array, *, median: float = 0.4, sign: float = 0.0) -> float:
+    """Bayes factor of one signature by quadrature."""
+
+    def integrand(size: float) -> float:
+        ratio = size * (z @ RESIDUAL) - 0.5 * size**2 * (z @ z)
+        return prior(size, median, sign=sign) * float(np.exp(ratio))
+
+    parts = [(-30.0, -0.05), (-0.05, 0.0), (0.0, 0.05), (0.05, 1.0), (1.0, 30.0)]
+    return sum(quad(integrand, a, b, limit=400)[0] for a, b in parts)
 
 
-@pytest.mark.parametrize("spread", [0.05, 1.0, 20.0])
-def test_an_amplitude_of_known_sign(spread: float) -> None:
-    prior = norm(0, spread)
-    whole = quad(lambda a: 2 * prior.pdf(a) * factor(Z[:, :1], a), 0, 40, points=[0.3, 0.6, 1.0])[0]
-    assert scores(board("fluid_convection", 1, spread))[0].gain == pytest.approx(np.log(whole), abs=1e-5)
+@pytest.mark.parametrize("median", [0.05, 0.4, 5.0])
+@pytest.mark.parametrize(("word", "sign"), [("fluid_convection", 1.0), ("sensor_offset", 0.0)])
+@pytest.mark.parametrize("column", [0, 1, 2])
+def test_a_bayes_factor_is_an_integral(column: int, word: str, sign: float, median: float) -> None:
+    found = gain_of(word, projected(column), 1, slab(median, sign=sign))
+    expected = np.log(factor_of(Z[:, column], median=median, sign=sign))
+    assert found == pytest.approx(expected, abs=0.03)
 
 
-@pytest.mark.parametrize("spread", [0.05, 1.0, 20.0])
-def test_an_amplitude_of_unknown_sign(spread: float) -> None:
-    prior = norm(0, spread)
-    whole = quad(lambda a: prior.pdf(a) * factor(Z[:, :1], a), -40, 40, points=[0.0, 0.3, 0.6, 1.0])[0]
-    assert scores(board("sensor_offset", 1, spread))[0].gain == pytest.approx(np.log(whole), abs=1e-5)
-
-
-def test_two_amplitudes_at_once() -> None:
-    prior, grid = norm(0, 0.8), np.linspace(-4, 4, 801)
-    a, b = np.meshgrid(grid, grid, indexing="ij")
-    gain = a * (Z[:, 0] @ RESIDUAL) + b * (Z[:, 1] @ RESIDUAL)
-    gram = Z.T @ Z
-    gain -= 0.5 * (gram[0, 0] * a**2 + 2 * gram[0, 1] * a * b + gram[1, 1] * b**2)
-    whole = np.sum(prior.pdf(a) * prior.pdf(b) * np.exp(gain)) * 0.01**2
-    assert scores(board("rezero", 2, 0.8))[0].gain == pytest.approx(np.log(whole), abs=1e-4)
+def test_sizes_that_do_not_look_alike_multiply() -> None:
+    expected = np.log(factor_of(Z[:, 0])) + np.log(factor_of(Z[:, 1]))
+    assert gain_of("rezero", projected(0, 1), 2, slab(count=2)) == pytest.approx(expected, abs=0.05)
 
 
 def test_an_effect_that_is_on_or_off_has_nothing_to_integrate() -> None:
-    assert scores(board("fluid_delay", 1, 1.0))[0].gain == pytest.approx(np.log(factor(Z[:, :1], 1.0)))
+    z = Z[:, 0]
+    ratio = z @ RESIDUAL - 0.5 * (z @ z)
+    assert gain_of("fluid_delay", projected(0), 1, slab()) == pytest.approx(ratio)
 
 
-def test_noise_levels_are_integrated_out() -> None:
-    """Evidence is summed over noise levels, each as likely before the readings as the others."""
-    prior, levels = norm(0, 1.0), (0.0, 1.5, -2.0)
-    wholes = [
-        quad(
-            lambda a, z=Z[:, :1] * (1 + 0.3 * k): prior.pdf(a) * factor(z, a), -40, 40, points=[0.0, 0.3, 0.6]
-        )[0]
-        for k in range(3)
-    ]
-    expected = np.log(np.exp(levels) @ wholes / np.sum(np.exp(levels)))
-    assert scores(board("sensor_offset", 1, 1.0, levels))[0].gain == pytest.approx(expected, abs=1e-5)
+def test_what_shows_nothing_gains_nothing() -> None:
+    assert gain_of("sensor_offset", projected(0, scale=0.0), 1, slab()) == -np.inf
 
 
-def test_a_claim_averages_over_its_shapes_and_pays_for_searched_instants() -> None:
-    one = scores(board("bed_memory", 1, 1.0))[0]
-    other = replace(one, gain=one.gain - 2.0)
-    mean = np.log(0.5 * (np.exp(one.gain) + np.exp(other.gain)))
-    (claim,) = by_claim([one, other])
-    assert claim.gain == pytest.approx(mean + np.log(catalogue()["bed_memory"].prior))
-    costly = replace(one, hypothesis=replace(one.hypothesis, cost=4.0))
-    assert by_claim([costly])[0].gain == pytest.approx(one.gain + np.log(0.5) - 4.0)
-
-
-def test_what_a_refit_absorbs_is_no_evidence() -> None:
-    """Shares are what least squares on all parameters and start values leaves of a signature."""
-    r = machine.simulated(1)
-    context = make_context(machine.campaign(r), machine.model(), ["r1"], list(machine.SEEN), [])
-    lens, noise = Lens(context.baseline), replace(context.settings[0], slow=(), heat=None)
-    view = lens.view(noise)
-    words = ("fluid_convection", "air_convection", "radiation", "friction_speed")
-    effects = [catalogue()[w] for w in words]
-    found = hypotheses(machine.model(), machine.CHANNELS, machine.SEEN, ["r1"], effects)
-    sheet = {
-        s.hypothesis.key + tuple(s.hypothesis.shapes.values()): s
-        for s in scores(make_board(lens, [view], found, np.ones(len(found))))
-    }
-    trajectory = context.baseline.trajectories[0]
-    slopes, prior = lens.jacobians[0].reshape(-1, len(context.baseline.theta)), lens.priors[1]
-    x = np.concatenate([slopes / machine.NOISE, prior])
-    columns = signatures(trajectory, found).reshape(len(slopes), -1) / machine.NOISE
-    for k, h in enumerate(found):
-        column = np.concatenate([columns[:, k], np.zeros(len(prior))])
-        left = column - x @ np.linalg.lstsq(x, column, rcond=None)[0]
-        share = sheet[h.key + tuple(h.shapes.values())].share
-        assert share == pytest.approx(np.linalg.norm(left) / np.linalg.norm(column), rel=1e-4)
-    absorbed = [
-        s.share for s in sheet.values() if s.hypothesis.effect.word in ("radiation", "air_convection")
-    ]
-    assert min(absorbed) < 0.02  # air at a body that has it already
-    assert max(s.share for s in sheet.values() if s.hypothesis.effect.word == "fluid_convection") > 0.1
-
-
-def test_which_recording_comes_first_says_nothing() -> None:
-    """A size is plausible by the heat that it moves where it moves most: one recording may be dry."""
-    wet, dry = machine.simulated(1), machine.simulated(2)
-    dry = machine.changed(dry, pump=np.zeros(len(dry.time)))
-    effect = catalogue()["fluid_convection"]
-    found = []
-    for order in (["r1", "r2"], ["r2", "r1"]):
-        context = make_context(
-            machine.campaign(wet, dry), machine.model(wet=False), order, tuple(machine.SEEN), [effect]
-        )
-        claims = hypotheses(context.model, context.campaign.channels, tuple(machine.SEEN), order, [effect])
-        found.append({h.states: (context.spread(h), context.minor(h)) for h in claims})
-    for states, sizes in found[0].items():
-        assert np.allclose(sizes, found[1][states], rtol=1e-3)
-
-
-def test_an_exchange_is_held_against_the_link_that_the_model_has() -> None:
-    """With the pump always on, a flooded gap is conductance beside conductance: half of that of the link."""
-    runs = [machine.simulated(seed) for seed in (1, 2)]
-    runs = [machine.changed(run, pump=np.ones(len(run.time))) for run in runs]
-    effects = [catalogue()[word] for word in ("flooded_gap", "fluid_convection")]
-    context = make_context(
-        machine.campaign(*runs), machine.model(), ["r1", "r2"], tuple(machine.SEEN), effects
+def test_noise_settings_and_shapes_are_summed_over() -> None:
+    """A claim has two shapes of given weights; each setting has its own level and its own signatures."""
+    h = Hypothesis(catalogue()["bed_memory"], (), ("a",), shapes={"t": 1.0})
+    two = [h.at({"t": 1.0}, np.log(0.3)), h.at({"t": 2.0}, np.log(0.7))]
+    levels = np.array([0.0, 1.5])
+    parts = [projected(0, 1), projected(0, 1, scale=1.3)]
+    (found,) = _ranked(two, slab(sign=1.0, count=2), levels, parts)
+    weights = np.exp(levels) / np.exp(levels).sum()
+    expected = sum(
+        weight * share * factor_of(scale * Z[:, column], sign=1.0)
+        for weight, scale in zip(weights, (1.0, 1.3), strict=True)
+        for column, share in enumerate((0.3, 0.7))
     )
-    claims = hypotheses(context.model, context.campaign.channels, tuple(machine.SEEN), ("r1", "r2"), effects)
-    half = {h.states: context.half_a_link(h) for h in claims}
-    fitted = context.baseline.model.parameters
-    assert half["motor", "table"] == pytest.approx((0.5 * fitted["G_mt"].value,))
-    assert half["table", "bed"] == pytest.approx((0.5 * fitted["G_tb"].value,))
-    assert half["motor", "bed"] == half["motor",] == (0.0,)
+    assert found.gain == pytest.approx(np.log(expected), abs=0.03)
+    assert found.odds == pytest.approx(found.gain + h.log_odds)
+
+
+def test_a_scan_integrates_everything_that_a_refit_could_absorb() -> None:
+    """Every claim on a fitted machine: least squares on all unknowns, then quadrature over the size."""
+    r = machine.simulated(1)
+    baseline = machine.model(wet=False)
+    fit = fit_model(baseline, machine.campaign(r), ["r1"], list(machine.SEEN))
+    seen, noise = Whitened(fit, 1), Noise(tuple(machine.SEEN), (machine.NOISE,) * 3)
+    words = ("fluid_convection", "air_convection", "flooded_gap")
+    claims = machine.claims(baseline, *words, recordings=["r1"])
+    prior_of = slab(8.0, sign=1.0, count=len(claims))
+    (found,) = scan(seen, [Setting(noise, 0.0, (0, 0, 0))], claims, prior_of)
+
+    belief, slope = fit.problem.prior_rows(fit.theta, fit.together)
+    measured = fit.trajectories[0].system.grid.measured
+    x = np.concatenate([fit.problem.jacobian(fit.trajectories[0])[measured] / machine.NOISE, slope])
+    y = np.concatenate([fit.problem.residual(fit.trajectories[0])[measured] / machine.NOISE, -belief])
+    columns = signatures(fit.trajectories[0], claims)[measured] / machine.NOISE
+    by_claim = {s.hypothesis.key: s for s in found}
+    assert len(by_claim) == len(claims)
+    for k, h in enumerate(claims):
+        z = np.concatenate([columns[:, k], np.zeros(len(belief))])
+        left = z - x @ np.linalg.lstsq(x, z, rcond=None)[0]
+        score = by_claim[h.key]
+        assert score.share == pytest.approx(np.linalg.norm(left) / np.linalg.norm(z), rel=1e-3, abs=1e-4)
+        if score.share < 0.01:
+            continue
+        dot, gram = left @ (y - x @ np.linalg.lstsq(x, y, rcond=None)[0]), left @ left
+        best = dot / gram
+        assert score.size[0] == pytest.approx(best, rel=1e-3)
+        top = max(best, 1e-3)
+
+        def integrand(size: float, dot: float = dot, gram: float = gram, top: float = top) -> float:
+            # the largest exponent is taken out: sizes at which nothing is seen give exp(-large)
+            shift = dot * top - 0.5 * gram * top**2
+            return prior(size, 8.0, sign=1.0) * float(np.exp(dot * size - 0.5 * gram * size**2 - shift))
+
+        width = 10 / np.sqrt(gram)
+        edges = sorted({0.0, max(top - width, 0.0), top, top + width})
+        whole = sum(quad(integrand, a, b, limit=400)[0] for a, b in pairwise(edges))
+        expected = np.log(whole) + dot * top - 0.5 * gram * top**2
+        assert score.gain == pytest.approx(expected, abs=0.05 + 1e-3 * abs(expected))
+    best_claim = found[0].hypothesis
+    assert (best_claim.effect.word, best_claim.states) == ("fluid_convection", ("table",))
+
+
+def test_odds_of_a_place_do_not_change_what_the_readings_say() -> None:
+    h = Hypothesis(catalogue()["sensor_offset"], (), ("a",))
+    (plain,) = _ranked([h], slab(), np.zeros(1), [projected(0)])
+    (rare,) = _ranked([replace(h, log_odds=-5.0)], slab(), np.zeros(1), [projected(0)])
+    assert rare.gain == plain.gain
+    assert rare.odds == pytest.approx(plain.odds - 5.0)

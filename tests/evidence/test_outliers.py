@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import make_grid
-from discovery.effects.candidates import hypotheses
+from discovery.effects.candidates import Scene, candidates
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.outliers import find_outliers
 from discovery.fitting import fit_model
@@ -25,7 +25,9 @@ def found(residual: NDArray[np.float64]) -> list[int]:
     channels = {"T": Channel("T", "temperature", "K", NOISE, "linear")}
     recording = Recording("a", time, {"T": residual})
     campaign = Campaign("one", channels, {"a": recording})
-    model = Model("constant", {}, {"x": State("x", "K", start_sd=0.0)}, (), {"T": parse("x")})
+    model = Model(
+        "constant", {}, {"x": State("x", "K", start=parse("0"), start_sd=0.0)}, (), {"T": parse("x")}
+    )
     fit = fit_model(model, campaign, ["a"], ["T"])
     grid = make_grid(campaign, "a", [], ["T"])
     return [round(o.time / 2.0) for o in find_outliers(fit, {"a": grid}, np.array([NOISE]))]
@@ -75,7 +77,8 @@ def test_sizes_carry_the_unit_of_the_place() -> None:
     }
     entries = [catalogue()[word] for word in ("air_convection", "sensor_offset")]
     entries = [replace(e, place="body") if e.word == "air_convection" else e for e in entries]
-    claims = {(h.effect.word, h.places): h for h in hypotheses(rate, channels, ("E", "T"), ("a",), entries)}
+    scene = Scene(channels, ("E", "T"), ("a",), {"a": ("a",)}, {}, frozenset(), 0.1, 0.1)
+    claims = {(h.effect.word, h.places): h for h in candidates(rate, entries, scene)}
 
     def unit(word: str, place: str) -> str:
         claim = claims[word, (place,)]
