@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from discovery.design.question import ask
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
@@ -117,6 +116,8 @@ def diagnose(
     Raises:
         UserError: a model that does not run, or recordings without readings.
     """
+    from discovery.design.question import ask  # it asks about what is found here
+
     began = clock.perf_counter()
     shared = [n for n in {**model.outputs, **model.states} if n in campaign.channels]
     outputs = tuple(dict.fromkeys(outputs or shared))

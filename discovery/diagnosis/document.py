@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, TypedDict
 import numpy as np
 from pydantic import Field
 
-from discovery.design.when import instants
 from discovery.diagnosis.proof import Improvement, unit_of
 from discovery.diagnosis.thresholds import RIVALS_SHOWN
 from discovery.diagnosis.verdict import FAULT, UNEXPLAINED, Named
+from discovery.diagnosis.when import instants
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.latent_force import alike, heat_over_time

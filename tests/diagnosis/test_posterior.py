@@ -82,11 +82,14 @@ def test_draws_keep_the_number_of_blocks_of_each_recording() -> None:
     even = Known((FLUID,), 2.0, np.full(blocks, 2.0 / blocks))
     lone = Known((LAG,), 2.0, np.where(np.arange(blocks) == 3, 2.0, 0.0))
     found = posterior(context, cast(list[Scored], [even, lone, Known((), 0.0, np.zeros(blocks))]))
-    by_word = dict(zip((m.hypotheses for m in found.models), found.evidence, strict=True))
-    assert by_word[FLUID,] == pytest.approx(2.0)
-    assert len(by_word[LAG,]) == thresholds.DRAWS
-    assert by_word[LAG,].mean() == pytest.approx(2.0, abs=0.6)  # multinomial: mean one, variance 11/12
-    assert by_word[LAG,].std() == pytest.approx(2.0 * np.sqrt(11 / 12), rel=0.25)
+    words = ["".join(h.effect.word for h in m.hypotheses) for m in found.models]
+    by_word = dict(zip(words, found.evidence, strict=True))
+    assert by_word["fluid_convection"] == pytest.approx(2.0)
+    assert len(by_word["sensor_lag"]) == thresholds.DRAWS
+    assert by_word["sensor_lag"].mean() == pytest.approx(
+        2.0, abs=0.6
+    )  # multinomial: mean one, variance 11/12
+    assert by_word["sensor_lag"].std() == pytest.approx(2.0 * np.sqrt(11 / 12), rel=0.25)
 
 
 def test_models_that_are_far_off_take_no_part() -> None:

@@ -17,7 +17,7 @@ from tests.diagnosis.parts import bare, claim_of, dry, scored_of, wetted
 def test_the_effect_that_is_there_makes_the_readings_more_likely() -> None:
     assert wetted().evidence > bare().evidence + 50.0
     assert wetted().rms() < bare().rms()
-    wrong = scored_of(dry(), claim_of(dry(), "friction_speed", "bed"))
+    wrong = scored_of(dry(), claim_of(dry(), "friction_speed", "motor"))
     assert wrong.evidence < wetted().evidence - 50.0
 
 

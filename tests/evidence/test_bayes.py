@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.stats import lognorm, norm
 
+from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Projected, Slab, _ranked, scan
@@ -134,12 +135,14 @@ def test_a_scan_integrates_everything_that_a_refit_could_absorb() -> None:
     """Every claim on a fitted machine: least squares on all unknowns, then quadrature over the size."""
     r = machine.simulated(1)
     baseline = machine.model(wet=False)
-    fit = fit_model(baseline, machine.campaign(r), ["r1"], list(machine.SEEN))
-    seen, noise = Whitened(fit, 1), Noise(tuple(machine.SEEN), (machine.NOISE,) * 3)
+    seen, outputs = machine.campaign(r), list(machine.SEEN)
+    grids = {"r1": make_grid(seen, "r1", machine.INPUTS, outputs)}
+    fit = fit_model(baseline, seen, ["r1"], outputs, grids=grids)
+    whitened, noise = Whitened(fit, 1), Noise(tuple(machine.SEEN), (machine.NOISE,) * 3)
     words = ("fluid_convection", "air_convection", "flooded_gap")
     claims = machine.claims(baseline, *words, recordings=["r1"])
     prior_of = slab(8.0, sign=1.0, count=len(claims))
-    (found,) = scan(seen, [Setting(noise, 0.0, (0, 0, 0))], claims, prior_of)
+    (found,) = scan(whitened, [Setting(noise, 0.0, (0, 0, 0))], claims, prior_of)
 
     belief, slope = fit.problem.prior_rows(fit.theta, fit.together)
     measured = fit.trajectories[0].system.grid.measured
