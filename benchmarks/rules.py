@@ -19,7 +19,7 @@ AIM_RULES, AIM_CONSTANTS = 15, 20
 TODAY_RULES, TODAY_CONSTANTS = 22, 31  # what a test holds: the aim is not reached yet
 
 RESOLUTION = {  # finer gives the same answer in more time
-    "evidence/bayes.py": "_NODES _WEIGHTS _FINE _NARROW",
+    "evidence/bayes.py": "_NARROW",
     "evidence/events.py": "COARSE FINE CLOSER",
     "evidence/form_error.py": "RANK",
     "evidence/latent_force.py": "BLOCKS SIZES MEMORY_BLOCKS",

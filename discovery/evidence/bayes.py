@@ -55,7 +55,7 @@ class Slab:
     def average(self, mean: Array, variance: Array) -> Array:
         """log of the prior density, averaged over Gaussian sizes of `mean` (A,) and `variance` (A,)."""
         sd = np.sqrt(np.maximum(variance, 1e-300))
-        narrow = np.abs(mean) > _NARROW * sd
+        narrow = (np.abs(mean) > _NARROW * sd) & (self.sign * mean >= 0)
         out = np.zeros(len(mean))
         for flat in (False, True):
             index = np.flatnonzero(narrow != flat)
@@ -78,7 +78,8 @@ class Slab:
         for sign in (1.0, -1.0):
             share = np.where(self.sign == 0, 0.5, (self.sign == sign).astype(float))
             z = (sign * size - mean) / sd
-            part = np.log(np.maximum(prior * share, 1e-300)) - 0.5 * z**2 - np.log(sd * np.sqrt(2 * np.pi))
+            with np.errstate(divide="ignore"):  # what has the wrong sign cannot be
+                part = np.log(prior * share) - 0.5 * z**2 - np.log(sd * np.sqrt(2 * np.pi))
             wide = np.logaddexp(wide, log_sum_exp(part))
         return wide
 

@@ -66,6 +66,15 @@ def test_the_average_of_the_prior_is_that_of_quadrature(
     assert found == pytest.approx(np.log(whole), abs=0.03)
 
 
+@pytest.mark.parametrize("deviations", [3.0, 10.0, 60.0])
+def test_a_size_of_the_wrong_sign_cannot_be(deviations: float) -> None:
+    """However well it would fit: what is left is the likelihood of nearly nothing, and no gain."""
+    sd = 0.01
+    found = slab(sign=1.0).average(np.array([-deviations * sd]), np.array([sd**2]))[0]
+    gain = 0.5 * deviations**2 + found + np.log(sd * np.sqrt(2 * np.pi))
+    assert gain < -1.0
+
+
 def projected(*which: int, scale: float = 1.0) -> Projected:
     """Some columns of Z as signatures, nothing absorbed."""
     z = scale * Z[:, which]
