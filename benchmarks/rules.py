@@ -85,7 +85,8 @@ def _is_number(value: ast.expr) -> bool:
     """A number, a tuple of them, or what numpy makes of numbers."""
     leaves = [n for n in ast.walk(value) if isinstance(n, ast.Constant)]
     plain = (ast.Constant, ast.Tuple, ast.UnaryOp, ast.BinOp)
-    return bool(leaves) and isinstance(value, plain) and all(isinstance(n.value, (int, float)) for n in leaves)
+    numbers = all(isinstance(n.value, (int, float)) for n in leaves)
+    return bool(leaves) and isinstance(value, plain) and numbers
 
 
 def rules() -> list[str]:
@@ -95,13 +96,10 @@ def rules() -> list[str]:
     found = []
     for file, tree in _files():
         for node in ast.walk(tree):
-            if isinstance(node, ast.Compare) and (
+            by_constant = isinstance(node, ast.Compare) and (
                 _used(node, thresholds) or any((file, name) in deciding for name in _names(node))
-            ):
-                found.append(f"{file}: {ast.unparse(node)}")
-            elif isinstance(node, ast.Compare) and file == "diagnosis/verdict.py" and _with_zero(node):
-                found.append(f"{file}: {ast.unparse(node)}")
-            elif isinstance(node, ast.Attribute) and node.attr == "contradicts" and file == "diagnosis/verdict.py":
+            )
+            if by_constant or (file == "diagnosis/verdict.py" and _withdraws(node)):
                 found.append(f"{file}: {ast.unparse(node)}")
             elif isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "VETOES":
                 found += [f"{file}: veto {ast.unparse(veto)}" for veto in getattr(node.value, "elts", [])]
@@ -119,8 +117,11 @@ def _used(node: ast.AST, thresholds: set[str]) -> bool:
     )
 
 
-def _with_zero(node: ast.Compare) -> bool:
-    return any(isinstance(c, ast.Constant) and c.value == 0 for c in node.comparators)
+def _withdraws(node: ast.AST) -> bool:
+    """A comparison with zero, or the question whether recordings contradict a name."""
+    if isinstance(node, ast.Compare):
+        return any(isinstance(c, ast.Constant) and c.value == 0 for c in node.comparators)
+    return isinstance(node, ast.Attribute) and node.attr == "contradicts"
 
 
 def main() -> None:

@@ -60,15 +60,17 @@ def test_every_package_has_its_place() -> None:
 
 
 def test_imports_go_to_the_left() -> None:
-    wrong = []
+    wrong: list[str] = []
     for file in sorted(ROOT.rglob("*.py")):
         where = file.relative_to(ROOT)
         own = where.parts[0].removesuffix(".py")
         if own == "__init__":
             continue  # names of the package, each loaded where it is asked for
-        for name in set(imported(file)) - {own}:
-            if LAYER.get(name, 99) >= LAYER[own] and (where.as_posix(), name) not in LAST:
-                wrong.append(f"{where} imports {name}")
+        wrong += [
+            f"{where} imports {name}"
+            for name in set(imported(file)) - {own}
+            if LAYER.get(name, 99) >= LAYER[own] and (where.as_posix(), name) not in LAST
+        ]
     assert wrong == []
 
 

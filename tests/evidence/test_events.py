@@ -12,6 +12,7 @@ from discovery.evidence.events import _span, heat_steps, place_events
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Noise, fit_model
+from discovery.recordings import Recording
 from tests import machine
 from tests.effects.sample import sample, trajectory
 from tests.machine import Array, Inputs
@@ -44,7 +45,7 @@ def sun(t: float, _: Array, __: Inputs) -> tuple[float, float, float]:
     return (0.0, 0.0, 40.0 * (30000 <= t < 52000))
 
 
-def seen_of(*runs: machine.Recording) -> Whitened:
+def seen_of(*runs: Recording) -> Whitened:
     seen, outputs = machine.campaign(*runs), list(machine.SEEN)
     grids = {r.name: make_grid(seen, r.name, machine.INPUTS, outputs) for r in runs}
     return Whitened(fit_model(machine.model(), seen, list(grids), outputs, grids=grids), 12)

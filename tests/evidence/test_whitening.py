@@ -110,7 +110,7 @@ def test_the_likelihood_is_the_one_of_another_kalman_filter() -> None:
     step, count = 600.0, 100
     capacity, loss, heat, slow, white = 30e3, 8.0, 3.0, 0.4, 0.5
     slow_time, heat_time = 5000.0, 9000.0
-    time = step * np.arange(count)
+    time: Array = step * np.arange(count, dtype=np.float64)
     y = np.random.default_rng(1).standard_normal(count)
     channels = {
         "y": Channel("y", "error", "um", None, "linear"),
