@@ -1,7 +1,7 @@
 """How many rules and constants decide in a diagnosis: `python -m benchmarks.rules`.
 
 A constant is a number (or a tuple of numbers) in capitals at the top of a file of `discovery/evidence` or
-`discovery/diagnosis`. It decides unless it stands below among those that do not: numbers that give an integral
+`discovery/diagnosis`. It decides unless it stands below among those that do not: numbers that give integrals
 or a search its resolution (finer gives the same answer in more time), and numbers of what is shown. A rule is
 a comparison with a constant that decides, a veto, or a comparison with zero in the verdict.
 """
