@@ -10,10 +10,11 @@ from typing import cast
 import numpy as np
 import pytest
 
-from discovery.design.next_experiment import believed, next_experiment
+from discovery.design.next_experiment import STEPS, _designs, believed, next_experiment
 from discovery.design.question import APART, CONFIRM, aim, look_back
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.diagnose import diagnose
+from discovery.dynamics import make_grid
 from discovery.effects.hypothesis import Hypothesis
 from discovery.fitting import Noise
 from discovery.models import Model, Parameter, State
@@ -202,3 +203,23 @@ def test_large_sizes_are_written_out() -> None:
     said = diagnose(model(), campaign(*runs), ["r1", "r2"]).question
     assert "would have shown" in said
     assert "e+" not in said
+
+
+def test_patterns_move_what_the_machine_has() -> None:
+    """Half of the time at full speed and load; steps of a twelfth; the pump by a sixth, and dry elsewhere."""
+    seen = campaign(simulated(1))
+    grids = {"r1": make_grid(seen, "r1", machine.INPUTS, list(SEEN))}
+    where = cast(Context, SimpleNamespace(campaign=seen, grids=grids, recordings=("r1",)))
+    found, time = _designs(where, 43200.0), np.linspace(0.0, 43200.0, STEPS + 1)
+    high = np.quantile(grids["r1"].samples["speed"].value, 0.95)
+    half = found["run 6 h at full speed and load, dry, then stand still for 6 h"]
+    assert np.array_equal(half["speed"], np.where(time < 21600.0, high, 0.0))
+    assert not half["pump"].any()
+    steps = found["step speed and load every 1 h, dry"]["speed"]
+    assert np.count_nonzero(np.diff(steps)) == 12
+    pump = found["switch the pump every 2 h at full speed and load"]
+    assert np.count_nonzero(np.diff(pump["pump"])) == 6
+    assert np.all(pump["speed"] == high)
+    still = found["stand still and follow the room"]
+    assert not still["speed"].any()
+    assert not still["pump"].any()

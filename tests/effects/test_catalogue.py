@@ -201,3 +201,12 @@ def test_terms_carry_the_word(effect: Effect) -> None:
         assert all(t.effect == effect.word for t in h.terms)
         assert h.terms or h.shown
         assert not (h.terms and h.shown)
+
+
+@pytest.mark.parametrize("file", ["bed_memory", "bed_memory_night"])
+def test_a_bed_takes_a_day_or_two(file: str) -> None:
+    """68 % of beds within 20 to 60 h, and none within minutes: that would be another effect."""
+    shape = catalogue()[file].shapes[0]
+    assert shape.middle is not None
+    assert 20.0 <= shape.middle / shape.factor / 3600 < shape.middle * shape.factor / 3600 <= 60.0
+    assert min(value for value, _ in shape.values) > 10 * 3600.0
