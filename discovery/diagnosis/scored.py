@@ -94,7 +94,7 @@ class Scored:
         return float(log_sum_exp(np.array([self._level(g, k) for g in self._forms(k)])))
 
     def _forms(self, k: int) -> tuple[Grams, ...]:
-        """The laws of the effects as they are, and each off by a share that depends on the operating point."""
+        """The laws of the effects as they are, and each off by a share that the operating point sets."""
         spread = self.seen.spread[sum(self.seen.form) :]
         return (self.grams[k].without(spread), self.grams[k]) if len(spread) else (self.grams[k],)
 
@@ -297,7 +297,7 @@ def light(one: Scored) -> Scored:
 
 @dataclass(frozen=True)
 class Scan:
-    """Claims on what a model leaves, the best odds first, and on what it leaves without one of its effects."""
+    """Claims on what a model leaves, the best odds first; and on what it leaves without one effect."""
 
     claims: tuple[Score, ...]
     without: Mapping[Key, tuple[Score, ...]]
@@ -362,6 +362,6 @@ def attempt(
     h = claim.hypothesis
     sizes: dict[str, float] = {}
     if h.effect.amplitude.fixed is None:
-        low = np.where(h.effect.amplitude.sign > 0, 0.0, -h.effect.amplitude.most)
-        sizes = {n: float(max(s, low)) for n, s in zip(h.amplitudes, claim.size, strict=True)}
+        low = 0.0 if h.effect.amplitude.sign > 0 else -h.effect.amplitude.most
+        sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
     return score(context, (*others, h), current.noise, current.fit, sizes)

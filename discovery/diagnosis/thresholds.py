@@ -20,7 +20,7 @@ FORMS = ((0.0, 0.0), (0.0, 0.1), (0.025, 0.1), (0.08, 0.1), (0.25, 0.25))  # sha
 FORM_WEIGHTS = (0.25, 0.25, 0.25, 0.15, 0.1)  # ... with these weights
 SLOW = (0.0, 0.3, 1.0, 3.0, 10.0)  # slow noise of outputs, as shares of the reading noise, integrated over ...
 SLOW_WEIGHTS = (0.35, 0.35, 0.2, 0.08, 0.02)  # ... with these weights
-FORM = 0.2  # of the flow of a named effect, at each operating point: a law of the catalogue is not that of nature
+FORM = 0.2  # of the flow of a named effect, at each operating point: no law is quite that of nature
 UNKNOWN_FORCE = 10.0  # of the process noise of a body: a latent force, "none of these"
 
 # --- effects ----------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """The verdict: what is named, how sure it is, what else it could be, and when to say that nothing is known.
 
-An effect is named where its probability says so, where it also predicts recordings that a fit has not seen, and
-where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
+An effect is named where its probability says so, where it also predicts recordings that a fit has not seen,
+and where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
 """
 
 from __future__ import annotations

@@ -120,8 +120,8 @@ def _noise(
 def reading_noise(
     fit: Fit, stated: Mapping[str, float | None], floor: Mapping[str, float], prior: Prior
 ) -> Noise:
-    """White reading noise: what is stated, else the most likely level with slow noise and process noise of any
-    size.
+    """White reading noise: what is stated, else the most likely level with slow noise and process noise of
+    any size.
 
     Process noise far above the usual is offered, so that a mismatch passes for that and not for reading
     noise. Time constants are 2 h of slow noise and 3 h of process noise, or a share of shorter recordings.

@@ -7,13 +7,11 @@ import pytest
 
 from discovery.dynamics import make_grid, make_system, simulate
 from discovery.dynamics.system import predict
-from discovery.effects.candidates import hypotheses
 from discovery.effects.catalogue import Effect, catalogue
 from discovery.effects.hypothesis import Hypothesis
-from discovery.evidence.events import heat_steps
 from discovery.evidence.signatures import signatures
-from tests.mismatch import machine
-from tests.mismatch.sample import expand, inside, sample, trajectory
+from tests import machine
+from tests.effects.sample import expand, inside, machine_for, sample, trajectory
 
 
 def _times(h: Hypothesis) -> dict[str, float]:
@@ -23,7 +21,7 @@ def _times(h: Hypothesis) -> dict[str, float]:
 @pytest.mark.parametrize("effect", catalogue().values(), ids=list(catalogue()))
 def test_signatures_equal_differences(effect: Effect) -> None:
     """Every effect at every place and shape, against a central difference of the extended model."""
-    baseline = sample()[0]
+    baseline = machine_for(effect)
     # a lag as short as the steps of the inputs is resolved by neither
     found = [inside(h) for h in expand(effect) if not any(0 < v < 100 for v in _times(h).values())]
     columns = signatures(trajectory(baseline), found)
@@ -54,8 +52,7 @@ def test_a_signature_is_what_scipy_sees() -> None:
     truth = machine.model().with_values(machine.SIZES)
     campaign = machine.campaign(runs[0])
     grid = make_grid(campaign, "r1", machine.INPUTS, tuple(machine.SEEN))
-    effects = [catalogue()["fluid_convection"], catalogue()["conduction_path"]]
-    found = hypotheses(truth, machine.CHANNELS, machine.SEEN, ["r1"], effects)
+    found = machine.claims(truth, "fluid_convection", "conduction_path", recordings=["r1"])
     places = [("motor",), ("motor", "bed")]
     chosen = [h for place in places for h in found if h.states == place]
     columns = signatures(simulate(make_system(truth, grid), truth.values()), chosen)
@@ -63,14 +60,6 @@ def test_a_signature_is_what_scipy_sees() -> None:
         seen = [r.values[n] - runs[0].values[n] for n in machine.SEEN]
         expected = np.column_stack([y[np.isfinite(y)] for y in seen]) / 0.01
         assert np.abs(columns[:, :, k] - expected).max() < 0.01 * np.abs(expected).max()
-
-
-def test_steps_of_heat_between_nodes_keep_their_share() -> None:
-    """Heat that sets in within an interval keeps its energy, so its late response is that of the instant."""
-    base = trajectory(sample()[0])
-    at = np.array([3000.0, 3150.0, 3300.0])
-    steps = heat_steps(base, "bed", at)[-1]
-    assert np.allclose(steps[:, 1], 0.5 * (steps[:, 0] + steps[:, 2]), rtol=1e-3)
 
 
 def test_what_belongs_to_another_recording_is_zero() -> None:

@@ -54,3 +54,29 @@ def test_everyday_heat_hides_what_looks_like_it() -> None:
     covariance = 0.09 * np.eye(24) + (sd / 1000.0) ** 2 * walk
     assert found == pytest.approx(expected(0.0002 * TIME, covariance), rel=0.02)
     assert found < 0.1 * expected(0.0002 * TIME, 0.09 * np.eye(24))
+
+
+def test_each_output_counts_in_its_own_noise() -> None:
+    """Two outputs of noises 2 and 0.5: the evidence is the sum of that of each."""
+
+    def both(first: str, other: str) -> Trajectory:
+        states = {"x": State("x", "degC", 1000.0, parse("0"), 0.0, 1e-3)}
+        model = Model("m", {}, states, (), {"E": parse(first), "F": parse(other)})
+        channels = {n: Channel(n, "error", "um", 1.0, "linear") for n in "EF"}
+        read = {n: np.zeros(24) for n in "EF"}
+        campaign = Campaign("c", channels, {"r": Recording("r", TIME, read)})
+        return simulate(make_system(model, make_grid(campaign, "r", [], ["E", "F"])), {})
+
+    noise = Noise(("E", "F"), (2.0, 0.5))
+    found = separation(both("x + 1", "x + 1"), both("x", "x"), noise)
+    assert found == pytest.approx(0.5 * (1 / 4 + 1 / 0.25) * np.arange(1, 25))
+
+
+def test_process_noise_that_grows_with_the_flow_hides_more() -> None:
+    """0.1 W flow through the body: a share of it adds to the floor as squares do."""
+    plain, flowing = (
+        Noise(("E",), (0.3,), (), {"x": heat}, share, heat_time=3 * 3600.0)
+        for heat, share in ((0.05, 0.0), (0.03, 0.4))
+    )  # sqrt(0.03^2 + (0.4*0.1)^2) = 0.05
+    pair = body("x + 0.0002*time"), body("x")
+    assert separation(*pair, flowing) == pytest.approx(separation(*pair, plain))

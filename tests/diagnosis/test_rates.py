@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discovery.diagnosis.context import make_context
-from discovery.diagnosis.diagnose import diagnose
+from discovery.diagnosis import diagnose, thresholds
+from discovery.evidence.process_noise import flow_sizes
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
-from tests.mismatch import machine
+from tests import machine
+from tests.diagnosis.parts import context_of, document
 
 EVERY = 300.0  # s
 INTO_MOTOR, INTO_COLUMN = 6e-4, 1.2e-4  # 1/s: the column has five times the capacity of the motor
@@ -48,7 +49,7 @@ def test_a_path_between_two_readings_has_a_rate_for_each() -> None:
     }
     apart = Model(
         "two readings",
-        states={"T_motor": State("T_motor", start=None), "T_column": State("T_column", start=None)},
+        states={"T_motor": State("T_motor"), "T_column": State("T_column")},
         parameters={
             "gain": Parameter(3e-6, "K/s/W", 0.0),
             "k_m": Parameter(3e-4, "1/s", 0.0),
@@ -68,10 +69,11 @@ def test_a_path_between_two_readings_has_a_rate_for_each() -> None:
         "conduction_path",
         {"T_motor", "T_column"},
     )
+    assert answer.after is not None
     into = {t.into: answer.after.model.parameters[n] for t, n in _ways(answer.repaired)}
     assert into["T_motor"].value == pytest.approx(INTO_MOTOR, rel=0.1)
     assert into["T_column"].value == pytest.approx(INTO_COLUMN, rel=0.1)
-    (told,) = answer.document()["physics"]
+    (told,) = document(answer)["physics"]
     assert len(told["parameters"]) == len(told["expressions"]) == 2
     assert answer.held_out["r3"].after < 1.1 * answer.held_out["r3"].floor
 
@@ -83,7 +85,7 @@ def _ways(model: Model | None) -> list[tuple[Term, str]]:
     return [(t, next(n for n in model.parameters if n.startswith(f"G_path_into_{t.into}"))) for t in paths]
 
 
-def test_everyday_rates_have_nothing_to_do_with_the_heat_of_the_bodies_beside_them() -> None:
+def test_process_noise_of_rates_has_nothing_to_do_with_the_heat_of_the_bodies_beside_them() -> None:
     """A foundation that follows the room within hours moves by 1e-4 K/s at most; heat flows are of 300 W."""
     plain = machine.model()
     followed = replace(
@@ -96,8 +98,11 @@ def test_everyday_rates_have_nothing_to_do_with_the_heat_of_the_bodies_beside_th
             Term("bed to foundation", "bed", parse("4*(foundation - bed)")),
         ),
     )
-    runs = machine.campaign(machine.simulated(1), machine.simulated(2))
-    context = make_context(runs, followed, ["r1", "r2"], list(machine.SEEN), [])
+    runs = machine.campaign(machine.simulated(1))
+    context = context_of(runs, followed)
     fastest = 1.5 / 13751.0  # K/s, of the room: a follower is slower
-    assert 0 < context.heat_limit["foundation"] < 0.04 * fastest
-    assert context.heat_limit["bed"] == pytest.approx(4.0)
+    assert 0 < context.floor["foundation"] < thresholds.FLOOR * fastest
+    bodies = flow_sizes(context.baseline)
+    heat = max(size for name, size in bodies.items() if name != "foundation")
+    assert context.floor["bed"] == pytest.approx(thresholds.FLOOR * heat)
+    assert heat > 100.0

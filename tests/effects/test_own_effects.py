@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from discovery.diagnosis.context import make_context
-from discovery.diagnosis.idle import not_offered
+from discovery.diagnosis import Diagnosis
 from discovery.effects.catalogue import catalogue
+from discovery.effects.form import Effect
+from discovery.effects.not_offered import not_offered
+from discovery.effects.own import EffectForm
 from discovery.errors import UserError
 from discovery.experiment import diagnose, load_experiment
-from discovery.experiment.pipeline import diagnosis
+from discovery.experiment.pipeline import diagnosis, fit_entry
 from discovery.models import read_model, write_model
-from tests.mismatch import machine
-from tests.mismatch.machine import CHANNELS, Array, Inputs, model, simulated
+from discovery.progress import silent
+from tests import machine
+from tests.machine import CHANNELS, Array, Inputs, model, simulated
 
 RUB = """
 [[mismatch.effects]]
@@ -28,16 +32,31 @@ formula = "k_rub*speed*exp(-time/t_free)"
 amplitude = "k_rub"
 unit = "W/rpm"
 plausible = 0.1
-shapes = { t_free = { unit = "s", grid = [10000, 30000], low = 2000, high = 90000 } }
+shapes = { t_free = { unit = "s", middle = 17000, factor = 3 } }
 source = "maintenance log"
 """
 
 
 @pytest.mark.parametrize("formula", ["1 + k_rub*speed*exp(-time/t_free)", "k_rub**2*speed*exp(-time/t_free)"])
-def test_the_amplitude_has_to_be_a_factor(formula: str, tmp_path: Path) -> None:
+def test_the_amplitude_has_to_be_a_factor(formula: str) -> None:
     text = RUB.replace("k_rub*speed*exp(-time/t_free)", formula)
     with pytest.raises(UserError, match=r"effect 'rub': its formula has to be zero where k_rub is zero"):
-        diagnosis(load_experiment(experiment(tmp_path, text)))
+        own(text)
+
+
+def answered(path: Path) -> Diagnosis:
+    """The diagnosis of an experiment file, as a run makes it."""
+    found = load_experiment(path)
+    fitted = {"baseline": fit_entry(found, "baseline", found.form.models["baseline"])}
+    answer = diagnosis(found, silent, fitted)
+    assert answer is not None
+    return answer
+
+
+def own(text: str) -> Effect:
+    """The effect of an experiment file's lines."""
+    (form,) = tomllib.loads(text)["mismatch"]["effects"]
+    return EffectForm.model_validate(form).effect()
 
 
 def rub(t: float, _: Array, u: Inputs) -> tuple[float, float, float]:
@@ -68,9 +87,8 @@ def experiment(folder: Path, effects: str) -> Path:
 
 
 def test_an_effect_in_the_experiment_file_is_found(tmp_path: Path) -> None:
-    answer = diagnosis(load_experiment(experiment(tmp_path, RUB)))
-    assert answer is not None
-    found = answer.document()
+    answer = answered(experiment(tmp_path, RUB))
+    found = answer.document().model_dump()
     (physics,) = found["physics"]
     assert (physics["effect"], physics["states"], physics["source"]) == ("rub", ["motor"], "maintenance log")
     sizes = {name.split("_")[0]: p for name, p in physics["parameters"].items()}
@@ -80,16 +98,6 @@ def test_an_effect_in_the_experiment_file_is_found(tmp_path: Path) -> None:
     assert found["improvement"]["explained"] > 0.9
     assert answer.repaired is not None
     assert [t.effect for t in answer.repaired.terms if t.effect] == ["rub"]
-
-
-@pytest.mark.parametrize(("most", "named"), [(1.0, True), (0.1, False)])
-def test_an_effect_that_would_have_to_be_larger_than_it_can_be_is_not_named(
-    most: float, named: bool, tmp_path: Path
-) -> None:
-    """The seal that is concealed takes 0.15 W/rpm."""
-    answer = diagnosis(load_experiment(experiment(tmp_path, f"{RUB}most = {most}\n")))
-    assert answer is not None
-    assert ("rub" in [one["effect"] for one in answer.document()["physics"]]) == named
 
 
 def test_the_repaired_model_that_is_written_is_the_one_that_was_proved(tmp_path: Path) -> None:
@@ -121,16 +129,36 @@ def test_the_repaired_model_that_is_written_is_the_one_that_was_proved(tmp_path:
         ("driven body", "link", None),
     ],
 )
-def test_an_effect_that_has_no_place_is_told(old: str, new: str, why: str | None, tmp_path: Path) -> None:
+def test_an_effect_that_has_no_place_is_told(old: str, new: str, why: str | None) -> None:
     text = RUB.replace(old, new)
     if new == "cooling terms":
         text = text.replace('unit = "W/rpm"', 'unit = "1"').replace(
             "k_rub*speed*", "cooling + k_rub*cooling*"
         )
-    answer = diagnosis(load_experiment(experiment(tmp_path, text)))
-    assert answer is not None
-    told = [reason for reason in answer.document()["reasons"] if reason.startswith("rub was not looked for")]
+    told = not_offered(model(), machine.scene(model()), [own(text)])
     assert told == ([f"rub was not looked for: {why}"] if why else [])
+
+
+def test_an_input_of_a_role_has_to_be_named() -> None:
+    text = RUB.replace("k_rub*speed*", "k_rub*level*")
+    with pytest.raises(UserError, match="effect 'rub': say under `roles` which inputs"):
+        own(text)
+    assert own(text + 'roles = ["heat load"]\n').roles == ("heat load",)
+
+
+@pytest.mark.parametrize(("place", "search"), [("recording", "step"), ("output of a recording", "step")])
+def test_an_instant_is_searched_for(place: str, search: str) -> None:
+    text = RUB.replace("driven body", place).replace("speed*exp(-time/t_free)", "where(time >= t_free, 1, 0)")
+    text = text.replace("middle = 17000, factor = 3", "instant = true")
+    found = own(text)
+    assert (found.search, found.acts) == (search, "in one recording")
+    with pytest.raises(UserError, match="it cannot act at the place 'body'"):
+        own(text.replace(place, "body"))
+
+
+def test_a_time_without_a_middle_is_any_that_the_recordings_show() -> None:
+    (shape,) = own(RUB.replace(", middle = 17000, factor = 3", "")).shapes
+    assert shape.middle is None
 
 
 MISTAKES = {
@@ -166,13 +194,12 @@ def test_a_usual_size_above_the_most_is_a_mistake(tmp_path: Path) -> None:
         ('word = "rub"', 'word = "Rub it"', "word"),
         ('unit = "W/rpm"', 'colour = "red"', "colour"),
         ('unit = "W/rpm"', 'unit = "W/rpmm"', "unit: the unit 'W/rpmm' is not known"),
-        ('unit = "s", grid', 'unit = "sec0nds", grid', "t_free.unit: the unit 'sec0nds' is not known"),
-        (
-            "grid = [10000, 30000], ",
-            "grid = [100], ",
-            "100 of its grid does not lie within low 2000 and high",
-        ),
-        ("grid = [10000, 30000], ", "grid = [], ", "grid"),
+        ('unit = "s", middle', 'unit = "sec0nds", middle', "t_free.unit: the unit 'sec0nds' is not known"),
+        (", factor = 3", "", "give a middle with a factor or a spread"),
+        ("factor = 3", "factor = 3, spread = 2", "give a middle with a factor or a spread"),
+        ("middle = 17000", "middle = -1", "a middle with a factor is more than zero, not -1"),
+        ("factor = 3", "factor = 0.5", "factor"),
+        ("middle = 17000, factor = 3", "grid = [1, 2], low = 1, high = 2", "unknown key"),
     ],
 )
 def test_a_mistake_in_a_key_names_it(line: str, wrong: str, said: str, tmp_path: Path) -> None:
@@ -183,10 +210,9 @@ def test_a_mistake_in_a_key_names_it(line: str, wrong: str, said: str, tmp_path:
 
 def test_a_drive_may_be_known_by_its_speed_alone() -> None:
     """Where no channel is a heat load but one a speed, it is the model that lacks a law of it."""
-    seen = machine.campaign(machine.simulated(1))
-    power = replace(seen.channels["P_drive"], role="other input")
-    seen = replace(seen, channels={**seen.channels, "P_drive": power})
-    context = make_context(seen, machine.model(), ["r1"], tuple(machine.SEEN), [])
+    scene = machine.scene(machine.model())
+    power = replace(scene.channels["P_drive"], role="other input")
+    scene = replace(scene, channels={**scene.channels, "P_drive": power})
     effect = replace(catalogue()["windage"], word="rub")
     why = "the model has no place of the kind 'driven body' where its channels could act"
-    assert not_offered(context, [effect]) == [f"rub was not looked for: {why}"]
+    assert not_offered(machine.model(), scene, [effect]) == [f"rub was not looked for: {why}"]

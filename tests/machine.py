@@ -13,6 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from discovery.effects.candidates import Scene, candidates
+from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, names, parse
@@ -158,3 +161,16 @@ def campaign(*recordings: Recording) -> Campaign:
 def changed(recording: Recording, **values: Array) -> Recording:
     """The recording with other values of some channels."""
     return replace(recording, values={**recording.values, **values})
+
+
+def scene(baseline: Model, recordings: Sequence[str] = ("r1", "r2")) -> Scene:
+    """What candidates are made for on this machine, recordings in their order."""
+    largest = {"T_env": 23.5, "T_fluid": 27.0, "pump": 1.0, "speed": 1200.0, "P_drive": 1200.0}
+    after = {run: tuple(recordings[k:]) for k, run in enumerate(recordings)}
+    unused = frozenset(set(largest) - set(baseline.inputs))
+    return Scene(CHANNELS, tuple(SEEN), tuple(recordings), after, largest, unused, 0.02, 0.02)
+
+
+def claims(baseline: Model, *words: str, recordings: Sequence[str] = ("r1", "r2")) -> list[Hypothesis]:
+    """Effects at all their places, at their middle shape values."""
+    return candidates(baseline, [catalogue()[word] for word in words], scene(baseline, recordings))

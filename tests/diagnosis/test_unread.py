@@ -7,7 +7,8 @@ import pytest
 
 from discovery import UserError, diagnose
 from discovery.recordings import Recording
-from tests.mismatch.machine import SEEN, campaign, changed, model, simulated
+from tests.diagnosis.parts import document
+from tests.machine import SEEN, campaign, changed, model, simulated
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -19,7 +20,7 @@ def unread(recording: Recording, *outputs: str) -> Recording:
 
 def test_an_output_that_was_never_read_leaves_no_rms() -> None:
     runs = [unread(simulated(seed), "E_Z") for seed in (1, 2)]
-    found = diagnose(model(wet=False), campaign(*runs, simulated(3)), ["r1", "r2"], ["r3"]).document()
+    found = document(diagnose(model(wet=False), campaign(*runs, simulated(3)), ["r1", "r2"], ["r3"]))
     assert [p["effect"] for p in found["physics"]] == ["fluid_convection"]
     assert found["detection"]["residual_rms"]["E_Z"] is None
     assert found["detection"]["residual_rms"]["E_Y"] > 1.0
@@ -33,6 +34,6 @@ def test_recordings_without_readings_are_refused_as_those_of_an_experiment() -> 
 
 def test_an_unseen_recording_without_readings_proves_nothing() -> None:
     runs = campaign(simulated(1), simulated(2), unread(simulated(3), *SEEN))
-    found = diagnose(model(wet=False), runs, ["r1", "r2"], ["r3"]).document()
+    found = document(diagnose(model(wet=False), runs, ["r1", "r2"], ["r3"]))
     assert found["improvement"]["held_out"] == {}
     assert not any("runs away" in reason for reason in found["reasons"])

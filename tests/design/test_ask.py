@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
-from discovery.design.next_experiment import believed, next_experiment
+from discovery.design.next_experiment import STEPS, _designs, believed, next_experiment
 from discovery.design.question import APART, CONFIRM, aim, look_back
-from discovery.diagnosis.context import Context, make_context
+from discovery.diagnosis.context import Context
 from discovery.diagnosis.diagnose import diagnose
-from discovery.diagnosis.printed import printed
-from discovery.effects.candidates import hypotheses
-from discovery.effects.catalogue import catalogue
+from discovery.dynamics import make_grid
 from discovery.effects.hypothesis import Hypothesis
 from discovery.fitting import Noise
 from discovery.models import Model, Parameter, State
+from discovery.printed import printed
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
-from tests.mismatch.machine import NOISE, SEEN, Array, Inputs, campaign, changed, model, simulated
+from tests import machine
+from tests.diagnosis.parts import context_of
+from tests.machine import NOISE, SEEN, Array, Inputs, campaign, changed, model, simulated
 
 PLATE = {
     "T_env": Channel("T_env", "ambient temperature", "degC", None, "linear"),
@@ -34,7 +37,7 @@ def plate(gain: float) -> Model:
     return Model(
         "plate",
         {"loss": Parameter(0.01, "1/s", 0.0), "gain": Parameter(gain, "K/W/s", 0.0)},
-        {"T": State("T", start=None)},
+        {"T": State("T")},
         (Term("loss", "T", parse("loss*(T_env - T)")), Term("gain", "T", parse("gain*heater"))),
         {},
     )
@@ -62,7 +65,7 @@ def ten_minutes() -> Campaign:
 
 
 def test_a_heated_plate_is_not_sent_to_pump_for_hours() -> None:
-    where = make_context(ten_minutes(), plate(0.04), ["a"], ["T"], [])
+    where = context_of(ten_minutes(), plate(0.04), outputs=["T"])
     fitted = where.baseline.model
     other = fitted.with_values({"gain": 1.3 * fitted.parameters["gain"].value})
     said = next_experiment(where, other, fitted, Noise(("T",), (0.1,)), CONFIRM)
@@ -74,7 +77,7 @@ def test_a_heated_plate_is_not_sent_to_pump_for_hours() -> None:
 
 def test_a_pattern_starts_where_the_machine_was_read() -> None:
     """Two answers that differ in how they cool down are told apart by standing still, from 60 degC on."""
-    where = make_context(ten_minutes(), plate(0.04), ["a"], ["T"], [])
+    where = context_of(ten_minutes(), plate(0.04), outputs=["T"])
     fitted = where.baseline.model
     still = replace(fitted, parameters={**fitted.parameters, "gain": Parameter(0.0, "K/W/s", fixed=True)})
     faster = still.with_values({"loss": 2 * still.parameters["loss"].value})
@@ -84,7 +87,7 @@ def test_a_pattern_starts_where_the_machine_was_read() -> None:
 
 @pytest.mark.parametrize("wet", [True, False])
 def test_a_machine_with_a_pump_is_asked_to_run_it_or_to_stay_dry(wet: bool) -> None:
-    where = make_context(campaign(simulated(1)), model(), ["r1"], tuple(SEEN), [])
+    where = context_of(campaign(simulated(1)), model())
     fitted = where.baseline.model
     name = "hF" if wet else "loss"
     other = fitted.with_values({name: 1.5 * fitted.parameters[name].value})
@@ -111,7 +114,7 @@ def test_no_sensor_is_asked_for_where_one_is(shown: bool) -> None:
         ),
         {"T": parse("plate" if shown else "0.5*plate + 0.5*foot")},
     )
-    where = make_context(ten_minutes(), two, ["a"], ["T"], [])
+    where = context_of(ten_minutes(), two, outputs=["T"])
     fitted = where.baseline.model
     other = fitted.with_values({"gain": 1.3 * fitted.parameters["gain"].value})
     said = next_experiment(where, other, fitted, Noise(("T",), (0.1,)), CONFIRM)
@@ -121,7 +124,7 @@ def test_no_sensor_is_asked_for_where_one_is(shown: bool) -> None:
 
 def test_a_pattern_confirms_an_effect_where_it_acts_and_takes_its_time() -> None:
     """Heat that comes late: half of the pattern says nothing, nor does what a gain explains."""
-    where = make_context(ten_minutes(), plate(0.04), ["a"], ["T"], [])
+    where = context_of(ten_minutes(), plate(0.04), outputs=["T"])
     fitted = where.baseline.model
     late = Term("late", "T", parse("0.02*heater*(time > 330)"))
     more = fitted.with_values({"gain": 1.1 * fitted.parameters["gain"].value})
@@ -143,7 +146,7 @@ def test_an_input_of_no_known_role_is_moved_where_it_is_what_acts() -> None:
         channels={**PLATE, "lamp": Channel("lamp", "other input", "W", None, "held")},
         recordings={"a": replace(one, values={**one.values, "lamp": lamp})},
     )
-    where = make_context(runs, plate(0.04), ["a"], ["T"], [])
+    where = context_of(runs, plate(0.04), outputs=["T"])
     fitted = where.baseline.model
     lit = fitted.with_terms(Term("lamp", "T", parse("0.02*lamp")))
     said = next_experiment(where, lit, fitted, Noise(("T",), (0.1,)), CONFIRM, believed(where))
@@ -159,17 +162,13 @@ def test_an_effect_of_the_fluid_is_not_confirmed_dry() -> None:
     assert "dry" not in answer.question
 
 
-def claims(where: Context) -> dict[str, Hypothesis]:
-    found = hypotheses(where.model, where.campaign.channels, tuple(SEEN), where.recordings, where.effects)
-    return {f"{h.effect.word} {h.where} {h.recording}": h for h in found}
-
-
 def test_what_has_no_answer_is_not_confirmed() -> None:
-    effects = [catalogue()[word] for word in ("friction_speed", "unmeasured_heat", "film_drag")]
-    where = make_context(campaign(simulated(1)), model(), ["r1"], tuple(SEEN), effects)
-    found = claims(where)
-    law, event = found["friction_speed motor None"], found["unmeasured_heat bed r1"]
-    drag = found["film_drag motor None"]
+    def found(word: str, place: str, run: str | None = None) -> Hypothesis:
+        every = machine.claims(model(), word)
+        return next(h for h in every if (h.places, h.recording) == ((place,), run))
+
+    law, event = found("friction_speed", "motor"), found("unmeasured_heat", "bed", "r1")
+    drag = found("film_drag", "motor")
     said = aim([law, event], None, answered=False)
     assert said.does == "would put to the test what came closest (friction_speed at motor)"
     said = aim([law], drag, answered=False)
@@ -192,11 +191,10 @@ def test_an_event_is_looked_at_where_it_was() -> None:
 
 
 def test_a_loss_that_is_another_was_changed_before() -> None:
-    where = make_context(
-        campaign(simulated(1), simulated(2)), model(), ["r1", "r2"], tuple(SEEN), [catalogue()["wear"]]
-    )
-    said = look_back(where, [claims(where)["wear motor r2"]])
-    assert said.startswith("look at what was changed at motor before r2; repeat r2")
+    seen = campaign(simulated(1), simulated(2))
+    wear = next(h for h in machine.claims(model(), "wear") if h.states == ("motor",))
+    where = cast(Context, SimpleNamespace(campaign=seen))
+    assert look_back(where, [wear]).startswith("look at what was changed at motor before r2; repeat r2")
 
 
 def test_large_sizes_are_written_out() -> None:
@@ -205,3 +203,23 @@ def test_large_sizes_are_written_out() -> None:
     said = diagnose(model(), campaign(*runs), ["r1", "r2"]).question
     assert "would have shown" in said
     assert "e+" not in said
+
+
+def test_patterns_move_what_the_machine_has() -> None:
+    """Half of the time at full speed and load; steps of a twelfth; the pump by a sixth, and dry elsewhere."""
+    seen = campaign(simulated(1))
+    grids = {"r1": make_grid(seen, "r1", machine.INPUTS, list(SEEN))}
+    where = cast(Context, SimpleNamespace(campaign=seen, grids=grids, recordings=("r1",)))
+    found, time = _designs(where, 43200.0), np.linspace(0.0, 43200.0, STEPS + 1)
+    high = np.quantile(grids["r1"].samples["speed"].value, 0.95)
+    half = found["run 6 h at full speed and load, dry, then stand still for 6 h"]
+    assert np.array_equal(half["speed"], np.where(time < 21600.0, high, 0.0))
+    assert not half["pump"].any()
+    steps = found["step speed and load every 1 h, dry"]["speed"]
+    assert np.count_nonzero(np.diff(steps)) == 12
+    pump = found["switch the pump every 2 h at full speed and load"]
+    assert np.count_nonzero(np.diff(pump["pump"])) == 6
+    assert np.all(pump["speed"] == high)
+    still = found["stand still and follow the room"]
+    assert not still["speed"].any()
+    assert not still["pump"].any()

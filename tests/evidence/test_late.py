@@ -9,14 +9,14 @@ import pytest
 from numpy.typing import NDArray
 
 from discovery.diagnosis.context import make_context
-from discovery.diagnosis.selection import search
+from discovery.diagnosis.selection import Search
 from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.late import beside_switches, perhaps_late
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
-from tests.mismatch import machine
+from tests import machine
 
 Array = NDArray[np.float64]
 COIL, FRAME, LINK, AIR = 3000.0, 30000.0, 14.0, 6.0  # J/K, W/K
@@ -68,11 +68,17 @@ def model() -> Model:
     return Model("light", parameters, states, terms, {})
 
 
+def after(seen: Campaign) -> dict[str, tuple[str, ...]]:
+    """By recording, those that were made then or later."""
+    names = tuple(seen.recordings)
+    return {run: names[k:] for k, run in enumerate(names)}
+
+
 def found(seen: Campaign) -> tuple[str, ...]:
     """Effects that a search takes up."""
     effects = [e for e in catalogue().values() if e.word in WORDS]
-    context = make_context(seen, model(), list(seen.recordings), ("coil", "frame"), effects)
-    return tuple(h.effect.word for h in search(context).best.hypotheses)
+    context = make_context(seen, model(), list(seen.recordings), ("coil", "frame"), effects, after(seen))
+    return tuple(h.effect.word for h in Search(context).run().best.hypotheses)
 
 
 def test_a_power_that_is_logged_late_is_no_missing_physics(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -92,7 +98,7 @@ def test_switches_off_the_grid_of_the_logger_are_no_missing_physics(monkeypatch:
 
 def test_stamps_that_are_exact_stay_so() -> None:
     seen = campaign(light(3, 0.0), light(4, 0.0))
-    context = make_context(seen, model(), ["r3", "r4"], ("coil", "frame"), [])
+    context = make_context(seen, model(), ["r3", "r4"], ("coil", "frame"), [], after(seen))
     late = [
         v for u, v in zip(context.baseline.problem.unknowns, context.baseline.theta, strict=True) if u.is_late
     ]
@@ -101,7 +107,7 @@ def test_stamps_that_are_exact_stay_so() -> None:
 
 def test_it_is_asked_only_where_bodies_and_readings_are_fast() -> None:
     seen = campaign(light(5, 0.0))
-    context = make_context(seen, model(), ["r5"], ("coil", "frame"), [])
+    context = make_context(seen, model(), ["r5"], ("coil", "frame"), [], after(seen))
     assert context.grids["r5"].unsure == {"P": INTERVAL}
     rare = light(5, 0.0)
     for name in ("coil", "frame"):
@@ -109,7 +115,7 @@ def test_it_is_asked_only_where_bodies_and_readings_are_fast() -> None:
     grid = make_grid(campaign(rare), "r5", ["P", "room"], ["coil", "frame"])
     assert perhaps_late(context.baseline, {"r5": grid})["r5"].unsure == {}
     slow = machine.campaign(machine.simulated(1), machine.simulated(2))
-    context = make_context(slow, machine.model(), ["r1", "r2"], tuple(machine.SEEN), [])
+    context = make_context(slow, machine.model(), ["r1", "r2"], tuple(machine.SEEN), [], after(slow))
     assert not any(g.unsure for g in context.grids.values())
 
 

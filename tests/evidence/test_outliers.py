@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import make_grid
-from discovery.effects.candidates import hypotheses
+from discovery.effects.candidates import Scene, candidates
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.outliers import find_outliers
 from discovery.fitting import fit_model
@@ -25,7 +25,9 @@ def found(residual: NDArray[np.float64]) -> list[int]:
     channels = {"T": Channel("T", "temperature", "K", NOISE, "linear")}
     recording = Recording("a", time, {"T": residual})
     campaign = Campaign("one", channels, {"a": recording})
-    model = Model("constant", {}, {"x": State("x", "K", start_sd=0.0)}, (), {"T": parse("x")})
+    model = Model(
+        "constant", {}, {"x": State("x", "K", start=parse("0"), start_sd=0.0)}, (), {"T": parse("x")}
+    )
     fit = fit_model(model, campaign, ["a"], ["T"])
     grid = make_grid(campaign, "a", [], ["T"])
     return [round(o.time / 2.0) for o in find_outliers(fit, {"a": grid}, np.array([NOISE]))]
@@ -48,7 +50,7 @@ def test_a_jump_a_slope_and_a_slow_start_are_no_wrong_readings() -> None:
     assert found(noise() + 0.4 * np.arange(200)) == []
     assert found(noise() + 30.0 * np.exp(-np.arange(200) / 8.0)) == []
     kicked = noise()
-    kicked[100:] += 20.0 * 0.3 ** np.arange(100)  # a pump goes on, the model has no fluid
+    kicked[100:] += 20.0 * 0.5 ** np.arange(100)  # a pump goes on, the model has no fluid
     assert found(kicked) == []
     late = noise()
     late[0] -= 25.0  # where a recording starts may be far from what the model has settled to
@@ -73,15 +75,17 @@ def test_sizes_carry_the_unit_of_the_place() -> None:
         "E": Channel("E", "error", "um", 0.5, "linear"),
         "T": Channel("T", "temperature", "degC", 0.1, "linear"),
     }
-    entries = [catalogue()[word] for word in ("air_convection", "sensor_offset")]
-    entries = [replace(e, place="body") if e.word == "air_convection" else e for e in entries]
-    claims = {(h.effect.word, h.places): h for h in hypotheses(rate, channels, ("E", "T"), ("a",), entries)}
+    entries = [catalogue()["sensor_offset"], replace(catalogue()["air_convection"], place="body")]
+    rates = replace(catalogue()["air_convection"], word="rate", place="error state")
+    entries.append(rates)
+    scene = Scene(channels, ("E", "T"), ("a",), {"a": ("a",)}, {}, frozenset(), 0.1, 0.1)
+    claims = {(h.effect.word, h.places): h for h in candidates(rate, entries, scene)}
 
     def unit(word: str, place: str) -> str:
         claim = claims[word, (place,)]
         return claim.added_to(rate).parameters[claim.amplitudes[0]].unit
 
-    assert unit("air_convection", "E") == "um/h/K"
+    assert unit("rate", "E") == "um/h/K"
     assert unit("air_convection", "T") == "1/h"
     assert unit("sensor_offset", "E") == "um"
     assert unit("sensor_offset", "T") == "K"
