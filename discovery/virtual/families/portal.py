@@ -1,0 +1,162 @@
+"""A portal with two columns in a tall hall: crossbeam, head, bed; the air above is warmer than below.
+
+Columns and beam are bars of eight cells; each cell of a column sees the air of its height. The head is cooled by a
+recorded cooling power, the bed is flooded from a sump, the foundation remembers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from discovery.virtual import physics
+from discovery.virtual.machine import Assembly, Channel, Machine, Pace, Spare, Words
+from discovery.virtual.materials import CAST_IRON, Bar
+from discovery.virtual.network import LEVEL, Array, Inputs, Law, heat, link
+from discovery.virtual.network import Form as F
+from discovery.virtual.signals import Draw, lagged, levels, room, shifts, switched
+
+PACE = Pace(hours=96.0, step_s=30.0, log_s=60.0, before_h=60.0, noise=(0.3, 1.6), heat_w=4.0)
+WORDS = Words(
+    fluid="sump", fluid_channel="T_fluid", pump="pump", speed="speed", top_speed=6000.0, power="P_spindle", cooling="P_cool",
+)  # fmt: skip
+COLUMNS = ("left", "right")
+
+
+def portal(rng: Draw, refine: int = 1) -> Machine:
+    """A portal of some 3 m, columns of 1.5 t."""
+    a = Assembly(rng, refine=refine)
+    about = a.about
+    height, width = about(2.4, 0.08), about(2.6, 0.08)
+    section = about(0.09)
+    for name in COLUMNS:
+        a.body(Bar(name, CAST_IRON, height, section * rng.uniform(0.95, 1.05), 8))
+    a.body(Bar("beam", CAST_IRON, width, about(0.07), 8))
+    a.body(Bar("head", CAST_IRON, about(0.9), about(0.05), 5))
+    a.body(Bar("bed", CAST_IRON, about(0.6), about(1.1), 5))
+
+    for k, name in enumerate(COLUMNS):
+        a.joint(name, "bed", about(60.0), (0.0, 0.1), (0.0, 0.2))
+        a.joint("beam", name, about(45.0), (0.0, 0.1) if k == 0 else (0.9, 1.0), (0.88, 1.0))
+    a.joint("head", "beam", about(30.0), (0.3, 1.0), (0.3, 0.7))
+    a.air("bed", about(45.0), exponent=0.25)
+    for name in COLUMNS:
+        _tall_air(a, name, about(19.0))
+    a.nature(
+        *[
+            Law("air beam", F.POWER, node, "T_top", about(16.0) * share / 5.0**0.25, shape=(0.25,))
+            for node, share in a.span("beam")
+        ]
+    )
+    a.believe("air around beam", "beam", "hA_beam*(T_top - beam)", {"hA_beam": (16.0, "W/K")})
+    a.airs["beam"] = 16.0
+    a.nature(*[Law("air head", F.LINK, node, "T_mid", about(7.0) * share) for node, share in a.span("head")])
+    a.believe("air around head", "head", "hA_head*(0.5*T_env + 0.5*T_top - head)", {"hA_head": (7.0, "W/K")})
+    a.airs["head"] = 7.0
+
+    a.loss("head", "P_spindle", about(0.5), at=(0.5, 1.0))
+    a.nature(
+        *[heat("cooling head", node, -0.9 * share, "P_cool") for node, share in a.span("head", 0.5, 1.0)]
+    )
+    a.believe("cooling of the head", "head", "-k_cool*P_cool", {"k_cool": (0.9, "1")})
+
+    a.nature(
+        heat("pump", "sump", about(600.0), "pump"),
+        heat("cutting", "sump", about(700.0), lambda u: u["load"] * u["pump"]),
+        link("sump air", "sump", "T_env", about(110.0)),
+        *physics.film("film", "pump", dry_s=4000.0),
+        nodes={"sump": about(2.5e6), "film": LEVEL},
+    )
+    a.fluid("bed", about(60.0), WORDS, at=(0.0, 0.3), film="film")
+
+    grow = CAST_IRON.expansion * height
+    a.error(
+        Channel("E_Z", "error", "um", sd=1.0),
+        {"left": 0.5 * grow, "right": 0.5 * grow, "head": -10.8 * 0.35, "bed": -2.0},
+        0.1,
+    )
+    a.error(Channel("E_Y", "error", "um", sd=1.0), {"head": 10.8 * 0.5, "beam": 10.8 * 0.25}, 0.2)
+    a.error(
+        Channel("E_A", "error", "um/m", sd=1.5),
+        {"left": grow / width, "right": -grow / width, "head": 1.2},
+        0.05,
+    )
+
+    channels = [
+        Channel("T_env", "ambient temperature", "degC", 2, lambda r: r["T_env"], 0.03),
+        Channel("T_top", "ambient temperature", "degC", 2, lambda r: r["T_top"], 0.03),
+        Channel("T_fluid", "fluid temperature", "degC", 2, lambda r: r["sump"], 0.03),
+        Channel("pump", "fluid flow", "1", 3, lambda r: r["pump"]),
+        Channel("speed", "rotation speed", "rpm", 0, lambda r: r["speed"]),
+        Channel("P_spindle", "heat load", "W", 1, lambda r: r["P_spindle"]),
+        Channel("P_cool", "cooling power", "W", 1, lambda r: r["P_cool"]),
+        Channel("P_hydraulic", "heat load", "W", 0, lambda r: r["P_hydraulic"]),
+        Channel("door", "other input", "1", 2, lambda r: r["door"]),
+    ]
+    cost, viscous, share = about(250.0), about(500.0), rng.uniform(0.35, 0.5)
+
+    def cycle(draw: Draw, hours: float) -> Inputs:
+        u = _cycle(draw, hours)
+        n = u["speed"] / 6000.0
+        power: Array = cost * u["load"] * (n > 0) + viscous * n ** (5.0 / 3.0)
+        u["P_spindle"] = power
+        u["P_cool"] = share * lagged(power, PACE.step_s, draw.uniform(900, 2400))
+        u["T_mid"] = 0.5 * (u["T_env"] + u["T_top"])
+        return u | {f"air {k}": u["T_env"] + (k + 0.5) / 8.0 * (u["T_top"] - u["T_env"]) for k in range(8)}
+
+    return a.machine(
+        "portal with two columns", channels, cycle, WORDS, PACE,
+        heat=400.0, cooled=("head",), chips=("bed",), splashed=COLUMNS, on_bed=("bed",), gaps=(("left", "bed"), ("right", "bed")),
+        unlinked=(("head", "left"), ("head", "right"), ("left", "right")),
+        spare=(
+            Spare("P_hydraulic", "input_heat", "right", size=250.0, full=900.0),
+            Spare("door", "input_exchange", "left", "T_env", size=25.0, full=1.0),
+            Spare("P_hydraulic", "input_path", output="E_Y", size=8.0, full=900.0),
+        ),
+        work=("speed", "load", "pump", "P_spindle", "P_cool", "P_hydraulic"),
+    )  # fmt: skip
+
+
+def _tall_air(a: Assembly, name: str, coefficient: float) -> None:
+    """Air along a column: warmer above; the baseline takes the mean of below and above."""
+    for k in range(8):
+        for node, share in a.span(name, k / 8, (k + 1) / 8):
+            a.nature(
+                Law(
+                    f"air {name}",
+                    F.POWER,
+                    node,
+                    f"air {k}",
+                    coefficient * share / 8 / 5.0**0.25,
+                    shape=(0.25,),
+                )
+            )
+    a.believe(
+        f"air around {name}",
+        name,
+        f"hA_{name}*(0.5*T_env + 0.5*T_top - {name})",
+        {f"hA_{name}": (coefficient, "W/K")},
+    )
+    a.airs[name] = coefficient
+
+
+def _cycle(rng: Draw, hours: float) -> Inputs:
+    """Days in a hall: warm above in the afternoon; jobs of the spindle, hydraulics, an open door now and then."""
+    step = PACE.step_s
+    n = round(hours * 3600 / step)
+    start = rng.uniform(0, 24)
+    day = shifts(rng, n, step, start)
+    low = room(rng, n, step, rng.uniform(20, 23), rng.uniform(0.8, 1.8), 0.7)
+    above = 0.6 + lagged(
+        rng.uniform(0.5, 2.0) * day * levels(rng, n, step, 2, 8, lambda: rng.uniform(0.3, 1.2)), step, 7200.0
+    )
+    work = np.maximum(day, levels(rng, n, step, 2, 9, lambda: float(rng.uniform() < 0.3)))
+    busy = work * levels(rng, n, step, 0.3, 3.0, lambda: float(rng.uniform() < 0.8))
+    return {
+        "T_env": low,
+        "T_top": low + above,
+        "speed": busy * levels(rng, n, step, 0.5, 5.0, lambda: rng.uniform(800, 6000)),
+        "load": busy * levels(rng, n, step, 0.3, 2.0, lambda: rng.uniform(0.0, 1.0)),
+        "pump": work * switched(rng, n, step, (1.0, 8.0), (0.5, 4.0)),
+        "P_hydraulic": work * levels(rng, n, step, 1.0, 6.0, lambda: float(rng.choice([0.0, 400.0, 900.0]))),
+        "door": levels(rng, n, step, 0.5, 6.0, lambda: float(rng.choice([0.0, 0.0, 0.5, 1.0]))),
+    }
