@@ -1,7 +1,7 @@
 """Concealed cases: a machine of a family with three recordings, something in them that its baseline lacks.
 
-A case is a folder of files as a user would have them, and a key that says what is concealed. Its size is what a
-refit of the baseline leaves of it, over the noise of a reading; below 1 `no mismatch` is a right answer, too.
+A case is a folder of files as a user would have them, and a key that says what is concealed. Its size is what
+a refit of the baseline leaves of it, over the noise of a reading; below 1 `no mismatch` is right, too.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Plan:
 def draw_plans(family: str, count: int, seed: int) -> list[Plan]:
     """Plans of `count` cases in random order, the shares of KINDS as near as whole numbers allow.
 
-    Effects and faults are dealt like cards, so that every one that the family can have comes before one returns.
+    Effects and faults are dealt like cards: each that the family can have comes before one returns.
     """
     rng = np.random.default_rng([seed, 1, *family.encode()])
     machine = FAMILIES[family](np.random.default_rng(0))
@@ -117,7 +117,7 @@ def conceal(rng: Draw, world: World, plan: Plan) -> tuple[dict[str, Columns], Ke
 
 
 def with_size(world: World, machine: Machine, key: Key) -> Key:
-    """The key with the rms that a full refit leaves; `no mismatch` is accepted where it is below the noise."""
+    """The key with the rms that a full refit leaves; below the noise `no mismatch` is accepted."""
     rms = world.visible(world.logs(machine, FIT))
     accepts = [*key.get("accepts", []), *(["no mismatch"] if rms < VISIBLE else [])]
     return key | {"rms_over_noise": round(rms, 3)} | ({"accepts": accepts} if accepts else {})
@@ -126,18 +126,20 @@ def with_size(world: World, machine: Machine, key: Key) -> Key:
 def sized(
     rng: Draw, world: World, effect: Effect, sizes: tuple[float, float], avoid: tuple[str, ...] = ()
 ) -> tuple[Machine, Key]:
-    """A machine with an effect as large as a target drawn from `sizes`, at a random place where physics allows it.
+    """A machine with an effect as large as a target drawn from `sizes`, at a random place where it can be.
 
-    Of three places the one is taken where it can be seen best, if the target is reached at none.
+    If physics allows it at none of three places, it stands where it is seen best.
     """
     machine, target = world.machine, float(np.exp(rng.uniform(*np.log(sizes))))
     places = [p for p in effect.places(machine) if not set(p) & set(avoid)] or effect.places(machine)
     found = []
     for k in rng.permutation(len(places))[:3]:
         at, shapes = places[int(k)], Shapes(rng)
-        size, reached = _size_for(
-            world, partial(effect.conceal, machine, at, shapes=shapes), effect.reach(machine, at), target
-        )
+
+        def make(size: float, at: Place = at, shapes: Shapes = shapes) -> Machine:
+            return effect.conceal(machine, at, size, shapes)
+
+        size, reached = _size_for(world, make, effect.reach(machine, at), target)
         found.append((min(reached, target), at, size, shapes))
         if reached > 0.8 * target:
             break
@@ -145,7 +147,9 @@ def sized(
     return effect.conceal(machine, at, size, shapes), _identity(world, effect, at, size, shapes)
 
 
-def _size_for(world: World, make: Any, most: float, target: float) -> tuple[float, float]:
+def _size_for(
+    world: World, make: Callable[[float], Machine], most: float, target: float
+) -> tuple[float, float]:
     """The size with three digits, up to `most`, of which a refit leaves about `target`; and what it leaves.
 
     More is not always seen better: a body tied fast enough is one with its neighbour, which a refit absorbs.
@@ -208,7 +212,7 @@ def _two(rng: Draw, world: World) -> tuple[dict[str, Columns], Key]:
 
 
 def _measuring(rng: Draw, world: World, word: str) -> tuple[dict[str, Columns], Key]:
-    """A fault of the measuring chain, well above noise; a lag acts in all recordings, the rest in one to fit."""
+    """A fault of the measuring chain, well above noise: a lag in all recordings, others in one to fit."""
     outputs, seconds = world.machine.outputs, world.machine.pace.hours * 3600.0
     j, where = int(rng.integers(len(outputs))), FIT[int(rng.integers(len(FIT)))]
     sigma, sign = world.sigma, float(rng.choice([-1.0, 1.0]))

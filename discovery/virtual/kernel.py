@@ -133,7 +133,7 @@ def _system(
 
 @njit(cache=True, error_model="numpy")
 def _factor(a: Array, order: Ints, start: Ints, later: Ints) -> None:
-    """Gauss elimination in place; `later[start[k]:start[k+1]]` are the neighbours of `order[k]` still there."""
+    """Gauss elimination in place; `later[start[k]:start[k+1]]`: neighbours of `order[k]` still there."""
     for k in range(len(order)):
         p = order[k]
         for m in range(start[k], start[k + 1]):

@@ -1,7 +1,8 @@
 """What the log of a machine shows: rows of inputs, readings where they were taken, noise; and its file.
 
-Channels that are held between stamps are means over the row, as a controller logs them: sampled at an instant,
-an input that switches within the row would look like physics. Temperatures are the value at the stamp.
+Channels that are held between stamps are means over the row, as a controller logs them: sampled at an
+instant, an input that switches within the row would look like physics. Temperatures are the value at the
+stamp.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ Columns = dict[str, Array]
 
 @dataclass(frozen=True)
 class Chain:
-    """The measuring chain: white noise of a reading, slow noise as a share of it with its correlation time."""
+    """White noise of a reading, slow noise as a share of it, and its correlation time."""
 
     white: float = 0.5  # times the `sd` of the channel
     slow: float = 0.0
@@ -50,7 +51,7 @@ def observe(machine: Machine, run: Run, first: int, at: Array, rng: Draw, chain:
     """
     step, per = run.step_s, round(machine.pace.log_s / run.step_s)
     rows = (run.steps - first) // per
-    stamps = np.arange(rows) * machine.pace.log_s
+    stamps = np.arange(rows, dtype=np.float64) * machine.pace.log_s
     inputs, reading = rng.spawn(2)
     time = np.union1d(stamps, at)
     columns: Columns = {"time": time}

@@ -3,9 +3,9 @@
     C_i dx_i/dt = sum over the laws of q(x, u)
 
 A *node* is anything that has a rate: a temperature with a capacity in J/K (its laws are heat flows in W), the
-mass of a film on a square metre with capacity 1 (laws in kg/m2/s), a molten share. A *law* is one flow into one
-node; it may leave another. A name that is no node is a series of the inputs: the room, a fluid that is not
-simulated. A *switch* is on or off by a temperature and its dead band: a chiller, a thermostat.
+mass of a film on a square metre with capacity 1 (laws in kg/m2/s), a molten share. A *law* is one flow into
+one node; it may leave another. A name that is no node is a series of the inputs: the room, a fluid that is
+not simulated. A *switch* is on or off by a temperature and its dead band: a chiller, a thermostat.
 """
 
 from __future__ import annotations
@@ -49,8 +49,9 @@ class Form(IntEnum):
 class Law:
     """One flow into one node.
 
-    `leaves`: the node that loses `take` times the flow. `film`: a node of film mass and the mass [kg/m2] at which
-    a surface is half wet; the flow is multiplied by m/(m + half). `switch`: the flow runs while it is on.
+    `leaves`: the node that loses `take` times the flow. `film`: a node of film mass and the mass [kg/m2] at
+    which a surface is half wet; the flow is multiplied by m/(m + half). `switch`: the flow runs while it is
+    on.
     """
 
     name: str
@@ -136,6 +137,6 @@ def times(gate: Gate | None, factor: Gate) -> Gate:
 
     def product(u: Inputs) -> Array:
         n = len(next(iter(u.values())))
-        return gate_values(gate, u, n) * gate_values(factor, u, n)
+        return np.asarray(gate_values(gate, u, n) * gate_values(factor, u, n))
 
     return product

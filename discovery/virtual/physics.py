@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from discovery.virtual.network import Array, Law, Switch, heat, link
-from discovery.virtual.network import Form as F
+from discovery.virtual.network import Array, Form, Law, Switch, heat, link
 
 RPM = 2.0 * np.pi / 60.0  # rad/s per rpm
 
@@ -41,14 +40,14 @@ def film(
 ) -> list[Law]:
     """A film of fluid [kg/m2] on a wall: fed by the pump, drained by gravity with its cube, dried slowly.
 
-    Nusselt's film: the mass that runs off goes with the cube of the thickness. It fills within thickness/flow; that
-    and a third of it should not be much shorter than a step of the plant.
+    Nusselt's film: the mass that runs off goes with the cube of the thickness. It fills within
+    thickness/flow; that and a third of it should not be much shorter than a step of the plant.
     """
     drain = flow_kg / thickness_kg**3
     return [
         heat(f"{name} fed", name, flow_kg, pump),
-        Law(f"{name} drains", F.POWER, name, size=drain, shape=(2.0,)),
-        Law(f"{name} dries", F.LINK, name, size=1.0 / dry_s),
+        Law(f"{name} drains", Form.POWER, name, size=drain, shape=(2.0,)),
+        Law(f"{name} dries", Form.LINK, name, size=1.0 / dry_s),
     ]
 
 
@@ -58,7 +57,7 @@ def chiller(
     """A chiller on a tank: its evaporator, 4 kJ/K, is cooled while it is on. Laws, nodes, switches."""
     plate, name = f"{tank} evaporator", f"{tank} chiller"
     laws = [
-        Law(name, F.HEAT, plate, size=-power, switch=name),
+        Law(name, Form.HEAT, plate, size=-power, switch=name),
         link(f"{name} plate", tank, plate, power / 4.0),
     ]
     return laws, {plate: 4e3}, {name: Switch(tank, target, band)}

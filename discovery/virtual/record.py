@@ -1,4 +1,4 @@
-"""Recordings of the paper's virtual machine: from an order to the files of a campaign, always the same bytes."""
+"""Recordings of the paper's virtual machine, from an order to files: always the same bytes."""
 
 from __future__ import annotations
 

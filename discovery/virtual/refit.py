@@ -1,7 +1,7 @@
 """What a refit of the baseline can absorb: the very model of the case file, fitted to readings without noise.
 
-Parameters and the start values of all states are free. A signature that a refit absorbs is no evidence, whoever
-looks at it; what a refit leaves of it, over the noise of a reading, is the size of an effect.
+Parameters and the start values of all states are free. A signature that a refit absorbs is no evidence,
+whoever looks at it; what a refit leaves of it, over the noise of a reading, is the size of an effect.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def refit(
     found = least_squares(
         problem.residual, start, problem.jacobian, method="trf", x_scale="jac", max_nfev=60, ftol=1e-5
     )
-    return Refit(systems, model, sigma, found.x, found.fun, found.jac)
+    return Refit(systems, model, sigma, found.x, found.fun, np.asarray(found.jac))
 
 
 def campaign_of(machine: Machine, recordings: Mapping[str, Columns]) -> Campaign:

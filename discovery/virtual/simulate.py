@@ -38,7 +38,7 @@ class Run:
         return self.inputs[name]
 
     def flow(self, chosen: str | Callable[[Law], bool]) -> Array:
-        """Sum of the flows of the laws of a name, or of those that `chosen` picks, (n,) at the step beginnings."""
+        """Sum of the flows (n,) of the laws of a name, or of those that `chosen` picks, as steps begin."""
         pick = (lambda law: law.name == chosen) if isinstance(chosen, str) else chosen
         rows = [r for r, law in enumerate(self.network.laws) if pick(law)]
         t = self.tables

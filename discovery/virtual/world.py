@@ -11,7 +11,7 @@ from discovery.virtual.log import Chain, Columns, observe, reading_instants
 from discovery.virtual.machine import Machine
 from discovery.virtual.network import Array, Inputs, heat
 from discovery.virtual.refit import Refit, refit
-from discovery.virtual.signals import DAY, HOUR, Draw, noise
+from discovery.virtual.signals import HOUR, Draw, noise
 from discovery.virtual.simulate import Run, simulate
 
 RECORDINGS = ("a", "b", "c")
@@ -52,7 +52,8 @@ class World:
         """Logs of a machine, its readings with or without noise."""
         chain = Chain(self.noise, 0.3 if self.coloured else 0.0, machine.pace.hours * 3600.0 / 36.0)
         return {
-            r: observe(machine, run, first_step(machine), self.instants[r], np.random.default_rng([self.seed, k]),
+            r: observe(machine, run, first_step(machine), self.instants[r],
+            np.random.default_rng([self.seed, k]),
                        chain if noisy else None)
             for k, (r, run) in enumerate(self.runs(machine, recordings).items())
         }  # fmt: skip
@@ -67,7 +68,7 @@ class World:
         return np.concatenate([s.grid.readings / self.fitted.sigma for s in self.fitted.systems], axis=None)
 
     def size(self, machine: Machine) -> float:
-        """Rms over noise that a refit leaves of a change: the first step of the refit, good while it is small."""
+        """Rms over noise that the first step of a refit leaves of a change."""
         return float(np.sqrt(np.mean(self.fitted.left(self.change(machine)) ** 2)))
 
     def visible(self, logs: dict[str, Columns]) -> float:
@@ -136,8 +137,8 @@ def first_step(machine: Machine) -> int:
 def draw_inputs(rng: Draw, machine: Machine, number: int, age: float) -> Inputs:
     """Inputs of a recording and of the hours before it; the machine rests for a part of these.
 
-    Adds `clock` [s since the recording began], `number` and `age` of the recording, and the heat that no channel
-    shows at each body, `everyday ...`.
+    Adds `clock` [s since the recording began], `number` and `age` of the recording, and the heat that no
+    channel shows at each body, `everyday ...`.
     """
     pace = machine.pace
     u = dict(machine.cycle(rng, pace.hours + pace.before_h))
@@ -147,17 +148,17 @@ def draw_inputs(rng: Draw, machine: Machine, number: int, age: float) -> Inputs:
     for name in machine.work:
         u[name] = u[name].copy()
         u[name][idle] = 0.0
-    u["clock"] = (np.arange(n) - first + 0.5) * pace.step_s
-    u["number"], u["age"] = np.full(n, float(number)), np.full(n, age)
+    u["clock"] = np.asarray((np.arange(n) - first + 0.5) * pace.step_s)
+    u |= {"number": np.full(n, float(number)), "age": np.full(n, age)}
     tau = pace.hours * HOUR / 24.0
     return u | {f"everyday {b}": noise(rng, n, pace.step_s, tau, pace.heat_w) for b in machine.bodies}
 
 
 def draw_calendar(rng: Draw) -> tuple[dict[str, str] | None, tuple[float, ...]]:
-    """Dates of the recordings, or none, and their ages: recordings since the first one, by date where there is one."""
+    """Dates of the recordings, or none, and their ages: 0, 1, ... or in proportion to the dates."""
     days = np.cumsum([rng.integers(0, 300), rng.integers(5, 20), rng.integers(5, 25)])
     begin = np.datetime64("2024-01-08T00:00:00") + days.astype("timedelta64[D]")
-    at = [str(d + np.timedelta64(int(rng.integers(0, DAY)), "s")) for d in begin]
+    at = [str(d + np.timedelta64(int(rng.integers(0, 86400)), "s")) for d in begin]
     if rng.uniform() < 0.5:
         return None, (0.0, 1.0, 2.0)
     return dict(zip(RECORDINGS, at, strict=True)), (

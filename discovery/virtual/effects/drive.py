@@ -72,7 +72,7 @@ def _viscosity(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
 
 
 def _preload(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
-    """The inner ring grows against the outer one: load grows with their difference, torque with a root of it."""
+    """The inner ring grows against the outer one: the load grows with their difference."""
     k, b = shapes("1/K", 0.03, 0.05, 0.1), shapes("m", 0.5, 1.0, 1.0)
     partner = next(p for pair in m.joints if at[0] in pair for p in pair if p != at[0])
     other = m.bodies[partner].nodes[0]
@@ -118,7 +118,7 @@ def _dead_band(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
 
 
 def _wear(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
-    """Friction falls from recording to recording: run-in, fast at first. `age` counts the recordings, or time."""
+    """Friction falls from recording to recording, by `age`; a run-in is fast at first."""
     run_in = shapes("recordings", 1.5, 1e6, 6.0)
 
     def factor(u: Inputs) -> Array:
@@ -138,17 +138,60 @@ def _preload_reach(m: Machine, at: Place) -> float:
 
 
 DRIVE = (
-    Effect("friction_speed", "W", "q = size (n/top)^1.67, in no recorded power", _hidden_friction, power(1.0), _friction,
-           ("windage",)),
-    Effect("viscosity_temperature", "W", "q = size (n/top)^1.67 nu(T)^(2/3) by Vogel, or Stribeck's curve",
-           _driven_by_speed, power(2.0), _viscosity, ("friction_speed",)),
-    Effect("thermal_preload", "W/K", "q = size n/top (1/k + T - T_neighbour)", _driven_by_speed, _preload_reach, _preload),
-    Effect("copper_resistance", "1", "q = size P 0.00393 (T - T_env)", _driven_by_power, number(1.0), _copper),
-    Effect("windage", "W", "q = size (n/top)^2.8", _hidden_friction, power(0.6), _windage, ("friction_speed",)),
-    Effect("rotating_air_convection", "W/K", "q = size (n/top)^0.8 (T_env - T)",
-           lambda m: each(tuple(b for b in m.rotating if b in m.air)), around(5.0), _rotating_air),
-    Effect("cooling_hysteresis", "W", "the cooling follows its signal beyond a dead band of size",
-           lambda m: each(m.cooled) if m.words.cooling else [], power(0.6), _dead_band),
-    Effect("wear", "1", "the loss falls by size from one recording to the next",
-           lambda m: each(tuple(m.driven)), number(0.4), _wear),
-)  # fmt: skip
+    Effect(
+        "friction_speed",
+        "W",
+        "q = size (n/top)^1.67, in no recorded power",
+        _hidden_friction,
+        power(1.0),
+        _friction,
+        ("windage",),
+    ),
+    Effect(
+        "viscosity_temperature",
+        "W",
+        "q = size (n/top)^1.67 nu(T)^(2/3) by Vogel, or Stribeck's curve",
+        _driven_by_speed,
+        power(2.0),
+        _viscosity,
+        ("friction_speed",),
+    ),
+    Effect(
+        "thermal_preload",
+        "W/K",
+        "q = size n/top (1/k + T - T_neighbour)",
+        _driven_by_speed,
+        _preload_reach,
+        _preload,
+    ),
+    Effect(
+        "copper_resistance", "1", "q = size P 0.00393 (T - T_env)", _driven_by_power, number(1.0), _copper
+    ),
+    Effect(
+        "windage", "W", "q = size (n/top)^2.8", _hidden_friction, power(0.6), _windage, ("friction_speed",)
+    ),
+    Effect(
+        "rotating_air_convection",
+        "W/K",
+        "q = size (n/top)^0.8 (T_env - T)",
+        lambda m: each(tuple(b for b in m.rotating if b in m.air)),
+        around(5.0),
+        _rotating_air,
+    ),
+    Effect(
+        "cooling_hysteresis",
+        "W",
+        "the cooling follows its signal beyond a dead band of size",
+        lambda m: each(m.cooled) if m.words.cooling else [],
+        power(0.6),
+        _dead_band,
+    ),
+    Effect(
+        "wear",
+        "1",
+        "the loss falls by size from one recording to the next",
+        lambda m: each(tuple(m.driven)),
+        number(0.4),
+        _wear,
+    ),
+)

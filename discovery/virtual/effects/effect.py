@@ -32,7 +32,7 @@ class Shapes:
 
 
 class Effect(NamedTuple):
-    """An effect: its size in `unit`, the law in one line, where it can act on a machine, and what it does there."""
+    """An effect: size in `unit`, law in one line, where it can act on a machine, what it does there."""
 
     word: str
     unit: str
@@ -72,11 +72,11 @@ def power(share: float) -> Callable[[Machine, Place], float]:
 
 def number(most: float) -> Callable[[Machine, Place], float]:
     """Reach of an effect whose size needs no machine."""
-    return lambda machine, place: most  # noqa: ARG005
+    return lambda *_: most
 
 
 def stretch(machine: Machine, body: str, shapes: Shapes) -> list[Share]:
-    """The stretch of a body where an effect acts: half of it or more, not where the baseline's heat enters."""
+    """The stretch of a body where an effect acts: half of it or more, not just where losses enter."""
     low = shapes("stretch from", 0.0, 0.0, 0.4)
     return machine.bodies[body].span(low, low + shapes("stretch length", 0.5, 0.6, 0.6))
 
@@ -87,7 +87,7 @@ def laws_at(
     nodes: list[Share],
     size: float,
     gate: Gate | None = None,
-    source: str | None = None,
+    source: str = "",
     shape: tuple[float, ...] = (),
     leaves: str = "",
     film: tuple[str, float] | None = None,
@@ -99,7 +99,7 @@ def laws_at(
             name,
             form,
             node,
-            node if source is None else source,
+            source or node,
             size * share,
             gate,
             shape,

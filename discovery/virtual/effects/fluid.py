@@ -1,4 +1,4 @@
-"""Effects of the fluid: splash, film, gap, hose, sump. Films and gaps fill and empty as states of their own."""
+"""Effects of the fluid: splash, film, gap, hose, sump. Films and gaps fill and empty as states."""
 
 from __future__ import annotations
 
@@ -40,8 +40,16 @@ def _splash(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
     name = f"film on {at[0]}"
     thickness = shapes("film kg/m2", 0.04, 0.1, 0.15)
     own = film(name, m.words.pump, shapes("splash kg/m2/s", 1e-4, 3e-4, 6e-4), thickness)
-    laws = laws_at("splash", Form.LINK, stretch(m, at[0], shapes), size, m.words.pump, m.words.fluid,
-                   leaves=m.words.fluid, film=(name, 0.02))  # fmt: skip
+    laws = laws_at(
+        "splash",
+        Form.LINK,
+        stretch(m, at[0], shapes),
+        size,
+        m.words.pump,
+        m.words.fluid,
+        leaves=m.words.fluid,
+        film=(name, 0.02),
+    )
     return m.plus([*laws, *own], {name: LEVEL})
 
 
@@ -90,8 +98,18 @@ def _evaporation(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
     """Lewis: the flux follows the vapour pressures over the film and in the room; the film dries by it."""
     name, flux = f"drying film on {at[0]}", shapes("W/m2", 200.0, 400.0, 700.0)
     own = film(name, m.words.pump, 8e-4, shapes("film kg/m2", 0.08, 0.12, 0.25), 1e5)
-    laws = laws_at("evaporation", Form.EVAPORATION, stretch(m, at[0], shapes), size, None, m.words.air,
-                   (shapes("humidity", 0.3, 0.45, 0.55),), name, (name, 0.004), -flux / max(size, 1e-9) / LATENT)  # fmt: skip
+    laws = laws_at(
+        "evaporation",
+        Form.EVAPORATION,
+        stretch(m, at[0], shapes),
+        size,
+        None,
+        m.words.air,
+        (shapes("humidity", 0.3, 0.45, 0.55),),
+        name,
+        (name, 0.004),
+        -flux / max(size, 1e-9) / LATENT,
+    )
     return m.plus([*laws, *own], {name: LEVEL})
 
 
@@ -165,23 +183,91 @@ def _all_wet(m: Machine) -> list[Place]:
 
 
 FLUID = (
-    Effect("fluid_convection", "W/K", "q = size pump film (T_fluid - T); a film that builds up and runs off",
-           lambda m: each(m.splashed), conductance(1.0), _splash, ("fluid_convection_speed",)),
-    Effect("fluid_convection_flow", "1", "exchange with the fluid saturates with the flow: size 0 is in proportion",
-           lambda m: _wet(m) if m.words.flow else [], number(1.0), _by_flow),
-    Effect("fluid_convection_speed", "W/K", "q = size pump (n/top)^m (T_fluid - T), m 0.67",
-           _wet_and_rotating, conductance(2.0), _faster, ("rim_detachment",)),
-    Effect("rim_detachment", "1", "G_wet (1 - size + size/(1 + (n/n_c)^2))", _wet_and_rotating, number(1.0), _rim,
-           ("fluid_convection_speed",)),
-    Effect("evaporation_drying", "W", "q = -size film (p(T) - 0.45 p(T_env))/p_0 while a film is there",
-           lambda m: _wet(m) if m.words.water else [], power(1.5), _evaporation),
-    Effect("film_drag", "W", "q = size pump (n/top)^2, and as much into the fluid", _wet_and_rotating, power(1.0), _drag),
-    Effect("flooded_gap", "W/K", "q = size fill (T_1 - T_2); a gap that fills and leaks", lambda m: list(m.gaps),
-           conductance(1.5), _gap),
-    Effect("fluid_delay", "s", "the fluid arrives size seconds late, smeared by six volumes", _all_wet,
-           lambda m, _: minutes(m, 60.0), _delay, ("fluid_sump",)),
-    Effect("fluid_sump", "s", "the fluid mixes behind its sensor with a time constant of size seconds", _all_wet,
-           lambda m, _: minutes(m, 240.0), _sump, ("fluid_delay",)),
-    Effect("swarf_heat", "W", "pulses of heat in jobs of their own while the pump runs",
-           lambda m: each(m.chips), power(2.0), _swarf, ("unmeasured_heat",), ("unexplained",)),
-)  # fmt: skip
+    Effect(
+        "fluid_convection",
+        "W/K",
+        "q = size pump film (T_fluid - T); a film that builds up and runs off",
+        lambda m: each(m.splashed),
+        conductance(1.0),
+        _splash,
+        ("fluid_convection_speed",),
+    ),
+    Effect(
+        "fluid_convection_flow",
+        "1",
+        "exchange with the fluid saturates with the flow: size 0 is in proportion",
+        lambda m: _wet(m) if m.words.flow else [],
+        number(1.0),
+        _by_flow,
+    ),
+    Effect(
+        "fluid_convection_speed",
+        "W/K",
+        "q = size pump (n/top)^m (T_fluid - T), m 0.67",
+        _wet_and_rotating,
+        conductance(2.0),
+        _faster,
+        ("rim_detachment",),
+    ),
+    Effect(
+        "rim_detachment",
+        "1",
+        "G_wet (1 - size + size/(1 + (n/n_c)^2))",
+        _wet_and_rotating,
+        number(1.0),
+        _rim,
+        ("fluid_convection_speed",),
+    ),
+    Effect(
+        "evaporation_drying",
+        "W",
+        "q = -size film (p(T) - 0.45 p(T_env))/p_0 while a film is there",
+        lambda m: _wet(m) if m.words.water else [],
+        power(1.5),
+        _evaporation,
+    ),
+    Effect(
+        "film_drag",
+        "W",
+        "q = size pump (n/top)^2, and as much into the fluid",
+        _wet_and_rotating,
+        power(1.0),
+        _drag,
+    ),
+    Effect(
+        "flooded_gap",
+        "W/K",
+        "q = size fill (T_1 - T_2); a gap that fills and leaks",
+        lambda m: list(m.gaps),
+        conductance(1.5),
+        _gap,
+    ),
+    Effect(
+        "fluid_delay",
+        "s",
+        "the fluid arrives size seconds late, smeared by six volumes",
+        _all_wet,
+        lambda m, _: minutes(m, 60.0),
+        _delay,
+        ("fluid_sump",),
+    ),
+    Effect(
+        "fluid_sump",
+        "s",
+        "the fluid mixes behind its sensor with a time constant of size seconds",
+        _all_wet,
+        lambda m, _: minutes(m, 240.0),
+        _sump,
+        ("fluid_delay",),
+    ),
+    Effect(
+        "swarf_heat",
+        "W",
+        "pulses of heat in jobs of their own while the pump runs",
+        lambda m: each(m.chips),
+        power(2.0),
+        _swarf,
+        ("unmeasured_heat",),
+        ("unexplained",),
+    ),
+)

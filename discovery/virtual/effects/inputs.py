@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,14 +14,14 @@ from discovery.virtual.network import Array, Form, Inputs, heat, link
 
 def spare_at(m: Machine, at: Place, kind: str) -> Spare:
     """The spare input that can act at a place in this way."""
-    return next(s for s in m.spare if s.kind == kind and at == ((s.output,) if s.output else (s.body,)))
+    return next(s for s in m.spare if s.kind == kind and at == (s.output or s.body,))
 
 
-def _places(kind: str) -> object:
-    return lambda m: [(s.output,) if s.output else (s.body,) for s in m.spare if s.kind == kind]
+def _places(kind: str) -> Callable[[Machine], list[Place]]:
+    return lambda m: [(s.output or s.body,) for s in m.spare if s.kind == kind]
 
 
-def _reach(kind: str) -> object:
+def _reach(kind: str) -> Callable[[Machine, Place], float]:
     return lambda m, at: 3.0 * spare_at(m, at, kind).size
 
 
@@ -63,7 +64,7 @@ def _path(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
 
 
 INPUTS = (
-    Effect("input_heat", "W", "size watts at full input", _places("input_heat"), _reach("input_heat"), _heat),  # type: ignore[arg-type]
+    Effect("input_heat", "W", "size watts at full input", _places("input_heat"), _reach("input_heat"), _heat),
     Effect(
         "input_exchange",
         "W/K",
@@ -71,7 +72,7 @@ INPUTS = (
         _places("input_exchange"),
         _reach("input_exchange"),
         _exchange,
-    ),  # type: ignore[arg-type]
+    ),
     Effect(
         "input_path",
         "um",
@@ -79,5 +80,5 @@ INPUTS = (
         _places("input_path"),
         _reach("input_path"),
         _path,
-    ),  # type: ignore[arg-type]
+    ),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -57,7 +58,7 @@ def _second_mass(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
     tau = shapes("time constant s", minutes(m, 25.0), minutes(m, 53.0), minutes(m, 120.0))
     names = [f"behind {at[0]} {k}" for k in range(cells)]
     first = [link("hidden mass", node, names[0], size * share) for node, share in stretch(m, at[0], shapes)]
-    inner = [link("hidden mass", b, a, 3.0 * size * cells) for a, b in zip(names, names[1:], strict=False)]
+    inner = [link("hidden mass", b, a, 3.0 * size * cells) for a, b in itertools.pairwise(names)]
     return m.plus([*first, *inner], dict.fromkeys(names, size * tau / cells))
 
 
@@ -81,7 +82,7 @@ def _contact(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
 
 
 def _joint(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
-    """A joint with play of `size` [um], narrower on the way up, that creeps home: part of an error follows it."""
+    """Part of an error follows a joint with play of `size` [um], narrower on the way up, that creeps home."""
     slip, narrow = shapes("slip", 0.4, 0.7, 1.0), shapes("up", 0.4, 0.7, 1.0)
     creep, j = shapes("creep 1/h", 0.0, 0.05, 0.2), m.outputs.index(at[0])
 
@@ -125,22 +126,76 @@ def _second_bodies(m: Machine) -> list[Place]:
 
 
 STRUCTURE = (
-    Effect("natural_convection", "W/K", "q = size (|dT|/5)^(1/4) dT, dT = T_env - T", lambda m: each(tuple(m.air)),
-           around(3.0), _natural, ("radiation", "air_convection")),
-    Effect("radiation", "m2", "q = size sigma (T_wall^4 - T^4), size = emissivity x area", lambda m: each(tuple(m.air)),
-           around(0.2), _radiation, ("natural_convection",)),
-    Effect("air_convection", "W/K", "q = size (T_env - T)", lambda m: each(tuple(b for b in m.bodies if b not in m.air)),
-           around(3.0), _air, ("natural_convection",)),
-    Effect("conduction_path", "W/K", "q = size (T_1 - T_2)", lambda m: list(m.unlinked), conductance(1.5), _path),
-    Effect("second_thermal_mass", "W/K", "a hidden mass hangs on the body by size", _second_bodies, conductance(2.0),
-           _second_mass),
-    Effect("bed_memory", "W/K", "q = size (T_bed - T), the bed follows the room in 30 h", lambda m: each(m.on_bed),
-           conductance(2.0), _bed),
-    Effect("contact_conductance", "1", "G (1 + size tanh((T - 24)/4)), T the mean of both", lambda m: list(m.joints),
-           number(0.9), _contact),
-    Effect("joint_hysteresis", "um", "the error follows its joint beyond a play of size",
-           lambda m: [(o.name,) for o in m.channels if o.role == "error"],
-           lambda m, _: 8.0 * m.pace.noise[1], _joint),
-    Effect("unmeasured_heat", "W", "heat in one window of some hours", lambda m: each(tuple(m.bodies)), power(2.0),
-           _unmeasured, (), ()),
-)  # fmt: skip
+    Effect(
+        "natural_convection",
+        "W/K",
+        "q = size (|dT|/5)^(1/4) dT, dT = T_env - T",
+        lambda m: each(tuple(m.air)),
+        around(3.0),
+        _natural,
+        ("radiation", "air_convection"),
+    ),
+    Effect(
+        "radiation",
+        "m2",
+        "q = size sigma (T_wall^4 - T^4), size = emissivity x area",
+        lambda m: each(tuple(m.air)),
+        around(0.2),
+        _radiation,
+        ("natural_convection",),
+    ),
+    Effect(
+        "air_convection",
+        "W/K",
+        "q = size (T_env - T)",
+        lambda m: each(tuple(b for b in m.bodies if b not in m.air)),
+        around(3.0),
+        _air,
+        ("natural_convection",),
+    ),
+    Effect(
+        "conduction_path", "W/K", "q = size (T_1 - T_2)", lambda m: list(m.unlinked), conductance(1.5), _path
+    ),
+    Effect(
+        "second_thermal_mass",
+        "W/K",
+        "a hidden mass hangs on the body by size",
+        _second_bodies,
+        conductance(2.0),
+        _second_mass,
+    ),
+    Effect(
+        "bed_memory",
+        "W/K",
+        "q = size (T_bed - T), the bed follows the room in 30 h",
+        lambda m: each(m.on_bed),
+        conductance(2.0),
+        _bed,
+    ),
+    Effect(
+        "contact_conductance",
+        "1",
+        "G (1 + size tanh((T - 24)/4)), T the mean of both",
+        lambda m: list(m.joints),
+        number(0.9),
+        _contact,
+    ),
+    Effect(
+        "joint_hysteresis",
+        "um",
+        "the error follows its joint beyond a play of size",
+        lambda m: [(o.name,) for o in m.channels if o.role == "error"],
+        lambda m, _: 8.0 * m.pace.noise[1],
+        _joint,
+    ),
+    Effect(
+        "unmeasured_heat",
+        "W",
+        "heat in one window of some hours",
+        lambda m: each(tuple(m.bodies)),
+        power(2.0),
+        _unmeasured,
+        (),
+        (),
+    ),
+)

@@ -1,7 +1,8 @@
-"""A bearing test rig: shaft, rings, housing, plate; oil flow, load and speed in steps, readings every few seconds.
+"""A bearing test rig: shaft, rings, housing, plate; oil flow, load and speed in steps, readings every few
+seconds.
 
-Not hours but minutes. Friction by Palmgren with a load-dependent part; temperatures of the outer ring and the housing
-are measured, and the growth of the shaft.
+Not hours but minutes. Friction by Palmgren with a load-dependent part; temperatures of the outer ring and
+the housing are measured, and the growth of the shaft.
 """
 
 from __future__ import annotations
@@ -9,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from discovery.virtual import physics
-from discovery.virtual.machine import Assembly, Channel, Machine, Pace, Spare, Words
+from discovery.virtual.assembly import Assembly
+from discovery.virtual.machine import Machine, Pace, Spare, Words, felt, logged
 from discovery.virtual.materials import CAST_IRON, STEEL, Bar
 from discovery.virtual.network import Array, Inputs, heat
 from discovery.virtual.signals import Draw, lagged, levels, room
@@ -62,31 +64,30 @@ def bearing_rig(rng: Draw, refine: int = 1) -> Machine:
     ):
         a.fluid(body, about(G), WORDS, at=at)
 
-    a.error(
-        Channel("E_X", "error", "um", sd=1.0),
-        {"shaft": STEEL.expansion * length * 0.8, "inner": 0.2, "housing": -0.5},
-        0.1,
-    )
-    a.error(
-        Channel("E_Y", "error", "um", sd=0.7),
-        {"housing": 10.8 * 0.12, "plate": 11.5 * 0.05, "outer": 0.3},
-        0.1,
-    )
-    a.sensor(Channel("T_outer", "temperature", "degC", sd=0.2), "outer")
-    a.sensor(Channel("T_housing", "temperature", "degC", sd=0.15), "housing", (0.4, 0.8))
+    a.error("E_X", "um", {"shaft": STEEL.expansion * length * 0.8, "inner": 0.2, "housing": -0.5}, uneven=0.1)
+    a.error("E_Y", "um", {"housing": 10.8 * 0.12, "plate": 11.5 * 0.05, "outer": 0.3}, noise=0.7, uneven=0.1)
+    a.sensor("T_outer", "outer", 0.2)
+    a.sensor("T_housing", "housing", 0.15, at=(0.4, 0.8))
 
     channels = [
-        Channel("T_env", "ambient temperature", "degC", 2, lambda r: r["T_env"], 0.03),
-        Channel("T_oil", "fluid temperature", "degC", 2, lambda r: r["T_oil"], 0.05),
-        Channel("oil", "fluid flow", "1", 3, lambda r: r["oil"]),
-        Channel("speed", "rotation speed", "rpm", 0, lambda r: r["speed"]),
-        Channel("load", "other input", "kN", 2, lambda r: r["load"]),
-        Channel("fan", "other input", "percent", 0, lambda r: r["fan"]),
-        Channel("P_heater", "heat load", "W", 0, lambda r: r["P_heater"]),
+        felt("T_env", "ambient temperature"),
+        felt("T_oil", "fluid temperature", sd=0.05, decimals=2),
+        logged("oil", "fluid flow", "1", 3),
+        logged("speed", "rotation speed", "rpm"),
+        logged("load", "other input", "kN", 2),
+        logged("fan", "other input", "percent"),
+        logged("P_heater", "heat load", "W"),
     ]
     return a.machine(
-        "bearing test rig", channels, _cycle, WORDS, PACE,
-        heat=60.0, rotating=("shaft", "inner"), splashed=("shaft",), gaps=(("shaft", "housing"),),
+        "bearing test rig",
+        channels,
+        _cycle,
+        WORDS,
+        PACE,
+        heat=60.0,
+        rotating=("shaft", "inner"),
+        splashed=("shaft",),
+        gaps=(("shaft", "housing"),),
         unlinked=(("shaft", "housing"), ("outer", "plate")),
         spare=(
             Spare("fan", "input_exchange", "housing", "T_env", size=3.0, full=100.0),
@@ -94,7 +95,7 @@ def bearing_rig(rng: Draw, refine: int = 1) -> Machine:
             Spare("P_heater", "input_path", output="E_X", size=6.0, full=50.0),
         ),
         work=("speed", "load", "P_heater"),
-    )  # fmt: skip
+    )
 
 
 def _cycle(rng: Draw, hours: float) -> Inputs:

@@ -11,15 +11,22 @@ from collections.abc import Callable
 import numpy as np
 
 from discovery.virtual import physics
-from discovery.virtual.machine import T_REF, Assembly, Channel, Machine, Pace, Spare, Words
+from discovery.virtual.assembly import Assembly
+from discovery.virtual.machine import T_REF, Machine, Pace, Spare, Words, felt, logged
 from discovery.virtual.materials import CAST_IRON, STEEL, Bar
 from discovery.virtual.network import LEVEL, Array, Inputs, heat, link
 from discovery.virtual.signals import Draw, lagged, levels, room, shifts, switched
 
 PACE = Pace()
 WORDS = Words(
-    fluid="sump", fluid_channel="T_fluid", pump="pump", flow="flow", speed="speed", top_speed=4500.0, power="P_motor",
-)  # fmt: skip
+    fluid="sump",
+    fluid_channel="T_fluid",
+    pump="pump",
+    flow="flow",
+    speed="speed",
+    top_speed=4500.0,
+    power="P_motor",
+)
 
 
 def headstock(rng: Draw, refine: int = 1) -> Machine:
@@ -89,17 +96,15 @@ def headstock(rng: Draw, refine: int = 1) -> Machine:
     a.fluid("housing_front", about(25.0), WORDS, at=(0.0, 0.6), film="film")
 
     a.error(
-        Channel("E_Z", "error", "um", sd=1.0),
+        "E_Z",
+        "um",
         {"spindle": 11.5 * 0.6 * length, "front": 0.3, "housing_front": -10.8 * 0.3 * length},
-        0.2,
+        uneven=0.2,
     )
+    a.error("E_Y", "um", {"front": 0.4, "housing_front": 10.8 * 0.12, "base": 10.8 * 0.3}, uneven=0.2)
     a.error(
-        Channel("E_Y", "error", "um", sd=1.0),
-        {"front": 0.4, "housing_front": 10.8 * 0.12, "base": 10.8 * 0.3},
-        0.2,
-    )
-    a.error(
-        Channel("E_A", "error", "um/m", sd=2.0),
+        "E_A",
+        "um/m",
         {
             "front": 1.5,
             "rear": -1.5,
@@ -107,17 +112,18 @@ def headstock(rng: Draw, refine: int = 1) -> Machine:
             "housing_rear": -10.8 * 0.12 / length,
             "base": -2.0,
         },
+        noise=2.0,
     )
 
     channels = [
-        Channel("T_env", "ambient temperature", "degC", 2, lambda r: r["T_env"], 0.03),
-        Channel("T_fluid", "fluid temperature", "degC", 2, lambda r: r["sump"], 0.03),
-        Channel("T_cool", "coolant temperature", "degC", 2, lambda r: r["tank"], 0.03),
-        Channel("pump", "fluid flow", "1", 3, lambda r: r["pump"]),
-        Channel("speed", "rotation speed", "rpm", 0, lambda r: r["speed"]),
-        Channel("P_motor", "heat load", "W", 1, lambda r: r["P_motor"]),
-        Channel("mist_fan", "other input", "percent", 0, lambda r: r["mist_fan"]),
-        Channel("P_dresser", "heat load", "W", 0, lambda r: r["P_dresser"]),
+        felt("T_env", "ambient temperature"),
+        felt("T_fluid", "fluid temperature", "sump"),
+        felt("T_cool", "coolant temperature", "tank"),
+        logged("pump", "fluid flow", "1", 3),
+        logged("speed", "rotation speed", "rpm"),
+        logged("P_motor", "heat load", "W", 1),
+        logged("mist_fan", "other input", "percent"),
+        logged("P_dresser", "heat load", "W"),
     ]
     spare = (
         Spare("mist_fan", "input_exchange", "housing_rear", "T_env", size=10.0, full=100.0),
@@ -125,11 +131,21 @@ def headstock(rng: Draw, refine: int = 1) -> Machine:
         Spare("P_dresser", "input_path", output="E_Y", size=5.0, full=200.0),
     )
     return a.machine(
-        "grinding headstock", channels, lambda r, h: _with(_cycle(r, h), P_motor=motor), WORDS, PACE,
-        rotating=("spindle", "front"), splashed=("base", "front"), chips=("housing_front",), gaps=(("spindle", "housing_front"),),
-        unlinked=(("front", "base"), ("spindle", "housing_rear"), ("rear", "base")), on_bed=("base",), spare=spare,
-        work=("speed", "torque", "pump", "P_dresser", "P_motor"), heat=250.0,
-    )  # fmt: skip
+        "grinding headstock",
+        channels,
+        lambda r, h: _with(_cycle(r, h), P_motor=motor),
+        WORDS,
+        PACE,
+        rotating=("spindle", "front"),
+        splashed=("base", "front"),
+        chips=("housing_front",),
+        gaps=(("spindle", "housing_front"),),
+        unlinked=(("front", "base"), ("spindle", "housing_rear"), ("rear", "base")),
+        on_bed=("base",),
+        spare=spare,
+        work=("speed", "torque", "pump", "P_dresser", "P_motor"),
+        heat=250.0,
+    )
 
 
 def _with(u: Inputs, **more: Callable[[Inputs], Array]) -> Inputs:

@@ -6,12 +6,14 @@ stretch of the screw that is travelled: each cell by the share of the stroke tha
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
-from discovery.virtual.machine import Assembly, Channel, Machine, Pace, Spare, Words
+from discovery.virtual.assembly import Assembly
+from discovery.virtual.machine import Machine, Pace, Spare, Words, felt, logged
 from discovery.virtual.materials import CAST_IRON, STEEL, Bar
-from discovery.virtual.network import Array, Gate, Inputs, Law, heat, link, natural
-from discovery.virtual.network import Form as F
+from discovery.virtual.network import Array, Form, Gate, Inputs, Law, heat, link, natural, times
 from discovery.virtual.signals import Draw, levels, room, shifts
 
 PACE = Pace(noise=(0.3, 1.4))
@@ -31,7 +33,7 @@ def linear_axis(rng: Draw, refine: int = 1) -> Machine:
     a.body(Bar("table", CAST_IRON, about(0.12), about(0.12), 4))
     a.body(Bar("bed", CAST_IRON, about(0.45), about(0.22), 5, web=about(0.12)))
 
-    for one, other in zip(SECTIONS, SECTIONS[1:], strict=False):
+    for one, other in itertools.pairwise(SECTIONS):
         a.joint(one, other, STEEL.conductivity * section / (length / 6), (0.75, 1.0), (0.0, 0.25))
     a.joint("bearing", "screw_1", about(8.0), other_at=(0.0, 0.2))
     a.joint("bearing", "bed", about(25.0), other_at=(0.7, 1.0))
@@ -52,8 +54,8 @@ def linear_axis(rng: Draw, refine: int = 1) -> Machine:
 
     for k, node in enumerate(cells):
         share = on_cell(k, len(cells), length)
-        a.nature(Law("loss nut", F.HEAT, node, size=0.5, gate=lambda u, s=share: rubbing(u) * s(u)))
-        a.nature(Law("nut on screw", F.LINK, node, "nut", grip, share, leaves="nut"))
+        a.nature(Law("loss nut", Form.HEAT, node, size=0.5, gate=times(rubbing, share)))
+        a.nature(Law("nut on screw", Form.LINK, node, "nut", grip, share, leaves="nut"))
     a.nature(heat("loss nut", "nut", 0.5, rubbing))
     a.driven["nut"] = "speed"
     a.believe("friction of the nut", "nut", "P_nut*(speed/1000)**1.4", {"P_nut": (0.5 * nut, "W")})
@@ -73,8 +75,12 @@ def linear_axis(rng: Draw, refine: int = 1) -> Machine:
         "speed",
         lambda u: preload * (0.4 * u["speed"] / 1000 + 0.6 * (u["speed"] / 1000) ** (5 / 3)),
     )
-    a.nature(link("motor flange", "motor", "bearing", about(3.0)), natural("motor air", "motor", "T_env", 1.5, 0.25),
-             heat("motor", "motor", motor, "P_servo"), nodes={"motor": about(4e3)})  # fmt: skip
+    a.nature(
+        link("motor flange", "motor", "bearing", about(3.0)),
+        natural("motor air", "motor", "T_env", 1.5, 0.25),
+        heat("motor", "motor", motor, "P_servo"),
+        nodes={"motor": about(4e3)},
+    )
     a.driven["bearing"] = "speed"
     a.believe(
         "motor warms the bearing", "bearing", "loss_bearing*P_servo", {"loss_bearing": (0.6 * motor, "1")}
@@ -82,17 +88,19 @@ def linear_axis(rng: Draw, refine: int = 1) -> Machine:
 
     growth = STEEL.expansion * length / 3
     a.error(
-        Channel("E_X_far", "error", "um", sd=1.0),
+        "E_X_far",
+        "um",
         {"screw_1": growth, "screw_2": growth, "screw_3": 0.5 * growth, "bed": -0.5},
-        0.1,
+        uneven=0.1,
     )
     a.error(
-        Channel("E_X_near", "error", "um", sd=1.0),
+        "E_X_near",
+        "um",
         {"screw_1": growth, "screw_2": 0.3 * growth, "bed": -0.3, "bearing": 0.4},
-        0.1,
+        uneven=0.1,
     )
-    a.error(Channel("E_Z", "error", "um", sd=1.0), {"table": 10.8 * 0.12, "bed": 10.8 * 0.2}, 0.1)
-    a.sensor(Channel("T_nut", "temperature", "degC", sd=0.2), "nut")
+    a.error("E_Z", "um", {"table": 10.8 * 0.12, "bed": 10.8 * 0.2}, uneven=0.1)
+    a.sensor("T_nut", "nut", 0.2)
 
     copper, iron = about(160.0), about(40.0)
 
@@ -100,13 +108,13 @@ def linear_axis(rng: Draw, refine: int = 1) -> Machine:
         return np.asarray(copper * u["force"] ** 2 + iron * (u["speed"] / 3000.0) ** 1.5)
 
     channels = [
-        Channel("T_env", "ambient temperature", "degC", 2, lambda r: r["T_env"], 0.03),
-        Channel("speed", "rotation speed", "rpm", 0, lambda r: r["speed"]),
-        Channel("x_low", "other input", "m", 3, lambda r: r["x_low"]),
-        Channel("x_high", "other input", "m", 3, lambda r: r["x_high"]),
-        Channel("P_servo", "heat load", "W", 1, lambda r: r["P_servo"]),
-        Channel("air_blast", "other input", "l/min", 0, lambda r: r["air_blast"]),
-        Channel("P_hydraulic", "heat load", "W", 0, lambda r: r["P_hydraulic"]),
+        felt("T_env", "ambient temperature"),
+        logged("speed", "rotation speed", "rpm"),
+        logged("x_low", "other input", "m", 3),
+        logged("x_high", "other input", "m", 3),
+        logged("P_servo", "heat load", "W", 1),
+        logged("air_blast", "other input", "l/min"),
+        logged("P_hydraulic", "heat load", "W"),
     ]
 
     def cycle(draw: Draw, hours: float) -> Inputs:
@@ -114,15 +122,22 @@ def linear_axis(rng: Draw, refine: int = 1) -> Machine:
         return {**u, "P_servo": servo(u)}
 
     return a.machine(
-        "linear axis", channels, cycle, WORDS, PACE,
-        heat=120.0, rotating=SECTIONS, on_bed=("bed",), unlinked=(("nut", "bed"), ("bearing", "table"), ("screw_2", "bed")),
+        "linear axis",
+        channels,
+        cycle,
+        WORDS,
+        PACE,
+        heat=120.0,
+        rotating=SECTIONS,
+        on_bed=("bed",),
+        unlinked=(("nut", "bed"), ("bearing", "table"), ("screw_2", "bed")),
         spare=(
             Spare("air_blast", "input_exchange", "screw_3", "T_env", size=1.5, full=200.0),
             Spare("P_hydraulic", "input_heat", "table", size=30.0, full=200.0),
             Spare("P_hydraulic", "input_path", output="E_Z", size=4.0, full=200.0),
         ),
         work=("speed", "force", "P_servo", "P_hydraulic"),
-    )  # fmt: skip
+    )
 
 
 def on_cell(k: int, count: int, length: float) -> Gate:
@@ -152,7 +167,10 @@ def _cycle(rng: Draw, hours: float, length: float) -> Inputs:
     force = levels(rng, n, step, 0.2, 2.0, lambda: rng.uniform(0.1, 1.0)) * (speed > 0)
     return {
         "T_env": room(rng, n, step, rng.uniform(21, 23), rng.uniform(0.5, 1.2), 0.4),
-        "speed": speed, "x_low": middle - stroke / 2, "x_high": middle + stroke / 2, "force": force,
+        "speed": speed,
+        "x_low": middle - stroke / 2,
+        "x_high": middle + stroke / 2,
+        "force": force,
         "air_blast": levels(rng, n, step, 1.0, 6.0, lambda: float(rng.choice([0.0, 50.0, 120.0, 200.0]))),
         "P_hydraulic": levels(rng, n, step, 0.5, 5.0, lambda: float(rng.choice([0.0, 0.0, 90.0, 180.0]))),
-    }  # fmt: skip
+    }

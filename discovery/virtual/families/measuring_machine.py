@@ -1,17 +1,19 @@
-"""A measuring machine in a room with a day: granite table, ceramic bridge, ram; nothing turns, nothing is wet.
+"""A measuring machine in a room with a day: granite table, ceramic bridge, ram; nothing turns, nothing is
+wet.
 
-Heat comes from the room: people and sun by day, an air conditioner that pulses. The air below the ceiling is a state
-of its own, the granite conducts so badly that its top and its bottom are bodies of five cells each.
+Heat comes from the room: people and sun by day, an air conditioner that pulses. The air below the ceiling
+is a state of its own, the granite conducts so badly that its top and its bottom are bodies of five cells
+each.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from discovery.virtual.machine import Assembly, Channel, Machine, Pace, Spare, Words
+from discovery.virtual.assembly import Assembly
+from discovery.virtual.machine import Machine, Pace, Spare, Words, felt, logged
 from discovery.virtual.materials import ALUMINIUM, CERAMIC, GRANITE, Bar
-from discovery.virtual.network import Form as F
-from discovery.virtual.network import Inputs, Law, Switch, heat, link
+from discovery.virtual.network import Form, Inputs, Law, Switch, heat, link
 from discovery.virtual.signals import Draw, lagged, levels, noise, room, shifts
 
 PACE = Pace(
@@ -50,42 +52,36 @@ def measuring_machine(rng: Draw, refine: int = 1) -> Machine:
     a.nature(
         link("ceiling", "ceiling", "T_env", 20.0),
         *[
-            Law("shine", F.RADIATION, node, "ceiling", about(0.06) * share)
+            Law("shine", Form.RADIATION, node, "ceiling", about(0.06) * share)
             for node, share in a.span("granite_top", 0.0, 0.2)
         ],
         heat("warm air", "ceiling", 1.0, "P_people"),
-        Law("conditioner", F.HEAT, "ceiling", size=-60.0, switch="conditioner"),
+        Law("conditioner", Form.HEAT, "ceiling", size=-60.0, switch="conditioner"),
         nodes={"ceiling": about(1.5e5)},
         switches={"conditioner": Switch("ceiling", 21.3, 0.3)},
     )
 
     tilt = 6.0 / (thick / 2)
-    a.error(
-        Channel("E_X", "error", "um", sd=1.0),
-        {"beam": 7.4 * span * 0.6, "granite_top": -6.0 * span * 0.5},
-        0.1,
-    )
-    a.error(
-        Channel("E_Z", "error", "um", sd=1.0),
-        {"legs": 7.4 * leg, "ram": -23.5 * 0.15, "granite_top": 0.3},
-        0.1,
-    )
-    a.error(
-        Channel("E_B", "error", "um/m", sd=2.0),
-        {"granite_top": tilt * 0.4, "granite_bottom": -tilt * 0.4},
-        0.1,
-    )
-    a.sensor(Channel("T_beam", "temperature", "degC", sd=0.07), "beam", (0.4, 0.6))
+    a.error("E_X", "um", {"beam": 7.4 * span * 0.6, "granite_top": -6.0 * span * 0.5}, uneven=0.1)
+    a.error("E_Z", "um", {"legs": 7.4 * leg, "ram": -23.5 * 0.15, "granite_top": 0.3}, uneven=0.1)
+    a.error("E_B", "um/m", {"granite_top": tilt * 0.4, "granite_bottom": -tilt * 0.4}, noise=2.0, uneven=0.1)
+    a.sensor("T_beam", "beam", 0.07, at=(0.4, 0.6))
 
     channels = [
-        Channel("T_env", "ambient temperature", "degC", 3, lambda r: r["T_env"], 0.02),
-        Channel("P_drives", "heat load", "W", 1, lambda r: r["P_drives"]),
-        Channel("P_lamps", "heat load", "W", 0, lambda r: r["P_lamps"]),
-        Channel("fan_room", "other input", "percent", 0, lambda r: r["fan_room"]),
+        felt("T_env", "ambient temperature", sd=0.02, decimals=3),
+        logged("P_drives", "heat load", "W", 1),
+        logged("P_lamps", "heat load", "W"),
+        logged("fan_room", "other input", "percent"),
     ]
     return a.machine(
-        "measuring machine", channels, _cycle, WORDS, PACE,
-        heat=15.0, on_bed=("granite_bottom",), unlinked=(("ram", "legs"), ("beam", "granite_top")),
+        "measuring machine",
+        channels,
+        _cycle,
+        WORDS,
+        PACE,
+        heat=15.0,
+        on_bed=("granite_bottom",),
+        unlinked=(("ram", "legs"), ("beam", "granite_top")),
         spare=(
             Spare("fan_room", "input_exchange", "granite_top", "T_env", size=5.0, full=100.0),
             Spare("fan_room", "input_exchange", "beam", "T_env", size=4.0, full=100.0),
@@ -93,7 +89,7 @@ def measuring_machine(rng: Draw, refine: int = 1) -> Machine:
             Spare("P_lamps", "input_path", output="E_Z", size=2.0, full=300.0),
         ),
         work=("P_drives", "P_lamps"),
-    )  # fmt: skip
+    )
 
 
 def _cycle(rng: Draw, hours: float) -> Inputs:

@@ -1,7 +1,7 @@
 """A portal with two columns in a tall hall: crossbeam, head, bed; the air above is warmer than below.
 
-Columns and beam are bars of eight cells; each cell of a column sees the air of its height. The head is cooled by a
-recorded cooling power, the bed is flooded from a sump, the foundation remembers.
+Columns and beam are bars of eight cells; each cell of a column sees the air of its height. The head is
+cooled by a recorded cooling power, the bed is flooded from a sump, the foundation remembers.
 """
 
 from __future__ import annotations
@@ -9,16 +9,22 @@ from __future__ import annotations
 import numpy as np
 
 from discovery.virtual import physics
-from discovery.virtual.machine import Assembly, Channel, Machine, Pace, Spare, Words
+from discovery.virtual.assembly import Assembly
+from discovery.virtual.machine import Machine, Pace, Spare, Words, felt, logged
 from discovery.virtual.materials import CAST_IRON, Bar
-from discovery.virtual.network import LEVEL, Array, Inputs, Law, heat, link
-from discovery.virtual.network import Form as F
+from discovery.virtual.network import LEVEL, Array, Form, Inputs, Law, heat, link
 from discovery.virtual.signals import Draw, lagged, levels, room, shifts, switched
 
 PACE = Pace(hours=96.0, step_s=30.0, log_s=60.0, before_h=60.0, noise=(0.3, 1.6), heat_w=4.0)
 WORDS = Words(
-    fluid="sump", fluid_channel="T_fluid", pump="pump", speed="speed", top_speed=6000.0, power="P_spindle", cooling="P_cool",
-)  # fmt: skip
+    fluid="sump",
+    fluid_channel="T_fluid",
+    pump="pump",
+    speed="speed",
+    top_speed=6000.0,
+    power="P_spindle",
+    cooling="P_cool",
+)
 COLUMNS = ("left", "right")
 
 
@@ -43,13 +49,15 @@ def portal(rng: Draw, refine: int = 1) -> Machine:
         _tall_air(a, name, about(19.0))
     a.nature(
         *[
-            Law("air beam", F.POWER, node, "T_top", about(16.0) * share / 5.0**0.25, shape=(0.25,))
+            Law("air beam", Form.POWER, node, "T_top", about(16.0) * share / 5.0**0.25, shape=(0.25,))
             for node, share in a.span("beam")
         ]
     )
     a.believe("air around beam", "beam", "hA_beam*(T_top - beam)", {"hA_beam": (16.0, "W/K")})
     a.airs["beam"] = 16.0
-    a.nature(*[Law("air head", F.LINK, node, "T_mid", about(7.0) * share) for node, share in a.span("head")])
+    a.nature(
+        *[Law("air head", Form.LINK, node, "T_mid", about(7.0) * share) for node, share in a.span("head")]
+    )
     a.believe("air around head", "head", "hA_head*(0.5*T_env + 0.5*T_top - head)", {"hA_head": (7.0, "W/K")})
     a.airs["head"] = 7.0
 
@@ -70,32 +78,28 @@ def portal(rng: Draw, refine: int = 1) -> Machine:
 
     grow = CAST_IRON.expansion * height
     a.error(
-        Channel("E_Z", "error", "um", sd=1.0),
-        {"left": 0.5 * grow, "right": 0.5 * grow, "head": -10.8 * 0.35, "bed": -2.0},
-        0.1,
+        "E_Z", "um", {"left": 0.5 * grow, "right": 0.5 * grow, "head": -10.8 * 0.35, "bed": -2.0}, uneven=0.1
     )
-    a.error(Channel("E_Y", "error", "um", sd=1.0), {"head": 10.8 * 0.5, "beam": 10.8 * 0.25}, 0.2)
+    a.error("E_Y", "um", {"head": 10.8 * 0.5, "beam": 10.8 * 0.25}, uneven=0.2)
     a.error(
-        Channel("E_A", "error", "um/m", sd=1.5),
-        {"left": grow / width, "right": -grow / width, "head": 1.2},
-        0.05,
+        "E_A", "um/m", {"left": grow / width, "right": -grow / width, "head": 1.2}, noise=1.5, uneven=0.05
     )
 
     channels = [
-        Channel("T_env", "ambient temperature", "degC", 2, lambda r: r["T_env"], 0.03),
-        Channel("T_top", "ambient temperature", "degC", 2, lambda r: r["T_top"], 0.03),
-        Channel("T_fluid", "fluid temperature", "degC", 2, lambda r: r["sump"], 0.03),
-        Channel("pump", "fluid flow", "1", 3, lambda r: r["pump"]),
-        Channel("speed", "rotation speed", "rpm", 0, lambda r: r["speed"]),
-        Channel("P_spindle", "heat load", "W", 1, lambda r: r["P_spindle"]),
-        Channel("P_cool", "cooling power", "W", 1, lambda r: r["P_cool"]),
-        Channel("P_hydraulic", "heat load", "W", 0, lambda r: r["P_hydraulic"]),
-        Channel("door", "other input", "1", 2, lambda r: r["door"]),
+        felt("T_env", "ambient temperature"),
+        felt("T_top", "ambient temperature"),
+        felt("T_fluid", "fluid temperature", "sump"),
+        logged("pump", "fluid flow", "1", 3),
+        logged("speed", "rotation speed", "rpm"),
+        logged("P_spindle", "heat load", "W", 1),
+        logged("P_cool", "cooling power", "W", 1),
+        logged("P_hydraulic", "heat load", "W"),
+        logged("door", "other input", "1", 2),
     ]
     cost, viscous, share = about(250.0), about(500.0), rng.uniform(0.35, 0.5)
 
     def cycle(draw: Draw, hours: float) -> Inputs:
-        u = _cycle(draw, hours)
+        u = dict(_cycle(draw, hours))
         n = u["speed"] / 6000.0
         power: Array = cost * u["load"] * (n > 0) + viscous * n ** (5.0 / 3.0)
         u["P_spindle"] = power
@@ -104,8 +108,17 @@ def portal(rng: Draw, refine: int = 1) -> Machine:
         return u | {f"air {k}": u["T_env"] + (k + 0.5) / 8.0 * (u["T_top"] - u["T_env"]) for k in range(8)}
 
     return a.machine(
-        "portal with two columns", channels, cycle, WORDS, PACE,
-        heat=400.0, cooled=("head",), chips=("bed",), splashed=COLUMNS, on_bed=("bed",), gaps=(("left", "bed"), ("right", "bed")),
+        "portal with two columns",
+        channels,
+        cycle,
+        WORDS,
+        PACE,
+        heat=400.0,
+        cooled=("head",),
+        chips=("bed",),
+        splashed=COLUMNS,
+        on_bed=("bed",),
+        gaps=(("left", "bed"), ("right", "bed")),
         unlinked=(("head", "left"), ("head", "right"), ("left", "right")),
         spare=(
             Spare("P_hydraulic", "input_heat", "right", size=250.0, full=900.0),
@@ -113,7 +126,7 @@ def portal(rng: Draw, refine: int = 1) -> Machine:
             Spare("P_hydraulic", "input_path", output="E_Y", size=8.0, full=900.0),
         ),
         work=("speed", "load", "pump", "P_spindle", "P_cool", "P_hydraulic"),
-    )  # fmt: skip
+    )
 
 
 def _tall_air(a: Assembly, name: str, coefficient: float) -> None:
@@ -123,7 +136,7 @@ def _tall_air(a: Assembly, name: str, coefficient: float) -> None:
             a.nature(
                 Law(
                     f"air {name}",
-                    F.POWER,
+                    Form.POWER,
                     node,
                     f"air {k}",
                     coefficient * share / 8 / 5.0**0.25,
@@ -140,7 +153,7 @@ def _tall_air(a: Assembly, name: str, coefficient: float) -> None:
 
 
 def _cycle(rng: Draw, hours: float) -> Inputs:
-    """Days in a hall: warm above in the afternoon; jobs of the spindle, hydraulics, an open door now and then."""
+    """Days in a hall, warm above in the afternoon; jobs, hydraulics, an open door now and then."""
     step = PACE.step_s
     n = round(hours * 3600 / step)
     start = rng.uniform(0, 24)

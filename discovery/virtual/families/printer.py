@@ -1,15 +1,15 @@
 """A printer's frame, warmed by its bed through the air of a chamber; a fan of the chamber is recorded.
 
-Not a machine tool: minutes instead of hours, aluminium, a bed on a thermostat. The air of the chamber is a state of
-its own (some 120 J/K); convection with 1/4 and 1/3 powers, radiation from the bed to the gantry.
+Not a machine tool: minutes instead of hours, aluminium, a bed on a thermostat. The air of the chamber is a
+state of its own (some 120 J/K); convection with 1/4 and 1/3 powers, radiation from the bed to the gantry.
 """
 
 from __future__ import annotations
 
-from discovery.virtual.machine import Assembly, Channel, Machine, Pace, Spare, Words
+from discovery.virtual.assembly import Assembly
+from discovery.virtual.machine import Channel, Machine, Pace, Spare, Words, felt, logged
 from discovery.virtual.materials import ALUMINIUM, STEEL, Bar, Material
-from discovery.virtual.network import Form as F
-from discovery.virtual.network import Inputs, Law, Switch
+from discovery.virtual.network import Form, Inputs, Law, Switch
 from discovery.virtual.signals import Draw, levels, room
 
 PACE = Pace(
@@ -41,19 +41,34 @@ def printer(rng: Draw, refine: int = 1) -> Machine:
         G, p = about(area), 1.0 / 3.0 if body == "bed" else 0.25
         rise = 50.0 if body == "bed" else 8.0
         a.nature(
-            *[Law(f"{body} to chamber", F.POWER, node, "chamber", G * share / rise**p, shape=(p,), leaves="chamber")
-              for node, share in a.span(body)]
-        )  # fmt: skip
+            *[
+                Law(
+                    f"{body} to chamber",
+                    Form.POWER,
+                    node,
+                    "chamber",
+                    G * share / rise**p,
+                    shape=(p,),
+                    leaves="chamber",
+                )
+                for node, share in a.span(body)
+            ]
+        )
         unit = f"W/K**{1 + p:.2f}"
-        a.believe(f"chamber around {body}", body, f"h_{body}*abs(chamber - {body})**{p:.2f}*(chamber - {body})",
-                  {f"h_{body}": (G / rise**p, unit)}, "chamber")  # fmt: skip
+        a.believe(
+            f"chamber around {body}",
+            body,
+            f"h_{body}*abs(chamber - {body})**{p:.2f}*(chamber - {body})",
+            {f"h_{body}": (G / rise**p, unit)},
+            "chamber",
+        )
 
     target = "bed_target"
     power, shine = about(280.0), about(0.006)
     a.nature(
-        Law("bed heater", F.HEAT, "bed", size=power, switch="thermostat"),
+        Law("bed heater", Form.HEAT, "bed", size=power, switch="thermostat"),
         *[
-            Law("shine", F.RADIATION, node, "bed", shine * share, leaves="bed")
+            Law("shine", Form.RADIATION, node, "bed", shine * share, leaves="bed")
             for node, share in a.span("gantry")
         ],
         switches={"thermostat": Switch("bed", target, rng.uniform(0.5, 1.5), heats=True)},
@@ -66,32 +81,36 @@ def printer(rng: Draw, refine: int = 1) -> Machine:
 
     alpha = ALUMINIUM.expansion
     a.error(
-        Channel("E_Z", "error", "um", sd=1.0),
+        "E_Z",
+        "um",
         {"left": 0.5 * alpha * height * 0.7, "right": 0.5 * alpha * height * 0.7, "bed": -0.15, "base": 0.8},
-        0.15,
+        uneven=0.15,
     )
+    a.error("E_X", "um", {"gantry": alpha * width * 0.5, "base": -11.5 * width * 0.4}, uneven=0.15)
     a.error(
-        Channel("E_X", "error", "um", sd=1.0),
-        {"gantry": alpha * width * 0.5, "base": -11.5 * width * 0.4},
-        0.15,
-    )
-    a.error(
-        Channel("E_B", "error", "um/m", sd=2.0),
+        "E_B",
+        "um/m",
         {"left": alpha * height * 0.7 / width, "right": -alpha * height * 0.7 / width, "gantry": 3.0},
-        0.1,
+        noise=2.0,
+        uneven=0.1,
     )
-    a.sensor(Channel("T_frame", "temperature", "degC", sd=0.06), "left", (0.4, 0.6))
+    a.sensor("T_frame", "left", 0.06, at=(0.4, 0.6))
 
     channels = [
-        Channel("T_env", "ambient temperature", "degC", 2, lambda r: r["T_env"], 0.03),
+        felt("T_env", "ambient temperature"),
         Channel("P_bed", "heat load", "W", 1, lambda r: r.flow("bed heater")),
-        Channel("P_hot", "heat load", "W", 1, lambda r: r["P_hot"]),
-        Channel("fan", "other input", "percent", 0, lambda r: r["fan"]),
-        Channel("P_light", "heat load", "W", 1, lambda r: r["P_light"]),
+        logged("P_hot", "heat load", "W", 1),
+        logged("fan", "other input", "percent"),
+        logged("P_light", "heat load", "W", 1),
     ]
     return a.machine(
-        "printer frame", channels, _cycle, WORDS, PACE,
-        heat=25.0, unlinked=(("left", "right"), ("bed", "gantry"), ("bed", "left")),
+        "printer frame",
+        channels,
+        _cycle,
+        WORDS,
+        PACE,
+        heat=25.0,
+        unlinked=(("left", "right"), ("bed", "gantry"), ("bed", "left")),
         spare=(
             Spare("fan", "input_exchange", "chamber", "T_env", size=4.0, full=100.0),
             Spare("fan", "input_exchange", "right", "chamber", size=1.0, full=100.0),
@@ -99,11 +118,11 @@ def printer(rng: Draw, refine: int = 1) -> Machine:
             Spare("P_light", "input_path", output="E_X", size=15.0, full=12.0),
         ),
         work=("P_hot", "P_light"),
-    )  # fmt: skip
+    )
 
 
 def _cycle(rng: Draw, hours: float) -> Inputs:
-    """Prints of some twenty minutes to two hours, each with its own bed, between pauses; the fan as it pleases."""
+    """Prints of twenty minutes to two hours, each with its own bed, between pauses; the fan at random."""
     step = PACE.step_s
     n = round(hours * 3600 / step)
     job = levels(rng, n, step, 0.3, 2.0, lambda: float(rng.choice([0.0, 60.0, 75.0, 90.0, 105.0])))

@@ -1,7 +1,8 @@
 """A rotary and swivelling table of a five-axis machine under cutting fluid, drawn around the paper's.
 
-Five bodies of five or six cells, a bearing and a motor between them, sump, film, bed. The chiller's cooling power is
-recorded. `structure` is shared with the machine of the repository's campaign, which is finer still.
+Five bodies of five or six cells, a bearing and a motor between them, sump, film, bed. The chiller's cooling
+power is recorded. `structure` is shared with the machine of the repository's campaign, which is finer
+still.
 """
 
 from __future__ import annotations
@@ -9,21 +10,29 @@ from __future__ import annotations
 import numpy as np
 
 from discovery.virtual import physics
-from discovery.virtual.machine import Assembly, Channel, Machine, Pace, Spare, Words
+from discovery.virtual.assembly import Assembly
+from discovery.virtual.machine import Machine, Pace, Spare, Words, felt, logged
 from discovery.virtual.materials import CAST_IRON, STEEL, Bar
 from discovery.virtual.network import LEVEL, Array, Inputs, heat, link
 from discovery.virtual.signals import Draw, lagged, levels, room, switched
 
 PACE = Pace(noise=(0.25, 0.9))
 WORDS = Words(
-    fluid="sump", fluid_channel="T_fluid", pump="pump", flow="pump", speed="speed", top_speed=1200.0, power="P_drive",
+    fluid="sump",
+    fluid_channel="T_fluid",
+    pump="pump",
+    flow="pump",
+    speed="speed",
+    top_speed=1200.0,
+    power="P_drive",
     cooling="P_cool",
-)  # fmt: skip
+)
 BODIES = ("table", "c_body_1", "c_body_2", "b_body_1", "b_body_2")
 
 
 def structure(a: Assembly) -> None:
-    """The five bodies, their joints, the air around them. kg and m from the size of such a machine (VDI class).
+    """The five bodies, their joints, the air around them. kg and m from the size of such a machine (VDI
+    class).
 
     Table 92 kg, C axis 130 and 170 kg, B corpus 330 and 480 kg.
     """
@@ -41,24 +50,22 @@ def structure(a: Assembly) -> None:
 
 
 def levers(a: Assembly) -> None:
-    """Errors by lever arms in m (physics of expansion: 11.5 um/m/K steel, 10.8 cast iron); tilts in um/m/K."""
-    um, um_m = {"unit": "um", "sd": 1.0}, {"unit": "um/m", "sd": 2.0}
+    """Errors by lever arms [m] times expansion (11.5 um/m/K steel, 10.8 cast iron); tilts in um/m/K."""
     a.error(
-        Channel("E_Y0C", "error", **um),
+        "E_Y0C",
+        "um",
         {"c_body_1": -1.78, "c_body_2": -0.86, "b_body_1": -5.18, "b_body_2": -2.72},
-        0.15,
-    )  # type: ignore[arg-type]
+        uneven=0.15,
+    )
+    a.error("E_Z0T", "um", {"table": 0.74, "c_body_1": 1.74, "c_body_2": 1.94, "b_body_1": 1.61}, uneven=0.15)
+    a.error("E_R0T", "um", {"table": 11.5 * 0.167}, uneven=0.15)
     a.error(
-        Channel("E_Z0T", "error", **um),
-        {"table": 0.74, "c_body_1": 1.74, "c_body_2": 1.94, "b_body_1": 1.61},
-        0.15,
-    )  # type: ignore[arg-type]
-    a.error(Channel("E_R0T", "error", **um), {"table": 11.5 * 0.167}, 0.15)  # type: ignore[arg-type]
-    a.error(
-        Channel("E_A0C", "error", **um_m),
+        "E_A0C",
+        "um/m",
         {"c_body_1": 5.83, "c_body_2": 2.87, "b_body_1": -6.29, "b_body_2": -2.41},
-        0.1,
-    )  # type: ignore[arg-type]
+        noise=2.0,
+        uneven=0.1,
+    )
 
 
 def rotary_table(rng: Draw, refine: int = 1) -> Machine:
@@ -97,26 +104,35 @@ def rotary_table(rng: Draw, refine: int = 1) -> Machine:
     a.fluid("c_body_1", about(30.0), WORDS, (0.0, 0.7), "film")
     levers(a)
     channels = [
-        Channel("T_env", "ambient temperature", "degC", 2, lambda r: r["T_env"], 0.03),
-        Channel("T_fluid", "fluid temperature", "degC", 2, lambda r: r["sump"], 0.03),
-        Channel("pump", "fluid flow", "1", 3, lambda r: r["pump"]),
-        Channel("speed", "rotation speed", "rpm", 1, lambda r: r["speed"]),
-        Channel("P_drive", "heat load", "W", 1, lambda r: r["P_drive"]),
-        Channel("P_cool", "cooling power", "W", 1, lambda r: r["P_cool"]),
-        Channel("air_curtain", "other input", "percent", 0, lambda r: r["air_curtain"]),
-        Channel("P_b_axis", "heat load", "W", 0, lambda r: r["P_b_axis"]),
+        felt("T_env", "ambient temperature"),
+        felt("T_fluid", "fluid temperature", "sump"),
+        logged("pump", "fluid flow", "1", 3),
+        logged("speed", "rotation speed", "rpm", 1),
+        logged("P_drive", "heat load", "W", 1),
+        logged("P_cool", "cooling power", "W", 1),
+        logged("air_curtain", "other input", "percent"),
+        logged("P_b_axis", "heat load", "W"),
     ]
 
     def cycle(draw: Draw, hours: float) -> Inputs:
-        u = _cycle(draw, hours)
+        u = dict(_cycle(draw, hours))
         u["P_drive"] = power(u)
         u["P_cool"] = draw.uniform(0.15, 0.35) * lagged(u["P_drive"], PACE.step_s, draw.uniform(1200, 3600))
         return u
 
     return a.machine(
-        "rotary table", channels, cycle, WORDS, PACE,
-        heat=180.0, rotating=("table", "c_body_1"), cooled=("c_body_2",), splashed=("c_body_2", "b_body_1", "b_body_2"),
-        gaps=(("c_body_1", "b_body_1"), ("table", "b_body_1")), chips=("table",), on_bed=("b_body_2", "b_body_1"),
+        "rotary table",
+        channels,
+        cycle,
+        WORDS,
+        PACE,
+        heat=180.0,
+        rotating=("table", "c_body_1"),
+        cooled=("c_body_2",),
+        splashed=("c_body_2", "b_body_1", "b_body_2"),
+        gaps=(("c_body_1", "b_body_1"), ("table", "b_body_1")),
+        chips=("table",),
+        on_bed=("b_body_2", "b_body_1"),
         unlinked=(("table", "b_body_1"), ("c_body_2", "b_body_2"), ("table", "c_body_2")),
         spare=(
             Spare("air_curtain", "input_exchange", "c_body_1", "T_env", size=12.0, full=100.0),
@@ -124,7 +140,7 @@ def rotary_table(rng: Draw, refine: int = 1) -> Machine:
             Spare("P_b_axis", "input_path", output="E_Z0T", size=5.0, full=120.0),
         ),
         work=("speed", "pump", "P_drive", "P_cool", "P_b_axis"),
-    )  # fmt: skip
+    )
 
 
 def _cycle(rng: Draw, hours: float) -> Inputs:

@@ -1,6 +1,8 @@
-"""Test cycles by seed: what the machine is told to do and what the room does, with the hours before a recording.
+"""Test cycles by seed: what the machine is told to do and what the room does, with the hours before a
+recording.
 
-R-Test readings need the table at rest: every reading is a stop of two minutes, with the sensors read in its middle.
+R-Test readings need the table at rest: every reading is a stop of two minutes, with the sensors read in its
+middle.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ FLOW = 10.0  # l/min, nominal
 
 @dataclass(frozen=True)
 class Cycle:
-    """Inputs over steps of `STEP_S`, the step at which the recording begins, instants of readings after it [s]."""
+    """Inputs over steps of `STEP_S`, the step where the recording begins, readings after it [s]."""
 
     inputs: Inputs
     first: int
@@ -157,7 +159,7 @@ def _internal(rng: Draw, n: int, first: int) -> Pattern:
 
 
 def _load_wet(rng: Draw, n: int, first: int) -> Pattern:
-    """Only the drive works, under fluid that a cooler keeps near the room: what the load does to a wet machine."""
+    """Only the drive works, under fluid that a cooler keeps near the room."""
     flow = np.full(n, FLOW)
     return Pattern(_held_room(rng, n), _after(first, _random_speed(rng, n), n), flow, np.full(n, -635.0))
 
@@ -181,7 +183,7 @@ def _warm_up_dry(rng: Draw, n: int, first: int) -> Pattern:
 
 
 def _nozzle(rng: Draw, n: int, first: int) -> Pattern:
-    """Height and flow matter: table at rest, tank warm, pump in pulses of a flow and a height of their own."""
+    """Height and flow matter: table at rest, warm fluid in pulses of their own flow and height."""
     flow = levels(rng, n, STEP_S, 0.3, 1.2, lambda: float(rng.choice([0.0, 0.0, 2.0, 3.0, 5.0, 8.0, 14.0])))
     height = levels(rng, n, STEP_S, 0.6, 2.0, lambda: float(rng.choice([20.0, 50.0, 100.0, 200.0, 400.0])))
     tank = levels(rng, n, STEP_S, 2.0, 6.0, lambda: float(rng.uniform(0.0, 1500.0)))
@@ -189,7 +191,7 @@ def _nozzle(rng: Draw, n: int, first: int) -> Pattern:
 
 
 def _flooded(rng: Draw, n: int, first: int) -> Pattern:
-    """Height and flow do not matter: the table turns under plenty of fluid, the film is thin and follows at once."""
+    """Height and flow do not matter: the table turns under plenty of fluid."""
     flow = levels(rng, n, STEP_S, 0.5, 2.0, lambda: float(rng.choice([8.0, 12.0, 16.0])))
     height = levels(rng, n, STEP_S, 0.6, 2.0, lambda: float(rng.choice([20.0, 50.0, 100.0, 200.0, 400.0])))
     del first
