@@ -93,19 +93,26 @@ class Assembly:
         exponent: float = 0.0,
         at: tuple[float, float] = (0.0, 1.0),
         air: str = "",
-        gate: Gate | None = None,
-        known: bool = True,
+        believed: str = "",
     ) -> None:
-        """Exchange with the air: `coefficient` |dT/5 K|^exponent dT [W/K at 5 K]."""
+        """Exchange with the air: `coefficient` |dT/5 K|^exponent dT [W/K at 5 K].
+
+        Args:
+            air: series that the plant takes; default the room.
+            believed: expression of channels that the baseline takes instead.
+        """
         around = air or self.default_air
         for node, share in self.span(body, *at):
             size = coefficient * share / 5.0**exponent
             form, shape = (Form.POWER, (exponent,)) if exponent else (Form.LINK, ())
-            self.laws.append(Law(f"air {body}", form, node, around, size, gate, shape, leaves=around))
-        if known and body not in self.airs:
-            self.airs[body] = coefficient
-            self.believe(f"air around {body}", body, f"hA_{body}*({around} - {body})",
-                         {f"hA_{body}": (coefficient, "W/K")})  # fmt: skip
+            self.laws.append(Law(f"air {body}", form, node, around, size, shape=shape, leaves=around))
+        self.airs[body] = coefficient
+        self.believe(
+            f"air around {body}",
+            body,
+            f"hA_{body}*({believed or around} - {body})",
+            {f"hA_{body}": (coefficient, "W/K")},
+        )
 
     def loss(
         self,
@@ -171,7 +178,8 @@ class Assembly:
         for body, lever in levers.items():
             cells = self.bodies[body].nodes
             slope = self.rng.uniform(-uneven, uneven) if uneven else 0.0
-            weight = 1.0 + slope * np.linspace(-1, 1, len(cells)) if len(cells) > 1 else np.ones(1)
+            place = (np.arange(len(cells)) + 0.5) / len(cells)  # of the middle of a cell along the body
+            weight = 1.0 + slope * (2.0 * place - 1.0)
             nodes |= {node: lever * w / len(cells) for node, w in zip(cells, weight.tolist(), strict=True)}
         self.levers[name] = nodes
         self.outputs.append(Channel(name, "error", unit, sd=noise))

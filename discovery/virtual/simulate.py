@@ -12,7 +12,7 @@ from discovery.virtual import kernel
 from discovery.virtual.network import LEVEL, ZERO, Array, Inputs, Law, Network, gate_values
 
 Ints = kernel.Ints
-TOLERANCE_K, LEVEL_TOLERANCE = 0.02, 0.003
+TOLERANCE_K, LEVEL_TOLERANCE = 0.1, 0.01
 
 
 @dataclass(frozen=True)

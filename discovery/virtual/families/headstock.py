@@ -22,7 +22,7 @@ WORDS = Words(
     fluid="sump",
     fluid_channel="T_fluid",
     pump="pump",
-    flow="flow",
+    flow="pump",
     speed="speed",
     top_speed=4500.0,
     power="P_motor",
@@ -34,7 +34,7 @@ def headstock(rng: Draw, refine: int = 1) -> Machine:
     a = Assembly(rng, refine=refine)
     about = a.about
     length, front_mm, rear_mm = about(0.3), about(90.0, 0.1), about(75.0, 0.1)
-    a.body(Bar("spindle", STEEL, length, about(4.0e-3), 8))
+    a.body(Bar("spindle", STEEL, length, about(4.0e-3), 12))
     a.body(Bar("front", STEEL, 0.06, about(6.0e-3), 1))
     a.body(Bar("rear", STEEL, 0.04, about(5.0e-3), 1))
     section = about(0.05)
@@ -162,7 +162,8 @@ def _cycle(rng: Draw, hours: float) -> Inputs:
     speed = job * np.maximum(work, levels(rng, n, step, 2, 8, lambda: float(rng.uniform() < 0.3))) * busy
     running = (speed > 0).astype(float)
     torque = lagged(levels(rng, n, step, 0.2, 1.5, lambda: rng.uniform(0.1, 1.0)), step, 120.0) * running
-    pump = switched(rng, n, step, (1.0, 6.0), (0.3, 3.0))
+    flow = levels(rng, n, step, 0.5, 4.0, lambda: float(rng.choice([0.4, 0.7, 1.0])))
+    pump = flow * switched(rng, n, step, (1.0, 6.0), (0.3, 3.0))
     return {
         "T_env": room(rng, n, step, rng.uniform(21, 23), rng.uniform(0.5, 1.2), 0.4),
         "speed": speed,

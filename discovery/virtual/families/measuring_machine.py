@@ -49,10 +49,11 @@ def measuring_machine(rng: Draw, refine: int = 1) -> Machine:
     a.loss("ram", "P_drives", about(0.25), at=(0.3, 1.0))
 
     # the air below the ceiling follows the room late; the beam and the legs see some of it
+    shine = about(0.06)  # m2
     a.nature(
         link("ceiling", "ceiling", "T_env", 20.0),
         *[
-            Law("shine", Form.RADIATION, node, "ceiling", about(0.06) * share)
+            Law("shine", Form.RADIATION, node, "ceiling", shine * share)
             for node, share in a.span("granite_top", 0.0, 0.2)
         ],
         heat("warm air", "ceiling", 1.0, "P_people"),

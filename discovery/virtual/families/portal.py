@@ -47,19 +47,8 @@ def portal(rng: Draw, refine: int = 1) -> Machine:
     a.air("bed", about(45.0), exponent=0.25)
     for name in COLUMNS:
         _tall_air(a, name, about(19.0))
-    a.nature(
-        *[
-            Law("air beam", Form.POWER, node, "T_top", about(16.0) * share / 5.0**0.25, shape=(0.25,))
-            for node, share in a.span("beam")
-        ]
-    )
-    a.believe("air around beam", "beam", "hA_beam*(T_top - beam)", {"hA_beam": (16.0, "W/K")})
-    a.airs["beam"] = 16.0
-    a.nature(
-        *[Law("air head", Form.LINK, node, "T_mid", about(7.0) * share) for node, share in a.span("head")]
-    )
-    a.believe("air around head", "head", "hA_head*(0.5*T_env + 0.5*T_top - head)", {"hA_head": (7.0, "W/K")})
-    a.airs["head"] = 7.0
+    a.air("beam", about(16.0), exponent=0.25, air="T_top")
+    a.air("head", about(7.0), air="T_mid", believed="0.5*T_env + 0.5*T_top")
 
     a.loss("head", "P_spindle", about(0.5), at=(0.5, 1.0))
     a.nature(

@@ -31,22 +31,23 @@ BODIES = ("table", "c_body_1", "c_body_2", "b_body_1", "b_body_2")
 
 
 def structure(a: Assembly) -> None:
-    """The five bodies, their joints, the air around them. kg and m from the size of such a machine (VDI
+    """The five bodies and their joints, each along whole cells. kg and m from the size of such a machine (VDI
     class).
 
     Table 92 kg, C axis 130 and 170 kg, B corpus 330 and 480 kg.
     """
     about = a.about
     a.body(Bar("table", STEEL, 0.25, about(0.047, 0.1), 5))  # along the radius
-    a.body(Bar("c_body_1", STEEL, 0.22, about(0.075, 0.1), 5))  # from the table down
+    a.body(Bar("c_body_1", STEEL, 0.22, about(0.075, 0.1), 10))  # from the table down
     a.body(Bar("c_body_2", CAST_IRON, 0.28, about(0.084, 0.1), 5))
-    a.body(Bar("b_body_1", CAST_IRON, 0.40, about(0.115, 0.1), 6))  # from the C axis outwards
-    a.body(Bar("b_body_2", CAST_IRON, 0.45, about(0.148, 0.1), 6))
-    a.joint("table", "c_body_1", about(60.0), (0.0, 0.5), (0.0, 0.3))
-    a.joint("c_body_1", "c_body_2", about(40.0), (0.6, 1.0), (0.0, 0.4))
-    a.joint("c_body_1", "b_body_1", about(35.0), (0.3, 0.8), (0.0, 0.4))
-    a.joint("c_body_2", "b_body_1", about(20.0), (0.4, 1.0), (0.0, 0.5))
-    a.joint("b_body_1", "b_body_2", about(40.0), (0.7, 1.0), (0.0, 0.3))
+    a.body(Bar("b_body_1", CAST_IRON, 0.40, about(0.115, 0.1), 5))  # from the C axis outwards
+    a.body(Bar("b_body_2", CAST_IRON, 0.45, about(0.148, 0.1), 5))
+    a.joint("table", "c_body_1", about(60.0), (0.0, 0.6), (0.0, 0.4))
+    # the C axis stands inside the B corpus: they meet along their length
+    a.joint("c_body_1", "c_body_2", about(40.0), (0.2, 1.0), (0.0, 0.8))
+    a.joint("c_body_1", "b_body_1", about(35.0), (0.0, 1.0), (0.0, 0.6))
+    a.joint("c_body_2", "b_body_1", about(20.0), (0.0, 1.0), (0.0, 0.8))
+    a.joint("b_body_1", "b_body_2", about(40.0), (0.4, 1.0), (0.0, 0.6))
 
 
 def levers(a: Assembly) -> None:
@@ -73,7 +74,7 @@ def rotary_table(rng: Draw, refine: int = 1) -> Machine:
     a = Assembly(rng, refine=refine)
     about = a.about
     structure(a)
-    a.air("table", about(4.0), at=(0.3, 1.0))
+    a.air("table", about(4.0), at=(0.2, 1.0))
     for body, G in (("c_body_1", 1.7), ("c_body_2", 2.9), ("b_body_1", 6.7), ("b_body_2", 12.0)):
         a.air(body, about(G), exponent=0.1)
 
@@ -83,9 +84,9 @@ def rotary_table(rng: Draw, refine: int = 1) -> Machine:
         n = u["speed"] / 600.0
         return np.asarray(iron * n**1.5 + rubbing * n + viscous * n ** (5.0 / 3.0))
 
-    a.loss("c_body_1", "P_drive", about(0.28), at=(0.3, 1.0))
-    a.loss("c_body_2", "P_drive", about(0.45), at=(0.0, 0.7))
-    a.loss("b_body_1", "P_drive", about(0.12), at=(0.0, 0.4))
+    a.loss("c_body_1", "P_drive", about(0.28), at=(0.2, 1.0))
+    a.loss("c_body_2", "P_drive", about(0.45), at=(0.0, 0.8))
+    a.loss("b_body_1", "P_drive", about(0.12), at=(0.0, 0.6))
     k_cool = about(0.9, 0.05)
     a.nature(
         *[
@@ -100,8 +101,8 @@ def rotary_table(rng: Draw, refine: int = 1) -> Machine:
         *physics.film("film", "pump"),
         nodes={"sump": about(1.2e6), "film": LEVEL},
     )
-    a.fluid("table", about(90.0), WORDS, (0.1, 1.0), "film")
-    a.fluid("c_body_1", about(30.0), WORDS, (0.0, 0.7), "film")
+    a.fluid("table", about(90.0), WORDS, (0.2, 1.0), "film")
+    a.fluid("c_body_1", about(30.0), WORDS, (0.0, 0.6), "film")
     levers(a)
     channels = [
         felt("T_env", "ambient temperature"),

@@ -109,8 +109,8 @@ def _drive(a: Assembly) -> None:
         torque = (viscous(u) + loaded(u)) / np.maximum(np.abs(u["speed"]) * physics.RPM, 1.0)
         return np.asarray(40.0 * (torque / 6.5) ** 2 * (1.0 - film.rest(u)))
 
-    top = a.span("c_body_1", 0.4, 1.0)
-    stator = a.span("c_body_2", 0.0, 0.6)
+    top = a.span("c_body_1", 0.2, 1.0)
+    stator = a.span("c_body_2")
     a.nature(
         Law(
             "loss c_body_1",
@@ -124,11 +124,11 @@ def _drive(a: Assembly) -> None:
         *[link("bearing inner", node, "bearing", 80.0 * share) for node, share in top],
         *[
             link("bearing outer", node, "bearing", 60.0 * share)
-            for node, share in a.span("c_body_2", 0.0, 0.4)
+            for node, share in a.span("c_body_2", 0.0, 0.8)
         ],
         *[
             link("bearing outer", node, "bearing", 25.0 * share)
-            for node, share in a.span("b_body_1", 0.0, 0.3)
+            for node, share in a.span("b_body_1", 0.0, 0.6)
         ],
         *[heat("loss c_body_2", node, 0.7 * share, iron) for node, share in stator],
         *[heat("loss c_body_1", node, 0.3 * share, iron) for node, share in top],
@@ -141,8 +141,8 @@ def _drive(a: Assembly) -> None:
 def _cooling(a: Assembly) -> None:
     """Jackets, a loop of 3.2 l/min, a tank of 16 l whose chiller of 2 kW switches about its own set point."""
     a.nature(
-        *[link("jacket", node, "jacket", 113.0 * share) for node, share in a.span("c_body_2", 0.0, 0.8)],
-        *[link("jacket", node, "jacket", 30.0 * share) for node, share in a.span("c_body_1", 0.5, 1.0)],
+        *[link("jacket", node, "jacket", 113.0 * share) for node, share in a.span("c_body_2")],
+        *[link("jacket", node, "jacket", 30.0 * share) for node, share in a.span("c_body_1", 0.2, 1.0)],
         link("coolant", "jacket", "coolant", 220.0),
         link("coolant air", "coolant", "T_env", 6.0),
         nodes={"jacket": 8e3, "coolant": 65e3},
@@ -158,7 +158,7 @@ def _fluid(a: Assembly) -> None:
         ("table", film.table_film, "film"),
         ("c_body_1", film.below_film, "film below"),
     ):
-        span = a.span("table", 0.1, 1.0) if body == "table" else a.span("c_body_1", 0.0, 0.7)
+        span = a.span("table", 0.2, 1.0) if body == "table" else a.span("c_body_1", 0.0, 0.6)
         a.nature(
             *[
                 Law(f"fluid {body}", Form.LINK, node, layer, share, gate, leaves=layer, film=wet)
@@ -197,7 +197,7 @@ def _fluid(a: Assembly) -> None:
         Law("gap leaks", Form.LINK, "gap", size=1 / 900.0),
         *[
             Law("gap", Form.LINK, x, y, 10.0 * share, leaves=y, film=("gap", 0.3))
-            for x, y, share in facing(a.span("c_body_1", 0.0, 0.5), a.span("b_body_1", 0.0, 0.5))
+            for x, y, share in facing(a.span("c_body_1", 0.0, 0.6), a.span("b_body_1", 0.0, 0.6))
         ],
         nodes={
             "sump": 1.2e6,
@@ -235,20 +235,20 @@ def _surroundings(a: Assembly) -> None:
         *[link("bed air", node, "T_env", 14.0 * share) for node, share in a.span("bed")],
         *[
             link("foot", x, y, 15.0 * share)
-            for x, y, share in facing(a.span("b_body_2", 0.8, 1.0), a.span("bed", 0.0, 0.3))
+            for x, y, share in facing(a.span("b_body_2", 0.4, 1.0), a.span("bed", 0.0, 1 / 3))
         ],
-        *[link("side sump", node, "sump", 15.0 * share) for node, share in a.span("side", 0.0, 0.3)],
+        *[link("side sump", node, "sump", 15.0 * share) for node, share in a.span("side", 0.0, 0.25)],
         *[link("side air", node, "T_env", 10.0 * share) for node, share in a.span("side")],
         *[
             link("side mount", x, y, 6.0 * share)
-            for x, y, share in facing(a.span("b_body_2", 0.5, 0.9), a.span("side", 0.6, 1.0))
+            for x, y, share in facing(a.span("b_body_2", 0.4, 0.8), a.span("side", 0.5, 1.0))
         ],
         nodes={"skin left": 30e3, "skin right": 30e3},
     )
     for skin in ("skin left", "skin right"):
         a.nature(
-            *[link("skin", node, skin, 30.0 * share) for node, share in a.span("b_body_1", 0.2, 1.0)],
-            *[link("skin", node, skin, 20.0 * share) for node, share in a.span("b_body_2", 0.0, 0.6)],
+            *[link("skin", node, skin, 15.0 * share) for node, share in a.span("b_body_1", 0.2, 1.0)],
+            *[link("skin", node, skin, 10.0 * share) for node, share in a.span("b_body_2", 0.0, 0.6)],
             Law("air skin", Form.POWER, skin, "cabin", 0.8, shape=(0.25,), leaves="cabin"),
         )
     # a nozzle on the left wets the structure: 20 W/K on the corpus, 10 W/K behind it, the skin most of all
@@ -280,7 +280,8 @@ def _levers(a: Assembly) -> None:
         noise=2.5,
         uneven=0.25,
     )
-    a.levers["E_X0C"] |= {"skin left": 1.6, "skin right": -1.6}
+    # a difference of 1 K over a width of 0.5 m bends an overhang of 0.48 m by 10.8*0.48^2/(2*0.5) = 2.5 um
+    a.levers["E_X0C"] |= {"skin left": 2.5, "skin right": -2.5}
     a.levers["E_Y0C"] |= {"skin left": -0.25, "skin right": -0.25, "bearing": -0.15} | dict.fromkeys(
         a.bodies["side"].nodes, -0.35 / (4 * a.refine)
     )
