@@ -14,11 +14,12 @@ from typer.testing import CliRunner
 from discovery.challenge import pool, seal
 from discovery.challenge.methods import METHODS
 from discovery.challenge.methods.refit_only import ljung_box
-from discovery.challenge.prepare import adopt, draw_orders, make
+from discovery.challenge.prepare import adopt, draw_orders
 from discovery.challenge.run import challenge
 from discovery.cli import app
 from discovery.errors import UserError
 from discovery.sparse.derivative import discrepancy_terms, smoothed_derivative
+from discovery.virtual.families import FAMILIES
 
 MODEL = """name = "one body"
 [parameters]
@@ -150,24 +151,62 @@ def test_changed_code_is_noticed(tmp_path: Path) -> None:
 
 
 def test_orders_have_their_shares_and_come_from_the_seed() -> None:
-    orders = draw_orders(200, 5)
-    kinds = [o.kind for o in orders]
-    shares = {"none": 50, "one": 80, "two": 20, "measuring": 20, "outside": 30}
-    assert {k: kinds.count(k) for k in shares} == shares
-    assert (
-        sum(o.seed % 2 for o in orders if o.kind == "none") == 25
-    )  # half of them with slow noise and small heat
-    assert draw_orders(200, 5) == orders
-    assert draw_orders(200, 6) != orders
+    families = ["portal", "headstock"]
+    orders = draw_orders(families, 200, 5)
+    for family in families:
+        kinds = [o.plan.kind for o in orders if o.family == family]
+        shares = {"none": 23, "one": 40, "input": 10, "two": 9, "measuring": 10, "outside": 8}
+        assert {k: kinds.count(k) for k in shares} == shares
+    assert draw_orders(families, 200, 5) == orders
+    assert draw_orders(families, 200, 6) != orders
     assert len({o.seed for o in orders}) == 200
+    assert orders[0].family != orders[1].family
 
 
-def test_a_case_does_not_show_its_seed() -> None:
-    order = draw_orders(1, 5)[0]
-    files = make(order).files
-    assert not any(
-        str(order.seed).encode() in content for name, content in files.items() if name.endswith(".toml")
-    )
+def test_a_case_does_not_show_its_seed(written: Path) -> None:
+    (order,) = draw_orders(["linear_axis"], 1, 5)
+    files = [p for p in (written / order.name).iterdir() if p.suffix == ".toml"]
+    assert len(files) == 3
+    assert not any(str(order.seed) in p.read_text() for p in files)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A case of a family, written by the command."""
+    out = tmp_path_factory.mktemp("written") / "practice"
+    words = ["--family", "linear_axis", "--cases", "1", "--seed", "5", "--jobs", "1", "--write", str(out)]
+    done = CliRunner().invoke(app, ["challenge", *words])
+    assert done.exit_code == 0, done.output
+    assert "1 cases of linear_axis (seed 5)" in done.output
+    return out
+
+
+def test_a_case_that_was_written_can_be_taken_up(written: Path, tmp_path: Path) -> None:
+    adopt(tmp_path / "out", written)
+    assert {p.name for p in (tmp_path / "out" / "cases" / "case_01").iterdir()} == {
+        "experiment.toml",
+        "campaign.toml",
+        "baseline.toml",
+        "a.csv.gz",
+        "b.csv.gz",
+        "c.csv.gz",
+    }
+    key = json.loads((written / "keys.json").read_text())["case_01"]
+    assert key["family"] == "linear_axis"
+
+
+def test_the_command_lists_the_families() -> None:
+    done = CliRunner().invoke(app, ["challenge", "--family", "help"])
+    assert done.exit_code == 0
+    for family in FAMILIES:
+        assert f"\n{family} " in f"\n{done.output}"
+
+
+def test_an_unknown_family_is_a_usage_error(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["challenge", "--family", "lathe", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "There is no family 'lathe'" in done.output
+    assert not (tmp_path / "out").exists()
 
 
 def test_end_to_end_and_going_on(cases: Path, tmp_path: Path) -> None:
