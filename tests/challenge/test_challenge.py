@@ -164,7 +164,7 @@ def test_orders_have_their_shares_and_come_from_the_seed() -> None:
 
 
 def test_a_case_does_not_show_its_seed(written: Path) -> None:
-    (order,) = draw_orders(["linear_axis"], 1, 5)
+    (order,) = draw_orders(["linear_axis"], 1, 1)
     files = [p for p in (written / order.name).iterdir() if p.suffix == ".toml"]
     assert len(files) == 3
     assert not any(str(order.seed) in p.read_text() for p in files)
@@ -174,10 +174,10 @@ def test_a_case_does_not_show_its_seed(written: Path) -> None:
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A case of a family, written by the command."""
     out = tmp_path_factory.mktemp("written") / "practice"
-    words = ["--family", "linear_axis", "--cases", "1", "--seed", "5", "--jobs", "1", "--write", str(out)]
+    words = ["--family", "linear_axis", "--cases", "1", "--seed", "1", "--jobs", "1", "--write", str(out)]
     done = CliRunner().invoke(app, ["challenge", *words])
     assert done.exit_code == 0, done.output
-    assert "1 cases of linear_axis (seed 5)" in done.output
+    assert "1 cases of linear_axis (seed 1)" in done.output
     return out
 
 

@@ -19,7 +19,7 @@ def free_forcing_only(problem: Problem) -> Answer:
     found = latent_forces(baseline.seen, baseline.settings[baseline.best], context.floor)
     fires = bool(found) and found[0].gain > FIRES
     verdict = Verdict(UNEXPLAINED if fires else NO_MISMATCH, baseline, (), (), ())
-    place = locate(context, baseline, verdict, Posterior((), np.zeros((0, 0))), found)
+    place = locate(context, baseline, verdict, Posterior((baseline,), np.zeros((1, 1))), found)
     windows = [
         {"recording": w.recording, "start_s": w.start_s, "end_s": w.end_s, "state": w.state}
         for w in place.windows
