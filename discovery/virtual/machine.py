@@ -141,6 +141,13 @@ class Machine:
         """This machine with more in its plant; the baseline does not know."""
         return replace(self, network=self.network.plus(laws, nodes, switches))
 
+    def scaled(self, laws: str, factor: float) -> Machine:
+        """This machine with every law whose name begins with `laws` so many times as strong."""
+        changed = self.network.changed(
+            lambda law: replace(law, size=factor * law.size) if law.name.startswith(laws) else law
+        )
+        return replace(self, network=changed)
+
     def mean(self, run: Run, body: str) -> Array:
         """Mean temperature of a body at the step beginnings, (n,)."""
         nodes = self.bodies[body].nodes

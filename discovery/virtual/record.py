@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,11 @@ from discovery.virtual import faults
 from discovery.virtual.effects import EFFECTS, Shapes
 from discovery.virtual.log import Chain, Columns, csv_gz, decimals, observe
 from discovery.virtual.machine import Machine
-from discovery.virtual.network import heat
-from discovery.virtual.nmv5000.cycles import KINDS, STEP_S, make_cycle
+from discovery.virtual.network import Inputs, heat
+from discovery.virtual.nmv5000.cycles import KINDS, STEP_S, Cycle, make_cycle
 from discovery.virtual.nmv5000.plant import five_axis
-from discovery.virtual.signals import HOUR, noise
-from discovery.virtual.simulate import State, simulate
+from discovery.virtual.signals import HOUR, Draw, noise
+from discovery.virtual.simulate import Run, State, simulate
 
 MOST = 3.0  # times the reach of an effect: what the plant still computes
 
@@ -49,6 +49,7 @@ class Order:
     age: float = 0.0  # how many recordings came before, for `wear`
     note: str = ""
     machine: Machine = field(default_factory=five_axis)
+    change: Callable[[Inputs], Inputs] | None = None  # what else happens to the inputs of the cycle
     chain: Chain = field(default_factory=lambda: Chain(white=0.4, slow=0.3))
 
 
@@ -60,14 +61,13 @@ class Taken:
     fault_at_s: tuple[float, ...]
 
 
-def take(order: Order) -> Taken:
-    """Run the machine once and record it."""
+def ran(order: Order) -> tuple[Machine, Cycle, Run]:
+    """The machine of an order with what is concealed in it, its cycle, and what it did."""
     cycle = make_cycle(order.cycle, order.seed, order.hours, order.nozzle_height_mm, order.nozzle_side)
+    if order.change:
+        cycle = replace(cycle, inputs=order.change(cycle.inputs))
     n = len(cycle.inputs["T_env"])
-    # Separate streams, so that an effect changes nothing but itself.
-    initial, everyday, reading, fault = np.random.default_rng(
-        [order.seed, list(KINDS).index(order.cycle), 1]
-    ).spawn(4)
+    initial, everyday, *_ = _streams(order)
     machine = concealing(order.machine, order.effects)
     own = {b: noise(everyday, n, STEP_S, 3 * HOUR, machine.pace.heat_w) for b in machine.bodies}
     machine = machine.plus(
@@ -81,13 +81,24 @@ def take(order: Order) -> Taken:
     inputs |= {"number": np.full(n, 0.0), "age": np.full(n, order.age)}
     room = float(cycle.inputs["T_env"][0]) + initial.normal(0.0, 0.1)
     start = State(dict.fromkeys(("sump", "hose"), cycle.fluid_start), {}, room)
-    run = simulate(machine.network, inputs, STEP_S, start)
+    return machine, cycle, simulate(machine.network, inputs, STEP_S, start)
+
+
+def take(order: Order) -> Taken:
+    """Run the machine once and record it."""
+    machine, cycle, run = ran(order)
+    *_, reading, fault = _streams(order)
     columns = observe(machine, run, cycle.first, cycle.readings, reading, order.chain)
     instants = []
     for name, channel, size in order.faults:
         instants.append(float(np.round(fault.uniform(0.2, 0.8) * order.hours * HOUR)))
         columns = FAULTS[name][0](columns, channel, size, instants[-1])
     return Taken(columns, tuple(instants))
+
+
+def _streams(order: Order) -> list[Draw]:
+    """Separate streams for start, small heat, readings and faults: an effect changes nothing but itself."""
+    return np.random.default_rng([order.seed, list(KINDS).index(order.cycle), 1]).spawn(4)
 
 
 def concealing(machine: Machine, requests: Sequence[Request]) -> Machine:

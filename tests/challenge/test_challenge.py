@@ -19,7 +19,6 @@ from discovery.challenge.run import challenge
 from discovery.cli import app
 from discovery.errors import UserError
 from discovery.sparse.derivative import discrepancy_terms, smoothed_derivative
-from discovery.virtual.families import FAMILIES
 
 MODEL = """name = "one body"
 [parameters]
@@ -161,52 +160,6 @@ def test_orders_have_their_shares_and_come_from_the_seed() -> None:
     assert draw_orders(families, 200, 6) != orders
     assert len({o.seed for o in orders}) == 200
     assert orders[0].family != orders[1].family
-
-
-def test_a_case_does_not_show_its_seed(written: Path) -> None:
-    (order,) = draw_orders(["linear_axis"], 1, 1)
-    files = [p for p in (written / order.name).iterdir() if p.suffix == ".toml"]
-    assert len(files) == 3
-    assert not any(str(order.seed) in p.read_text() for p in files)
-
-
-@pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A case of a family, written by the command."""
-    out = tmp_path_factory.mktemp("written") / "practice"
-    words = ["--family", "linear_axis", "--cases", "1", "--seed", "1", "--jobs", "1", "--write", str(out)]
-    done = CliRunner().invoke(app, ["challenge", *words])
-    assert done.exit_code == 0, done.output
-    assert "1 cases of linear_axis (seed 1)" in done.output
-    return out
-
-
-def test_a_case_that_was_written_can_be_taken_up(written: Path, tmp_path: Path) -> None:
-    adopt(tmp_path / "out", written)
-    assert {p.name for p in (tmp_path / "out" / "cases" / "case_01").iterdir()} == {
-        "experiment.toml",
-        "campaign.toml",
-        "baseline.toml",
-        "a.csv.gz",
-        "b.csv.gz",
-        "c.csv.gz",
-    }
-    key = json.loads((written / "keys.json").read_text())["case_01"]
-    assert key["family"] == "linear_axis"
-
-
-def test_the_command_lists_the_families() -> None:
-    done = CliRunner().invoke(app, ["challenge", "--family", "help"])
-    assert done.exit_code == 0
-    for family in FAMILIES:
-        assert f"\n{family} " in f"\n{done.output}"
-
-
-def test_an_unknown_family_is_a_usage_error(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["challenge", "--family", "lathe", "--out", str(tmp_path / "out")])
-    assert done.exit_code == 2
-    assert "There is no family 'lathe'" in done.output
-    assert not (tmp_path / "out").exists()
 
 
 def test_end_to_end_and_going_on(cases: Path, tmp_path: Path) -> None:

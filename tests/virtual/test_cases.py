@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from discovery.challenge.prepare import draw_orders
+from discovery.challenge.prepare import adopt, draw_orders
 from discovery.cli import app
 from discovery.errors import UsageError
 from discovery.models import read_model
@@ -167,7 +167,12 @@ def test_the_command_lists_families_and_writes_cases(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, [*command, "--write", str(tmp_path / "rig")])
     assert done.exit_code == 0, done.output
     assert list(json.loads((tmp_path / "rig" / "keys.json").read_text())) == ["case_01"]
-    assert (tmp_path / "rig" / "case_01" / "experiment.toml").exists()
+    (order,) = draw_orders(["bearing_rig"], 1, 3)
+    texts = [p.read_text() for p in (tmp_path / "rig" / "case_01").glob("*.toml")]
+    assert len(texts) == 3
+    assert not any(str(order.seed) in text for text in texts)
+    adopt(tmp_path / "challenge", tmp_path / "rig")
+    assert len(list((tmp_path / "challenge" / "cases" / "case_01").iterdir())) == 6
     again = CliRunner().invoke(app, [*command, "--write", str(tmp_path / "rig")])
     assert (again.exit_code, "not empty" in again.output) == (1, True)
     wrong = CliRunner().invoke(app, ["challenge", "--family", "lathe", "--write", str(tmp_path / "x")])

@@ -118,19 +118,20 @@ def _dead_band(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
 
 
 def _wear(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
-    """Friction falls from recording to recording, by `age`; a run-in is fast at first."""
+    """Less of the recorded loss reaches the body, by `age` of the recording; a run-in is fast at first."""
     run_in = shapes("recordings", 1.5, 1e6, 6.0)
 
-    def factor(u: Inputs) -> Array:
+    def change(u: Inputs) -> Array:
         age = u["age"]
-        return np.asarray(1.0 - size * (run_in * (1.0 - np.exp(-age / run_in)) if run_in < 1e3 else age))
+        return np.asarray(-size * (run_in * (1.0 - np.exp(-age / run_in)) if run_in < 1e3 else age))
 
-    def change(law: Law) -> Law:
-        if law.name not in {f"loss {b}" for b in at}:
-            return law
-        return replace(law, gate=times(law.gate, factor) if law.gate else factor)
-
-    return replace(m, network=m.network.changed(change))
+    losses = [law for law in m.network.laws if law.name in {f"loss {b}" for b in at}]
+    return m.plus(
+        [
+            replace(law, name=f"wear of {law.name}", gate=times(law.gate, change) if law.gate else change)
+            for law in losses
+        ]
+    )
 
 
 def _preload_reach(m: Machine, at: Place) -> float:
