@@ -47,14 +47,10 @@ class Refit:
         moved = np.linalg.lstsq(self.slopes / scale, change, rcond=1e-8)[0]
         return np.asarray(change - self.slopes / scale @ moved)
 
-    def readings(self, recordings: Sequence[Columns]) -> Array:
-        """Readings of recordings (R,) in units of noise, at the instants and in the order of the residual."""
-        parts = []
-        for system, columns in zip(self.systems, recordings, strict=True):
-            rows = np.searchsorted(columns["time"], system.grid.time[system.grid.read])
-            table = np.column_stack([columns[name] for name in system.grid.outputs])[rows]
-            parts.append((table / self.sigma).ravel())
-        return np.concatenate(parts)
+    def on(self, machine: Machine, recordings: Mapping[str, Columns]) -> Array:
+        """The residual (R,) that this fit leaves of other logs of the same recordings."""
+        systems = _systems(machine, self.model, recordings)
+        return _Problem(systems, self.model, self.sigma).residual(self.theta)
 
 
 def refit(
@@ -69,16 +65,21 @@ def refit(
     """
     from scipy.optimize import least_squares
 
-    campaign = campaign_of(machine, recordings)
-    model = expanded(machine.baseline.with_values(machine.nominal), campaign.channels)
-    inputs = inputs_of(model, campaign, machine.outputs)
-    systems = tuple(make_system(model, make_grid(campaign, r, inputs, machine.outputs)) for r in recordings)
+    channels = campaign_of(machine, recordings).channels
+    model = expanded(machine.baseline.with_values(machine.nominal), channels)
+    systems = _systems(machine, model, recordings)
     problem = _Problem(systems, model, sigma)
     start = problem.start if begin is None else begin.theta
     found = least_squares(
         problem.residual, start, problem.jacobian, method="trf", x_scale="jac", max_nfev=60, ftol=1e-5
     )
     return Refit(systems, model, sigma, found.x, found.fun, np.asarray(found.jac))
+
+
+def _systems(machine: Machine, model: Model, recordings: Mapping[str, Columns]) -> tuple[System, ...]:
+    campaign = campaign_of(machine, recordings)
+    inputs = inputs_of(model, campaign, machine.outputs)
+    return tuple(make_system(model, make_grid(campaign, r, inputs, machine.outputs)) for r in recordings)
 
 
 def campaign_of(machine: Machine, recordings: Mapping[str, Columns]) -> Campaign:

@@ -59,13 +59,13 @@ class World:
         }  # fmt: skip
 
     def change(self, machine: Machine) -> Array:
-        """Change (R,) of the readings to fit, over noise, when the machine is this one."""
-        return self.fitted.readings(list(self.logs(machine, FIT).values())) - self.readings
+        """Change (R,) of what the baseline leaves to fit, over noise, when the machine is this one.
 
-    @property
-    def readings(self) -> Array:
-        """Noise-free readings (R,) of the recordings to fit, over noise."""
-        return np.concatenate([s.grid.readings / self.fitted.sigma for s in self.fitted.systems], axis=None)
+        The baseline runs on the inputs that this machine shows: a chiller that switches at other times, or a
+        warmer sump, stands in the log.
+        """
+        logs = self.logs(machine, FIT)
+        return self.fitted.residual - self.fitted.on(machine, logs)
 
     def size(self, machine: Machine) -> float:
         """Rms over noise that the first step of a refit leaves of a change."""

@@ -48,9 +48,9 @@ def table(case: Case, name: str) -> pd.DataFrame:
 
 
 def test_the_same_bytes_twice(cases: dict[str, Case]) -> None:
-    again = make_case("headstock", 7, PLANS["two"])
-    assert again.files == cases["two"].files
-    assert again.key == cases["two"].key
+    again = make_case("headstock", 7, PLANS["measuring"])
+    assert again.files == cases["measuring"].files
+    assert again.key == cases["measuring"].key
     assert make_case("headstock", 8, PLANS["none"]).files["a.csv.gz"] != cases["none"].files["a.csv.gz"]
 
 
@@ -110,12 +110,12 @@ def test_size_grows_with_the_effect_and_ignores_what_a_refit_absorbs(world: Worl
     assert sizes[1] / sizes[0] == pytest.approx(2.0, rel=0.05)
     assert sizes[2] / sizes[1] == pytest.approx(2.0, rel=0.05)
     scaled = world.machine.network.changed(
-        lambda law: replace(law, size=1.03 * law.size) if law.name == "loss spindle" else law
+        lambda law: replace(law, size=1.1 * law.size) if law.name == "loss spindle" else law
     )
     absorbed = replace(world.machine, network=scaled)
-    change = world.change(absorbed)
-    assert np.sqrt(np.mean(change**2)) > 0.5  # a parameter of the baseline moves the errors
-    assert world.size(absorbed) < 0.05  # and a refit follows
+    moved = float(np.sqrt(np.mean(world.change(absorbed) ** 2)))
+    assert moved > 1.0  # a parameter of the baseline moves the errors
+    assert world.size(absorbed) < 0.05 * moved  # and a refit follows
 
 
 def test_visible_is_what_a_nonlinear_refit_leaves(world: World) -> None:

@@ -61,8 +61,13 @@ def rate_of_every_form(x: Array, P: float) -> Array:
     """The same equations, written out."""
     a, b, c, wet, share = x
     room, k = 20.0, 804.0 * 2 / 3
-    oil = lambda T: np.exp(k / (T + 95.0) - k / 117.0)  # noqa: E731
-    kelvin = lambda T: T + 273.15  # noqa: E731
+
+    def oil(T: float) -> float:
+        return float(np.exp(k / (T + 95.0) - k / 117.0))
+
+    def kelvin(T: float) -> float:
+        return T + 273.15
+
     v = 0.9 * P * oil(b)
     mixed = 900.0 * P * 2 * np.pi / 60 * (0.05 * np.exp(-v) + 0.2 * v ** (2 / 3))
     joint, damp = 12.0 * (b - a), 8.0 * wet / (wet + 0.02) * max(0.0, vapour(b) - 0.5 * vapour(room))
@@ -79,9 +84,11 @@ def by_lsoda(inputs: dict[str, Array], step: float) -> Array:
     x = np.array([20.0, 20.0, 20.0, 0.0, 0.0])
     rows = [x]
     for P in inputs["P"]:
-        x = solve_ivp(
-            lambda _, y, p=P: rate_of_every_form(y, p), (0, step), x, method="LSODA", rtol=1e-9, atol=1e-9
-        ).y[:, -1]
+
+        def rate(_: float, y: Array, P: float = float(P)) -> Array:
+            return rate_of_every_form(y, P)
+
+        x = solve_ivp(rate, (0.0, step), x, method="LSODA", rtol=1e-9, atol=1e-9).y[:, -1]
         rows.append(x)
     return np.array(rows)
 

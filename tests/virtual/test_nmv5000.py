@@ -83,7 +83,7 @@ def test_half_the_mesh_changes_less_than_a_tenth_of_a_micrometre() -> None:
     cycle = make_cycle("fit", 11, 24.0)
     coarse, fine = errors(cycle, without_switches()), errors(cycle, without_switches(2))
     for name in coarse:
-        assert np.abs(fine[name] - coarse[name]).max() < (0.25 if name == "E_A0C" else 0.1), name
+        assert np.abs(fine[name] - coarse[name]).max() < (0.15 if name == "E_A0C" else 0.1), name
 
 
 def test_half_the_step_changes_less_than_a_tenth_of_a_micrometre() -> None:
@@ -97,8 +97,9 @@ def test_half_the_step_changes_less_than_a_tenth_of_a_micrometre() -> None:
 
 def test_the_size_of_a_plant() -> None:
     m = five_axis()
-    assert 40 <= len(m.network.nodes) <= 60
-    assert len(m.network.nodes) > 5 * 6  # finer than the bodies of a thermobalance
+    temperatures = sum(C != LEVEL for C in m.network.nodes.values())
+    assert 40 <= temperatures <= 60
+    assert temperatures > 5 * 6  # finer than the bodies of a thermobalance
 
 
 def test_names_in_the_network_exist(wet: Run) -> None:
@@ -126,7 +127,7 @@ def test_only_a_nozzle_on_one_side_breaks_the_symmetry() -> None:
     centre = errors(make_cycle("fit", 9, 24.0))
     left = errors(make_cycle("fit", 9, 24.0, nozzle_side=1.0))
     assert np.abs(centre["E_X0C"]).max() < 1.0  # below the resolution of the axes, as in the paper
-    assert np.abs(left["E_X0C"]).max() > 2.0
+    assert np.abs(left["E_X0C"]).max() > 1.5
     assert left["E_R0T"].mean() < centre["E_R0T"].mean()  # less fluid on the table
 
 

@@ -24,7 +24,7 @@ def test_bytes_are_the_same_twice() -> None:
 def test_command_writes_campaign_and_envelope(tmp_path: Path) -> None:
     out = tmp_path / "radiating"
     command = ["record", "--seed", "3", "--hours", "6", "--recordings", "2", "--out", str(out)]
-    result = CliRunner().invoke(app, [*command, "--effect", "radiation=0.5", "--nozzle-height", "100"])
+    result = CliRunner().invoke(app, [*command, "--effect", "radiation=0.3", "--nozzle-height", "100"])
     assert result.exit_code == 0, result.output
     campaign = tomllib.loads((out / "campaign.toml").read_text())
     assert list(campaign["recordings"]) == ["recording_1", "recording_2"]
@@ -36,7 +36,7 @@ def test_command_writes_campaign_and_envelope(tmp_path: Path) -> None:
     ]
     answers = json.loads((tmp_path / "radiating.answer.json").read_text())
     assert answers[0]["effects"] == [
-        {"effect": "radiation", "states": ["c_body_1"], "size": 0.5, "unit": "m2"}
+        {"effect": "radiation", "states": ["c_body_1"], "size": 0.3, "unit": "m2"}
     ]
 
 
@@ -53,8 +53,8 @@ def test_command_conceals_and_reveals(tmp_path: Path) -> None:
     ("text", "part"),
     [
         ("radiatio=1", "no effect 'radiatio'"),
-        ("radiation", "needs a size in m2"),
-        ("radiation=much", "needs a size in m2"),
+        ("radiation", r"needs a size, for example radiation=0\.0294 \(m2\)"),
+        ("radiation=much", r"needs a size, for example radiation=0\.0294 \(m2\)"),
         ("radiation=-1e9", "is not possible; give 0 to"),
         ("radiation=1600", "is not possible"),
         ("radiation@leg=1", "cannot act at 'leg'.*choose one of: c_body_1, c_body_2"),
@@ -72,7 +72,7 @@ def test_mistakes_elsewhere(tmp_path: Path) -> None:
         (["--hours", "0"], "not possible"),
         (["--fault", "rezro=1"], "no fault 'rezro'"),
         (["--campaign", "nmv"], "no campaign 'nmv'"),
-        (["--conceal", "--effect", "radiation=0.5"], "leave out --effect, or --conceal"),
+        (["--conceal", "--effect", "radiation=0.3"], "leave out --effect, or --conceal"),
     ):
         result = CliRunner().invoke(app, ["record", "--out", str(tmp_path / "x"), *option])
         assert result.exit_code == 2
@@ -110,7 +110,7 @@ def test_a_folder_with_other_recordings_is_left_alone(tmp_path: Path) -> None:
 
 def test_an_answer_goes_with_its_recordings(tmp_path: Path) -> None:
     command = ["record", "--hours", "2", "--out", str(tmp_path / "x")]
-    assert CliRunner().invoke(app, [*command, "--effect", "radiation=0.5", "--reveal"]).exit_code == 0
+    assert CliRunner().invoke(app, [*command, "--effect", "radiation=0.3", "--reveal"]).exit_code == 0
     answers = [tmp_path / "x.answer.json", tmp_path / "x" / "answer.json"]
     assert all(path.exists() for path in answers)
     assert CliRunner().invoke(app, command).exit_code == 0

@@ -37,10 +37,10 @@ def structure(a: Assembly) -> None:
     Table 92 kg, C axis 130 and 170 kg, B corpus 330 and 480 kg.
     """
     about = a.about
-    a.body(Bar("table", STEEL, 0.25, about(0.047, 0.1), 5))  # along the radius
+    a.body(Bar("table", STEEL, 0.25, about(0.047, 0.1), 10))  # along the radius
     a.body(Bar("c_body_1", STEEL, 0.22, about(0.075, 0.1), 10))  # from the table down
     a.body(Bar("c_body_2", CAST_IRON, 0.28, about(0.084, 0.1), 5))
-    a.body(Bar("b_body_1", CAST_IRON, 0.40, about(0.115, 0.1), 5))  # from the C axis outwards
+    a.body(Bar("b_body_1", CAST_IRON, 0.40, about(0.115, 0.1), 10))  # from the C axis outwards
     a.body(Bar("b_body_2", CAST_IRON, 0.45, about(0.148, 0.1), 5))
     a.joint("table", "c_body_1", about(60.0), (0.0, 0.6), (0.0, 0.4))
     # the C axis stands inside the B corpus: they meet along their length
