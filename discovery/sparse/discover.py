@@ -17,11 +17,9 @@ from discovery.recordings import Campaign
 from discovery.sparse.bymasses import MassData, discover_error
 from discovery.sparse.byrates import discover_rates
 from discovery.sparse.discovery import Discovery, joined
-from discovery.sparse.drives import AMBIENT, Inputs, make_inputs
+from discovery.sparse.drives import AMBIENT, Inputs, make_drives, make_inputs
 from discovery.sparse.families import candidates
-from discovery.sparse.folds import make_blocks
 from discovery.sparse.growth import Growth
-from discovery.sparse.masses import make_mass_library, respond
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.ratedata import make_rate_data
 from discovery.sparse.rates import with_candidates
@@ -31,7 +29,6 @@ from discovery.terms import names
 from discovery.threads import one_thread
 
 FILE_FAMILIES = ("wet", "rotation", "coupling")
-QUICK = (60.0, 240.0)  # s
 
 
 @one_thread
@@ -89,12 +86,8 @@ def _mass_data(
     inputs: Inputs,
     options: SparseOptions,
 ) -> MassData:
-    quick = QUICK if inputs.bodies else ()  # an error follows the temperature of its own body at once
-    constants = sorted({*quick, *options.time_constants})
-    library = make_mass_library(inputs, constants, options.pump_ratios, options.library or ())
     grids = {r: make_grid(campaign, r, inputs.names, outputs) for r in recordings}
-    blocks = make_blocks([grids[r].time[grids[r].read] for r in recordings], options.blocks)
-    return MassData(library, grids, tuple(respond(library, grids[r]) for r in recordings), blocks)
+    return MassData(make_drives(inputs, campaign, options.library or ()), grids)
 
 
 def _error_rates(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.recordings import Campaign
+from discovery.terms import names, parse, text
 
 AMBIENT = "ambient temperature"
 FLOW = "fluid flow"
@@ -77,6 +78,27 @@ def make_inputs(campaign: Campaign, recordings: Sequence[str], asked: Sequence[s
 def _known(campaign: Campaign, recording: str, name: str) -> NDArray[np.float64]:
     series = campaign.recordings[recording].values.get(name)
     return np.empty(0) if series is None else series[np.isfinite(series)]
+
+
+@dataclass(frozen=True)
+class Drives:
+    """What may drive a hidden mass."""
+
+    inputs: tuple[str, ...]
+    expressions: tuple[str, ...]
+    linear: tuple[str, ...]  # inputs that run straight between their stamps
+    settled: tuple[str, ...]  # expressions whose mass begins in balance with them: air, measured bodies
+    integrals: tuple[str, ...] = ()  # expressions that may add up without bound
+
+
+def make_drives(inputs: Inputs, campaign: Campaign, extra: Sequence[str] = ()) -> Drives:
+    """Drives of hidden masses from the inputs, and expressions of the user."""
+    expressions = [text(parse(one)) for one in [*mass_drives(inputs), *extra]]
+    air = frozenset((*inputs.of(*TEMPERATURES), *inputs.bodies))
+    gate = names(parse(inputs.gate)) if inputs.gate else frozenset()
+    settled = [e for e in expressions if names(parse(e)) & air and not names(parse(e)) & gate]
+    linear = [name for name in inputs.names if campaign.channels[name].between == "linear"]
+    return Drives(inputs.names, tuple(dict.fromkeys(expressions)), tuple(linear), tuple(settled))
 
 
 def mass_drives(inputs: Inputs) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from discovery.schema import Strict
 
@@ -45,17 +45,12 @@ class SparseOptions(Strict):
         None, description="states of a baseline file that candidates may enter; default all"
     )
     max_terms: int = Field(15, ge=1, le=60, description="most terms of one output")
-    max_masses: int = Field(4, ge=1, le=12, description="most hidden masses of one error")
-    time_constants: Numbers = Field(
-        (900.0, 1800.0, 3600.0, 7200.0, 14400.0, 28800.0, 57600.0),
-        description="grid of time constants of the hidden masses [s]",
-        min_length=1,
+    time_constants: Annotated[tuple[float, float], FROM_LIST] | None = Field(
+        None,
+        description="least and greatest time constant of the hidden masses [s]; default from sampling and length",
     )
-    pump_ratios: Numbers = Field(
-        (1.0, 2.0, 4.0, 8.0),
-        description="how many times quicker a hidden mass may answer while the pump runs",
-        min_length=1,
-    )
+    keep: Words = Field((), description="terms that stay")
+    forbid: Words = Field((), description="terms that are not offered")
     bounds: dict[str, Annotated[tuple[Bound, Bound], FROM_LIST]] = Field(
         default_factory=dict,
         description="smallest and largest coefficient of a term, by its expression; [0, inf] is a sign",
@@ -76,13 +71,6 @@ class SparseOptions(Strict):
     refine: bool = Field(True, description="fit all numbers of the chosen model by output error at the end")
     seed: int = Field(0, ge=0, description="of the bootstraps")
     also: Words = Field((), description="recordings that this model is fitted to besides `fit`")
-
-    @field_validator("time_constants", "pump_ratios")
-    @classmethod
-    def _positive(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        if any(not 0 < value < 1e9 for value in values):
-            raise ValueError("every entry must be a positive number")
-        return tuple(sorted(set(values)))
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
