@@ -159,7 +159,7 @@ def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
     reference = np.zeros(len(outputs))
     for y, name in enumerate(outputs):
         taken = grid.readings[grid.measured[:, y], y]
-        if experiment.campaign.channels[name].role == "temperature" and len(taken):
+        if experiment.campaign.channels[name].role != "error" and len(taken):
             reference[y] = taken[0]
     predicted = model_outputs(trajectory)
     return Prediction(outputs, grid.time[grid.read], grid.readings, predicted, reference)

@@ -64,6 +64,7 @@ def results_document(
         "fit": list(experiment.fit),
         "held_out": list(experiment.held_out),
         "outputs": list(experiment.outputs),
+        "roles": {name: channels[name].role for name in experiment.outputs},
         "units": {name: channels[name].unit for name in experiment.outputs},
         "input_units": {name: c.unit for name, c in channels.items() if name not in experiment.outputs},
         "noise": {name: channels[name].noise for name in experiment.outputs},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +13,14 @@ from discovery.dynamics import Grid
 from discovery.fitting import Fit, fit_model
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.sparse.choice import Choice
-from discovery.sparse.discovery import Discovery, PathPoint
+from discovery.sparse.borrowed import borrowed
+from discovery.sparse.choice import Choice, chosen
+from discovery.sparse.discovery import Discovery, PathPoint, path_points
 from discovery.sparse.drives import Drives
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.library import Feature, FilteredInputs
-from discovery.sparse.masses import Response, Rules, mass_model, responses_of
-from discovery.sparse.optimiser import SparseSearch, rough_noise
+from discovery.sparse.masses import Response, Rules, mass_model, responses_of, with_spreads
+from discovery.sparse.optimiser import SparseSearch, features_of, rough_noise
 from discovery.sparse.options import SparseOptions
 
 Array = NDArray[np.float64]
@@ -34,7 +36,7 @@ class MassData:
     grids: Mapping[str, Grid]
 
 
-def discover_error(
+def discover_masses(
     data: MassData,
     campaign: Campaign,
     recordings: Sequence[str],
@@ -69,12 +71,13 @@ def discover_error(
         options.blocks,
         options.bootstraps,
         options.seed,
+        chosen if options.optimiser == "search" else borrowed(options.optimiser, options.optimiser_arguments),
     )
     sindy = pysindy.SINDy(optimizer=search, feature_library=library)
     tables = [_table(grids[r], data.drives.inputs) for r in recordings]
     sindy.fit(tables, t=1.0, x_dot=[grids[r].readings for r in recordings])
     choice = search.choices_[0]
-    features = [library.feature_at(int(f), float(p)) for f, p in zip(choice.terms.family, choice.terms.place)]
+    features = features_of(library, choice.terms)
     rules = Rules(
         output,
         {name: c.unit for name, c in campaign.channels.items()},
@@ -83,8 +86,8 @@ def discover_error(
         (float(library.taus_[0]), float(library.taus_[-1])),
         choice.start_sd,
     )
-    model, fit, left = _clear(rules, features, choice, campaign, recordings, output, grids, options)
-    return Discovery(model, *_evidence(output, features, left, choice, model, library))
+    model, left = _clear(rules, features, choice, campaign, recordings, grids, options)
+    return Discovery(model, *_evidence(output, features, left, choice, library))
 
 
 def _table(grid: Grid, inputs: Sequence[str]) -> Array:
@@ -100,50 +103,43 @@ def _clear(
     choice: Choice,
     campaign: Campaign,
     recordings: Sequence[str],
-    output: str,
     grids: Mapping[str, Grid],
     options: SparseOptions,
-) -> tuple[Model, Fit | None, list[Feature]]:
-    """The model of the chosen features, fitted by output error, without those whose interval holds zero."""
-    terms = choice.terms
-    offset: float | None = None
-    responses = []
-    for feature, gain, pole in zip(features, terms.theta, terms.pole, strict=True):
-        if feature.drive == "1":
-            offset = float(gain)
-        else:
-            responses.append(Response(feature, float(gain), int(pole)))
-    model = mass_model(rules, offset, responses)
+) -> tuple[Model, list[Feature]]:
+    """The model of the chosen features, fitted by output error, without those whose interval holds zero; and these."""
+    found = zip(features, choice.terms.theta, choice.terms.pole, strict=True)
+    responses = [Response(f, float(gain), int(pole), f) for f, gain, pole in found]
     if not options.refine:
-        return model, None, list(features)
-    names = {id(r): f for r, f in zip(responses, [f for f in features if f.drive != "1"], strict=True)}
-    kept = [names[id(r)] for r in responses]
+        return mass_model(rules, responses), list(features)
+
+    def fitted(model: Model) -> Fit:
+        return fit_model(model, campaign, recordings, [rules.output], grids=grids)
+
     while True:
-        fit = fit_model(mass_model(rules, offset, responses), campaign, recordings, [output], grids=grids)
-        offset, responses, strength = responses_of(fit, responses)
+        fit = fitted(mass_model(rules, responses))
+        responses, strength = responses_of(fit, responses)
         free = [i for i, r in enumerate(responses) if r.feature.drive not in options.keep]
         weakest = min(free, key=lambda i: strength[i], default=None)
         if weakest is None or strength[weakest] >= CLEAR:
-            return fit.model, fit, kept
+            return fitted(with_spreads(fit)).model, [r.chosen for r in responses]
         responses = [r for i, r in enumerate(responses) if i != weakest]
-        kept = [f for i, f in enumerate(kept) if i != weakest]
 
 
-def _evidence(output, features, left, choice, model, library):  # type: ignore[no-untyped-def]
-    labels = [str(f) for f in features]
-    rms = np.sqrt(choice.left_out.mean(axis=1))
-    points = tuple(
-        PathPoint((output,), size, float(rms[k]), float(np.sqrt(choice.fit[k])), k == choice.chosen, ())
-        for k, size in enumerate(choice.sizes)
-    )
-    stability = {f"{output}: {l}": s for l, s, f in zip(labels, choice.stability, features) if f in left}
+def _evidence(
+    output: str, features: Sequence[Feature], left: Sequence[Feature], choice: Choice, library: FilteredInputs
+) -> tuple[tuple[PathPoint, ...], dict[str, float], dict[str, Any]]:
+    """Path, stability and report."""
+    points = path_points([output], choice, library.drive_of_family_)
+    stability = {f"{output}: {f}": s for f, s in zip(features, choice.stability, strict=True) if f in left}
     report = {
         "outputs": [output],
         "form": "masses",
         "terms": len(left),
-        "left_out_rms": round(float(rms[choice.chosen]), 4),
+        "left_out_rms": round(choice.left_out[choice.row], 4),
         "library": library.families_.columns,
         "kept": [str(f) for f in left],
-        "costs": {str(f): round(c, 4) for f, c in zip(features, choice.costs) if f in left},
+        "costs": {
+            str(f): round(cost, 4) for f, cost in zip(features, choice.costs, strict=True) if f in left
+        },
     }
     return points, stability, report

@@ -134,7 +134,7 @@ class FilteredInputs(BaseFeatureLibrary):
         """Features (rows that are wanted, n_output_features_) of each trajectory (T, len(names))."""
         made = [self._features(x) for x in x_full]
         self.rows_ = [len(columns) for columns in made]
-        self.decays_ = [self._decays(x) for x in x_full]
+        self.nuisance_ = [self._decays(x) for x in x_full]
         self.times_ = [self._column(x, "time")[self._read(x)] for x in x_full]
         return [AxesArray(columns, {"ax_time": 0, "ax_coord": 1}) for columns in made]
 
@@ -186,3 +186,54 @@ class FilteredInputs(BaseFeatureLibrary):
         """Names as formulas: P0, lag(P0, 3600), integral(P0)."""
         return [str(feature) for feature in self.features_]
 
+
+class ModelTerms(BaseFeatureLibrary):
+    """Terms of a model filtered through its own dynamics: how its outputs move with the coefficient of each term.
+
+    The columns are those of the trajectories that a model was fitted to; the left-hand side that belongs to them is
+    what the fit leaves plus what its coefficients make: residual + J theta = J theta_new.
+
+    Args:
+        names: of the coefficients.
+        columns: (R, M) sensitivities by trajectory, over the noise.
+        nuisance: (R, m) sensitivities of start values, by trajectory.
+        precision: (m,) inverse variances of their priors, by trajectory.
+        times: (R,) instants of the rows [s], by trajectory.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        columns: Sequence[Array],
+        nuisance: Sequence[Array],
+        precision: Sequence[Array],
+        times: Sequence[Array],
+    ) -> None:
+        self.names = names
+        self.columns = columns
+        self.nuisance = nuisance
+        self.precision = precision
+        self.times = times
+
+    @x_sequence_or_item
+    def fit(self, x_full: Sequence[Any], y: Any = None) -> Self:  # noqa: ARG002
+        """Check that the trajectories are those of the fit."""
+        rows = [len(x) for x in x_full]
+        if rows != [len(one) for one in self.columns]:
+            raise ValueError(f"the terms were filtered for trajectories of other lengths than {rows}")
+        self.rows_, self.times_ = rows, list(self.times)
+        self.nuisance_, self.precision_ = list(self.nuisance), list(self.precision)
+        self.drive_of_family_ = list(self.names)
+        self.n_features_in_ = x_full[0].shape[-1]
+        self.n_output_features_ = len(self.names)
+        return self
+
+    @x_sequence_or_item
+    def transform(self, x_full: Sequence[Any]) -> list[Any]:
+        """The filtered terms (R, M) of each trajectory."""
+        self.fit(x_full)
+        return [AxesArray(one, {"ax_time": 0, "ax_coord": 1}) for one in self.columns]
+
+    def get_feature_names(self, input_features: Sequence[str] | None = None) -> list[str]:  # noqa: ARG002
+        """Names of the coefficients."""
+        return list(self.names)

@@ -16,7 +16,6 @@ import numpy as np
 from discovery.fitting import Fit
 from discovery.models import Model, Parameter, State
 from discovery.models.dimensions import unit_of
-from discovery.models.units import differences
 from discovery.sparse.library import Feature
 from discovery.terms import Number, Term, parse, text
 
@@ -30,6 +29,12 @@ class Response:
     feature: Feature
     gain: float
     pole: int
+    chosen: Feature  # as the search chose it; the fit moves its time constant
+
+    @property
+    def lagged(self) -> bool:
+        """Whether it has a time constant."""
+        return 0 < self.feature.tau < np.inf
 
 
 @dataclass(frozen=True)
@@ -44,28 +49,23 @@ class Rules:
     start_sd: float
 
 
-def mass_model(rules: Rules, offset: float | None, responses: Sequence[Response]) -> Model:
-    """The responses written as a model: one hidden state for each time constant."""
-    y = rules.output
-    unit = rules.units[y]
+def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
+    """The responses written as a model: one hidden state for each time constant; the drive 1 is the offset."""
+    y, unit = rules.output, rules.units[rules.output]
     parameters: dict[str, Parameter] = {}
     states: dict[str, State] = {}
     terms: list[Term] = []
     direct: list[str] = []
-    if offset is not None:
-        parameters[f"{y}_0"] = Parameter(offset, unit)
-        direct.append(f"{y}_0")
-    lagged = [r for r in responses if 0 < r.feature.tau < np.inf]
-    number = {pole: k for k, pole in enumerate(dict.fromkeys(r.pole for r in lagged), start=1)}
-    for k, r in enumerate(responses, start=1):
-        drive, gain = r.feature.drive, f"{y}_gain{k}"
+    number = _numbers(responses)
+    for k, r in enumerate(responses):
+        drive, gain = r.feature.drive, _gain(y, k, r)
         of = unit_of(parse(drive), rules.units)
         low, high = rules.bounds.get(drive, (-np.inf, np.inf))
         per = unit if of == "1" else f"{unit}/({of})" if set("*/") & set(of) else f"{unit}/{of}"
-        driven = text(parse(f"{gain}*({drive})"))
+        driven = gain if drive == "1" else text(parse(f"{gain}*({drive})"))
         if r.feature.tau == 0.0:
             direct.append(driven)
-        elif np.isinf(r.feature.tau):
+        elif not r.lagged:
             per, state = f"{per}/s", f"{y}_sum{k}"
             states[state] = State(state, unit, None, Number(0.0), rules.start_sd, 1.0)
             terms.append(Term(f"{drive} adds up in {state}", state, parse(driven)))
@@ -78,7 +78,7 @@ def mass_model(rules: Rules, offset: float | None, responses: Sequence[Response]
                 terms.append(Term(f"{state} settles", state, parse(f"-{state}/{tau}")))
             if drive in rules.settled:
                 start = states[state].start
-                begun = driven if start == Number(0.0) else f"{text(start)} + {driven}" if start else driven
+                begun = driven if start in (None, Number(0.0)) else f"{text(start)} + {driven}"
                 states[state] = replace(states[state], start=parse(begun))
             terms.append(Term(f"{drive} through {state}", state, parse(f"{driven}/{tau}")))
         parameters[gain] = Parameter(r.gain, per, low, high)
@@ -86,18 +86,43 @@ def mass_model(rules: Rules, offset: float | None, responses: Sequence[Response]
     return Model(y, parameters, states, tuple(terms), {y: output}, "s")
 
 
-def responses_of(fit: Fit, responses: Sequence[Response]) -> tuple[float | None, list[Response], list[float]]:
-    """Offset, responses with the fitted gains and time constants, and how many standard errors each gain is from 0."""
-    y = fit.problem.outputs[0]
-    values = fit.model.parameters
-    errors = {u.name: e for u, e in zip(fit.problem.unknowns, fit.standard_errors, strict=True) if not u.is_nuisance}
-    lagged = [r for r in responses if 0 < r.feature.tau < np.inf]
-    number = {pole: k for k, pole in enumerate(dict.fromkeys(r.pole for r in lagged), start=1)}
+def _gain(output: str, k: int, response: Response) -> str:
+    return f"{output}_0" if response.feature.drive == "1" else f"{output}_gain{k}"
+
+
+def _numbers(responses: Sequence[Response]) -> dict[int, int]:
+    """Number of the hidden mass of each pole."""
+    return {pole: k for k, pole in enumerate(dict.fromkeys(r.pole for r in responses if r.lagged), start=1)}
+
+
+def responses_of(fit: Fit, responses: Sequence[Response]) -> tuple[list[Response], list[float]]:
+    """Responses with the fitted gains and time constants, and by how many standard errors each gain is not 0."""
+    y, values = fit.problem.outputs[0], fit.model.parameters
+    unknowns = zip(fit.problem.unknowns, fit.standard_errors, strict=True)
+    errors = {u.name: e for u, e in unknowns if not u.is_nuisance}
+    number = _numbers(responses)
     found, strength = [], []
-    for k, r in enumerate(responses, start=1):
-        gain = f"{y}_gain{k}"
-        tau = values[f"{y}_tau{number[r.pole]}"].value if r in lagged else r.feature.tau
-        found.append(Response(replace(r.feature, tau=tau), values[gain].value, r.pole))
+    for k, r in enumerate(responses):
+        gain = _gain(y, k, r)
+        tau = values[f"{y}_tau{number[r.pole]}"].value if r.lagged else r.feature.tau
+        found.append(replace(r, feature=replace(r.feature, tau=tau), gain=values[gain].value))
         strength.append(abs(values[gain].value) / max(errors[gain], 1e-300))
-    offset = values[f"{y}_0"].value if f"{y}_0" in values else None
-    return offset, found, strength
+    return found, strength
+
+
+def with_spreads(fit: Fit) -> Model:
+    """The fitted model with the spread of the start of each mass that its recordings show, the common one counted as
+    one recording more.
+
+    What a mass remembers from before a recording is for the readings to say: charge is anywhere, a mass of minutes
+    is at rest.
+    """
+    found: dict[str, list[float]] = {}
+    for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
+        if u.is_start:
+            found.setdefault(u.name, []).append(float(value) ** 2 + float(error) ** 2)
+    states = {
+        name: replace(s, start_sd=float(np.sqrt(np.mean([*found.get(name, []), s.start_sd**2]))))
+        for name, s in fit.model.states.items()
+    }
+    return replace(fit.model, states=states)

@@ -1,10 +1,10 @@
 """The constrained search as an optimiser of `pysindy.SINDy`: signs, bounds, terms that stay, time constants that
-move; and any optimiser of PySINDy on the same columns.
+move.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Self
 
@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pysindy.optimizers.base import BaseOptimizer
 
-from discovery.sparse.choice import Choice, Problem, chosen
+from discovery.sparse.choice import Choice, chosen
 from discovery.sparse.folds import PREDICT, make_blocks
-from discovery.sparse.library import Feature, FilteredInputs
+from discovery.sparse.library import Feature, FilteredInputs, ModelTerms
+from discovery.sparse.problem import Problem, equal_shares
 from discovery.sparse.search import Families, Terms, plain
 
 Array = NDArray[np.float64]
@@ -28,19 +29,21 @@ class SparseSearch(BaseOptimizer):
     chosen features alone. With any other library the columns stay where they are.
 
     Args:
-        library: the library of the same `SINDy`, whose time constants may move; None: columns as they are.
-        max_terms: most terms of one target.
-        bounds: smallest and largest coefficient by drive (by column number without a library); (0, inf) is a sign.
+        library: the library of the same `SINDy`, where it is one of this package; None: plain columns.
+        max_terms: most terms of one target, those of `keep` not counted.
+        bounds: smallest and largest coefficient by drive (by number of the column without a library); (0, inf) is
+            a sign.
         keep: drives (columns) that are in every set.
-        noise: standard deviation of a reading of each target; default estimated.
+        noise: standard deviation of a reading of each target; default estimated from the readings.
         tolerance: standard errors by which a sparser set may be worse on what was left out.
-        blocks: pieces that the trajectories are cut into for the standard errors.
+        blocks: pieces that the trajectories are cut into for these standard errors.
         bootstraps, seed: block bootstraps for the stability of the terms.
+        select: makes the `Choice` of a `Problem`; default by free runs on what was left out.
     """
 
     def __init__(
         self,
-        library: FilteredInputs | None = None,
+        library: FilteredInputs | ModelTerms | None = None,
         max_terms: int = 12,
         bounds: Bounds | None = None,
         keep: Sequence[str] = (),
@@ -49,6 +52,7 @@ class SparseSearch(BaseOptimizer):
         blocks: int = 24,
         bootstraps: int = 0,
         seed: int = 0,
+        select: Callable[[Problem], Choice] = chosen,
     ) -> None:
         super().__init__()
         self.library = library
@@ -60,6 +64,7 @@ class SparseSearch(BaseOptimizer):
         self.blocks = blocks
         self.bootstraps = bootstraps
         self.seed = seed
+        self.select = select
 
     def fit(self, x_: Any, y: Any, sample_weight: Any = None, **_: Any) -> Self:
         """Choose and fit terms for each target.
@@ -84,41 +89,58 @@ class SparseSearch(BaseOptimizer):
         """BaseOptimizer asks for it; `fit` does the work on normal equations."""
 
     def _choose(self, x: Array, target: Array, k: int) -> Choice:
+        """The choice for one target, in its unit."""
         problem, noise = self._problem(x, target, k)
-        found = chosen(problem, self.bootstraps, self.seed)
-        terms = replace(found.terms, theta=found.terms.theta * noise)
-        return replace(found, terms=terms, left_out=found.left_out * noise**2, fit=found.fit * noise**2, start_sd=found.start_sd*noise)
+        found = self.select(problem)
+        return replace(
+            found,
+            terms=replace(found.terms, theta=found.terms.theta * noise),
+            left_out=tuple(noise * rms for rms in found.left_out),
+            fit=tuple(noise * rms for rms in found.fit),
+            start_sd=found.start_sd * noise,
+        )
 
     def _problem(self, x: Array, target: Array, k: int) -> tuple[Problem, float]:
         """The problem of one target over its noise, and the noise."""
         library = self.library
-        rows = library.rows_ if library else [len(x)]
+        rows = [len(x)] if library is None else library.rows_
+        times = [np.arange(len(x), dtype=float)] if library is None else library.times_
+        nuisance = [np.zeros((len(x), 0))] if library is None else library.nuisance_
         cuts = np.cumsum(rows)[:-1]
         readings = tuple(np.split(target, cuts))
-        size = float(np.sqrt(np.nanmean(target**2))) or 1.0
+        size = float(np.nanstd(target)) or 1.0
         noise = (self.noise[k] if self.noise else None) or rough_noise(readings) or 1e-3 * size
-        times = library.times_ if library else [np.arange(len(x), dtype=float)]
-        families = self._families(x.shape[1], noise)
+        counts = [d.shape[1] for d in nuisance]
+        precision = (
+            tuple(library.precision_)
+            if isinstance(library, ModelTerms)
+            else equal_shares(size / noise, counts)
+        )
+        kept = [int(self._mine(name)[-1]) for name in self._always]
         problem = Problem(
             tuple(np.split(x, cuts)),
-            tuple(library.decays_ if library else [np.zeros((len(x), 0))]),
+            tuple(nuisance),
+            precision,
             tuple(y / noise for y in readings),
             make_blocks(times, self.blocks),
-            families,
-            np.array([self._family(name) for name in self._always], int),
+            self._families(x.shape[1], noise),
+            np.array(kept, int),
+            self.max_terms + len(kept),
             size / noise,
-            self.max_terms + len(self._always),
             self.tolerance,
+            self.bootstraps,
+            self.seed,
         )
-        return problem, noise
+        return problem, float(noise)
 
     @property
     def _always(self) -> list[str]:
-        offset = ["1"] if self.library and self.library.offset else []
-        return [*offset, *(name for name in self.keep if name != "1")]
+        """Names of what is in every set, the offset first."""
+        offset = ["1"] if isinstance(self.library, FilteredInputs) and self.library.offset else []
+        return list(dict.fromkeys([*offset, *self.keep]))
 
     def _families(self, columns: int, noise: float) -> Families:
-        families = self.library.families_ if self.library else plain(columns)
+        families = self.library.families_ if isinstance(self.library, FilteredInputs) else plain(columns)
         low, high = families.low.copy(), families.high.copy()
         for name, (least, most) in (self.bounds or {}).items():
             mine = self._mine(name)
@@ -126,33 +148,29 @@ class SparseSearch(BaseOptimizer):
         return replace(families, low=low, high=high)
 
     def _mine(self, name: str) -> list[int]:
-        """Families of a drive. Raises ValueError: there is none."""
+        """Families of a drive or column. Raises ValueError: there is none."""
         if self.library is None:
             return [int(name)]
-        found = [f for f, drive in enumerate(self.library.drive_of_family_) if drive == name]
+        names = self.library.drive_of_family_
+        found = [f for f, drive in enumerate(names) if drive == name]
         if not found:
-            known = ", ".join(dict.fromkeys(self.library.drive_of_family_))
-            raise ValueError(f"'{name}' is no drive of the library ({known})")
+            raise ValueError(f"the library has no '{name}' ({', '.join(dict.fromkeys(names))})")
         return found
-
-    def _family(self, name: str) -> int:
-        """The family that stays for a drive: through a lag where there is one."""
-        return self._mine(name)[-1]
 
     def _place(self, columns: int) -> None:
         """Coefficients (targets, features); a library that can move holds the chosen features from now on."""
         sets = [choice.terms for choice in self.choices_]
-        if self.library is None:
-            self.coef_ = np.zeros((len(sets), columns))
-            for row, terms in zip(self.coef_, sets, strict=True):
-                row[terms.family] = terms.theta
-        else:
+        if isinstance(self.library, FilteredInputs):
             found = [features_of(self.library, terms) for terms in sets]
             features = list(dict.fromkeys(f for one in found for f in one))
-            self.coef_ = np.zeros((len(sets), len(features)))
-            for row, mine, terms in zip(self.coef_, found, sets, strict=True):
-                row[[features.index(f) for f in mine]] = terms.theta
             self.library.keep(features)
+            places = [[features.index(f) for f in one] for one in found]
+            columns = len(features)
+        else:
+            places = [terms.family.tolist() for terms in sets]
+        self.coef_ = np.zeros((len(sets), columns))
+        for row, mine, terms in zip(self.coef_, places, sets, strict=True):
+            row[mine] = terms.theta
         self.ind_ = self.coef_ != 0
 
 

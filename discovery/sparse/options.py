@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from discovery.schema import Strict
+from discovery.sparse.laws import LAWS
 
-FAMILIES = ("linear", "wet", "rotation", "coupling", "radiation", "natural", "load", "second mass")
+THERMAL = ("wet", "rotation", "coupling", "radiation", "natural", "load", "second mass")
+FAMILIES = (*LAWS, "threshold", "product", *THERMAL)
+HIDDEN = ("own", "rate", "upstream")
 
 FROM_LIST = Field(strict=False)  # a file has lists where options have tuples
 Words = Annotated[tuple[str, ...], FROM_LIST]
@@ -49,14 +52,28 @@ class SparseOptions(Strict):
         None,
         description="least and greatest time constant of the hidden masses [s]; default from sampling and length",
     )
+    hidden: Literal["auto", "own", "rate", "upstream"] = Field(
+        "auto",
+        description='what stands behind an output in rates: "own": nothing; "rate": its rate is a hidden state (a '
+        'mass on a spring); "upstream": a hidden body empties into it (a tank above a tank); "auto": what '
+        "predicts best",
+    )
+    stable: bool = Field(
+        True, description="no pole in the right half plane: states are drawn back, not driven away"
+    )
     keep: Words = Field((), description="terms that stay")
     forbid: Words = Field((), description="terms that are not offered")
     bounds: dict[str, Annotated[tuple[Bound, Bound], FROM_LIST]] = Field(
         default_factory=dict,
         description="smallest and largest coefficient of a term, by its expression; [0, inf] is a sign",
     )
-    optimiser: Literal["elimination", "stlsq", "ssr", "sr3"] = Field(
-        "elimination", description="our own search, or an optimiser of PySINDy"
+    optimiser: str = Field(
+        "search",
+        pattern=r"^(search|pysindy:\w+)$",
+        description='"search": our own; "pysindy:SR3": an optimiser of PySINDy by its name',
+    )
+    optimiser_arguments: dict[str, Any] = Field(
+        default_factory=dict, description="of the optimiser of PySINDy, as { threshold = 0.1 }"
     )
     tolerance: float | None = Field(
         None,

@@ -274,7 +274,12 @@ def entry(G, v, start, count, g, p, low, high, barred):  # type: ignore[no-untyp
             for k in range(n):
                 left -= theta[k] * H[k, j] * np.sqrt(S[k, k])
                 own -= H[k, j] * inner[k, j]
-            barrier = barred[j] or own <= 1e-7 * G[j, j] or (left > 0 and high[f] <= 0) or (left < 0 and low[f] >= 0)
+            barrier = (
+                barred[j]
+                or own <= 1e-7 * G[j, j]
+                or (left > 0 and high[f] <= 0)
+                or (left < 0 and low[f] >= 0)
+            )
             for k in range(n):
                 barrier = barrier or (g[k] == f and (count[f] < POINTS or abs(p[k] - i) < APART))
             if not barrier and left * left / own > best:

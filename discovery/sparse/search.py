@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.sparse import pursuit
-from discovery.sparse.gram import Gram
+from discovery.sparse.gram import RIDGE, Gram
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -86,6 +86,10 @@ class Search:
         found, theta, gain = pursuit.refine(*self._problem, *where)
         return Terms(family, found, pole, theta, gain)
 
+    def of(self, family: Ints) -> Terms:
+        """The terms of some families without time constants."""
+        return self.refined(family, np.zeros(len(family)))
+
     def grown(self, terms: Terms) -> Terms | None:
         """The set with the term that takes most off, all refined; None where none may enter.
 
@@ -123,25 +127,28 @@ class Search:
         return self.refined(terms.family[rest], terms.place[rest], pole)
 
     def shrunk(self, terms: Terms) -> Terms:
-        """The set without the term whose loss costs least."""
-        n, f = len(terms), self.families
-        work = tuple(np.empty((n - 1, k)) for k in (f.columns, pursuit.POINTS, pursuit.POINTS))
-        gains = np.full(n, -np.inf)
-        for k in range(len(self.always), n):
-            rest = np.arange(n) != k
-            where = (terms.family[rest], terms.place[rest], f.low, f.high)
-            gains[k] = pursuit.solved(
-                *self._problem, *where, *work, np.empty(n - 1, int), np.empty((n - 1, n - 1))
-            )[1]
-        return self.without(terms, int(np.argmax(gains)))
+        """The set without the term whose loss costs least: theta_j^2 / (S^-1)_jj at the places as they are.
+
+        A coefficient at a bound of zero costs nothing and goes first.
+        """
+        n, f, kept = len(terms), self.families, len(self.always)
+        work = tuple(np.empty((n, k)) for k in (f.columns, pursuit.POINTS, pursuit.POINTS))
+        S = np.empty((n, n))
+        where = (terms.family, terms.place, f.low, f.high)
+        theta, _ = pursuit.solved(*self._problem, *where, *work, np.empty(n, int), S)
+        scale = np.sqrt(np.diag(S))
+        inverse = np.linalg.inv(S / np.outer(scale, scale) + RIDGE * np.eye(n))
+        rise = (theta * scale) ** 2 / np.diag(inverse)
+        return self.without(terms, kept + int(np.argmin(rise[kept:])))
 
     def path(self, size: int) -> list[Terms]:
         """Sets of growing size, from `always` alone up to `size` terms.
 
         The term that takes most off enters, all places are refined, weak members are exchanged; then the largest set
-        shrinks again. The better set of each size stays.
+        (all columns, where none has a time constant) shrinks again. The better set of each size stays: growth finds
+        first what two others imitate together, shrinking keeps what growth has a proxy for.
         """
-        terms = self.refined(self.always, np.zeros(len(self.always)))
+        terms = self.of(self.always)
         found = {len(terms): terms}
         while len(terms) < size:
             more = self.grown(terms)
@@ -149,10 +156,15 @@ class Search:
                 break
             terms = self._exchanged(more)
             found[len(terms)] = terms
+        if self.families.count.max() == 1:
+            rest = np.setdiff1d(np.flatnonzero(np.diag(self.g.matrix) > 0), self.always)
+            terms = self.of(np.concatenate([self.always, rest]))
         while len(terms) > len(self.always) + 1:
-            less, known = self.shrunk(terms), found[len(terms) - 1]
-            terms = less if less.gain > known.gain and together(less) is None else known
-            found[len(terms)] = terms
+            terms = self.shrunk(terms)
+            known = found.get(len(terms))
+            better = known is None or terms.gain > known.gain
+            if better and len(terms) <= size and together(terms) is None:
+                found[len(terms)] = terms
         return [found[n] for n in sorted(found)]
 
     def _exchanged(self, terms: Terms) -> Terms:
@@ -195,7 +207,6 @@ def on_grid(terms: Terms, families: Families) -> Array:
         points = pursuit.POINTS if count >= pursuit.POINTS else 1
         theta[first : first + points] += value * w[:points]
     return theta
-
 
 
 def together(terms: Terms) -> tuple[int, int] | None:

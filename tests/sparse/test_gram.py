@@ -4,11 +4,11 @@ import warnings
 
 import numpy as np
 import pytest
+from discovery.sparse.optimisers import stlsq
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from discovery.sparse.gram import factor, gram, project_out, solve, total
-from discovery.sparse.optimisers import stlsq
 
 Array = NDArray[np.float64]
 

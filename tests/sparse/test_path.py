@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from discovery.sparse.optimisers import Optimiser, pysindy_path
+from discovery.sparse.path import backward, best_of_each_size, forward
 from numpy.typing import NDArray
 
 from discovery.sparse.gram import Gram, gram, solve
-from discovery.sparse.optimisers import Optimiser, pysindy_path
-from discovery.sparse.path import backward, best_of_each_size, forward
 
 TRUE = {1, 4, 6}
 
