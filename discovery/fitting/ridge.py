@@ -22,10 +22,11 @@ PARTS = 5  # that a single recording is cut into; several recordings are left ou
 def fit_ridge(
     campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str]
 ) -> Fit:
-    """Ridge regression (Hoerl & Kennard, Technometrics 12, 1970) of each output on the inputs at its readings.
+    """Ridge regression (Hoerl & Kennard, Technometrics 12, 1970) of each output on the inputs at its
+    readings.
 
-    The strength is the one that predicts recordings that were left out best (parts of a single one). Intervals are
-    those of the ridge estimate at white noise.
+    The strength is the one that predicts recordings that were left out best (parts of a single one).
+    Intervals are those of the ridge estimate at white noise.
     """
     values: dict[str, float] = {}
     errors: dict[str, float] = {}

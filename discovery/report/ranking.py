@@ -98,7 +98,7 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 
 def is_error(run: Run) -> bool:
-    """Whether the outputs are errors, which are zero where nothing is wrong; other measured things are not."""
+    """Whether the outputs are errors, which are zero where nothing is wrong."""
     if roles := run.results.get("roles"):
         return all(roles[output] == "error" for output in run.outputs if output in roles)
     return not any(run.unit(output) in ("°C", "K", "°F") for output in run.outputs)

@@ -14,8 +14,8 @@ Ints = NDArray[np.intp]
 def filtered(left, right, step, read, taus, start):  # type: ignore[no-untyped-def]
     """Responses of unit gain, tau ds/dt = u - s, at the readings.
 
-    Exact for inputs that are held or run straight within each interval (first-order hold), whatever the lengths
-    of the intervals.
+    Exact for inputs that are held or run straight within each interval (first-order hold), whatever the
+    lengths of the intervals.
 
     Args:
         left, right: (K, D) inputs at both ends of each interval.

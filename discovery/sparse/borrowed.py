@@ -22,9 +22,10 @@ Array = NDArray[np.float64]
 def borrowed(optimiser: str, arguments: Mapping[str, Any]) -> Callable[[Problem], Choice]:
     """A choice made by an optimiser of PySINDy: "pysindy:SR3" is `pysindy.SR3(**arguments)`.
 
-    It gets the M rows that hold all that the readings say (`gram.factor`), columns and target of unit length: a
-    coefficient is a share of the output's size, and a threshold of 0.05 drops what makes less than 5 % of it, in any
-    unit. Of neighbours on the grid of time constants the strongest is taken, and its time constant refined.
+    It gets the M rows that hold all that the readings say (`gram.factor`), columns and target of unit
+    length: a coefficient is a share of the output's size, and a threshold of 0.05 drops what makes less
+    than 5 % of it, in any unit. Of neighbours on the grid of time constants the strongest is taken, and its
+    time constant refined.
 
     Raises:
         UserError: PySINDy has no such optimiser, or it does not take these arguments.

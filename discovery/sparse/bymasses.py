@@ -106,7 +106,9 @@ def _clear(
     grids: Mapping[str, Grid],
     options: SparseOptions,
 ) -> tuple[Model, list[Feature]]:
-    """The model of the chosen features, fitted by output error, without those whose interval holds zero; and these."""
+    """The model of the chosen features, fitted by output error, without those whose interval holds zero;
+    and these.
+    """
     found = zip(features, choice.terms.theta, choice.terms.pole, strict=True)
     responses = [Response(f, float(gain), int(pole), f) for f, gain, pole in found]
     if not options.refine:

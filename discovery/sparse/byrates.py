@@ -197,8 +197,8 @@ class Judge:
         return left_out(self.data, fit_of, self.whole)
 
     def costs(self, problem: Problem, terms: Terms) -> tuple[float, ...]:
-        """For each term: share by which what the linearised fit leaves on left-out blocks grows without it."""
-        free = [k for k in range(len(problem.always), len(terms))]
+        """Share by which what the linearised fit leaves on left-out blocks grows without each term."""
+        free = list(range(len(problem.always), len(terms)))
         left = np.zeros(len(free) + 1)
         for fold in make_folds(problem.blocks, False):
             inside, outside = np.ones(problem.blocks.count), np.zeros(problem.blocks.count)
@@ -222,8 +222,8 @@ def plainer(
     labels: Mapping[str, str],
     worth: float,
 ) -> Terms:
-    """The set with terms of the first order in place of others into the same state, where the cost rises by less than
-    a further term would have to bring.
+    """The set with terms of the first order in place of others into the same state, where the cost rises by
+    less than a further term would have to bring.
     """
     first = [i for i, name in enumerate(names) if name in easy]
     bound = terms.gain - worth

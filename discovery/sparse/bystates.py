@@ -60,7 +60,9 @@ def discover_states(
 def _discovered(
     data: RateData, kind: str, words: Sequence[str], unit: str, options: SparseOptions
 ) -> Discovery:
-    """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free runs."""
+    """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free
+    runs.
+    """
     y = data.outputs[0]
     if kind == "upstream":
         structure = _allowed(_chain(data, y, words, unit), options)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +38,9 @@ class Choice:
 def chosen(problem: Problem) -> Choice:
     """The smallest set within `tolerance` standard errors of the best on what was left out.
 
-    No set is larger than the one of the least extended BIC at the effective number of readings, and none ends at the
-    slow end of the time constants. Terms then share a time constant where the criterion is better for it.
+    No set is larger than the one of the least extended BIC at the effective number of readings, and none
+    ends at the slow end of the time constants. Terms then share a time constant where the criterion is
+    better for it.
     """
     problem = _with_spread(problem)
     while True:
@@ -46,11 +48,11 @@ def chosen(problem: Problem) -> Choice:
         path = search.path(problem.max_terms)
         left = problem.residuals(on_grid(path[-1], problem.families))
         effective = search.g.count / readings_as_one([r[:, None] for r in left])
-        scores = [_criterion(problem, search.g, effective, one) for one in path]
+        worth = partial(_criterion, problem, search.g, effective)
         folds = problem.folds()
-        errors = _left_out(problem, folds, int(np.argmin(scores)) + 1)
+        errors = _left_out(problem, folds, int(np.argmin([worth(one) for one in path])) + 1)
         row = choose(errors, problem.tolerance)
-        terms = search.shared(path[row], lambda one: _criterion(problem, search.g, effective, one))
+        terms = search.shared(path[row], worth)
         ended = search.ended(terms)
         if not ended:
             break
@@ -77,7 +79,8 @@ def evidence(problem: Problem, terms: Terms) -> Choice:
 def _with_spread(problem: Problem) -> Problem:
     """The problem with the spread of start values that makes its readings most likely (empirical Bayes).
 
-    -2 log p = n log(cost/n) + log det(1 + spread^2 D'D/m), with D the decays of each trajectory over the noise.
+    -2 log p = n log(cost/n) + log det(1 + spread^2 D'D/m), with D the decays of each trajectory over the
+    noise.
     """
     counts = [d.shape[1] for d in problem.nuisance]
     if not all(counts):
@@ -132,7 +135,8 @@ def _missed(problem: Problem, terms: Terms, fold: Ints, errors: Array) -> None:
 def free_run(problem: Problem, terms: Terms, i: int) -> Array:
     """Prediction (R,) of a trajectory, zeroed on its first reading alone.
 
-    The same Bayesian step as `fitting.predict_recording`: the masses in use share what the first reading says.
+    The same Bayesian step as `fitting.predict_recording`: the masses in use share what the first reading
+    says.
     """
     readings = problem.readings[i]
     predicted = problem.columns[i] @ on_grid(terms, problem.families)
@@ -149,7 +153,7 @@ def free_run(problem: Problem, terms: Terms, i: int) -> Array:
 
 
 def _costs(problem: Problem, terms: Terms) -> tuple[float, tuple[float, ...]]:
-    """rms on what was left out, and for each term the share by which it grows when the set does without it."""
+    """rms on what was left out, and the share by which it grows without each term."""
     sets = [None, *range(len(problem.always), len(terms))]
     errors = np.full((len(sets), problem.blocks.count), np.nan)
     for fold, search in problem.folds():

@@ -44,10 +44,10 @@ def discover(
 ) -> Discovery:
     """Discover a sparse model of `outputs` from `recordings`; no other recording is looked at.
 
-    Errors become sums of filtered inputs; measured temperatures, systems that a library of states is asked of, and
-    baseline files get terms in the rates of their states; for other outputs both are tried. Sizes are chosen by free
-    runs on what was left out (recordings, or parts of a few); numbers are fitted by output error and carry 95 %
-    intervals.
+    Errors become sums of filtered inputs; measured temperatures, systems that a library of states is asked
+    of, and baseline files get terms in the rates of their states; for other outputs both are tried. Sizes
+    are chosen by free runs on what was left out (recordings, or parts of a few); numbers are fitted by
+    output error and carry 95 % intervals.
 
     Args:
         recordings: names of the recordings to fit.
@@ -114,8 +114,8 @@ def _best(
     found += discover_states(rates, options, states, progress)
     if not found:
         raise UserError(
-            f"{campaign.path}: no model of {', '.join(outputs)} in the form asked for stays finite on its own "
-            "readings; offer other terms under library, or leave out form and hidden"
+            f"{campaign.path}: no model of {', '.join(outputs)} in the form asked for stays finite on "
+            "its own readings; offer other terms under library, or leave out form and hidden"
         )
     if len(found) == 1:
         return found[0]

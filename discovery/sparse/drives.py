@@ -107,9 +107,9 @@ def make_drives(inputs: Inputs, campaign: Campaign, library: Sequence[str] | Non
         expression = parse(word, "library of the discovery")
         for name in sorted(names(expression) - {*inputs.names, "time"}):
             raise UserError(
-                f"{campaign.path}: the library of the discovery names '{name}' in '{word}', which is neither a family "
-                f"({', '.join(FAMILIES)}) nor made of inputs ({', '.join(inputs.names)}); terms of states "
-                'need form = "rates"'
+                f"{campaign.path}: the library of the discovery names '{name}' in '{word}', which is neither "
+                f"a family ({', '.join(FAMILIES)}) nor made of inputs ({', '.join(inputs.names)}); terms of "
+                'states need form = "rates"'
             )
         expressions.append(text(expression))
     air = frozenset((*inputs.of(*TEMPERATURES), *inputs.bodies))
@@ -123,7 +123,9 @@ def make_drives(inputs: Inputs, campaign: Campaign, library: Sequence[str] | Non
 
 
 def mass_drives(inputs: Inputs, words: Sequence[str] = ("linear", "wet")) -> list[str]:
-    """Expressions of the inputs: temperatures from the reference, the others as they are; heat gated by the pump."""
+    """Expressions of the inputs: temperatures from the reference, the others as they are; heat gated by the
+    pump.
+    """
     warm = [f"{name} - {inputs.reference:g}" for name in (*inputs.of(*TEMPERATURES), *inputs.bodies)]
     others = [
         name

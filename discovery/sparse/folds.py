@@ -77,9 +77,9 @@ def bootstraps(blocks: int, count: int, seed: int) -> Iterator[Array]:
 def choose(errors: Array, tolerance: float) -> int:
     """The sparsest row whose error on what was left out is within `tolerance` standard errors of the best.
 
-    The standard error is that of the paired difference over blocks, of the logarithms and of the squares alike:
-    logarithms hold where recordings of different violence stand side by side, squares where what tells happens in
-    few blocks.
+    The standard error is that of the paired difference over blocks, of the logarithms and of the squares
+    alike: logarithms hold where recordings of different violence stand side by side, squares where what
+    tells happens in few blocks.
 
     Args:
         errors: (sizes, B) mean squared error of each left-out block, sparsest model first.

@@ -22,7 +22,8 @@ RAN_AWAY = 1e12  # instead of the squared error of a model that runs away
 
 
 def left_out(data: RateData, fit_of: FitOf, whole: bool = True) -> Array:
-    """Mean squared error (B,) of the free run on each block, over outputs, by fits that have not seen its fold.
+    """Mean squared error (B,) of the free run on each block, over outputs, by fits that have not seen its
+    fold.
 
     Args:
         fit_of: makes a fit without a fold.

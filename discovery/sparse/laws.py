@@ -27,7 +27,8 @@ def laws(words: Sequence[str], variable: str, seen: NDArray[np.float64] | None =
     """Expressions of a variable by the words of a library.
 
     Args:
-        seen: (N,) values of the variable, where they are known: thresholds stand at their quantiles, and a root is
+        seen: (N,) values of the variable, where they are known: thresholds stand at their quantiles, and a
+        root is
             offered to what is nowhere negative alone.
 
     >>> laws(["linear", "cubic"], "y")
@@ -51,7 +52,8 @@ def products(words: Sequence[str], variables: Sequence[str]) -> list[str]:
 
 
 def with_levels(expression: Expression, name: str) -> tuple[Expression, float] | None:
-    """The expression with the level at which its max(..., 0) begins as a parameter, and that level; None: it has none.
+    """The expression with the level at which its max(..., 0) begins as a parameter, and that level; None:
+    it has none.
 
     >>> from discovery.terms import text
     >>> found = with_levels(parse("k*sqrt(max(h, 0))"), "c")

@@ -1,4 +1,5 @@
-"""Feature libraries for `pysindy.SINDy`: inputs through first-order lags, and terms through a model's own dynamics.
+"""Feature libraries for `pysindy.SINDy`: inputs through first-order lags, and terms through a model's own
+dynamics.
 
 Both take the readings themselves as left-hand side, so that nothing is differentiated:
 
@@ -47,17 +48,19 @@ class Feature:
         return f"integral({self.drive})" if np.isinf(self.tau) else f"lag({self.drive}, {self.tau:.4g})"
 
 
-class FilteredInputs(BaseFeatureLibrary):
+class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
     """Inputs at once and through first-order lags tau ds/dt = u - s, exactly, at irregular stamps.
 
     After `fit` the features stand on a grid of time constants; an optimiser that can move them
     (`SparseSearch(library)`) leaves the few that it chose, at the time constants that it found.
 
     Args:
-        names: of the columns of each trajectory (T, len(names)): one is "time" [s], increasing; one may be "read",
+        names: of the columns of each trajectory (T, len(names)): one is "time" [s], increasing; one may be
+        "read",
             1 in the rows that are wanted (default all); the others are inputs.
         drives: expressions of the inputs that go through lags; default each input.
-        time_constants: least and greatest of the grid [s]; default a tenth of the distance of two readings (the
+        time_constants: least and greatest of the grid [s]; default a tenth of the distance of two readings
+        (the
             distance of two inputs, where that is more) and the length of the longest trajectory.
         linear: inputs that run straight between their stamps; the others are held.
         settled: drives whose lag begins in balance with its first value; the others begin at zero.
@@ -172,7 +175,7 @@ class FilteredInputs(BaseFeatureLibrary):
 
     def feature_at(self, family: int, place: float) -> Feature:
         """The feature at a place of a family of the grid."""
-        first = self.grid_[self.families_.start[family]]
+        first: Feature = self.grid_[self.families_.start[family]]
         if self.families_.count[family] == 1:
             return first
         return Feature(first.drive, float(self.taus_[0] * (self.taus_[1] / self.taus_[0]) ** place))
@@ -187,11 +190,12 @@ class FilteredInputs(BaseFeatureLibrary):
         return [str(feature) for feature in self.features_]
 
 
-class ModelTerms(BaseFeatureLibrary):
-    """Terms of a model filtered through its own dynamics: how its outputs move with the coefficient of each term.
+class ModelTerms(BaseFeatureLibrary):  # type: ignore[misc]
+    """Terms of a model filtered through its own dynamics: how its outputs move with the coefficient of each
+    term.
 
-    The columns are those of the trajectories that a model was fitted to; the left-hand side that belongs to them is
-    what the fit leaves plus what its coefficients make: residual + J theta = J theta_new.
+    The columns are those of the trajectories that a model was fitted to; the left-hand side that belongs to
+    them is what the fit leaves plus what its coefficients make: residual + J theta = J theta_new.
 
     Args:
         names: of the coefficients.

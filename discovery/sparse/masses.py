@@ -2,8 +2,8 @@
 
     tau_j ds_j/dt = sum_k g_jk phi_k(u) - s_j          y = sum_j s_j + sum_k g_k phi_k(u) + offset
 
-Eq. (8) generalised: there every input has one mass of its own, in eq. (9) all inputs share one. An input may act
-without a mass, or be added up without bound, as charge is.
+Eq. (8) generalised: there every input has one mass of its own, in eq. (9) all inputs share one. An input
+may act without a mass, or be added up without bound, as charge is.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Rules:
 
 
 def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
-    """The responses written as a model: one hidden state for each time constant; the drive 1 is the offset."""
+    """The responses written as a model: a hidden state for each time constant; the drive 1 is the offset."""
     y, unit = rules.output, rules.units[rules.output]
     parameters: dict[str, Parameter] = {}
     states: dict[str, State] = {}
@@ -96,7 +96,9 @@ def _numbers(responses: Sequence[Response]) -> dict[int, int]:
 
 
 def responses_of(fit: Fit, responses: Sequence[Response]) -> tuple[list[Response], list[float]]:
-    """Responses with the fitted gains and time constants, and by how many standard errors each gain is not 0."""
+    """Responses with the fitted gains and time constants, and by how many standard errors each gain is not
+    0.
+    """
     y, values = fit.problem.outputs[0], fit.model.parameters
     unknowns = zip(fit.problem.unknowns, fit.standard_errors, strict=True)
     errors = {u.name: e for u, e in unknowns if not u.is_nuisance}
@@ -111,18 +113,18 @@ def responses_of(fit: Fit, responses: Sequence[Response]) -> tuple[list[Response
 
 
 def with_spreads(fit: Fit) -> Model:
-    """The fitted model with the spread of the start of each mass that its recordings show, the common one counted as
-    one recording more.
+    """The fitted model with the spread of the start of each mass that its recordings show, the common one
+    counted as one recording more.
 
-    What a mass remembers from before a recording is for the readings to say: charge is anywhere, a mass of minutes
-    is at rest.
+    What a mass remembers from before a recording is for the readings to say: charge is anywhere, a mass of
+    minutes is at rest.
     """
     found: dict[str, list[float]] = {}
     for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
         if u.is_start:
             found.setdefault(u.name, []).append(float(value) ** 2 + float(error) ** 2)
     states = {
-        name: replace(s, start_sd=float(np.sqrt(np.mean([*found.get(name, []), s.start_sd**2]))))
+        name: replace(s, start_sd=float(np.sqrt(np.mean([*found.get(name, []), (s.start_sd or 0.0) ** 2]))))
         for name, s in fit.model.states.items()
     }
     return replace(fit.model, states=states)

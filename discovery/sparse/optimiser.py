@@ -1,5 +1,5 @@
-"""The constrained search as an optimiser of `pysindy.SINDy`: signs, bounds, terms that stay, time constants that
-move.
+"""The constrained search as an optimiser of `pysindy.SINDy`: signs, bounds, terms that stay, time constants
+that move.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ Array = NDArray[np.float64]
 Bounds = Mapping[str, tuple[float, float]]
 
 
-class SparseSearch(BaseOptimizer):
+class SparseSearch(BaseOptimizer):  # type: ignore[misc]
     """Orthogonal matching pursuit on normal equations, its size chosen by what is left out.
 
-    With a `FilteredInputs` library the time constants move continuously, and after `fit` the library holds the
-    chosen features alone. With any other library the columns stay where they are.
+    With a `FilteredInputs` library the time constants move continuously, and after `fit` the library holds
+    the chosen features alone. With any other library the columns stay where they are.
 
     Args:
         library: the library of the same `SINDy`, where it is one of this package; None: plain columns.
         max_terms: most terms of one target, those of `keep` not counted.
-        bounds: smallest and largest coefficient by drive (by number of the column without a library); (0, inf) is
+        bounds: smallest and largest coefficient by drive (by number of the column without a library); (0,
+        inf) is
             a sign.
         keep: drives (columns) that are in every set.
         noise: standard deviation of a reading of each target; default estimated from the readings.

@@ -50,13 +50,13 @@ class SparseOptions(Strict):
     max_terms: int = Field(15, ge=1, le=60, description="most terms of one output")
     time_constants: Annotated[tuple[float, float], FROM_LIST] | None = Field(
         None,
-        description="least and greatest time constant of the hidden masses [s]; default from sampling and length",
+        description="least and greatest time constant of the hidden masses [s]; default by the sampling",
     )
     hidden: Literal["auto", "own", "rate", "upstream"] = Field(
         "auto",
-        description='what stands behind an output in rates: "own": nothing; "rate": its rate is a hidden state (a '
-        'mass on a spring); "upstream": a hidden body empties into it (a tank above a tank); "auto": what '
-        "predicts best",
+        description='what stands behind an output in rates: "own": nothing; "rate": its rate is a hidden '
+        'state (a mass on a spring); "upstream": a hidden body empties into it (a tank above a tank); '
+        '"auto": what predicts best',
     )
     stable: bool = Field(
         True, description="no pole in the right half plane: states are drawn back, not driven away"

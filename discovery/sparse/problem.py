@@ -1,4 +1,6 @@
-"""A sparse regression of one output on several trajectories: everything over its noise, ready to be searched."""
+"""A sparse regression of one output on several trajectories: everything over its noise, ready to be
+searched.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,8 @@ WHOLE = 4  # trajectories from which whole ones are left out; of fewer a quarter
 class Problem:
     """readings = columns theta + nuisance delta + noise, by trajectory; delta has a normal prior.
 
-    The nuisance is what is left of unknown start values. It is of one trajectory each, and is taken out of the normal
-    equations of every trajectory before anything is searched.
+    The nuisance is what is left of unknown start values. It is of one trajectory each, and is taken out of
+    the normal equations of every trajectory before anything is searched.
     """
 
     columns: tuple[Array, ...]  # (R, M) each
@@ -51,7 +53,9 @@ class Problem:
         return tuple(found)
 
     def pooled(self, weights: Array | None = None) -> Gram:
-        """Normal equations of the library, the nuisance taken out; `weights` (B,) says how often a block counts."""
+        """Normal equations of the library, the nuisance taken out; `weights` (B,) says how often a block
+        counts.
+        """
         weights = np.ones(self.blocks.count) if weights is None else weights
         parts = []
         for blocks, precision in zip(self.grams, self.precision, strict=True):

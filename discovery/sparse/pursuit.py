@@ -1,17 +1,17 @@
 """Orthogonal matching pursuit over filtered inputs whose time constants move continuously.
 
-The columns of one drive on a grid of time constants are samples of a smooth curve c(p), with p the place on the
-grid (log tau in units of its spacing). Between the samples c(p) is their interpolation, w(p)' columns, so that the
-normal equations of the grid hold those of *every* set of time constants:
+The columns of one drive on a grid of time constants are samples of a smooth curve c(p), with p the place on
+the grid (log tau in units of its spacing). Between the samples c(p) is their interpolation, w(p)' columns,
+so that the normal equations of the grid hold those of *every* set of time constants:
 
     c(p)'c(q) = w(p)' G w(q),        c(p)'y = w(p)' v.
 
 After each step all time constants of the set are refined together by variable projection (Golub & Pereyra,
-Inverse Problems 19, 2003; Gauss-Newton of Kaufman, BIT 15, 1975) on these small matrices: what it costs does not
-depend on the number of readings.
+Inverse Problems 19, 2003; Gauss-Newton of Kaufman, BIT 15, 1975) on these small matrices: what it costs
+does not depend on the number of readings.
 
-Columns stand in families: a family of one column has no time constant (an offset, an input that acts at once), one
-of `POINTS` or more is a curve. A term is a family and a place; terms may share a place.
+Columns stand in families: a family of one column has no time constant (an offset, an input that acts at
+once), one of `POINTS` or more is a curve. A term is a family and a place; terms may share a place.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ _ROUNDS = 60  # of Levenberg-Marquardt, those that fail too
 
 @njit(cache=True)
 def weights(p, m, w, dw):  # type: ignore[no-untyped-def]
-    """Weights (POINTS,) of the interpolation at place p of 0 .. m - 1, their slopes; returns the first point."""
+    """Weights (POINTS,) of the interpolation at place p of 0 .. m - 1, their slopes; returns the first
+    point.
+    """
     if m < POINTS:
         w[:], dw[:] = 0.0, 0.0
         w[0] = 1.0
@@ -91,8 +93,8 @@ def _solve(a, b):  # type: ignore[no-untyped-def]
 def bounded(S, b, low, high):  # type: ignore[no-untyped-def]
     """Least squares on normal equations S theta = b within bounds, by an active set (Lawson & Hanson, 1974).
 
-    The coefficient that is farthest beyond a bound is held there, until none is; then one that would rather come
-    back is let go.
+    The coefficient that is farthest beyond a bound is held there, until none is; then one that would rather
+    come back is let go.
     """
     n = b.shape[0]
     at = np.zeros(n)  # 0 free, -1 at the lower bound, 1 at the upper one
@@ -140,8 +142,8 @@ def bounded(S, b, low, high):  # type: ignore[no-untyped-def]
 def solved(G, v, start, count, g, p, low, high, H, W, dW, first, S):  # type: ignore[no-untyped-def]
     """Coefficients (n,) of the terms (g, p) and what they take off the sum of squares.
 
-    H (n, M), W and dW (n, POINTS), first (n,), S (n, n) are filled on the way: rows of G, weights and their columns,
-    the normal equations of the terms.
+    H (n, M), W and dW (n, POINTS), first (n,), S (n, n) are filled on the way: rows of G, weights and their
+    columns, the normal equations of the terms.
     """
     n = g.shape[0]
     b, lower, upper = np.empty(n), np.empty(n), np.empty(n)
@@ -175,7 +177,8 @@ def _scaled(S, a):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def refine(G, v, start, count, g, p, pole, low, high):  # type: ignore[no-untyped-def]
-    """Places (n,), coefficients (n,) and what the terms take off the sum of squares, at the best places near p.
+    """Places (n,), coefficients (n,) and what the terms take off the sum of squares, at the best places
+    near p.
 
     Args:
         G, v: (M, M), (M,) normal equations.
@@ -207,7 +210,8 @@ def refine(G, v, start, count, g, p, pole, low, high):  # type: ignore[no-untype
             theta, gain, failed, damping = tried, its, 0, max(damping / 5, 1e-8)
             if settled:
                 break
-            # slope of the fit with each place: J_q = sum of theta_k c'_k over its terms, their part in the columns
+            # slope of the fit with each place: J_q = sum of theta_k c'_k over its terms, their part in the
+            # columns
             # of the set taken out
             gradient[:], hessian[:], within[:] = 0.0, 0.0, 0.0
             for k in range(n):

@@ -35,7 +35,9 @@ class RateData:
 
     @property
     def size(self) -> tuple[float, ...]:
-        """What errors of each output are weighed with: its stated noise, else a share of the readings' spread."""
+        """What errors of each output are weighed with: its stated noise, else a share of the readings'
+        spread.
+        """
         return rough_noise(self).white
 
 
@@ -53,7 +55,8 @@ def make_rate_data(
 
 
 def time_scale(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> float:
-    """Time [s] in which readings forget half of what they were: the lag at which their autocorrelation is one half.
+    """Time [s] in which readings forget half of what they were: the lag at which their autocorrelation is
+    one half.
 
     The correlation at the smallest lag counts as one, which leaves white noise out.
     """

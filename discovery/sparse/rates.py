@@ -204,7 +204,9 @@ def regress(
     select: Callable[[Problem], Choice],
     max_terms: int | None = None,
 ) -> Choice:
-    """The choice of coefficients of a linearised fit, by `pysindy.SINDy` with a library of its filtered terms."""
+    """The choice of coefficients of a linearised fit, by `pysindy.SINDy` with a library of its filtered
+    terms.
+    """
     import pysindy
 
     from discovery.sparse.library import ModelTerms
@@ -242,7 +244,7 @@ def extended_bic(g: Gram, sizes: Sequence[int], costs: Sequence[float], library:
 
 
 def masked(grid: Grid, keep: NDArray[np.bool_]) -> Grid:
-    """The grid with some readings (R,) left out, save the first of each output, from which free runs begin."""
+    """The grid with some readings (R,) left out, save the first of each output: free runs begin there."""
     first = np.cumsum(np.isfinite(grid.readings), axis=0) <= 1
     return replace(grid, readings=np.where(keep[:, None] | first, grid.readings, np.nan))
 

@@ -1,4 +1,6 @@
-"""The search for a sparse set of terms on normal equations: sets of every size, poles shared where that is cheaper."""
+"""The search for a sparse set of terms on normal equations: sets of every size, poles shared where that is
+cheaper.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ _TRIES = 6  # entries that run into a term of their own family before growth end
 
 @dataclass(frozen=True)
 class Families:
-    """How columns belong together: first column and number of columns of each family, bounds of coefficients."""
+    """How columns belong together: first column and number of columns of each family, bounds of
+    coefficients.
+    """
 
     start: Ints  # (F,)
     count: Ints
@@ -54,7 +58,9 @@ def plain(columns: int, low: Array | None = None, high: Array | None = None) -> 
 
 @dataclass(frozen=True)
 class Terms:
-    """A set: family and place of each term, which terms share a place, coefficients, what it takes off the cost."""
+    """A set: family and place of each term, which terms share a place, coefficients, what it takes off the
+    cost.
+    """
 
     family: Ints  # (n,)
     place: Array
@@ -93,8 +99,9 @@ class Search:
     def grown(self, terms: Terms) -> Terms | None:
         """The set with the term that takes most off, all refined; None where none may enter.
 
-        A new term that runs into one of its own family was that one's other half: its place is barred. Two old ones
-        that run into each other once the new one is there were standing in for it: they become one.
+        A new term that runs into one of its own family was that one's other half: its place is barred. Two
+        old ones that run into each other once the new one is there were standing in for it: they become
+        one.
         """
         f, size = self.families, len(terms)
         barred = np.zeros(f.columns, dtype=bool)
@@ -116,9 +123,11 @@ class Search:
         return None
 
     def ended(self, terms: Terms) -> list[int]:
-        """Families whose time constant ended at the slow end of the grid: there they only add up their input."""
+        """Families whose time constant ended at the slow end of the grid: there they only add up their
+        input.
+        """
         last = self.families.count[terms.family] - 1
-        return terms.family[(last > 0) & (terms.place > last - _EDGE)].tolist()
+        return [int(f) for f in terms.family[(last > 0) & (terms.place > last - _EDGE)]]
 
     def without(self, terms: Terms, k: int) -> Terms:
         """The set without its term k, refined."""
@@ -135,7 +144,7 @@ class Search:
         work = tuple(np.empty((n, k)) for k in (f.columns, pursuit.POINTS, pursuit.POINTS))
         S = np.empty((n, n))
         where = (terms.family, terms.place, f.low, f.high)
-        theta, _ = pursuit.solved(*self._problem, *where, *work, np.empty(n, int), S)
+        theta, _ = pursuit.solved(*self._problem, *where, *work, np.empty(n, int), S)  # type: ignore[call-arg]
         scale = np.sqrt(np.diag(S))
         inverse = np.linalg.inv(S / np.outer(scale, scale) + RIDGE * np.eye(n))
         rise = (theta * scale) ** 2 / np.diag(inverse)
@@ -144,9 +153,10 @@ class Search:
     def path(self, size: int) -> list[Terms]:
         """Sets of growing size, from `always` alone up to `size` terms.
 
-        The term that takes most off enters, all places are refined, weak members are exchanged; then the largest set
-        (all columns, where none has a time constant) shrinks again. The better set of each size stays: growth finds
-        first what two others imitate together, shrinking keeps what growth has a proxy for.
+        The term that takes most off enters, all places are refined, weak members are exchanged; then the
+        largest set (all columns, where none has a time constant) shrinks again. The better set of each size
+        stays: growth finds first what two others imitate together, shrinking keeps what growth has a proxy
+        for.
         """
         terms = self.of(self.always)
         found = {len(terms): terms}
@@ -178,7 +188,9 @@ class Search:
         return terms
 
     def shared(self, terms: Terms, worth: Callable[[Terms], float]) -> Terms:
-        """The set with places shared by terms that do as well at one: `worth` falls as long as pairs are joined."""
+        """The set with places shared by terms that do as well at one: `worth` falls as long as pairs are
+        joined.
+        """
         curved = self.families.count[terms.family] >= pursuit.POINTS
         while True:
             poles = sorted({int(q) for q in terms.pole[curved]})

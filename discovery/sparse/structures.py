@@ -1,8 +1,10 @@
-"""What stands behind a measured output: its own state alone, its rate as a hidden state, or a body that empties into it.
+"""What stands behind a measured output: its own state alone, its rate as a hidden state, or a body that
+empties into it.
 
     own        y' = sum of terms in y and the inputs
-    rate       y' = v,  v' = sum of terms in y, v and the inputs            a mass on a spring, a resonant circuit
-    upstream   y' = flow(h) - flow(y),  h' = terms in the inputs - flow(h)  a tank above a tank, a body behind a body
+    rate       y' = v,  v' = sum of terms in y, v and the inputs            a mass on a spring, a resonant
+    circuit upstream   y' = flow(h) - flow(y),  h' = terms in the inputs - flow(h)  a tank above a tank, a
+    body behind a body
 
 What leaves the body upstream enters the output: that fixes the scale in which the hidden state counts.
 """
@@ -133,9 +135,7 @@ def _expressions(words: Sequence[str], into: str, aliases: Mapping[str, str]) ->
 
 def _measured(data: RateData, output: str, unit: str) -> State:
     """An output as a state that starts at its first reading."""
-    channel = data.campaign.channels[output]
-    noise = channel.noise or 0.01 * float(np.nanstd(_seen(data, output)))
-    return State(output, channel.unit, None, None, noise, 1.0 / TIME_UNITS[unit])
+    return State(output, data.campaign.channels[output].unit, scale=1.0 / TIME_UNITS[unit])
 
 
 def _inputs(data: RateData, outputs: Sequence[str]) -> list[str]:
@@ -145,7 +145,7 @@ def _inputs(data: RateData, outputs: Sequence[str]) -> list[str]:
 def _seen(data: RateData, output: str) -> Array:
     column = data.outputs.index(output)
     series = np.concatenate([data.grids[r].readings[:, column] for r in data.recordings])
-    return series[np.isfinite(series)]
+    return np.asarray(series[np.isfinite(series)])
 
 
 def started(structure: Structure, coefficients: Mapping[int, float]) -> Structure:

@@ -33,7 +33,9 @@ _FINEST, _COARSEST, _STEP = 4, 4, 1.5  # half widths tried: readings, share of t
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of the weak regression: columns (W, M), target (W,), middle of each window (W,) [s], half width [s]."""
+    """Rows of the weak regression: columns (W, M), target (W,), middle of each window (W,) [s], half width
+    [s].
+    """
 
     columns: Array
     target: Array
@@ -68,7 +70,8 @@ class Window:
 
 
 def half_width(grids: Sequence[Grid], output: str, noise: float, order: int = 1) -> float:
-    """Half width [s] of the windows with the most information on the rate: (signal/noise)^2 times their number.
+    """Half width [s] of the windows with the most information on the rate: (signal/noise)^2 times their
+    number.
 
     White noise of a reading every d seconds makes noise^2 d int w'^2 (w''^2) of the target.
     """
