@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from discovery.dynamics.system import predict as model_outputs
 from discovery.errors import RunsAwayError
 from discovery.evaluation import evaluate
-from discovery.evaluation.crossvalidation import cross_validate
+from discovery.evaluation.crossvalidation import Refit, cross_validate
 from discovery.experiment.experiment import Experiment
 from discovery.fitting import Fit, predict_recording
 from discovery.models import Model
@@ -73,6 +73,7 @@ def judged(
     report: Mapping[str, Any] | None = None,
     seconds: float = 0.0,
     progress: Progress = silent,
+    refit: Refit | None = None,
 ) -> Fitted:
     """A model and its fit: cross-validation on the fit recordings alone, free runs on all, notes."""
     began = clock.perf_counter() - seconds
@@ -82,7 +83,8 @@ def judged(
     if experiment.form.cross_validate:
         progress(f"cross-validating {name}")
         try:
-            validation = cross_validate(fit.model, experiment.fitting, experiment.fit, outputs, fit.noise)
+            seen, names = experiment.fitting, experiment.fit
+            validation = cross_validate(fit.model, seen, names, outputs, fit.noise, refit)
         except RunsAwayError:  # a finding about the model, no mistake of the user's
             lost.append(f"with a part of the readings left out the fit of {name} runs away: do not trust it")
     seconds = clock.perf_counter() - began

@@ -25,9 +25,13 @@ def is_discovered(run: Run, model: str) -> bool:
 
 
 def origin(run: Run, model: str) -> str:
-    """Where a model comes from: "discovered", "hand-built", or "repaired" after a diagnosis."""
-    if kind(run, model) == "repaired":
-        return "repaired"
+    """Where a model comes from: "discovered", "hand-built", "repaired" after a diagnosis, or a method
+    to compare with: "PySINDy", "regression".
+    """
+    if kind(run, model) in ("repaired", "regression"):
+        return kind(run, model)
+    if kind(run, model) == "pysindy":
+        return "PySINDy"
     return "discovered" if is_discovered(run, model) else "hand-built"
 
 
