@@ -96,6 +96,8 @@ class SparseOptions(Strict):
                 raise ValueError(
                     f"the bounds of '{name}' are {low:g} and {high:g}: the smaller one comes first"
                 )
+        if self.time_constants and not 0 < self.time_constants[0] < self.time_constants[1]:
+            raise ValueError("time_constants are two positive times in s, the shorter one first")
         if self.form == "masses" and self.baseline != "eq9":
             raise ValueError('a baseline file is built upon by rates; leave out form = "masses"')
         return self
