@@ -25,6 +25,7 @@ from discovery.progress import Progress, silent
 from discovery.recordings import Channel
 
 Array = NDArray[np.float64]
+_AT_BOUND = 1e-4  # share of a bound that counts as at it
 _NEGLIGIBLE = 0.01  # of the spread of an input: an offset so small is none
 
 
@@ -101,6 +102,7 @@ def judged(
         *fit.unidentified,
         *check_dimensions(model, experiment.campaign.channels),
     ]
+    notes += bound_notes(fit.model)
     notes += offset_notes(fit, experiment.campaign.channels)
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
     return Fitted(name, kind, model, fit, predictions, validation, report or {}, tuple(notes), seconds)
@@ -134,6 +136,20 @@ def coarse_notes(fit: Fit) -> list[str]:
         f"taken are {len(largest.read)} single readings and inputs as means over "
         f"{float(np.median(largest.step)):.3g} s, their large steps where they are"
     ]
+
+
+def bound_notes(model: Model) -> list[str]:
+    """A sentence for each number that stands at a bound other than zero: the readings ask for more."""
+    notes = []
+    for name, p in model.parameters.items():
+        for bound, which in ((p.min, "least"), (p.max, "greatest")):
+            near = _AT_BOUND * max(abs(bound), 1e-12) if np.isfinite(bound) else 0.0
+            if near and bound != 0 and not p.fixed and abs(p.value - bound) <= near:
+                notes.append(
+                    f"{name} stands at its {which} allowed value, {bound:.4g} {p.unit}: the readings ask for "
+                    "more; allow it, or ask what the model lacks"
+                )
+    return notes
 
 
 def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:

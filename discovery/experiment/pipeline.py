@@ -187,20 +187,25 @@ def compared(
     began = clock.perf_counter()
     inputs, outputs = experiment.inputs(entry), experiment.outputs_of(entry)
 
-    def fitted_to(campaign: Campaign, recordings: Sequence[str]) -> tuple[Fit, dict[str, Any]]:
-        if isinstance(entry, RegressionEntry):
-            return fit_ridge(campaign, recordings, outputs, inputs), {}
-        from discovery.sparse.plain import fit_plain
+    report: dict[str, Any] = {}
+    seen, recordings = experiment.fitting, experiment.fit
+    if isinstance(entry, RegressionEntry):
 
-        forms = {"auto": (False, True), "plain": (False,), "weak": (True,)}[entry.form]
-        return fit_plain(campaign, recordings, outputs, inputs, forms)
+        def refit(campaign: Campaign, recordings: Sequence[str]) -> Fit:
+            return fit_ridge(campaign, recordings, outputs, inputs)
 
-    fit, report = fitted_to(experiment.fitting, experiment.fit)
+        fit = refit(seen, recordings)
+    else:
+        from discovery.sparse.plain import fit_plain, settings
+
+        fit, best, report = fit_plain(seen, recordings, outputs, inputs, settings(entry.form))
+
+        def refit(campaign: Campaign, recordings: Sequence[str]) -> Fit:
+            return fit_plain(campaign, recordings, outputs, inputs, [best])[0]
+
     model = replace(fit.model, name=name)
     seconds = clock.perf_counter() - began
-    return judged(
-        experiment, name, entry.kind, model, fit, report, seconds, progress, lambda c, r: fitted_to(c, r)[0]
-    )
+    return judged(experiment, name, entry.kind, model, fit, report, seconds, progress, refit)
 
 
 def repaired_of(

@@ -15,11 +15,12 @@ from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.sparse.borrowed import borrowed
 from discovery.sparse.choice import Choice, chosen
+from discovery.sparse.constraints import matched
 from discovery.sparse.discovery import Discovery, PathPoint, path_points
 from discovery.sparse.drives import Drives
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.library import Feature, FilteredInputs
-from discovery.sparse.masses import Response, Rules, mass_model, responses_of, with_spreads
+from discovery.sparse.masses import Response, Rules, mass_model, responses_of, with_spreads, within
 from discovery.sparse.optimiser import SparseSearch, features_of, rough_noise
 from discovery.sparse.options import SparseOptions
 
@@ -46,6 +47,7 @@ def discover_masses(
     """Choose the inputs and time constants of one output and fit their numbers."""
     import pysindy
 
+    options = matched(options, data.drives.expressions, campaign.path)
     column = data.grids[recordings[0]].outputs.index(output)
     grids = {
         r: replace(data.grids[r], outputs=(output,), readings=data.grids[r].readings[:, [column]])
@@ -120,6 +122,10 @@ def _clear(
     while True:
         fit = fitted(mass_model(rules, responses))
         responses, strength = responses_of(fit, responses)
+        inside = within(rules, responses)
+        if inside != responses:
+            responses = inside
+            continue
         free = [i for i, r in enumerate(responses) if r.feature.drive not in options.keep]
         weakest = min(free, key=lambda i: strength[i], default=None)
         if weakest is None or strength[weakest] >= CLEAR:

@@ -17,6 +17,7 @@ from discovery.models import Model, Parameter
 from discovery.models.model import TIME_UNITS
 from discovery.progress import Progress
 from discovery.sparse.byrates import discover_rates
+from discovery.sparse.constraints import UnknownTermError, matched
 from discovery.sparse.discovery import Discovery
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.freeruns import left_out
@@ -54,6 +55,9 @@ def discover_states(
             found.append(_discovered(data, kind, words, unit, options))
         except RunsAwayError:
             continue
+        except UnknownTermError:  # a term that this form does not have: another one may
+            if options.form != "auto" and len(hidden) == 1:
+                raise
     return found
 
 
@@ -65,7 +69,7 @@ def _discovered(
     """
     y = data.outputs[0]
     if kind == "upstream":
-        structure = _allowed(_chain(data, y, words, unit), options)
+        structure, options = _allowed(data, _chain(data, y, words, unit), options)
         entered = {i for i, c in enumerate(structure.candidates) if c.start != 0.0}
     else:
         bare = (
@@ -73,7 +77,8 @@ def _discovered(
             if kind == "own"
             else rate(data, y, words, unit, options.stable)
         )
-        structure, entered = _weakly(data, _allowed(bare, options))
+        bare, options = _allowed(data, bare, options)
+        structure, entered = _weakly(data, bare)
     stay = {i for i, c in enumerate(structure.candidates) if c.label in options.keep}
     for _ in range(_GROWTHS):
         before = entered
@@ -120,15 +125,18 @@ def _refined(
     return replace(structure, model=model, candidates=tuple(found)), moved
 
 
-def _allowed(structure: Structure, options: SparseOptions) -> Structure:
-    """The structure without forbidden terms, with the bounds of the options."""
+def _allowed(data: RateData, structure: Structure, options: SparseOptions) -> tuple[Structure, SparseOptions]:
+    """The structure without forbidden terms and with the bounds of the options, and these as they match it."""
+    y = data.outputs[0]
+    aliases = {"y": y, "rate": f"{y}_rate", "up": f"{y}_up"}
+    options = matched(options, [c.label for c in structure.candidates], data.campaign.path, aliases)
     kept = []
     for c in structure.candidates:
         if c.label in options.forbid:
             continue
         low, high = options.bounds.get(c.label, (c.low, c.high))
         kept.append(replace(c, low=low, high=high))
-    return replace(structure, candidates=tuple(kept))
+    return replace(structure, candidates=tuple(kept)), options
 
 
 def _weakly(data: RateData, structure: Structure) -> tuple[Structure, set[int]]:

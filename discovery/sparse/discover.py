@@ -18,6 +18,7 @@ from discovery.recordings import Campaign
 from discovery.sparse.bymasses import MassData, discover_masses
 from discovery.sparse.byrates import discover_rates
 from discovery.sparse.bystates import discover_states, left_out_of
+from discovery.sparse.constraints import UnknownTermError, kept
 from discovery.sparse.discovery import Discovery, joined
 from discovery.sparse.drives import Inputs, make_drives, make_inputs
 from discovery.sparse.families import candidates
@@ -106,7 +107,11 @@ def _best(
         progress(f"filtered inputs of {', '.join(outputs)}")
         grids = {r: make_grid(campaign, r, inputs.names, outputs) for r in recordings}
         data = MassData(make_drives(inputs, campaign, options.library), grids)
-        found += [discover_masses(data, campaign, recordings, name, options) for name in outputs]
+        try:
+            found += [discover_masses(data, campaign, recordings, name, options) for name in outputs]
+        except UnknownTermError:
+            if len(forms) == 1:
+                raise
     states = [form for form in forms if form != "masses"]
     if not states:
         return found[0]
@@ -115,7 +120,7 @@ def _best(
     if not found:
         raise UserError(
             f"{campaign.path}: no model of {', '.join(outputs)} in the form asked for stays finite on "
-            "its own readings; offer other terms under library, or leave out form and hidden"
+            "its own readings and has the terms under keep and bounds; offer other terms under library, or leave out form and hidden"
         )
     if len(found) == 1:
         return found[0]
@@ -156,7 +161,8 @@ def _on_file(
             for n in baseline.free
             if baseline.parameters[n].min <= 0 <= baseline.parameters[n].max and n not in used
         }
-        return discover_rates(data, model, labels, (), options)
-    growth = Growth(most=options.max_terms, restart=baseline.values())
+        return discover_rates(data, model, labels, kept(labels, options, campaign.path), options)
+    always = kept(labels, options, campaign.path)
+    growth = Growth(tuple(always), options.max_terms, restart=baseline.values())
     model, labels = grown(data, model, labels, growth, options)
-    return discover_rates(data, model, labels, (), options, grown=True, tolerance=CLAIM)
+    return discover_rates(data, model, labels, always, options, grown=True, tolerance=CLAIM)

@@ -19,6 +19,7 @@ from discovery.models.dimensions import unit_of
 from discovery.sparse.library import Feature
 from discovery.terms import Number, Term, parse, text
 
+_AT = 1e-3  # share of a bound that counts as at it
 QUICKER = 10.0  # times below the grid that the time constant of a fit may go
 
 
@@ -110,6 +111,22 @@ def responses_of(fit: Fit, responses: Sequence[Response]) -> tuple[list[Response
         found.append(replace(r, feature=replace(r.feature, tau=tau), gain=values[gain].value))
         strength.append(abs(values[gain].value) / max(errors[gain], 1e-300))
     return found, strength
+
+
+def within(rules: Rules, responses: Sequence[Response]) -> list[Response]:
+    """The responses with none at an end of the time constants: what settles at once has no mass, and what
+    never settles in these recordings leaves.
+    """
+    least, most = rules.time_constants
+    found = []
+    for r in responses:
+        if not r.lagged or least / QUICKER * (1 + _AT) < r.feature.tau < most * (1 - _AT):
+            found.append(r)
+        elif r.feature.tau < most * (1 - _AT):
+            direct = replace(r.feature, tau=0.0)
+            if all(direct != other.feature for other in responses):
+                found.append(replace(r, feature=direct))
+    return found
 
 
 def with_spreads(fit: Fit) -> Model:

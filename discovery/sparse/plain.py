@@ -14,6 +14,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations_with_replacement, product
 from typing import Any
 
@@ -51,7 +52,7 @@ class Setting:
     threshold: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # a table is itself alone: its weak rows are made once
 class Table:
     """Outputs and inputs of a stretch without gaps at equal steps, standardised; its time in time scales."""
 
@@ -60,27 +61,35 @@ class Table:
     u: Array  # (T, U)
 
 
+def settings(form: str = "auto") -> list[Setting]:
+    """What is tried: "plain", "weak", or both ("auto"), with every degree and threshold."""
+    forms = {"auto": (False, True), "plain": (False,), "weak": (True,)}[form]
+    return [Setting(*one) for one in product(forms, DEGREES, THRESHOLDS)]
+
+
 def fit_plain(
     campaign: Campaign,
     recordings: Sequence[str],
     outputs: Sequence[str],
     inputs: Sequence[str],
-    forms: Sequence[bool] = (False, True),
+    tried: Sequence[Setting],
     seed: int = 0,
-) -> tuple[Fit, dict[str, Any]]:
+) -> tuple[Fit, Setting, dict[str, Any]]:
     """A PySINDy model of the outputs, and what was chosen.
 
     Args:
         inputs: channels u.
-        forms: weak forms that are tried: False, True, or both.
+        tried: settings of which the best on what is left out is taken; a single one is taken as it is.
         seed: of the test functions.
     """
     grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
     frame = _Frame.of(grids, outputs, inputs)
     tables = {r: frame.tables(grid) for r, grid in grids.items()}
-    tried = [Setting(*one) for one in product(forms, DEGREES, THRESHOLDS)]
-    errors = [_left_out(frame, tables, campaign, grids, one, seed) for one in tried]
-    best = tried[int(np.argmin(errors))]
+    errors, best = [float("nan")], tried[0]
+    if len(tried) > 1:
+        folds = _folds(list(tables), tables)
+        errors = [_left_out(frame, folds, campaign, grids, one, seed) for one in tried]
+        best = tried[int(np.argmin(errors))]
     everything = [table for some in tables.values() for table in some]
     model = frame.model(_coefficients(everything, best, seed), best.degree, campaign)
     report = {
@@ -89,7 +98,10 @@ def fit_plain(
         "threshold": best.threshold,
         "left_out_rms": float(min(errors)),
     }
-    return held_fit(model, campaign, recordings, outputs), report
+    return held_fit(model, campaign, recordings, outputs), best, report
+
+
+Fold = tuple[dict[str, tuple[float, float]], list[Table]]  # what is left out, and what stays
 
 
 @dataclass(frozen=True)
@@ -190,6 +202,7 @@ def _coefficients(tables: Sequence[Table], setting: Setting, seed: int) -> Array
         return np.asarray(optimiser.coef_)
 
 
+@lru_cache(maxsize=512)
 def _weak_rows(table: Table, degree: int, seed: int) -> tuple[Array, Array]:
     """Rows (K, F) and targets (K, Y) of the weak library of one recording, the random domains seeded."""
     import pysindy
@@ -213,16 +226,15 @@ def _weak_rows(table: Table, degree: int, seed: int) -> tuple[Array, Array]:
 
 def _left_out(
     frame: _Frame,
-    tables: Mapping[str, list[Table]],
+    folds: Sequence[Fold],
     campaign: Campaign,
     grids: Mapping[str, Grid],
     setting: Setting,
     seed: int,
 ) -> float:
     """rms over the spread of free runs on what was left out, all outputs together."""
-    names = list(tables)
     squares: list[Array] = []
-    for out, train in _folds(names, tables):
+    for out, train in folds:
         if not train:
             continue
         model = frame.model(_coefficients(train, setting, seed), setting.degree, campaign)
@@ -239,9 +251,7 @@ def _left_out(
     return mean if np.isfinite(mean) else FAR
 
 
-def _folds(
-    names: Sequence[str], tables: Mapping[str, list[Table]]
-) -> list[tuple[dict[str, tuple[float, float]], list[Table]]]:
+def _folds(names: Sequence[str], tables: Mapping[str, list[Table]]) -> list[Fold]:
     """What is left out (share of each recording), and the tables that stay."""
     if len(names) > 1:
         parts = [names[k::FOLDS] for k in range(min(FOLDS, len(names)))]

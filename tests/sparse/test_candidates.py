@@ -8,9 +8,8 @@ import pytest
 from discovery.errors import UserError
 from discovery.models import Model, State
 from discovery.recordings import Campaign, Channel, Recording
-from discovery.sparse.drives import Inputs, make_inputs, mass_drives
+from discovery.sparse.drives import Inputs, make_drives, make_inputs, mass_drives
 from discovery.sparse.families import candidates
-from discovery.sparse.drives import make_drives
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.rates import Candidate
 from discovery.terms import Number, text

@@ -13,8 +13,8 @@ from discovery.recordings import Campaign, Channel, Recording
 from discovery.sparse import Discovery, SparseOptions, discover
 from discovery.sparse.byrates import plainer
 from discovery.sparse.gram import gram
-from discovery.sparse.search import Search, plain
 from discovery.sparse.rates import without_idle
+from discovery.sparse.search import Search, plain
 from discovery.sparse.temperatures import second_masses
 from discovery.terms import Term, parse
 
