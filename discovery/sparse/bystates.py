@@ -84,7 +84,12 @@ def _discovered(
         before = entered
         model, labels = with_candidates(structure.model, structure.candidates)
         names = list(labels)
-        growth = Growth(tuple(names[i] for i in sorted(stay | entered)), options.max_terms, model.values())
+        growth = Growth(
+            tuple(names[i] for i in sorted(stay | entered)),
+            tuple(names[i] for i in sorted(stay)),
+            options.max_terms,
+            model.values(),
+        )
         small, kept = grown(data, model, labels, growth, options)
         entered = {names.index(name) for name in kept} | stay
         structure, moved = _refined(data, structure, small, names)
@@ -126,7 +131,7 @@ def _refined(
 
 
 def _allowed(data: RateData, structure: Structure, options: SparseOptions) -> tuple[Structure, SparseOptions]:
-    """The structure without forbidden terms and with the bounds of the options, and these as they match it."""
+    """The structure without forbidden terms and within the bounds; the options as they match its terms."""
     y = data.outputs[0]
     aliases = {"y": y, "rate": f"{y}_rate", "up": f"{y}_up"}
     options = matched(options, [c.label for c in structure.candidates], data.campaign.path, aliases)

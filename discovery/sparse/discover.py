@@ -120,7 +120,8 @@ def _best(
     if not found:
         raise UserError(
             f"{campaign.path}: no model of {', '.join(outputs)} in the form asked for stays finite on "
-            "its own readings and has the terms under keep and bounds; offer other terms under library, or leave out form and hidden"
+            "its own readings and has the terms under keep and bounds; offer other terms under library, or "
+            "leave out form and hidden"
         )
     if len(found) == 1:
         return found[0]
@@ -163,6 +164,6 @@ def _on_file(
         }
         return discover_rates(data, model, labels, kept(labels, options, campaign.path), options)
     always = kept(labels, options, campaign.path)
-    growth = Growth(tuple(always), options.max_terms, restart=baseline.values())
+    growth = Growth(tuple(always), tuple(always), options.max_terms, restart=baseline.values())
     model, labels = grown(data, model, labels, growth, options)
     return discover_rates(data, model, labels, always, options, grown=True, tolerance=CLAIM)

@@ -29,6 +29,7 @@ class Growth:
     """
 
     entered: tuple[str, ...] = ()
+    always: tuple[str, ...] = ()  # of these, those that stay
     most: int = 15
     restart: Mapping[str, float] = field(default_factory=dict)
 
@@ -75,9 +76,11 @@ def _exchanged(
     model, cost = _fitted_with(data, model, labels, entered, growth, noise)
     for _ in range(growth.most):
         seen = linearised(_as_it_stands(data, model, noise))
-        kept = [name for name in seen.names if name not in labels]
-        choice = regress(seen, kept, options, partial(_best_set, library=len(labels)), len(entered))
-        other = [seen.names[f] for f in choice.terms.members if seen.names[f] not in kept]
+        kept = [name for name in seen.names if name not in labels or name in growth.always]
+        choice = regress(
+            seen, kept, options, partial(_best_set, library=len(labels)), len(entered) - len(growth.always)
+        )
+        other = [seen.names[f] for f in choice.terms.members if seen.names[f] in labels]
         if set(other) == set(entered):
             break
         tried, its = _fitted_with(data, model, labels, other, growth, noise)
