@@ -202,7 +202,7 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         lines += ["", "Terms: how much more is left without each on what was left out"]
         for group in self.discovery_.report["groups"]:
             of = ", ".join(group["outputs"])
-            lines.append(f"  {of}: rms on what was left out {group['left_out_rms']:.4g}")
+            lines.append(f"  {of}: rms on what was left out {group['left_out_rms']:.4g} reading noises")
             lines += [f"    {label}  {100 * cost:+.1f} %" for label, cost in group.get("costs", {}).items()]
         return "\n".join(lines)
 

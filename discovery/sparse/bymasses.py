@@ -89,7 +89,13 @@ def discover_masses(
         choice.start_sd,
     )
     model, left = _clear(rules, features, choice, campaign, recordings, grids, options)
-    return Discovery(model, *_evidence(output, features, left, choice, library))
+    return Discovery(model, *_evidence(output, features, left, over(choice, noise), library))
+
+
+def over(choice: Choice, noise: float) -> Choice:
+    """The choice with what it misses counted in reading noises."""
+    left_out, fit = (tuple(rms / noise for rms in some) for some in (choice.left_out, choice.fit))
+    return replace(choice, left_out=left_out, fit=fit)
 
 
 def _table(grid: Grid, inputs: Sequence[str]) -> Array:
@@ -147,7 +153,9 @@ def _evidence(
         "library": library.families_.columns,
         "kept": [str(f) for f in left],
         "costs": {
-            str(f): round(cost, 4) for f, cost in zip(features, choice.costs, strict=True) if f in left
+            str(f): round(cost, 4)
+            for f, cost in zip(features, choice.costs, strict=True)
+            if f in left and np.isfinite(cost)
         },
     }
     return points, stability, report

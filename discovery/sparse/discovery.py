@@ -12,7 +12,7 @@ from discovery.sparse.choice import Choice
 
 @dataclass(frozen=True)
 class PathPoint:
-    """One size on the way from sparse to rich: error on what was left out, in the unit of the outputs."""
+    """One size on the way from sparse to rich: errors on what was left out and fitted, over the noise."""
 
     outputs: tuple[str, ...]
     terms: int
