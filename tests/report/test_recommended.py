@@ -32,8 +32,8 @@ def test_a_lead_and_a_tie_are_said_with_their_outputs() -> None:
     }
     said = recommended(run(found), "on the unseen recording “v”")
     assert said == (
-        "On the unseen recording “v”, “masses” predicts E_Y (50 % less rms than “ridge”, 95 %: 41 to 62 %) best; "
-        "“ridge” and “masses” tie for E_Z."
+        "On the unseen recording “v”, “masses” predicts E_Y (50 % less rms than “ridge”, 95 %: 41 to 62 %) "
+        "best; “ridge” and “masses” tie for E_Z."
     )
 
 
