@@ -130,18 +130,20 @@ def within(rules: Rules, responses: Sequence[Response]) -> list[Response]:
 
 
 def with_spreads(fit: Fit) -> Model:
-    """The fitted model with the spread of the start of each mass that its recordings show, the common one
-    counted as one recording more.
+    """The fitted model with the spread of the start of each mass in a recording to come.
 
-    What a mass remembers from before a recording is for the readings to say: charge is anywhere, a mass of
-    minutes is at rest.
+    The mean square of the starts that were found, and of one more: a recording may be cut out of what goes
+    on, and then the mass stands anywhere in its own range. Few cold starts do not say that all are cold.
     """
     found: dict[str, list[float]] = {}
     for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
         if u.is_start:
             found.setdefault(u.name, []).append(float(value) ** 2 + float(error) ** 2)
+    order = list(fit.problem.model.states)
+    runs = np.concatenate([one.x for one in fit.trajectories])
     states = {
-        name: replace(s, start_sd=float(np.sqrt(np.mean([*found.get(name, []), (s.start_sd or 0.0) ** 2]))))
+        name: replace(s, start_sd=float(np.sqrt(np.mean([*found.get(name, []), moved**2]))))
         for name, s in fit.model.states.items()
+        for moved in [float(np.std(runs[:, order.index(name)]))]
     }
     return replace(fit.model, states=states)
