@@ -34,6 +34,7 @@ from discovery.terms import Number
 
 Array = NDArray[np.float64]
 
+THERMAL_ROLES = {"error", "temperature"}  # their rates count per hour
 _ROUNDS = 6  # of a fit in a fold
 _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
@@ -47,7 +48,8 @@ def discover_states(
 ) -> list[Discovery]:
     """A discovery for each kind of hidden state that was asked for and does not run away."""
     words = options.library or WORDS
-    unit = time_unit(data.scale)
+    roles = {data.campaign.channels[y].role for y in data.outputs}
+    unit = "h" if roles <= THERMAL_ROLES else time_unit(data.scale)
     found = []
     for kind in hidden:
         progress(f"terms of {', '.join(data.outputs)}, {kind}")

@@ -50,7 +50,7 @@ def chosen(problem: Problem) -> Choice:
         effective = search.g.count / readings_as_one([r[:, None] for r in left])
         worth = partial(_criterion, problem, search.g, effective)
         folds = problem.folds()
-        errors = _left_out(problem, folds, int(np.argmin([worth(one) for one in path])) + 1)
+        errors = _left_out(problem, folds, path, int(np.argmin([worth(one) for one in path])) + 1)
         row = choose(errors, problem.tolerance)
         terms = search.shared(path[row], worth)
         ended = search.ended(terms)
@@ -110,15 +110,36 @@ def _criterion(problem: Problem, g: Gram, effective: float, terms: Terms) -> flo
     return float(effective * np.log(left) + price)
 
 
-def _left_out(problem: Problem, folds: Sequence[tuple[Ints, Search]], sizes: int) -> Array:
-    """Mean squared error (sizes, B) of the free run on each block; the path of each fold is its own."""
-    paths = [search.path(len(problem.always) + sizes - 1) for _, search in folds]
+def _left_out(
+    problem: Problem, folds: Sequence[tuple[Ints, Search]], whole: Sequence[Terms], sizes: int
+) -> Array:
+    """Mean squared error (sizes, B) of the free run on each block.
+
+    Each fold searches on its own. Where its readings themselves prefer the set of that size that was found on
+    all of them, that set stands: that a search on less misses it says nothing against the size.
+
+    Args:
+        whole: sets found on everything.
+    """
+    paths = [_better(search, search.path(len(problem.always) + sizes - 1), whole) for _, search in folds]
     rows = min(len(path) for path in paths)
     errors = np.full((rows, problem.blocks.count), np.nan)
     for (fold, _), path in zip(folds, paths, strict=True):
         for row in range(min(rows, sizes)):
             _missed(problem, path[row], fold, errors[row])
     return errors[:, np.isfinite(errors).all(axis=0)]
+
+
+def _better(search: Search, path: Sequence[Terms], whole: Sequence[Terms]) -> list[Terms]:
+    """Of each size the set that takes more off: the own one, or one found elsewhere and refined here."""
+    others = {len(one): one for one in whole}
+    found = []
+    for one in path:
+        if other := others.get(len(one)):
+            refined = search.refined(other.family, other.place, other.pole)
+            one = refined if refined.gain > one.gain else one
+        found.append(one)
+    return found
 
 
 def _missed(problem: Problem, terms: Terms, fold: Ints, errors: Array) -> None:

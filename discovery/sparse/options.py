@@ -65,7 +65,8 @@ class SparseOptions(Strict):
     forbid: Words = Field((), description="terms that are not offered")
     bounds: dict[str, Annotated[tuple[Bound, Bound], FROM_LIST]] = Field(
         default_factory=dict,
-        description="smallest and largest coefficient of a term, by its expression; [0, inf] is a sign",
+        description="smallest and largest coefficient of a term, by its expression; [0, inf] is a sign; in "
+        "the units of the equations, for rates of errors and temperatures per hour",
     )
     optimiser: str = Field(
         "search",
