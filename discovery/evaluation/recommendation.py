@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
 
 Array = NDArray[np.float64]
 
@@ -58,10 +57,11 @@ def recommend(output: str, left: Mapping[str, Sequence[Array]]) -> Recommendatio
     """What to take for an output; None where fewer than two models, or no reading, can be compared.
 
     Args:
-        left: by model, for each recording: readings minus free run (R,), NaN where nothing was read. A
-        model that
-            lacks a recording (it ran away) is left out.
+        left: by model, for each recording: readings minus free run (R,), NaN where nothing was read. A model
+            that lacks a recording (it ran away) is left out.
     """
+    from scipy.stats import t
+
     count = max((len(rows) for rows in left.values()), default=0)
     names = [name for name, rows in left.items() if len(rows) == count and count]
     if len(names) < 2:
