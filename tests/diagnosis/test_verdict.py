@@ -152,9 +152,7 @@ def test_single_wrong_readings_are_all_that_is_wrong() -> None:
 def test_a_fault_is_told_from_physics() -> None:
     faulty = Tried([Model((OFFSET,), 100.0), Model((), 0.0)])
     assert said(faulty, {"sensor_offset": 0.9}).word == "measurement fault"
-    both = Tried(
-        [Model((FLUID, OFFSET), 150.0), Model((FLUID,), 100.0), Model((OFFSET,), 20.0), Model((), 0.0)]
-    )
+    both = pair(FLUID, OFFSET, 150.0, 100.0, 20.0)
     assert said(both, {"sensor_offset": 0.9, "fluid_convection": 0.9}).word == "missing physics"
 
 
@@ -182,18 +180,14 @@ def test_what_does_not_matter_in_free_runs_is_no_mismatch(by: float, word: str) 
 
 def test_what_is_left_unnamed_may_not_carry_the_answer() -> None:
     """Friction is not sure, and the fluid alone is 80 short of the two."""
-    both = Tried(
-        [Model((FLUID, FRICTION), 160.0), Model((FLUID,), 100.0), Model((FRICTION,), 30.0), Model((), 0.0)]
-    )
+    both = pair(FLUID, FRICTION, 180.0, 100.0, 30.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.5})
     assert found.word == "unexplained"
     assert "what can be named explains too little (log evidence 80 below the best)" in found.reasons
 
 
 def test_what_would_be_missed_most_is_named_first() -> None:
-    both = Tried(
-        [Model((FRICTION, FLUID), 160.0), Model((FLUID,), 150.0), Model((FRICTION,), 30.0), Model((), 0.0)]
-    )
+    both = pair(FRICTION, FLUID, 160.0, 30.0, 150.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
     assert [n.hypothesis for n in found.named] == [FLUID, FRICTION]
 
