@@ -62,6 +62,7 @@ class Context:
     belief: float | None
     outliers: tuple[Outlier, ...]  # set aside
     form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
+    laws: int  # of these, the first, that are of laws and not of edges
     known: dict[tuple[str, ...], list[tuple[float, float, float]]] = field(default_factory=dict, repr=False)
 
     @property
@@ -178,6 +179,7 @@ def make_context(
         grids = thinned(without(whole, outliers))
         fit = fitted(grids, fit)
         white = reading_noise(fit, stated, floor, process_prior())
+    form, laws = model_form(fit, np.array(white.white))
     own = {n: replace(s, start_sd=fit.model.states[n].start_sd) for n, s in model.states.items()}
     scene = Scene(
         campaign.channels,
@@ -204,7 +206,8 @@ def make_context(
         floor,
         belief,
         tuple(outliers),
-        tuple(model_form(fit, np.array(white.white))),
+        tuple(form),
+        laws,
     )
 
 
