@@ -5,7 +5,8 @@
 for each flow of the model, and likewise for what each output shows. psi_m are the inputs, the body and the
 recording, each less its mean and over its spread, scaled so that a flow is off by the share in all. And the
 bodies of a lumped model have no sharp edges: a share of each flow enters a neighbour of the body that it is
-drawn at. Both shares are unknown, together on a ladder from an exact model to a coarse one. The part of form error that wanders with time is process noise (`process_noise.py`); this one does not average
+drawn at. Both shares are unknown, together on a ladder from an exact model to a coarse one. The part of form
+error that wanders with time is process noise (`process_noise.py`); this one does not average
 out over a long recording (Kennedy & O'Hagan, J. R. Stat. Soc. B 63, 2001).
 """
 
