@@ -216,7 +216,7 @@ class Whitened:
         """The fit under one noise setting, as normal equations by block."""
         unit = replace(noise, form=1.0, edge=1.0)
         known = self.last.setdefault("grams", [])
-        same = next((pieces for other, pieces in known if other == unit), None)
+        same: tuple[Array, Array] | None = next((pieces for other, pieces in known if other == unit), None)
         if same is None:
             same = self._blocks(unit)
             known.append((unit, same))
