@@ -88,7 +88,7 @@ def _stacked(trajectories: Sequence[Trajectory], columns: Sequence[Array], white
     """Columns (R, Y, M) by recording over the reading noise, what is not measured zero, as (N, M)."""
     measured = [t.system.grid.measured[:, :, None] for t in trajectories]
     parts = [np.where(m, c / white[None, :, None], 0.0) for m, c in zip(measured, columns, strict=True)]
-    return np.concatenate([p.reshape(-1, p.shape[2]) for p in parts])
+    return np.concatenate([p.reshape(p.shape[0] * p.shape[1], p.shape[2]) for p in parts])
 
 
 def effect_form(trajectories: Sequence[Trajectory], hypotheses: Sequence[Hypothesis]) -> list[Array]:
