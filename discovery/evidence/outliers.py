@@ -74,7 +74,9 @@ def _returns(r: Array, middle: Array, limit: Array, suspect: NDArray[np.bool_]) 
     found, size = np.zeros(len(r), dtype=bool), np.abs(r - middle)
     for k in np.flatnonzero(suspect):
         before, after = k - 1, k + 1
-        row = suspect & (size > 0.5 * size[k])  # what fades is a response, not a row of wrong readings
+        row = (
+            suspect & (size > 0.5 * size[k]) & (size < 2 * size[k])
+        )  # what fades is a response, not a row of wrong readings
         while before > 0 and row[before] and after - before <= MOST:
             before -= 1
         while after < len(r) - 1 and row[after] and after - before <= MOST:
