@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from discovery.naming import is_taken, is_word
+from discovery.recordings.columns import TIME
 from discovery.recordings.roles import CORRECTION, Between, Role, is_input
 from discovery.schema import Strict
 
@@ -28,6 +29,12 @@ def _recording_name(name: str) -> str:
     return name
 
 
+def _column_name(name: str) -> str:
+    if name == TIME:
+        raise ValueError("the column 'time' is the clock of a recording, not a channel; name another column")
+    return name
+
+
 class ChannelForm(Strict):
     """One line of [channels]."""
 
@@ -41,7 +48,9 @@ class ChannelForm(Strict):
         "standard deviation, in the unit (a difference); a fit finds it",
     )
     between: Between | None = Field(None, description="what the value does between stamps")
-    column: str | None = Field(None, description="the header in the files, when it is not the channel's name")
+    column: Annotated[str, AfterValidator(_column_name)] | None = Field(
+        None, description="the header in the files, when it is not the channel's name"
+    )
     corrects: str | None = Field(
         None,
         description="of an applied correction: the error to whose readings it is added; "
