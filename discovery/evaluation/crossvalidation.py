@@ -89,7 +89,7 @@ def _left_over(
             trajectory = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)
             yield fit.problem.residual(trajectory)
         return
-    masked = {name: _mask(campaign.recordings[name], outputs, fold.windows[name]) for name in recordings}
+    masked = {name: masked(campaign.recordings[name], outputs, fold.windows[name]) for name in recordings}
     fit = fit_model(
         model, replace(campaign, recordings=masked), recordings, outputs, noise=noise, max_rounds=ROUNDS
     )
@@ -102,7 +102,7 @@ def _left_over(
         yield np.where(((time >= low) & (time < high))[:, None], rows, np.nan)
 
 
-def _mask(recording: Recording, outputs: Sequence[str], window: Window) -> Recording:
+def masked(recording: Recording, outputs: Sequence[str], window: Window) -> Recording:
     """The recording with the readings of a window taken away, save the first one, on which models are zeroed.
 
     Inputs stay: the machine went on.

@@ -62,6 +62,11 @@ class ChannelForm(Strict):
         "-1 for what was added to the position, as `discovery compensate` gives it out",
     )
 
+    guessed: str | None = Field(
+        None,
+        description="what `discovery new` was not sure of; delete it once you have looked, `run` says what hangs on it",
+    )
+
     @model_validator(mode="after")
     def _corrections_alone_correct(self) -> Self:
         given = [name for name in ("corrects", "sign") if name in self.model_fields_set]
@@ -96,6 +101,7 @@ class CampaignForm(Strict):
     """The whole file."""
 
     name: str
+    guessed: str | None = Field(None, description="the same, of the clock of the files")
     channels: dict[Annotated[str, AfterValidator(_channel_name)], ChannelForm] = Field(min_length=1)
     recordings: dict[Annotated[str, AfterValidator(_recording_name)], RecordingForm] = Field(min_length=1)
 

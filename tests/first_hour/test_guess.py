@@ -11,7 +11,7 @@ import pytest
 from discovery.errors import UserError
 from discovery.firsthour.guess import Guess, drives, guess, guess_all
 from discovery.firsthour.table import Column, read_own
-from discovery.firsthour.words import role_of
+
 
 CASES = [
     ("T_room", "", np.linspace(20, 23, 50), "ambient temperature", "degC"),
