@@ -19,15 +19,18 @@ def check(
         typer.Option("--model", help="A model file: do its names and units fit? Repeatable."),
     ] = None,
 ) -> None:
-    """List what is wrong with the recordings of CAMPAIGN: where, and what to do about it.
+    """List what is wrong with the recordings of CAMPAIGN, worst first: where, and what to do about it.
 
-    An `error` keeps the recording from being used (exit status 1); a `warning` is worth a look.
+    Each channel is looked at by itself, beside its siblings, and beside the other recordings: units, signs, clocks,
+    swapped columns, dead or frozen sensors, copies. An `error` keeps the recording from being used (exit status 1);
+    a `warning` is worth a look.
     """
     from discovery.recordings.check import check_campaign, summary
+    from discovery.recordings.finding import folded
 
     findings, misfits = check_campaign(campaign), []
-    for finding in findings:
-        typer.echo(str(finding))
+    for line in folded(findings):
+        typer.echo(line)
     if models:
         from discovery.models.check import check_models
 
@@ -51,7 +54,9 @@ def new(
     ] = None,
     joins: Annotated[
         list[Path] | None,
-        typer.Option("--join", metavar="FILE", help="A second logger of the same hours, one for each --from."),
+        typer.Option(
+            "--join", metavar="FILE", help="A second logger of the same hours, one for each --from."
+        ),
     ] = None,
     statements: Annotated[
         list[str] | None,

@@ -89,9 +89,9 @@ def _left_over(
             trajectory = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)
             yield fit.problem.residual(trajectory)
         return
-    masked = {name: masked(campaign.recordings[name], outputs, fold.windows[name]) for name in recordings}
+    hidden = {name: masked(campaign.recordings[name], outputs, fold.windows[name]) for name in recordings}
     fit = fit_model(
-        model, replace(campaign, recordings=masked), recordings, outputs, noise=noise, max_rounds=ROUNDS
+        model, replace(campaign, recordings=hidden), recordings, outputs, noise=noise, max_rounds=ROUNDS
     )
     for trajectory in fit.trajectories:
         name = trajectory.system.grid.recording

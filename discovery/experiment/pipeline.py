@@ -21,6 +21,7 @@ from discovery.experiment.form import (
     separate,
 )
 from discovery.experiment.joining import check_joins, join
+from discovery.experiment.quality import quality, refuse
 from discovery.experiment.results import write_run
 from discovery.fitting import fit_model
 from discovery.fitting.fit import written_with
@@ -31,7 +32,8 @@ from discovery.models import Model
 from discovery.models.dimensions import with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
-from discovery.progress import Progress, silent
+from discovery.progress import Progress, Steps, silent
+from discovery.recordings.finding import folded
 from discovery.report import write_report
 from discovery.runfolder import default_folder, staged
 from discovery.sparse.options import SparseOptions
@@ -41,7 +43,14 @@ if TYPE_CHECKING:
     from discovery.mismatch import Diagnosis
 
 
-def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
+def run(
+    path: Path,
+    out: Path | None = None,
+    progress: Progress = silent,
+    *,
+    force: bool = False,
+    tell: Progress = silent,
+) -> Path:
     """Do what an experiment file says and write the results folder.
 
     Args:
@@ -50,36 +59,57 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
             at the very end, so an interrupted run leaves what was there before; exports, figures and
             whatever else stands there stay.
         progress: told what begins.
+        force: use recordings that are wrong all the same.
+        tell: told what is wrong with the recordings, a line each.
 
     Returns:
         The folder.
 
     Raises:
-        UserError: a mistake in a file, a model that cannot be fitted, or one that cannot be exported; then
-            the run is kept.
+        UserError: a mistake in a file, recordings that cannot be used, a model that cannot be fitted, or one that
+            cannot be exported; then the run is kept.
     """
     began = clock.perf_counter()
     progress("reading the recordings")
     experiment = load_experiment(path)
+    progress("comparing the recordings with each other")
+    findings = quality(experiment)
+    if not force:
+        refuse(findings)
+    for line in folded(findings):
+        tell(line)
+    steps = Steps(progress, [*(_weight(entry) for entry in experiment.form.models.values()), *_DIAGNOSIS])
+    progress = steps
     folder = out or default_folder(experiment.name)
     if experiment.form.export:
         check_targets(experiment.form.export.to)
     with staged(folder) as temporary:
         fitted: dict[str, Fitted] = {}
         for name, entry in experiment.form.models.items():
+            steps.begin()
             fitted[name] = fit_entry(experiment, name, entry, progress)
+        steps.begin()
         found = diagnosis(experiment, progress, fitted)
         if found is not None and found.repaired is not None:
             name = _free_name("repaired", fitted)
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
         seconds = clock.perf_counter() - began
         progress("writing the report")
-        write_run(temporary, "run", experiment, fitted, found.document() if found else None, seconds)
+        document = found.document() if found else None
+        write_run(temporary, "run", experiment, fitted, document, seconds, findings)
         write_report(temporary)
     if experiment.form.export:
         progress(f"exporting {experiment.form.export.model}")
         export_of(folder, experiment.form.export)
     return folder
+
+
+_DIAGNOSIS = (4.0,)  # how long it takes beside a model that is only fitted
+
+
+def _weight(entry: ModelEntry) -> float:
+    """How long a model takes beside one that is only fitted."""
+    return 3.0 if isinstance(entry, SparseOptions) else 1.0
 
 
 def export_of(folder: Path, wanted: ExportForm) -> None:

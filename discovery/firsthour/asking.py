@@ -37,8 +37,12 @@ def questions(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> list[Q
         if one.sure:
             continue
         roles = [(one.role, one.chance), *one.rivals] if one.chance < SURE else [(one.role, 1.0)]
-        units = [(one.unit, one.unit_chance), *one.unit_rivals] if one.unit_chance < SURE else [(one.unit, 1.0)]
-        pairs = [(role, one.unit) for role, _ in roles[:_MOST]] + [(one.role, unit) for unit, _ in units[1:_MOST]]
+        units = (
+            [(one.unit, one.unit_chance), *one.unit_rivals] if one.unit_chance < SURE else [(one.unit, 1.0)]
+        )
+        pairs = [(role, one.unit) for role, _ in roles[:_MOST]] + [
+            (one.role, unit) for unit, _ in units[1:_MOST]
+        ]
         known = [pair for pair in dict.fromkeys(pairs) if _fits(*pair)]
         answers = tuple((f"{role}, {unit}", role, unit) for role, unit in known)
         if len(answers) > 1:

@@ -86,8 +86,10 @@ def _left_out(experiment: Experiment, name: str, entry: ModelEntry, fold: Fold) 
     """Sums of squares left over, and without a model, on what a fit did not see: each (outputs,)."""
     whole, outputs = experiment.campaign, experiment.outputs_of(entry)
     kept = [r for r in experiment.fit if r not in fold.recordings]
-    seen = {r: masked(whole.recordings[r], outputs, fold.windows[r]) if fold.windows else whole.recordings[r]
-            for r in kept}
+    seen = {
+        r: masked(whole.recordings[r], outputs, fold.windows[r]) if fold.windows else whole.recordings[r]
+        for r in kept
+    }
     inner = replace(
         experiment,
         campaign=replace(whole, recordings=seen),
@@ -108,13 +110,20 @@ def _left_out(experiment: Experiment, name: str, entry: ModelEntry, fold: Fold) 
 
 
 def _residual(
-    model: Model, campaign: Campaign, recording: str, outputs: Sequence[str], noise: Sequence[float], fold: Fold
+    model: Model,
+    campaign: Campaign,
+    recording: str,
+    outputs: Sequence[str],
+    noise: Sequence[float],
+    fold: Fold,
 ) -> Array:
     trajectory = predict_recording(model, campaign, recording, outputs, noise)
 
     grid = trajectory.system.grid
     rows = grid.readings - predict(trajectory)
-    return np.nansum(np.where(_inside(grid.time[grid.read], fold, recording)[:, None], rows, np.nan) ** 2, axis=0)
+    return np.nansum(
+        np.where(_inside(grid.time[grid.read], fold, recording)[:, None], rows, np.nan) ** 2, axis=0
+    )
 
 
 def _spread(campaign: Campaign, recording: str, outputs: Sequence[str], fold: Fold) -> Array:
@@ -154,7 +163,9 @@ def _thin(recording: Recording, campaign: Campaign, points: int) -> Recording:
         if campaign.channels[name].is_input:
             values[name] = np.array([np.nanmean(p) if np.isfinite(p).any() else np.nan for p in pieces])
         else:
-            values[name] = np.array([p[np.isfinite(p)][0] if np.isfinite(p).any() else np.nan for p in pieces])
+            values[name] = np.array(
+                [p[np.isfinite(p)][0] if np.isfinite(p).any() else np.nan for p in pieces]
+            )
     return replace(recording, time=recording.time[edges[:-1]], values=values)
 
 

@@ -85,13 +85,19 @@ class Evidence:
         keys = {key for pair, of in _ROLES.items() if of == role for key in pair} or {"other", "state", "fan"}
         if role == OTHER:
             keys |= {"current", "voltage", "torque", "position"}
-        told = [(max((v for k, v in says.items() if k in keys), default=0.0), why) for why, says in self.reasons]
+        told = [
+            (max((v for k, v in says.items() if k in keys), default=0.0), why) for why, says in self.reasons
+        ]
         best = sorted((one for one in told if one[0] > 0.9), key=lambda one: -one[0])[:2]
         return ", ".join(why for _, why in best) or "nothing says what it is"
 
 
 def evidence(
-    name: str, about: str, unit: str | None, values: Array, hints: Sequence[tuple[str, Mapping[str, float]]] = ()
+    name: str,
+    about: str,
+    unit: str | None,
+    values: Array,
+    hints: Sequence[tuple[str, Mapping[str, float]]] = (),
 ) -> Evidence:
     """All that is known of a column.
 
@@ -139,7 +145,14 @@ def value_odds(form: Shape, unit: str | None) -> list[tuple[str, Mapping[str, fl
         found.append(("it answers slowly", {"temperature": 1.5, "displacement": 1.0, "speed": -2.5, "power": -1.0,
                                             "signal": -1.0, "flow": -1.0, "torque": -1.5, "voltage": -0.5}))  # fmt: skip
     elif form.jump > 0.4:
-        says = {"temperature": -3.0, "displacement": -2.0, "speed": 1.0, "power": 1.0, "signal": 1.0, "flow": 0.5}
+        says = {
+            "temperature": -3.0,
+            "displacement": -2.0,
+            "speed": 1.0,
+            "power": 1.0,
+            "signal": 1.0,
+            "flow": 0.5,
+        }
         found.append(("it jumps", says))
     if unit is not None:
         return found
@@ -167,7 +180,6 @@ def value_odds(form: Shape, unit: str | None) -> list[tuple[str, Mapping[str, fl
     if form.high < 20.0:
         found.append((f"never above {form.high:.3g}", {"speed": -2.0, "temperature": -0.5}))
     return found
-
 
 
 def _spelled(word: Word, name: str) -> str:

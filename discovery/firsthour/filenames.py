@@ -18,7 +18,14 @@ _NUMBER = re.compile(
 )
 _NEAR = 0.03  # of a number: a column that stands so near is what the name says
 _RANGE = 0.3  # of a range: so near its ends
-_SPELLED = {"umin": "u/min", "u_min": "u/min", "rmin": "r/min", "r_min": "r/min", "l_min": "l/min", "lmin": "l/min"}
+_SPELLED = {
+    "umin": "u/min",
+    "u_min": "u/min",
+    "rmin": "r/min",
+    "r_min": "r/min",
+    "l_min": "l/min",
+    "lmin": "l/min",
+}
 
 Said = tuple[float, float, str]
 """Low, high (or the same), unit."""
@@ -50,9 +57,16 @@ def file_hints(runs: Mapping[str, OwnTable]) -> dict[str, list[tuple[str, Mappin
                 known = column.values[np.isfinite(column.values)]
                 if not known.size or any("file name" in why for why, _ in found.get(column.name, ())):
                     continue
-                if low == high and low and np.mean(np.abs(known / low - 1) < _NEAR) > 0.5 and unit not in ("degC", "degF"):
+                if (
+                    low == high
+                    and low
+                    and np.mean(np.abs(known / low - 1) < _NEAR) > 0.5
+                    and unit not in ("degC", "degF")
+                ):
                     says = {key: odds / 2 for key, odds in dimension_of(unit).items()}
-                    found.setdefault(column.name, []).append((f"it stands at {low:g} {unit} as the file name says", says))
+                    found.setdefault(column.name, []).append(
+                        (f"it stands at {low:g} {unit} as the file name says", says)
+                    )
                 elif high > low and unit in ("degC", "degF"):
                     wide = _RANGE * (high - low)
                     if abs(known.min() - low) < wide and abs(known.max() - high) < wide:

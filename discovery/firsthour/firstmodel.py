@@ -99,8 +99,11 @@ def _temperature(
         block.term(f"fluid on {output}", output, f"{name}*{f'{pump}*' if pump else ''}({fluid} - {output})")
     if masses == 2:
         core = f"{output}_core"
-        block.states.append(f'{core} = {{ unit = "degC", start = "{room}", start_sd = 5.0 }}' if room else
-                            f'{core} = {{ unit = "degC", start = 22.0, start_sd = 5.0 }}')
+        block.states.append(
+            f'{core} = {{ unit = "degC", start = "{room}", start_sd = 5.0 }}'
+            if room
+            else f'{core} = {{ unit = "degC", start = 22.0, start_sd = 5.0 }}'
+        )
         into = block.parameter(f"into_{core}", "2e-3", "1/s", least="0.0")
         back = block.parameter(f"back_{core}", "4e-4", "1/s", least="0.0")
         block.term(f"{core} on {output}", output, f"{into}*({core} - {output})")
@@ -143,7 +146,9 @@ def usual_inputs(guesses: Mapping[str, Guess], room: str | None) -> list[str]:
         if one.role in ("fluid temperature", "coolant temperature")
         or (one.role == "other input" and one.unit in DEGREES)
     ]
-    others = [n for n, one in guesses.items() if one.quantity in ("fan", "flow") or one.role == "cooling power"]
+    others = [
+        n for n, one in guesses.items() if one.quantity in ("fan", "flow") or one.role == "cooling power"
+    ]
     return list(dict.fromkeys([*([room] if room else []), *temperatures, *drives(guesses), *others]))
 
 

@@ -88,7 +88,9 @@ def guess(column: Column, hints: Sequence[tuple[str, Mapping[str, float]]] = ())
     if unit is not None:
         return _with_unit(one, unit, named is not None, column.unit)
     if spelled:
-        return replace(one, role=OTHER, chance=0.5, why=f"{why}; the header says {column.unit}, no known unit")
+        return replace(
+            one, role=OTHER, chance=0.5, why=f"{why}; the header says {column.unit}, no known unit"
+        )
     return _by_values(one, column, found)
 
 
@@ -229,7 +231,13 @@ def _one_room(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[s
     clearest = min(air, key=lambda name: air[name])
     measured = any(one.role in ("temperature", "error") for one in guesses.values())
     why = f"{clearest} is the air around"
-    if not measured and not clear and len(set(air.values())) == 1 and len(air) > 1 or (not measured and not clear and len(air) == 1):
+    if (
+        not measured
+        and not clear
+        and len(set(air.values())) == 1
+        and len(air) > 1
+        or (not measured and not clear and len(air) == 1)
+    ):
         clearest, why = "", "nothing else is measured"
     for name, (_, more) in air.items():
         if name in clear:

@@ -18,7 +18,9 @@ _LEAST = 0.02  # of what is left that one more input has to explain
 _RIDGE = 1e-4
 
 
-def strongest(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str]) -> list[str]:
+def strongest(
+    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str]
+) -> list[str]:
     """At most five of the inputs, taken one after the other by what each explains beside those before it.
 
     Args:
@@ -32,7 +34,9 @@ def strongest(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[s
     chosen: list[str] = []
     left = 1.0
     while len(chosen) < min(_MOST, len(moving)):
-        tried = {name: _unexplained(blocks, targets, [*chosen, name]) for name in moving if name not in chosen}
+        tried = {
+            name: _unexplained(blocks, targets, [*chosen, name]) for name in moving if name not in chosen
+        }
         best = min(tried, key=lambda name: tried[name])
         if chosen and tried[best] > (1 - _LEAST) * left:
             break
@@ -48,7 +52,11 @@ def _moves(campaign: Campaign, recordings: Sequence[str], name: str) -> bool:
 
 
 def _blocks(
-    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str], taus: list[float]
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    inputs: Sequence[str],
+    taus: list[float],
 ) -> tuple[list[dict[str, Array]], list[Array]]:
     """For each output, responses by input and readings, both about their means in each recording."""
     between = {name: campaign.channels[name].between for name in inputs}

@@ -96,7 +96,14 @@ def new(
         write_atomic(folder / "campaign.toml", text)
         notes = rewrite(folder, made)
     room_line = [about_room] if about_room else []
-    return [*room_line, *_said(tables, found, guesses), *made.said, *notes, "", *_next(folder, guesses, found)]
+    return [
+        *room_line,
+        *_said(tables, found, guesses),
+        *made.said,
+        *notes,
+        "",
+        *_next(folder, guesses, found),
+    ]
 
 
 def _planned_again(folder: Path, progress: Progress) -> list[str]:
@@ -157,7 +164,10 @@ def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Gue
     width, inner = (max(len(row[place]) for row in rows) for place in (0, 1))
     lines += [f"  {header:{width}} -> {what:{inner}} {mark:1} {why}" for header, what, mark, why in rows]
     for quantity, (unit, values) in found.constants.items():
-        lines.append(f"  {quantity} in {unit} from the names of the files: " + ", ".join(f"{v:g}" for v in values.values()))
+        lines.append(
+            f"  {quantity} in {unit} from the names of the files: "
+            + ", ".join(f"{v:g}" for v in values.values())
+        )
     warmed = [n for n, one in guesses.items() if one.role == "other input" and one.unit in DEGREES]
     if not drives(guesses) and not warmed and not found.constants:
         lines.append(

@@ -132,8 +132,11 @@ def _decided(
     else:
         chosen = [next(iter(lines))]
         remarks.append("None is better than no model: do not use one before more is recorded.")
-        said = [f"no model is better than none on {how} left out ({', '.join(told)})", *missing(campaign, fit, outputs, guesses)]
-    models = {name: lines[name].replace(', bootstraps = 0', '') for name in chosen}
+        said = [
+            f"no model is better than none on {how} left out ({', '.join(told)})",
+            *missing(campaign, fit, outputs, guesses),
+        ]
+    models = {name: lines[name].replace(", bootstraps = 0", "") for name in chosen}
     kept = {
         file: text for name, (file, _) in HAND_BUILT.items() if name in chosen for text in [files[file]]
     } or {"model.toml": files["model.toml"]}

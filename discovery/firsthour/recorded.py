@@ -153,7 +153,13 @@ def _in_unit(column: Column, unit: str) -> Column:
     here, wanted = known_unit(column.unit), known_unit(unit)
     if not unit or here is None or wanted is None or here == wanted:
         return replace(column, unit=column.unit or unit)
-    role = "temperature" if here in DEGREES else "error" if wanted in ("um", "mm", "inch", "mil") else "heat load"
+    role = (
+        "temperature"
+        if here in DEGREES
+        else "error"
+        if wanted in ("um", "mm", "inch", "mil")
+        else "heat load"
+    )
     try:
         a, b = conversion(here, role), conversion(wanted, role)
     except UnitError:
@@ -171,14 +177,18 @@ def _counted(
     seen = [run for name, run in list(recordings.items())[:-1] if run.counted] or [recordings[undecided[0]]]
     odds: dict[str, float] = {}
     for run in seen:
-        for unit, value in time_odds(run.time, [c.values for c in run.columns], stated_interval(run.above)).items():
+        for unit, value in time_odds(
+            run.time, [c.values for c in run.columns], stated_interval(run.above)
+        ).items():
             odds[unit] = odds.get(unit, 0.0) + value / len(seen) ** 0.5
     shares = {said: 1.0} if said else probabilities(odds)
     unit, chance = next(iter(shares.items()))
     doubt = "" if chance >= 0.9 else f" (? {chance:.0%} likely; nothing names its unit)"
     scaled = {
         name: replace(
-            run, time=run.time * TIME_UNITS[unit], about_time=f"{run.about_time.replace('counted', f'counted in {unit}{doubt}')}"
+            run,
+            time=run.time * TIME_UNITS[unit],
+            about_time=f"{run.about_time.replace('counted', f'counted in {unit}{doubt}')}",
         )
         if run.counted
         else run

@@ -54,7 +54,11 @@ def campaign_text(
         channels[name] = dict(kept.get(name, entry))
     given: dict[str, dict[str, float]] = {name: {} for name in found.recordings}
     for quantity, (unit, values) in found.constants.items():
-        channels[quantity] = {"role": _CONSTANTS[quantity], "unit": unit, "guessed": "from the names of the files"}
+        channels[quantity] = {
+            "role": _CONSTANTS[quantity],
+            "unit": unit,
+            "guessed": "from the names of the files",
+        }
         for name, value in values.items():
             given[name][quantity] = value
     if room is not None:
@@ -134,5 +138,3 @@ held_out = [{listed(names[-1:])}]
 [models]
 {chr(10).join(lines)}
 """ + (f'\n[mismatch]\nmodel = "{mismatch}"\n' if mismatch else "")
-
-

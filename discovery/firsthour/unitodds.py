@@ -19,7 +19,11 @@ def temperature_odds(forms: Sequence[Shape], *, air: bool = False) -> dict[str, 
     """Log odds of the units of temperatures that share one. `air`: the air around a machine is never hot."""
     odds = {"degC": 0.0, "degF": -2.2, "K": -0.5}  # kelvin fits no other values
     for form in forms:
-        for unit, (factor, offset) in {"degC": (1.0, 0.0), "degF": (5 / 9, -160 / 9), "K": (1.0, -273.15)}.items():
+        for unit, (factor, offset) in {
+            "degC": (1.0, 0.0),
+            "degF": (5 / 9, -160 / 9),
+            "K": (1.0, -273.15),
+        }.items():
             first, low, high = (factor * v + offset for v in (form.first, form.low, form.high))
             if low < -60.0 or high > 1500.0:
                 odds[unit] -= 12.0
@@ -71,7 +75,11 @@ def flow_odds(form: Shape) -> dict[str, float]:
     if form.binary:
         return {"1": 8.0, "l/min": 0.0}
     small = form.high <= 1.0
-    return {"1": 0.5 if small else -3.0, "l/min": -0.2 if small else 1.0, "percent": 1.0 if 20 < form.high <= 100 else -5.0}
+    return {
+        "1": 0.5 if small else -3.0,
+        "l/min": -0.2 if small else 1.0,
+        "percent": 1.0 if 20 < form.high <= 100 else -5.0,
+    }
 
 
 def usual(role: str) -> Mapping[str, float]:

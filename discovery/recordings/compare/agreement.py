@@ -10,15 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Array
-from discovery.recordings.compare.repairs import Repair, all_repairs
+from discovery.recordings.compare.repairs import Repair, all_repairs, shiftable, shifted
 from discovery.recordings.compare.seen import Seen, inputs_of, outputs_of
 from discovery.recordings.responses import even_grid, filtered, input_on_grid
+from discovery.threads import one_thread
 
 _SHARES = (0.0, 1 / 500, 1 / 150, 1 / 50, 1 / 15, 1 / 5)  # of the longest recording: time constants
 _POINTS = 1000
@@ -26,8 +28,9 @@ _READINGS = 400  # of an output in a recording: more say nothing new
 _FEWEST = 20
 _RIDGE = 1e-3
 _ROOM = 22.0  # degC: responses to temperatures are counted from here
-_OUTLIER = 2.0  # times the usual misfit: a recording that may be damaged
+_OUTLIER, _SUSPECT = 2.0, 1.3  # times the usual misfit: a recording that is, or may be, damaged
 _GAIN = 0.5  # of the misfit, at most, that a repair leaves
+_WEAK_GAIN = 0.4  # the same of a recording that is a suspect only
 _TWO_GAIN = 0.35  # the same where two recordings stand against each other
 _AGREES = 3.0  # times the usual misfit, at most, after a repair
 _TWO_AGREES = 0.4  # of the movement itself
@@ -36,6 +39,7 @@ _LEAST = 0.03  # of the movement: a misfit so small is usual
 _LEVERAGE = 3.0  # times the usual movement of an output: more weighs no more
 # how much larger the gain of a less usual damage must be to go before a usual one
 _DOUBT = {"unit": 0.0, "time": 0.0, "sign": 0.0, "swap": 0.0, "factor": 0.3, "shift": 0.2, "halfway": 0.4}
+_LATE = np.arange(0.002, 0.25, 0.001)  # of a recording: how late a channel may be
 _MOST = 6  # repairs of a campaign that are looked for
 
 
@@ -72,6 +76,7 @@ class _Reading:
         return float(np.median(self.read[:3]))
 
 
+@one_thread
 def disagreements(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -> list[Disagreement]:
     """Repairs that make recordings agree with the others, the largest gain first."""
     recordings = [one for one in recordings if len(one.time) >= _FEWEST and one.time[-1] > 0]
@@ -101,7 +106,12 @@ class _Story:
         known: Mapping[str, _Features] | None = None,
     ) -> None:
         self.recordings = {one.name: one for one in recordings}
-        self.channels, self.inputs, self.outputs, self.taus = channels, list(inputs), list(outputs), list(taus)
+        self.channels, self.inputs, self.outputs, self.taus = (
+            channels,
+            list(inputs),
+            list(outputs),
+            list(taus),
+        )
         self.features = {one.name: (known or {}).get(one.name) or self._responses(one) for one in recordings}
         self.names = list(next(iter(self.features.values())).of_input)
         self.scale = {n: self._usual_size(n) for n in self.names}
@@ -130,27 +140,72 @@ class _Story:
         theta = {y: t for y in self.outputs if (t := self._theta(y, {one.name})) is not None}
         features = self.features[one.name]
         parts = {y: self._parts(features, y, theta[y]) for y in theta}
-        misfit = {y: m for y in theta if (m := self._misfit(features, parts[y], theta[y], y, self.readings[one.name, y]))}
+        misfit = {
+            y: m
+            for y in theta
+            if (m := self._misfit(features, parts[y], theta[y], y, self.readings[one.name, y]))
+        }
         usual = {y: self._usual_misfit(one.name, y) for y in misfit}
-        wrong = {y for y, m in misfit.items() if m > _OUTLIER * usual[y]}
+        wrong = {y for y, m in misfit.items() if m > _SUSPECT * usual[y]}
         if not wrong and not two:
             return []
         found = []
-        for repair in all_repairs(one, self.channels, self.inputs, self.outputs):
+        late = (
+            shifted(one, group, seconds)
+            for group in shiftable(one, self.channels, self.inputs, self.outputs)
+            if (seconds := self._lateness(one, group, features, parts, theta)) != 0.0
+        )
+        for repair in chain(all_repairs(one, self.channels, self.inputs, self.outputs), late):
             touched = [y for y in misfit if y in repair.channels] or list(misfit)
             if not two and not set(touched) & wrong:
                 continue
             after = self._after(repair, features, parts, theta, touched)
             if len(after) < len(touched):
                 continue
-            b, a, limit = (float(np.sqrt(np.mean([of[y] ** 2 for y in touched]))) for of in (misfit, after, usual))
+            b, a, limit = (
+                float(np.sqrt(np.mean([of[y] ** 2 for y in touched]))) for of in (misfit, after, usual)
+            )
             agrees = a < _TWO_AGREES if two else a < min(_AGREES * limit, 0.6)
             # the log likelihood of each output's readings; a half of them by chance is as good as all by little
             each = [np.log(max(misfit[y], _LEAST) / max(after[y], _LEAST)) for y in touched]
             gain = float(np.sum(each)) / len(touched) ** 0.5
-            if agrees and gain > -np.log(_TWO_GAIN if two else _GAIN):
+            least = _TWO_GAIN if two else _GAIN if any(misfit[y] > _OUTLIER * usual[y] for y in touched) else _WEAK_GAIN
+            if agrees and gain > -np.log(least):
                 found.append((gain - _DOUBT[repair.kind], Disagreement(one.name, repair, b, a)))
         return found
+
+    def _lateness(
+        self,
+        one: Seen,
+        group: Sequence[str],
+        features: _Features,
+        parts: Mapping[str, Mapping[str, Array]],
+        theta: Mapping[str, Array],
+    ) -> float:
+        """By how many seconds a channel, or all readings, are late: the response to a late input is late by as
+        much, so that nothing has to be filtered anew.
+        """
+        length = float(one.time[-1])
+        shifts = np.concatenate([s * _LATE * length for s in (-1.0, 1.0)])
+        cost = np.zeros(len(shifts) + 1)
+        mine = set(self._with(set(group) & set(self.inputs)))
+        outputs = [y for y in parts if y in group] or list(parts)
+        for y in outputs:
+            reading = self.readings[one.name, y]
+            if reading is None:
+                continue
+            free = features.free @ theta[y][-features.free.shape[1] :] * self._start(y, reading)
+            still = sum(v for n, v in parts[y].items() if n not in mine) + free
+            moves = sum((v for n, v in parts[y].items() if n in mine), start=np.zeros(len(features.grid)))
+            if not mine:
+                still, moves = np.zeros(len(features.grid)), still
+            base = reading.read - np.interp(reading.at, features.grid, still)
+            for k, seconds in enumerate((0.0, *shifts)):
+                at = reading.at + (seconds if mine else -seconds)
+                inside = (at >= 0) & (at <= length)
+                left = (base - np.interp(at, features.grid, moves))[inside]
+                cost[k] += np.log(max(float(np.std(left)), 1e-12)) if left.size > _FEWEST else np.inf
+        return float((0.0, *shifts)[int(np.argmin(cost))])
 
     def _after(
         self,
@@ -168,9 +223,16 @@ class _Story:
             features = self._changed(features, repair.made, changed)
         found = {}
         for y in outputs:
-            reading = _readings(repair.made, y) if y in repair.channels or not repair.channels else (
-                self.readings[repair.made.name, y])
-            mine = parts[y] if not changed else {**parts[y], **self._parts(features, y, theta[y], self._with(changed))}
+            reading = (
+                _readings(repair.made, y)
+                if y in repair.channels or not repair.channels
+                else (self.readings[repair.made.name, y])
+            )
+            mine = (
+                parts[y]
+                if not changed
+                else {**parts[y], **self._parts(features, y, theta[y], self._with(changed))}
+            )
             misfit = self._misfit(features, mine, theta[y], y, reading)
             if misfit is not None:
                 found[y] = misfit
@@ -226,7 +288,9 @@ class _Story:
 
     def _gram(self, features: _Features, y: str, reading: _Reading) -> tuple[Array, Array, float]:
         columns = [features.of_input[name] / self.scale[name] for name in self.names]
-        F = _at(features.grid, np.column_stack([*columns, features.free * self._start(y, reading)]), reading.at)
+        F = _at(
+            features.grid, np.column_stack([*columns, features.free * self._start(y, reading)]), reading.at
+        )
         F = F - F.mean(axis=0)
         read = reading.read - reading.read.mean()
         # a recording that moves far more than the others says no more than they do
@@ -234,11 +298,16 @@ class _Story:
         return weight * F.T @ F, weight * F.T @ read, weight * len(read)
 
     def _start(self, y: str, reading: _Reading) -> float:
-        return (reading.first - (_ROOM if self.channels[y].unit == "degC" else 0.0)) / max(self.size[y], 1e-12)
+        return (reading.first - (_ROOM if self.channels[y].unit == "degC" else 0.0)) / max(
+            self.size[y], 1e-12
+        )
 
     def _changed(self, features: _Features, made: Seen, changed: set[str]) -> _Features:
         """Responses with those of some inputs made anew."""
-        fresh = {n: input_on_grid(made.time, made.values[n], features.grid, self.channels[n].between) for n in changed}
+        fresh = {
+            n: input_on_grid(made.time, made.values[n], features.grid, self.channels[n].between)
+            for n in changed
+        }
         even = {**features.even, **fresh}
         series = _with_products(even, self.channels)
         renewed = {n: self._filtered(series[n], features.grid) for n in self._with(changed)}
@@ -246,8 +315,12 @@ class _Story:
 
     def _responses(self, one: Seen) -> _Features:
         grid = even_grid(one.time, _POINTS)
-        even = {n: input_on_grid(one.time, one.values[n], grid, self.channels[n].between) for n in self.inputs}
-        found = {name: self._filtered(series, grid) for name, series in _with_products(even, self.channels).items()}
+        even = {
+            n: input_on_grid(one.time, one.values[n], grid, self.channels[n].between) for n in self.inputs
+        }
+        found = {
+            name: self._filtered(series, grid) for name, series in _with_products(even, self.channels).items()
+        }
         return _Features(grid, even, found, np.column_stack([np.exp(-grid / tau) for tau in self.taus[1:]]))
 
     def _filtered(self, series: Array, grid: Array) -> Array:

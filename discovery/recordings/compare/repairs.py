@@ -44,17 +44,24 @@ _SCALES: tuple[tuple[str, float, float], ...] = (
     ("degF", 5 / 9, -160 / 9),
     ("K", 1.0, -273.15),
 )
-_CLOCKS = ((60.0, "minutes"), (3600.0, "hours"), (1e-3, "milliseconds"), (86400.0, "days"), (1 / 60.0, "sixtieths of a second"))
-_SHARES = (0.01, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.2)  # of a recording: shifts
+_CLOCKS = (
+    (60.0, "minutes"),
+    (3600.0, "hours"),
+    (1e-3, "milliseconds"),
+    (86400.0, "days"),
+    (1 / 60.0, "sixtieths of a second"),
+)
 _WHEN = tuple(np.linspace(0.1, 0.9, 17))  # of a recording: where a damage may begin
 
 Channels = Mapping[str, Channel]
 Family = Callable[[Seen, Channels, Sequence[str], Sequence[str]], Iterator[Repair]]
 
 
-def all_repairs(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]) -> Iterator[Repair]:
-    """Every repair of a recording that is known."""
-    for family in (units, signs, swaps, shifts, clocks, halves):
+def all_repairs(
+    one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]
+) -> Iterator[Repair]:
+    """Every repair of a recording that is known, but for shifts, whose size has to be found (`shifted`)."""
+    for family in (units, signs, swaps, clocks, halves):
         yield from family(one, channels, inputs, outputs)
 
 
@@ -102,20 +109,21 @@ def swaps(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
                 yield Repair("swap", (a, b), what, do, one.having({a: one.values[b], b: one.values[a]}))
 
 
-def shifts(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]) -> Iterator[Repair]:
-    """A channel, or all readings, early or late."""
+def shifted(one: Seen, group: Sequence[str], seconds: float) -> Repair:
+    """A channel, or all readings, that are late (early where below zero) by so many seconds."""
+    said = f"'{group[0]}' is" if len(group) == 1 else "the readings are"
+    what = f"{said} {_duration(abs(seconds))} {'late' if seconds > 0 else 'early'} beside the other channels"
+    moved = {name: _moved(one.time, one.values[name], seconds) for name in group if name in one.values}
+    return Repair("shift", tuple(group), what, "look at the clock of its logger", one.having(moved))
+
+
+def shiftable(
+    one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]
+) -> list[tuple[str, ...]]:
+    """Channels that may be late by themselves, and all readings together."""
     groups = [(name,) for name in _moving(one, inputs) if channels[name].between == "held"]
     groups += [(name,) for name in _moving(one, outputs)]
-    groups += [tuple(outputs)] if len(outputs) > 1 else []
-    length = float(one.time[-1])
-    for group in groups:
-        for share in (*_SHARES, *(-s for s in _SHARES)):
-            seconds = share * length
-            said = f"'{group[0]}' is" if len(group) == 1 else "the readings are"
-            what = f"{said} {_duration(abs(seconds))} {'late' if share > 0 else 'early'}"
-            do = "look at the clock of its logger"
-            moved = {name: _moved(one.time, one.values[name], seconds) for name in group if name in one.values}
-            yield Repair("shift", group, what, do, one.having(moved))
+    return groups + ([tuple(outputs)] if len(outputs) > 1 else [])
 
 
 def clocks(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]) -> Iterator[Repair]:
@@ -143,7 +151,13 @@ def halves(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequen
             for words, factor, offset in changes:
                 made = np.where(after, factor * values + offset, values)
                 what = f"'{name}' {words} from {_duration(share * length)} on"
-                yield Repair("halfway", (name,), what, "split the recording there, or mend it", one.having({name: made}))
+                yield Repair(
+                    "halfway",
+                    (name,),
+                    what,
+                    "split the recording there, or mend it",
+                    one.having({name: made}),
+                )
 
 
 def _moving(one: Seen, names: Sequence[str]) -> list[str]:
@@ -168,4 +182,10 @@ def _moved(time: Array, values: Array, seconds: float) -> Array:
 
 
 def _duration(seconds: float) -> str:
-    return f"{seconds / 3600:.2g} h" if seconds >= 5400 else f"{seconds / 60:.2g} min" if seconds >= 90 else f"{seconds:.2g} s"
+    return (
+        f"{seconds / 3600:.2g} h"
+        if seconds >= 5400
+        else f"{seconds / 60:.2g} min"
+        if seconds >= 90
+        else f"{seconds:.2g} s"
+    )

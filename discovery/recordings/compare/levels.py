@@ -1,0 +1,178 @@
+"""A channel against its siblings and against itself in the other recordings: level, noise, resolution, speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from discovery.recordings.campaign import Channel
+from discovery.recordings.columns import Array
+from discovery.recordings.compare.seen import Seen, noise_of
+from discovery.recordings.finding import Finding
+
+_FEWEST = 30  # readings
+_NOISIER = 8.0  # times the noise elsewhere
+_COARSER = 20.0  # times the steps of readings elsewhere, and more than a hundredth of what the channel moves
+_START = 10.0  # K: the first reading against its siblings, beyond what it is elsewhere
+_AGREE = 6.0  # K: siblings that agree so well show the odd one out in a single recording
+_ALONE = 15.0  # K
+_SPREADS = 8.0  # times the usual spread of a start between recordings
+_FASTER = 8.0  # times the fastest that a temperature moves elsewhere
+_CLIMB = 8.0  # K within a few minutes, at least
+_FLAT = 0.02  # of the readings at the largest value: a range that is full
+_LOWER = 0.97  # of what the other recordings reach
+_MINUTES = 360.0  # s
+
+
+def level_findings(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -> Iterator[Finding]:
+    """What stands out in level, noise, resolution, rate or range, the channel and the recording named."""
+    for name, channel in channels.items():
+        having = [one for one in recordings if name in one.values and name not in one.constant]
+        yield from _noise(having, channel)
+        yield from _resolution(having, channel)
+        yield from _full_range(having, channel)
+        if channel.unit == "degC":
+            yield from _climbs(having, channel)
+    yield from _starts(recordings, [c for c in channels.values() if c.unit == "degC"])
+
+
+def _noise(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
+    if not channel.measured and channel.between != "linear":
+        return
+    found = {one.name: noise_of(one.known(channel.name)[1]) for one in recordings}
+    sizes = {one.name: one.known(channel.name)[1].size for one in recordings}
+    for one in recordings:
+        others = [v for name, v in found.items() if name != one.name and v > 0 and sizes[name] >= _FEWEST]
+        usual = float(np.median(others)) if others else channel.noise or 0.0
+        if sizes[one.name] >= _FEWEST and usual > 0 and found[one.name] > _NOISIER * usual:
+            times = found[one.name] / usual
+            where = "than in the other recordings" if others else "than the campaign says"
+            what = f"'{channel.name}' is {times:.2g} times noisier {where} ({found[one.name]:.2g} {channel.unit})"
+            yield _finding(one, channel, 0, what, "look at its cable, range and filter", "noise", np.log(times))
+
+
+def _resolution(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
+    if not channel.measured and channel.between != "linear":
+        return
+    steps = {one.name: _step(one.known(channel.name)[1]) for one in recordings}
+    for one in recordings:
+        others = [v for name, v in steps.items() if name != one.name and v > 0]
+        read = one.known(channel.name)[1]
+        if not others or read.size < _FEWEST:
+            continue
+        usual, span = float(np.median(others)), float(np.ptp(read))
+        if steps[one.name] > _COARSER * usual and steps[one.name] > 0.02 * span > 0:
+            what = f"'{channel.name}' is recorded in steps of {steps[one.name]:.2g} {channel.unit}, elsewhere of {usual:.2g}"
+            yield _finding(one, channel, 0, what, "record it with more digits", "resolution", 0.5)
+
+
+def _step(readings: Array) -> float:
+    """The smallest step between different readings, where most steps are multiples of it."""
+    different = np.diff(np.unique(readings))
+    return float(np.min(different)) if different.size > 2 else 0.0
+
+
+def _full_range(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
+    """Readings that stay at the very largest value again and again, where elsewhere it goes higher and never
+    does so.
+    """
+    flat, tops = {}, {}
+    for one in recordings:
+        read = one.known(channel.name)[1]
+        if read.size < _FEWEST or np.unique(read).size < 30:
+            continue
+        for sign in (1.0, -1.0):
+            top = float(np.max(sign * read))
+            tops[one.name, sign] = top
+            flat[one.name, sign] = float(np.mean(sign * read == top))
+    for one in recordings:
+        for sign in (1.0, -1.0):
+            if (one.name, sign) not in flat or flat[one.name, sign] < _FLAT:
+                continue
+            others = [name for name, s in flat if s == sign and name != one.name]
+            middle = float(np.median(one.known(channel.name)[1])) * sign
+            higher = [n for n in others if tops[n, sign] - middle > (tops[one.name, sign] - middle) / _LOWER]
+            usual = max((flat[n, sign] for n in others), default=1.0)
+            if higher and usual < flat[one.name, sign] / 4:
+                read = one.known(channel.name)[1]
+                row = int(np.argmax(sign * read))
+                what = (
+                    f"'{channel.name}' stays at its {'largest' if sign > 0 else 'smallest'} value {read[row]:.4g} in "
+                    f"{flat[one.name, sign]:.0%} of its readings; elsewhere it goes "
+                    f"{'higher' if sign > 0 else 'lower'} and never stays"
+                )
+                yield _finding(one, channel, row, what, "a full range or a limit: widen it", "saturated", 2.0)
+
+
+def _climbs(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
+    """A temperature that moves far faster than it does in any other recording, and not by a single reading."""
+    fastest = {one.name: _fastest(*one.known(channel.name)) for one in recordings}
+    for one in recordings:
+        others = [v for name, (v, _) in fastest.items() if name != one.name]
+        if len(others) < 2:
+            continue
+        change, row = fastest[one.name]
+        usual = max(others)
+        if abs(change) > max(_CLIMB, _FASTER * usual):
+            word = "climbs" if change > 0 else "falls"
+            what = f"'{channel.name}' {word} by {abs(change):.3g} K within {_MINUTES / 60:.0f} min, elsewhere by at most {usual:.2g} K"
+            yield _finding(one, channel, row, what, "look at the sensor and its contact", "climbs", 2.0)
+
+
+def _fastest(time: Array, read: Array) -> tuple[float, int]:
+    """Largest lasting change within a few minutes [K], and its first reading."""
+    if read.size < _FEWEST:
+        return 0.0, 0
+    smooth = np.median(np.lib.stride_tricks.sliding_window_view(read, 5), axis=1)
+    stamps = time[2:-2]
+    ahead = np.minimum(np.searchsorted(stamps, stamps + _MINUTES), len(stamps) - 1)
+    ahead = np.maximum(ahead, np.minimum(np.arange(len(stamps)) + 1, len(stamps) - 1))
+    change = smooth[ahead] - smooth
+    row = int(np.argmax(np.abs(change)))
+    return float(change[row]), row + 2
+
+
+def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iterator[Finding]:
+    """Temperatures that agree at a cold start, but for one that agrees elsewhere."""
+    away: dict[tuple[str, str], float] = {}
+    agree: dict[str, float] = {}
+    for one in recordings:
+        first = {}
+        for c in temperatures:
+            if c.name in one.values and c.name not in one.constant and (read := one.known(c.name)[1]).size >= 3:
+                first[c.name] = float(np.median(read[:5]))
+        if len(first) < 3:
+            continue
+        for name, value in first.items():
+            others = np.array([v for n, v in first.items() if n != name])
+            away[one.name, name] = value - float(np.median(others))
+            agree[f"{one.name}|{name}"] = float(np.percentile(others, 90) - np.percentile(others, 10))
+    for one in recordings:
+        for c in temperatures:
+            if (one.name, c.name) not in away:
+                continue
+            here = away[one.name, c.name]
+            elsewhere = np.array([v for (r, n), v in away.items() if n == c.name and r != one.name])
+            siblings = sum(1 for r, _ in away if r == one.name) - 1
+            if elsewhere.size >= 2:
+                middle = float(np.median(elsewhere))
+                spread = 1.4826 * float(np.median(np.abs(elsewhere - middle)))
+                odd = abs(here - middle) > max(_START, _SPREADS * spread, 1.5 * np.ptp(elsewhere))
+                odd = odd and agree[f"{one.name}|{c.name}"] < _START
+            else:
+                odd = siblings >= 5 and abs(here) > _ALONE and agree[f"{one.name}|{c.name}"] < _AGREE
+            if odd:
+                read = one.known(c.name)[1]
+                side = "above" if here > 0 else "below"
+                what = (
+                    f"'{c.name}' starts at {np.median(read[:5]):.3g} degC, {abs(here):.2g} K {side} the other "
+                    f"temperatures, which agree"
+                )
+                yield _finding(one, c, 0, what, "look at the sensor, its unit and its contact", "start", 2.0)
+
+
+def _finding(
+    one: Seen, channel: Channel, row: int, what: str, do: str, kind: str, weight: float
+) -> Finding:
+    return Finding("warning", one.file, one.line(channel.name, row), what, do, kind, channel.name, float(weight))
