@@ -74,6 +74,9 @@ def new(
         bool,
         typer.Option("--again", help="Make model and experiment anew; what you wrote in DIR stays."),
     ] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Do not compare models: write a simple and a discovered one.")
+    ] = False,
     ask: Annotated[
         bool | None, typer.Option("--ask/--no-ask", help="Ask about doubtful guesses [if on a terminal].")
     ] = None,
@@ -101,6 +104,7 @@ def new(
             _asked if asks else None,
             progress,
             again=again,
+            quick=quick,
         )
     for line in lines:
         typer.echo(line)

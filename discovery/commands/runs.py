@@ -14,9 +14,7 @@ def run(
     force: Annotated[
         bool, typer.Option("--force", help="Run although the recordings cannot be used as they are.")
     ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Nothing but the last five lines.")
-    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Nothing but the last five lines.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="What was found as one JSON object on stdout, nothing else.")
     ] = False,

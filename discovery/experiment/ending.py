@@ -62,7 +62,13 @@ class Ending:
 
     def lines(self) -> list[str]:
         """Five lines for the terminal."""
-        return [self._winner(), self._sure(), self._verdict(), self._doubts(), f"next: {self.next}; report: {self.report}"]
+        return [
+            self._winner(),
+            self._sure(),
+            self._verdict(),
+            self._doubts(),
+            f"next: {self.next}; report: {self.report}",
+        ]
 
     def _winner(self) -> str:
         where = f"{len(self.held_out)} held-out recording{'s' * (len(self.held_out) != 1)}"
@@ -105,7 +111,9 @@ class Ending:
             told.append(f"{worst}{rest}")
         if self.guesses:
             named = [
-                f"{name} ({self.hangs_on_guesses[name]:.0%} of the prediction)" if name in self.hangs_on_guesses else name
+                f"{name} ({self.hangs_on_guesses[name]:.0%} of the prediction)"
+                if name in self.hangs_on_guesses
+                else name
                 for name in sorted(self.guesses, key=lambda n: -self.hangs_on_guesses.get(n, 0.0))
             ]
             told.append(f"nobody has confirmed what was guessed of {', '.join(named[:4])}")
@@ -122,7 +130,9 @@ def ending(folder: Path) -> Ending:
     other = order[1] if len(order) > 1 else None
     diagnosis = run.diagnosis if (folder / DIAGNOSIS).exists() else None
     guesses = dict(run.results.get("guessed") or {})
-    rms = {u: float(np.sqrt(np.mean(np.square(v)))) for u, v in rms_by_unit(run, best).items()} if best else {}
+    rms = (
+        {u: float(np.sqrt(np.mean(np.square(v)))) for u, v in rms_by_unit(run, best).items()} if best else {}
+    )
     return Ending(
         best,
         best if helps else None,
@@ -161,7 +171,7 @@ def _next(
         return str(diagnosis["next_experiment"]).rstrip(".")
     if not helps:
         return "record what drives the machine, each input moving on its own"
-    return f"`discovery export {run.folder} --model {best} --to json`, or diagnose it ([mismatch] model = \"{best}\")"
+    return f'`discovery export {run.folder} --model {best} --to json`, or diagnose it ([mismatch] model = "{best}")'
 
 
 def hanging(run: Run, model: str, guesses: Mapping[str, str]) -> dict[str, float]:
@@ -217,5 +227,3 @@ def _without(run: Run, readings: Array, output: str) -> Array:
     known = readings[np.isfinite(readings)]
     first = known[0] if known.size and run.unit(output) in ("°C", "K", "°F", "degC") else 0.0
     return np.asarray(readings - first)
-
-

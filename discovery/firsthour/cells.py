@@ -23,7 +23,7 @@ _NOTHING = frozenset(
 # on, off
 _SWITCHES = (
     "true false,on off,yes no,enabled disabled,active inactive,running stopped,run stop,start stop,open closed,"
-    "opened closed,"
+    "opened closed,open shut,"
     "wahr falsch,ein aus,an aus,ja nein,aktiv inaktiv,auf zu,offen geschlossen,läuft steht,betrieb stillstand,"
     "vrai faux,marche arrêt,marche arret,oui non,ouvert fermé,activé désactivé,"
     "vero falso,acceso spento,sì no,si no,aperto chiuso,verdadero falso,encendido apagado,sí no,abierto cerrado,"
@@ -35,7 +35,7 @@ SWITCHES = {
 }
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _WITH_UNIT = re.compile(
-    r"([-+]?\s*[\d.,' ]*\d[.,]?(?:[eE][-+]?\d+)?)\s*([^\W\d]\S{0,9}|[°%‰\"'][^\d\s]{0,8})"
+    r"([-+]?\s*[\d.,' ]*\d(?:[eE][-+]?\d+)?)\s*([^\W\d]\S{0,9}|[°%‰\"'][^\d\s]{0,8})"
 )
 _LIKE_NUMBER = re.compile(r"[-+]?\s*(\d[\d.,'’\u00a0\u202f ]*|[.,]\d+)([eE][-+]?\d+)?")
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}([,.]\d{3})+")
@@ -131,8 +131,10 @@ def read_numbers(cells: Sequence[str], comma: bool | None) -> Numbers:
             value = math.nan
         values[index] = value
     unit = max(units, key=lambda u: units[u]) if units and sum(units.values()) > len(known) / 2 else ""
-    if wrong is not None and len(strange) == 2 and not np.isfinite(values).any():
-        first, second = strange
+    words = [cell for cell in known if cell in strange or cell.casefold() in SWITCHES]
+    if wrong is not None and len(words) == 2 and all(map(is_empty, known.keys() - set(words))):
+        # one of the two may be known: what is beside "on" is off
+        first, second = sorted(words, key=lambda w: (SWITCHES.get(w.casefold(), 0.5), words.index(w)))
         values = np.array([math.nan if is_empty(c) else float(c == second) for c in cells])
         return Numbers(values, "", None, (first, second))
     return Numbers(values, unit, wrong)

@@ -172,7 +172,7 @@ def value_odds(form: Shape, unit: str | None) -> list[tuple[str, Mapping[str, fl
         found.append(("it starts at zero and answers slowly", {"displacement": 1.5, "temperature": -1.0}))
     if form.low < -0.02 * max(abs(form.high), abs(form.low)):
         found.append(("it goes below zero", {"displacement": 1.0, "correction": 0.5, "speed": -0.5, "flow": -3.0,
-                                             "power": -1.0, "signal": -3.5, "other": 0.3}))  # fmt: skip
+                                             "power": -1.0, "signal": -5.0, "other": 0.3}))  # fmt: skip
     if form.high >= 200.0 and form.whole and form.jump > 0.05:
         found.append((f"whole numbers up to {form.high:.0f}", {"speed": 1.5, "power": 0.5}))
     if form.high > _STEPS:

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 Hints = Mapping[str, Sequence[tuple[str, Mapping[str, float]]]]
 
 SURE = 0.9  # probability below which a guess is asked about
+_SENT = 0.85  # that what a controller sends is what heats
 _NEXT = 0.02  # of an answer worth offering
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
 CURRENTS, VOLTAGES = ("A", "mA", "kA"), ("V", "mV", "kV")
@@ -84,6 +85,8 @@ def guess(column: Column, hints: Sequence[tuple[str, Mapping[str, float]]] = ())
     role, chance = next(iter(roles.items()))
     rivals = tuple((other, p) for other, p in roles.items() if other != role and p > _NEXT)
     why = found.why(role)
+    if found.quantity() == "signal":  # what a controller sends may heat, or not
+        chance = min(chance, _SENT)
     one = Guess(role, "1", why, chance, rivals=rivals, quantity=found.quantity())
     if unit is not None:
         return _with_unit(one, unit, named is not None, column.unit)

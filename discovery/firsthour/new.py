@@ -32,6 +32,7 @@ def new(
     progress: Progress = silent,
     *,
     again: bool = False,
+    quick: bool = False,
 ) -> list[str]:
     """Write recordings, ``campaign.toml``, models and ``experiment.toml`` into a folder.
 
@@ -44,6 +45,7 @@ def new(
         room: column that stands for the air around the machine.
         ask: asks a person about doubtful guesses; without, they are marked in the campaign file.
         again: the folder is there already; what a person wrote in it stays.
+        quick: models are written without comparing them.
 
     Returns:
         Lines that say what was guessed, why, and what comes next.
@@ -62,7 +64,7 @@ def new(
     if joins and len(joins) != len(sources):
         raise UsageError(f"{len(sources)} --from and {len(joins)} --join: say one --join for each --from")
     if not sources:
-        return _planned_again(folder, progress)
+        return _planned_again(folder, progress, quick=quick)
     said, clock = read_statements(statements)
     progress("reading the files")
     tables = [table for source in sources for table in read_tables(Path(source))]
@@ -89,7 +91,7 @@ def new(
             write_atomic(temporary / f"{name}.csv", csv_text(table))
         text = campaign_text(folder.resolve().name, found, guesses, air, about_room, kept)
         write_atomic(temporary / "campaign.toml", text)
-        made = plan(temporary, folder.resolve().name, names, progress)
+        made = plan(temporary, folder.resolve().name, names, progress, quick=quick)
         folder.mkdir(parents=True, exist_ok=True)
         for name in found.recordings:
             (temporary / f"{name}.csv").replace(folder / f"{name}.csv")
@@ -106,7 +108,7 @@ def new(
     ]
 
 
-def _planned_again(folder: Path, progress: Progress) -> list[str]:
+def _planned_again(folder: Path, progress: Progress, *, quick: bool) -> list[str]:
     """Models and experiment of a campaign whose roles a person has corrected."""
     campaign = read_toml(folder / "campaign.toml", CampaignForm)
     names = list(campaign.recordings)
@@ -114,15 +116,14 @@ def _planned_again(folder: Path, progress: Progress) -> list[str]:
     if before is not None:
         names = [*(n for n in names if n not in before.held_out), *(n for n in names if n in before.held_out)]
     with beside(folder) as temporary:
-        for name, recording in campaign.recordings.items():
+        for recording in campaign.recordings.values():
             source = (folder / recording.file).resolve()
             if source.is_file():
                 target = temporary / recording.file
                 target.parent.mkdir(parents=True, exist_ok=True)
                 target.symlink_to(source)
-            del name
         (temporary / "campaign.toml").write_text((folder / "campaign.toml").read_text("utf-8"), "utf-8")
-        made = plan(temporary, folder.resolve().name, names, progress)
+        made = plan(temporary, folder.resolve().name, names, progress, quick=quick)
         notes = rewrite(folder, made)
     return [*made.said, *notes, "", *_next(folder, {}, None)]
 

@@ -38,14 +38,14 @@ class Plan:
 
 
 def plan(
-    folder: Path, title: str, names: Sequence[str], progress: Progress = silent, outputs: Sequence[str] = ()
+    folder: Path, title: str, names: Sequence[str], progress: Progress = silent, *, quick: bool = False
 ) -> Plan:
     """First models and the experiment of the campaign in a folder; the last of the named recordings is unseen.
 
     Args:
         folder: holds campaign.toml and the recordings; trial models are written into it. title: of the experiment.
         names: recordings, the last one held out.
-        outputs: default the errors, else the temperatures, without those that never move.
+        quick: models are not compared: a simple one and a discovered one are written.
 
     Raises:
         UserError: a mistake in the campaign, or nothing that could be an output.
@@ -54,7 +54,7 @@ def plan(
     campaign = load_campaign(folder, only=names[:-1] or names)
     fit = list(campaign.recordings)
     guesses = {name: _as_guess(name, one, campaign, fit) for name, one in form.channels.items()}
-    outputs = list(outputs) or measured(campaign, fit)
+    outputs = measured(campaign, fit)
     room = next((n for n, one in guesses.items() if one.role == "ambient temperature"), None)
     progress("looking for what drives the outputs")
     # a constant drives no error
@@ -71,8 +71,10 @@ def plan(
         for name, entry in CANDIDATES.items()
         if drivers or "INPUTS" not in entry
     }
-    write_atomic(folder / "experiment.toml", experiment_text(title, names, outputs, lines, None, ()))
-    scores = choose(load_experiment(folder / "experiment.toml"), progress)
+    trial = experiment_text(title, [*fit, ""], outputs, lines, None, ()).replace('held_out = [""]', "held_out = []")
+    write_atomic(folder / "experiment.toml", trial)
+    experiment = load_experiment(folder / "experiment.toml")  # whatever is wrong with it is said now
+    scores = [] if quick else choose(experiment, progress)
     return _decided(title, names, outputs, scores, lines, files, campaign, guesses, fit)
 
 
@@ -115,6 +117,8 @@ def _decided(
     guesses: Mapping[str, Guess],
     fit: Sequence[str],
 ) -> Plan:
+    if not scores:
+        return _unchosen(title, names, outputs, lines, files)
     helping = [one.name for one in scores if one.helps]
     told = [f"{one.name} {one.ratio:.0%}" for one in scores]
     how = "parts of it" if len(fit) == 1 else "recordings"
@@ -144,6 +148,19 @@ def _decided(
     content = {file: head + text for file, text in kept.items()}
     content["experiment.toml"] = experiment_text(title, names, outputs, models, mismatch, remarks)
     return Plan(content, tuple(scores), tuple(said), models, mismatch)
+
+
+def _unchosen(
+    title: str, names: Sequence[str], outputs: Sequence[str], lines: Mapping[str, str], files: Mapping[str, str]
+) -> Plan:
+    """The simple model and a discovered one, not compared."""
+    models = {name: lines[name].replace(", bootstraps = 0", "") for name in ("first_order", "discovered")}
+    remarks = ["Not compared (--quick): `discovery new DIR --again` chooses by what each predicts."]
+    content = {
+        "model.toml": "# Written by `discovery new`.\n" + files["model.toml"],
+        "experiment.toml": experiment_text(title, names, outputs, models, "first_order", remarks),
+    }
+    return Plan(content, (), (), models, "first_order")
 
 
 def missing(

@@ -12,12 +12,12 @@ from discovery.errors import UserError
 from discovery.firsthour.clocks import bookkeeping, tells_time
 from discovery.firsthour.evidence import is_set_point_word
 from discovery.firsthour.filenames import constants, file_hints
-from discovery.firsthour.guess import TEMPERATURES, Guess, guess_all
+from discovery.firsthour.guess import TEMPERATURES, Guess, guess, guess_all
 from discovery.firsthour.measures import DEGREES, TIME_UNITS, known_unit
 from discovery.firsthour.odds import probabilities
 from discovery.firsthour.stamps import stated_interval
 from discovery.firsthour.table import Array, Column, OwnTable
-from discovery.firsthour.vocabulary import words_of
+from discovery.firsthour.vocabulary import SET_POINT, words_of
 from discovery.recordings.timeunit import time_odds
 from discovery.recordings.units import UnitError, conversion
 
@@ -53,7 +53,7 @@ def recorded(tables: Sequence[OwnTable], time_unit: str | None = None) -> Record
     Raises:
         UserError: files that have nothing in common, or of which nothing is left.
     """
-    recordings = _same_units(_named(tables))
+    recordings = _same_units(_recordings(tables))
     recordings, clock, notes = _counted(recordings, time_unit)
     names, runs = list(recordings), list(recordings.values())
     common, left = _common(runs)
@@ -119,7 +119,7 @@ def _stem(run: OwnTable) -> str:
     return run.path.name.removesuffix(".gz").rsplit(".", 1)[0] + (f" {run.name}" if run.name else "")
 
 
-def _named(tables: Sequence[OwnTable]) -> dict[str, OwnTable]:
+def _recordings(tables: Sequence[OwnTable]) -> dict[str, OwnTable]:
     if len(tables) == 1:
         split = round(_LAST_THIRD * len(tables[0].time))
         return {"first_part": _cut(tables[0], slice(split)), "last_part": _cut(tables[0], slice(split, None))}
@@ -217,7 +217,7 @@ def _says_nothing(
     column: Column, one: Guess, of_runs: Sequence[tuple[Array, Array]], *, has_load: bool
 ) -> str:
     """Why a column is left out, or ""."""
-    role = one.role
+    role = _named(column)
     if all(tells_time(column.header, column.unit, values, time, role) for time, values in of_runs):
         return "is a clock, in exact proportion to the time: left out (if not, name its unit in the header)"
     electric = any(word.gloss in _ELECTRIC for word in words_of(column.header))
@@ -225,15 +225,21 @@ def _says_nothing(
     books = [bookkeeping(column.header, unit, values, time, role) for time, values in of_runs]
     if all(books):
         return f"{books[0]}: left out" + ("" if column.unit else " (if not, name its unit in the header)")
-    if is_set_point_word(column.header) and role in TEMPERATURES:
+    bare = all(word.gloss == SET_POINT for word in words_of(column.header)) and not column.unit
+    if is_set_point_word(column.header) and (one.role in TEMPERATURES or bare):
         if never_moves(column):
             return "is a set point that never moves: left out"
         if has_load:
             return "is a set point, no measurement: left out"
     if not np.isfinite(column.values).any():
         return "holds nothing in what is fitted: left out"
-    inputs = role == "other input" or (role not in TEMPERATURES and role != "error" and not one.sure)
+    inputs = one.role == "other input" or (one.role not in TEMPERATURES and one.role != "error" and not one.sure)
     return "never moves: left out" if inputs and never_moves(column) else ""
+
+
+def _named(column: Column) -> str:
+    """The role that name and unit say, whatever the values are."""
+    return guess(replace(column, values=np.zeros(0))).role
 
 
 def _joined(column: Column, runs: Sequence[OwnTable]) -> Column:

@@ -288,10 +288,12 @@ def _body(
     for index, (line, cells) in enumerate(lines.cut(first), start=first):
         if len(cells) == spare and (spare < width or not cells[-1]):
             cells = cells[:width] if spare > width else [*cells, ""]
-        if len(cells) != width or (len(lines) - index <= _TRAILER and not _is_data(cells)):
+        last = len(lines) - index <= _TRAILER and index > first + FEWEST
+        if len(cells) != width or (last and not _is_data(cells) and holds_word(cells[0])):
+            cut_off = index == len(lines) - 1 and len(cells) < width
             if cells[:width] == header[:width]:
                 again += 1
-            elif len(lines) - index <= _TRAILER and index > first + FEWEST:
+            elif last and (cut_off or not _is_data(cells)):
                 trailer.append(line)
             elif ragged is None:
                 ragged = line, len(cells)
@@ -316,7 +318,8 @@ def _body(
         store()
     notes = [f"{again} rows repeat the header: left out"] if again else []
     if trailer:
-        notes.append(f"line {trailer[0]} and {len(trailer) - 1} more below the readings are left out")
+        rest = f" and {len(trailer) - 1} more" if trailer[1:] else ""
+        notes.append(f"line {trailer[0]}{rest} below the readings: left out")
     return (
         tuple(map(pa.chunked_array, chunks)) if numbers else (),
         np.array(numbers, dtype=np.int64),

@@ -115,7 +115,7 @@ def experiment_text(
     """Text of ``experiment.toml``: the last recording is held out.
 
     Args:
-        models: lines of [models], by name.
+        names: the last one is held out. models: lines of [models], by name.
         mismatch: the model to diagnose, if any.
         remarks: how the models were chosen.
     """

@@ -56,7 +56,7 @@ def load_odds(form: Shape, *, signal: bool) -> dict[str, float]:
     if form.low >= -1e-9 and 10.0 < form.high <= 100.0:
         odds["percent"] += 2.5 + (1.0 if form.high == 100.0 else 0.0)
     else:
-        odds["percent"] -= 4.0 if form.low < -100.0 or form.high > 101.0 else 1.0
+        odds["percent"] -= 4.0 if form.low < -1e-9 or form.high > 101.0 else 1.0
     if signal:
         odds["W"] -= 4.0
         odds["kW"] -= 4.0

@@ -69,10 +69,10 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     ("probe", {"displacement": 3}, "probe shift eddy ~プローブ"),
     (
         "correction",
-        {"correction": 6},
+        {"correction": 9, "displacement": -1},
         "corr ~correction comp ~compensation ~korrektur ~kompensation ~補正 ~补偿 applied ~correzione",
     ),
-    ("offset", {"correction": 5}, "offset offsets"),
+    ("offset", {"correction": 7}, "offset offsets"),
     ("height", {"nozzle height": 6}, "h_nozzle nozzle_height ~duesenhoehe nozzle_h ~ノズル高さ"),
     ("side", {"nozzle side": 6}, "nozzle_side side_nozzle ~duesenseite"),
     (
@@ -80,7 +80,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         {"flow": 6},
         "flow ~flow_rate ~durchfluss ~volumenstrom ~volume_stream ~流量 ~유량 debit ~portata ~caudal ~расход",
     ),
-    ("pump", {"flow": 5}, "pump ~pumpe pumps ~ポンプ ~泵 ~펌프 pompe ~pompa bomba ~насос"),
+    ("pump", {"flow": 6}, "pump ~pumpe pumps ~ポンプ ~泵 ~펌프 pompe ~pompa bomba ~насос"),
     (
         "speed",
         {"speed": 7},
@@ -111,7 +111,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     ),
     (
         "duty",
-        {"signal": 5},
+        {"signal": 6},
         "duty dutycycle duty_cycle pwm ssr ~stellgroesse ~stellgrad ~stellwert ~stellung control "
         "controller valve ~ventil ~操作量 ~バルブ u mv",
     ),
@@ -174,11 +174,12 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "ext external surrounding surroundings ~aussen ~外気 ~周囲 ~环境 ~環境 ~室外 ambiant ambiante ambiental ambiente ~주변 "
         "exterieur esterno exterior ta taussen",
     ),
+    ("air", {"air": 7.5, "temperature": 1.5}, "air hall ~halle ~hallen ~luft shop workshop ~車間 ~车间 ~工場"),
     (
         "room",
         {"air": 7, "temperature": 1.5},
-        "air hall room ~raum ~raeume ~halle ~hallen ~室温 ~室内 ~車間 ~车间 ~工場 ~실내 "
-        "salle atelier officina stanza sala cabinet ~luft shop workshop lab ~labor chamber ~kammer ~チャンバ ~恒温室",
+        "room ~raum ~raeume ~室温 ~室内 ~실내 "
+        "salle atelier officina stanza sala cabinet lab ~labor chamber ~kammer ~チャンバ ~恒温室",
     ),
     (
         "fluid",

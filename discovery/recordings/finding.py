@@ -73,7 +73,9 @@ def folded(findings: Sequence[Finding]) -> list[str]:
 
 def _line(group: Sequence[Finding]) -> str:
     first = group[0]
-    channels = list(dict.fromkeys(one.channel for one in group if one.channel and one.channel != first.channel))
+    channels = list(
+        dict.fromkeys(one.channel for one in group if one.channel and one.channel != first.channel)
+    )
     files = list(dict.fromkeys(one.file.name for one in group if one.file != first.file))
     told = []
     if channels:

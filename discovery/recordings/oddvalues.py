@@ -26,6 +26,7 @@ _USUAL = 6.0  # times the steps that one in ten exceeds
 _AGREE = 0.3  # of that distance: what the neighbours differ by
 # so far away that nothing but a fault explains it: such a reading is left out on loading
 _IMPOSSIBLE = {"degC": 30.0, "um": 100.0, "um/m": 100.0}
+_SOME = 3  # readings that are none: no slip any more
 _MANY, _MANY_SHARE = 5, 0.01  # so many lone readings, or such a share of all, pull at a fit
 _ZERO = 15.0  # median steps that a reading falls to be exactly zero
 _STEP = 12.0  # times the largest of the steps around it: a jump, not a response
@@ -45,12 +46,12 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         told = np.flatnonzero((read < limits.usual[0]) | (read > limits.usual[1]))
     words = np.setdiff1d(words, told)
     yield from _told(file, lines[known], channel, read, words, "no reading but a logger's word for nothing",
-                     "empty these cells", "sentinel", severity="error", weight=5.0)  # fmt: skip
+                     "empty these cells", "sentinel", weight=5.0)  # fmt: skip
     if channel.role not in _SENSORS or known.size < FEW:
         return
     zeros = np.setdiff1d(_zeros(read), words)
     yield from _told(file, lines[known], channel, read, zeros, "exactly zero between readings far from it",
-                     "empty the cells where nothing was measured", "zeros", severity="error", weight=4.0)  # fmt: skip
+                     "empty the cells where nothing was measured", "zeros", weight=4.0)  # fmt: skip
     lone = np.setdiff1d(lone_readings(read), [*words, *zeros, *told])
     left_out = np.intersect1d(lone, impossible_readings(channel, read)).size
     if left_out or lone.size >= max(_MANY, _MANY_SHARE * read.size):
@@ -65,7 +66,9 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
     if not channel.measured:  # the air may jump: a door
         return
     for row in _steps(read, np.unique(np.concatenate((words, zeros, lone, told)))):
-        what = f"'{channel.name}' jumps from {read[row]:g} to {read[row + 1]:g} {channel.unit} and stays there"
+        what = (
+            f"'{channel.name}' jumps from {read[row]:g} to {read[row + 1]:g} {channel.unit} and stays there"
+        )
         do = "a sensor that moved, or a new zero: split the recording there"
         yield Finding("warning", file, int(lines[known[row + 1]]), what, do, "step", channel.name, 2.0)
 
@@ -111,7 +114,9 @@ def _logger_words(read: Array) -> Lines:
             continue
         rest = np.delete(read, rows)
         rest = rest[~np.isin(rest, _WORDS)]
-        if rest.size and min(abs(word - rest.min()), abs(word - rest.max())) > _APART * max(float(np.ptp(rest)), 1.0):
+        if rest.size and min(abs(word - rest.min()), abs(word - rest.max())) > _APART * max(
+            float(np.ptp(rest)), 1.0
+        ):
             found.append(rows)
     return np.unique(np.concatenate(found))
 
@@ -156,13 +161,12 @@ def _told(
     do: str,
     kind: str,
     *,
-    severity: str,
     weight: float,
 ) -> Iterator[Finding]:
     if rows.size:
         what = f"'{channel.name}' is {read[rows[0]]:g}, {why}"
         yield Finding(
-            "error" if severity == "error" else "warning",
+            "error" if rows.size >= _SOME else "warning",
             file,
             int(lines[rows[0]]),
             what + more(rows.size),

@@ -46,4 +46,6 @@ def _disagreement(seen: Seen, one: Disagreement) -> Finding:
     proof = f"undone, it agrees with the other recordings: misfit {one.before:.0%} -> {one.after:.0%}"
     channel = repair.channels[0] if repair.channels else ""
     weight = _WEIGHTS.get(repair.kind, 2.0)
-    return Finding(severity, seen.file, None, f"{repair.what} ({proof})", repair.do, repair.kind, channel, weight)
+    return Finding(
+        severity, seen.file, None, f"{repair.what} ({proof})", repair.do, repair.kind, channel, weight
+    )

@@ -24,7 +24,11 @@ _TAIL = 3.0  # robust standard deviations beyond which a second difference is a 
 
 def copied_channels(one: Seen, channels: Mapping[str, Channel]) -> Iterator[Finding]:
     """Errors that stand once more among the inputs, and channels recorded twice."""
-    names = [n for n, c in channels.items() if n in one.values and n not in one.constant and c.role != "applied correction"]
+    names = [
+        n
+        for n, c in channels.items()
+        if n in one.values and n not in one.constant and c.role != "applied correction"
+    ]
     for k, a in enumerate(names):
         for b in names[k + 1 :]:
             if not (channels[a].measured or channels[b].measured):
@@ -45,7 +49,9 @@ def copied_channels(one: Seen, channels: Mapping[str, Channel]) -> Iterator[Find
                 yield Finding("warning", one.file, None, what, do, "copy", other, 1.0)
 
 
-def near_copies(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -> Iterator[tuple[str, str, str]]:
+def near_copies(
+    recordings: Sequence[Seen], channels: Mapping[str, Channel]
+) -> Iterator[tuple[str, str, str]]:
     """Pairs of recordings that share their noise: names, and the channel that shows it."""
     measured = [n for n, c in channels.items() if c.measured]
     series = {

@@ -23,6 +23,9 @@ _CLIMB = 8.0  # K within a few minutes, at least
 _FLAT = 0.02  # of the readings at the largest value: a range that is full
 _LOWER = 0.97  # of what the other recordings reach
 _MINUTES = 360.0  # s
+_APART = 2.0  # times the usual spread: another level
+_STILL, _LINE = 0.1, 0.8  # of the recording; correlation elsewhere
+_RELATED = 0.5  # of what a channel moves: what a straight line of its sibling leaves
 
 
 def level_findings(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -> Iterator[Finding]:
@@ -35,6 +38,9 @@ def level_findings(recordings: Sequence[Seen], channels: Mapping[str, Channel]) 
         if channel.unit == "degC":
             yield from _climbs(having, channel)
     yield from _starts(recordings, [c for c in channels.values() if c.unit == "degC"])
+    inputs = [c for c in channels.values() if c.is_input]
+    yield from _exchanged(recordings, inputs)
+    yield from _stuck(recordings, inputs)
 
 
 def _noise(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
@@ -49,7 +55,9 @@ def _noise(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
             times = found[one.name] / usual
             where = "than in the other recordings" if others else "than the campaign says"
             what = f"'{channel.name}' is {times:.2g} times noisier {where} ({found[one.name]:.2g} {channel.unit})"
-            yield _finding(one, channel, 0, what, "look at its cable, range and filter", "noise", np.log(times))
+            yield _finding(
+                one, channel, 0, what, "look at its cable, range and filter", "noise", np.log(times)
+            )
 
 
 def _resolution(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
@@ -140,7 +148,11 @@ def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iter
     for one in recordings:
         first = {}
         for c in temperatures:
-            if c.name in one.values and c.name not in one.constant and (read := one.known(c.name)[1]).size >= 3:
+            if (
+                c.name in one.values
+                and c.name not in one.constant
+                and (read := one.known(c.name)[1]).size >= 3
+            ):
                 first[c.name] = float(np.median(read[:5]))
         if len(first) < 3:
             continue
@@ -172,7 +184,104 @@ def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iter
                 yield _finding(one, c, 0, what, "look at the sensor, its unit and its contact", "start", 2.0)
 
 
-def _finding(
-    one: Seen, channel: Channel, row: int, what: str, do: str, kind: str, weight: float
-) -> Finding:
-    return Finding("warning", one.file, one.line(channel.name, row), what, do, kind, channel.name, float(weight))
+def _exchanged(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Finding]:
+    """Two inputs that stand at each other's level, or whose relation fits when they are exchanged."""
+    for k, a in enumerate(inputs):
+        for b in inputs[k + 1 :]:
+            if (a.unit == "degC") != (b.unit == "degC"):
+                continue
+            both = {
+                one.name: pair for one in recordings if (pair := _together(one, a.name, b.name)) is not None
+            }
+            for one in recordings:
+                others = [pair for name, pair in both.items() if name != one.name]
+                if one.name not in both or len(others) < 2:
+                    continue
+                if _levels_exchanged(both[one.name], others) or _relation_exchanged(both[one.name], others):
+                    what = (
+                        f"'{a.name}' and '{b.name}' look swapped: each stands where the other does elsewhere"
+                    )
+                    yield Finding(
+                        "warning", one.file, None, what, "look at their columns", "swap", a.name, 6.0
+                    )
+
+
+def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Finding]:
+    """An input that keeps one value while another one, with which it moves elsewhere, goes on: frozen or full."""
+    for b in inputs:
+        for a in inputs:
+            if a.name == b.name or (a.unit == "degC") != (b.unit == "degC"):
+                continue
+            both = {
+                one.name: pair for one in recordings if (pair := _together(one, a.name, b.name)) is not None
+            }
+            for one in recordings:
+                others = [pair for name, pair in both.items() if name != one.name]
+                if one.name not in both or len(others) < 2 or not _related(others):
+                    continue
+                x, y = both[one.name]
+                values, counts = np.unique(y, return_counts=True)
+                value = float(values[np.argmax(counts)])
+                still = y == value
+                goes_on = float(np.std(x[still])) / (float(np.std(x)) or 1.0)
+                usual = max((_goes_on(o) for o in others), default=0.0)
+                if still.mean() > _STILL and goes_on > 0.4 and usual < 0.5 * goes_on:
+                    what = (
+                        f"'{b.name}' stays at {value:.4g} in {still.mean():.0%} of the recording while '{a.name}', with "
+                        "which it moves elsewhere, goes on"
+                    )
+                    do = "frozen, or at the end of its range: look at the sensor"
+                    yield Finding("warning", one.file, None, what, do, "stuck", b.name, 3.0)
+
+
+def _goes_on(pair: Array) -> float:
+    """How much one channel moves while the other keeps its most frequent value."""
+    values, counts = np.unique(pair[1], return_counts=True)
+    still = pair[1] == values[np.argmax(counts)]
+    return float(np.std(pair[0][still])) / (float(np.std(pair[0])) or 1.0)
+
+
+def _related(others: Sequence[Array]) -> bool:
+    """Whether one channel is nearly a straight line of the other in every recording."""
+    return all(abs(float(np.corrcoef(o)[0, 1])) > _LINE for o in others)
+
+
+def _together(one: Seen, a: str, b: str) -> Array | None:
+    """Values of two channels where both are known, (2, N); None where one does not move or is a switch."""
+    if a not in one.values or b not in one.values or {a, b} & one.constant:
+        return None
+    pair = np.array([one.values[a], one.values[b]])
+    pair = pair[:, np.isfinite(pair).all(axis=0)]
+    moves = pair.shape[1] >= _FEWEST and all(np.unique(row).size > 2 for row in pair)
+    return pair if moves else None
+
+
+def _levels_exchanged(pair: Array, others: Sequence[Array]) -> bool:
+    middle = np.array([np.median(other, axis=1) for other in others])
+    usual, spread = np.median(middle, axis=0), np.ptp(middle, axis=0)
+    inside = np.median([np.percentile(o, 75, axis=1) - np.percentile(o, 25, axis=1) for o in others], axis=0)
+    size = np.maximum(np.maximum(spread, inside), 1e-3 * np.abs(usual) + 1e-9)
+    here = np.median(pair, axis=1)
+    now, exchanged = np.abs(here - usual) / size, np.abs(here[::-1] - usual) / size
+    return bool((now > _APART).all() and (exchanged < 1.0).all())
+
+
+def _relation_exchanged(pair: Array, others: Sequence[Array]) -> bool:
+    """One channel as a straight line of the other, fitted to the other recordings."""
+    for x, y in ((0, 1), (1, 0)):
+        slope, zero = np.polyfit(
+            np.concatenate([o[x] for o in others]), np.concatenate([o[y] for o in others]), 1
+        )
+        size = float(np.median([np.std(o[y]) for o in others])) or 1e-12
+        usual = max(float(np.sqrt(np.mean((o[y] - slope * o[x] - zero) ** 2))) for o in others) / size
+        now = float(np.sqrt(np.mean((pair[y] - slope * pair[x] - zero) ** 2))) / size
+        exchanged = float(np.sqrt(np.mean((pair[x] - slope * pair[y] - zero) ** 2))) / size
+        if usual < _RELATED and now > _APART * usual and exchanged < 1.2 * usual:
+            return True
+    return False
+
+
+def _finding(one: Seen, channel: Channel, row: int, what: str, do: str, kind: str, weight: float) -> Finding:
+    return Finding(
+        "warning", one.file, one.line(channel.name, row), what, do, kind, channel.name, float(weight)
+    )

@@ -69,6 +69,8 @@ def units(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
     """A channel in another unit than the campaign says, or a decimal point that slipped."""
     for name in _moving(one, [*inputs, *outputs]):
         channel, values = channels[name], one.values[name]
+        if _is_switch(values):
+            continue
         if channel.unit == "degC":
             for unit, factor, offset in _SCALES:
                 what, do = f"'{name}' looks like {unit} read as degC", f'say unit = "{unit}", or convert it'
@@ -89,7 +91,7 @@ def signs(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
     """A channel with the other sign; a switch the other way round."""
     for name in _moving(one, [*inputs, *outputs]):
         values = one.values[name]
-        if np.isin(values[np.isfinite(values)], (0.0, 1.0)).all():
+        if _is_switch(values):
             what, do = f"'{name}' is 1 where it should be 0", "turn the switch round"
             yield Repair("sign", (name,), what, do, one.having({name: 1.0 - values}))
         elif channels[name].unit != "degC":
@@ -117,6 +119,14 @@ def shifted(one: Seen, group: Sequence[str], seconds: float) -> Repair:
     return Repair("shift", tuple(group), what, "look at the clock of its logger", one.having(moved))
 
 
+def drifting(one: Seen, name: str, per_second: float) -> Repair:
+    """An output that creeps away by so much a second."""
+    whole = per_second * float(one.time[-1])
+    made = one.values[name] - per_second * one.time
+    what = f"'{name}' drifts by {whole:.3g} over the recording, which nothing that was recorded explains"
+    return Repair("drift", (name,), what, "look at its zero and its holder", one.having({name: made}))
+
+
 def shiftable(
     one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]
 ) -> list[tuple[str, ...]]:
@@ -139,6 +149,8 @@ def halves(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequen
     length = float(one.time[-1])
     for name in _moving(one, [*outputs, *inputs]):
         values, channel = one.values[name], channels[name]
+        if _is_switch(values):
+            continue
         changes: list[tuple[str, float, float]] = []
         if channel.unit == "degC":
             changes = [("is in Fahrenheit", 5 / 9, -160 / 9)]
@@ -167,6 +179,10 @@ def _moving(one: Seen, names: Sequence[str]) -> list[str]:
 def _moves(values: Array) -> bool:
     known = values[np.isfinite(values)]
     return bool(known.size and known.min() < known.max())
+
+
+def _is_switch(values: Array) -> bool:
+    return bool(np.isin(values[np.isfinite(values)], (0.0, 1.0)).all())
 
 
 def _moved(time: Array, values: Array, seconds: float) -> Array:
