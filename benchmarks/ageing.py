@@ -1,22 +1,24 @@
-"""Thirty days of an ageing virtual machine: losses fall, a gap widens; the error left with and without
-updating.
+"""Does `discovery update` say what happened? Unchanged machines, wear, a faulty sensor, and new physics.
 
-    python benchmarks/ageing.py [days] [seed]
+    python benchmarks/ageing.py [first seed] [recordings]
 
-Every day is a random cycle of 24 h. An update sees six readings of a day (one about every four hours); the
-error is judged on all the other readings of the *next* day, which no update has seen yet.
+Part one: recordings of an unchanged machine, each compared alone: how many would write a revision. Part two:
+the five cases of an outside review, three recordings of 72 h each, with all readings and with eight a day.
+Part three: days on which losses fall by 1 % each, an update every day with eight readings since the last
+revision; the error is judged on all readings of the next day, which no update has seen.
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discovery.dynamics.system import predict as model_outputs
 from discovery.export.document import Exported, from_document, render
@@ -26,95 +28,142 @@ from discovery.fitting import fit_model, predict_recording
 from discovery.models import Model
 from discovery.models.modelfile import read_model
 from discovery.recordings import Campaign, Recording, load_campaign
-from discovery.runtime.belief import belief_of, residual_levels, update_belief
-from discovery.runtime.update import next_revision
+from discovery.runtime.hypotheses import compare
+from discovery.runtime.update import revision_of
+from discovery.virtual.effects import Request
 from discovery.virtual.machine import Machine
 from discovery.virtual.record import Order, take
 
 DATA = Path(__file__).parents[1] / "datasets" / "nmv5000"
 ERRORS = ("E_Y0C", "E_Z0T", "E_R0T", "E_A0C")
+Values = dict[str, NDArray[np.float64]]
 
 
-def aged(day: int) -> Machine:
-    """Losses that reach the bodies fall by 1 % a day, the gap between C-Body 1 and B-Body 1 conducts 1.5 %
-    more.
-    """
+def worn(share: float) -> Machine:
+    """Losses that reach the bodies, as a share of those of a new machine."""
     fresh = Machine()
-    loss = 1.0 - 0.01 * day
     return fresh._replace(
-        friction_share=tuple(loss * share for share in fresh.friction_share),
-        motor_share=tuple(loss * share for share in fresh.motor_share),
-        G_c1_b1=fresh.G_c1_b1 * (1.0 + 0.015 * day),
+        friction_share=tuple(share * s for s in fresh.friction_share),
+        motor_share=tuple(share * s for s in fresh.motor_share),
     )
 
 
-def day_of(campaign: Campaign, day: int, machine: Machine, seed: int, few: bool) -> Campaign:
-    """A day on the machine; `few`: only six of its readings."""
-    columns = take(Order(f"day_{day}", "fit", seed + day, 24.0, machine=machine)).columns
-    values = {name: series for name, series in columns.items() if name != "time"}
-    read = np.flatnonzero(np.isfinite(values[ERRORS[0]]))
-    if few:
-        chosen = np.concatenate([read[:1], read[len(read) // 6 :: len(read) // 6]])[:6]
-        for name in ERRORS:
-            values[name] = np.where(np.isin(np.arange(len(columns["time"])), chosen), values[name], np.nan)
-    recording = Recording(f"day_{day}", columns["time"], values)
-    return replace(campaign, recordings={recording.name: recording})
+def recorded(
+    campaign: Campaign,
+    count: int,
+    hours: float,
+    seed: int,
+    *,
+    plant: Machine | None = None,
+    effects: tuple[Request, ...] = (),
+    readings: int | None = None,
+    spoil: Callable[[Values], None] = lambda _: None,
+    cycle: str = "fit",
+) -> Campaign:
+    """Recordings of a machine; `readings`: so many a day, None: all (every 10 to 15 min)."""
+    found = {}
+    for k in range(count):
+        order = Order(f"r{k}", cycle, seed + k, hours, machine=plant or Machine(), effects=effects)
+        columns = take(order).columns
+        values = {name: series.copy() for name, series in columns.items() if name != "time"}
+        if readings is not None:
+            read = np.flatnonzero(np.isfinite(values[ERRORS[0]]))
+            chosen = read[np.linspace(0, len(read) - 1, round(readings * hours / 24.0)).astype(int)]
+            for name in ERRORS:
+                keep = np.isin(np.arange(len(columns["time"])), chosen)
+                values[name] = np.where(keep, values[name], np.nan)
+        spoil(values)
+        found[f"r{k}"] = Recording(f"r{k}", columns["time"], values)
+    return replace(campaign, recordings=found)
 
 
-def error_left(model: Model, campaign: Campaign, name: str) -> float:
+def sealed(model: Model, campaign: Campaign) -> Exported:
+    """The fitted model, as a runtime reads it."""
+    return from_document(*open_seal(render(make_document(model, campaign, ["fit"])), "model"), "model")
+
+
+def unchanged(exported: Exported, campaign: Campaign, first: int, count: int) -> None:
+    """How often an unchanged machine would be changed."""
+    for title, hours, readings, cycle in (
+        ("24 h, eight readings", 24.0, 8, "fit"),
+        ("24 h, all readings", 24.0, None, "fit"),
+        ("72 h, all readings, other cycle", 72.0, None, "validation"),
+    ):
+        verdicts: Counter[str] = Counter()
+        most = -np.inf
+        for k in range(count):
+            one = recorded(campaign, 1, hours, first + k, readings=readings, cycle=cycle)
+            found = compare(exported, one, ["r0"])
+            verdicts[found.verdict] += 1
+            most = max(most, *(v for n, v in found.odds.items() if n != "nothing"))
+        print(f"unchanged, {title}: {dict(verdicts)} of {count}; largest log odds {most:.1f}", flush=True)
+
+
+def cases(exported: Exported, campaign: Campaign, seed: int) -> None:
+    """The five cases of the review."""
+
+    def warm(values: Values) -> None:
+        values["T_env"] = values["T_env"] + 1.5
+
+    fresh = Machine()
+    fan = fresh._replace(air=tuple(a * 1.6 for a in fresh.air))
+    gap = (Request("flooded_gap", 25.0, ("c_body_1", "b_body_1")),)
+    hysteresis = (Request("cooling_hysteresis", 1.5, ("c_body_2",)),)
+    for readings in (None, 8):
+        given = "all readings" if readings is None else f"{readings} readings a day"
+        for title, options in (
+            ("flooded gap 25 W/K", {"effects": gap}),
+            ("fan, air +60 %", {"plant": fan}),
+            ("room sensor +1.5 K", {"spoil": warm}),
+            ("hysteresis 1.5 K", {"effects": hysteresis}),
+            ("wear, losses -10 %", {"plant": worn(0.9)}),
+        ):
+            these = recorded(campaign, 3, 72.0, seed, readings=readings, **options)  # type: ignore[arg-type]
+            found = compare(exported, these, list(these.recordings))
+            signed = revision_of(exported, these, found) is not None
+            print(f"{title}, {given}: {found}; {'revision' if signed else 'no revision'}", flush=True)
+
+
+def error_left(model: Model, campaign: Campaign) -> float:
     """rms over all errors of a free run, E_A0C weighed as um at 0.35 m."""
-    trajectory = predict_recording(model, campaign, name, ERRORS)
+    trajectory = predict_recording(model, campaign, "r0", ERRORS)
     residual = trajectory.system.grid.readings - model_outputs(trajectory)
     residual[:, 3] *= 0.35
     return float(np.sqrt(np.nanmean(residual[1:] ** 2)))
 
 
-def sealed(document: Mapping[str, Any]) -> Exported:
-    """The model of a document, as a runtime reads it."""
-    return from_document(*open_seal(render(document), "model"), "model")
+def days(exported: Exported, campaign: Campaign, seed: int, count: int) -> None:
+    """Losses fall by 1 % a day."""
+    first, since, rows = exported, list[Recording](), []
+    for day in range(1, count + 1):
+        whole = recorded(campaign, 1, 24.0, seed + day, plant=worn(1.0 - 0.01 * (day - 1)))
+        rows.append((error_left(exported.model, whole), error_left(first.model, whole)))
+        few = recorded(campaign, 1, 24.0, seed + day, plant=worn(1.0 - 0.01 * (day - 1)), readings=8)
+        since.append(replace(few.recordings["r0"], name=f"day_{day}"))
+        seen = replace(campaign, recordings={one.name: one for one in since})
+        found = compare(exported, seen, list(seen.recordings))
+        revised = revision_of(exported, seen, found)
+        if revised is not None:
+            exported = from_document(*open_seal(render(revised[0]), "model"), "model")
+            since.clear()
+        print(f"day {day}: left {rows[-1][0]:.2f}, {rows[-1][1]:.2f} without; {found.verdict}", flush=True)
+    left = np.array(rows)
+    print(
+        f"day one {left[0, 0]:.2f} um; last seven days: {left[-7:, 0].mean():.2f} um with updating, "
+        f"{left[-7:, 1].mean():.2f} um without; {exported.revision - 1} revisions"
+    )
 
 
-def main(days: int, seed: int) -> None:
-    """Print the error left day by day."""
+def main(seed: int, count: int) -> None:
+    """Print all three parts."""
     began = time.perf_counter()
     campaign = load_campaign(DATA / "campaign.toml", only=["fit"])
-    model = fit_model(read_model(DATA / "thermobalance.toml"), campaign, ["fit"]).model
-    exported = sealed(make_document(model, campaign, ["fit"]))
-    belief, levels = belief_of(exported), residual_levels(exported)
-    rows = []
-    for day in range(1, days + 1):
-        whole = day_of(campaign, day, aged(day - 1), seed, few=False)
-        name = f"day_{day}"
-        fresh = day_of(campaign, day, aged(0), seed, few=False)
-        rows.append(
-            (
-                error_left(belief.at_work, whole, name),
-                error_left(model, whole, name),
-                error_left(model, fresh, name),
-            )
-        )
-        belief, finding = update_belief(
-            belief, levels, day_of(campaign, day, aged(day - 1), seed, few=True), name
-        )
-        if finding.verdict == "drift":
-            exported = sealed(next_revision(exported, belief, [finding]))
-            belief = belief_of(exported)
-        updated, left, fresh_left = rows[-1]
-        print(
-            f"day {day:2d}: left {updated:.2f} with updating, {left:.2f} without, {fresh_left:.2f} had it "
-            "not aged; "
-            f"{finding.verdict}, p = {finding.p_value:.2g}"
-        )
-    found = np.array(rows)
-    last = found[-7:]
-    print(
-        f"day one {found[0, 0]:.2f} um; last seven days: with updating {last[:, 0].mean():.2f} um "
-        f"({last[:, 0].mean() / found[0, 0]:.2f} of day one), without {last[:, 1].mean():.2f} um "
-        f"({last[:, 1].mean() / found[0, 0]:.2f}), had it not aged {last[:, 2].mean():.2f} um; "
-        f"worst day with updating {found[:, 0].max():.2f} um"
-    )
+    exported = sealed(fit_model(read_model(DATA / "thermobalance.toml"), campaign, ["fit"]).model, campaign)
+    unchanged(exported, campaign, seed, count)
+    cases(exported, campaign, seed + 1000)
+    days(exported, campaign, seed + 2000, 30)
     print(f"{time.perf_counter() - began:.0f} s")
 
 
 if __name__ == "__main__":
-    main(*(int(word) for word in (sys.argv[1:] + ["30", "1000"][len(sys.argv) - 1 :])))
+    main(*(int(word) for word in (sys.argv[1:] + ["9000", "60"][len(sys.argv) - 1 :])))

@@ -38,7 +38,7 @@ def offsets(exported: Exported, inputs: np.ndarray, gap_s: float, how: str) -> n
         if how != "always" and OFF_AT <= now < OFF_AT + gap_s:
             continue
         if now == OFF_AT + gap_s and how == "cold":
-            compensator.acknowledge()
+            compensator = Compensator(exported, Settings(tick_s=TICK))
         if now == OFF_AT + gap_s and how == "frozen" and compensator.origin is not None:
             compensator.origin += gap_s  # as if no time had gone by
         readings = {n: Reading(v, now) for n, v in zip(exported.compiled.inputs, row.tolist(), strict=True)}

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from discovery.diagnosis import diagnose
     from discovery.errors import UserError
     from discovery.experiment import run
     from discovery.fitting import fit_model
     from discovery.frames import campaign_from_frames, prediction_frame, recording_frame
-    from discovery.mismatch import diagnose
     from discovery.models import read_model, write_model
     from discovery.recordings import load_campaign
     from discovery.report import write_report
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _HOME = {
     "UserError": "errors",
     "campaign_from_frames": "frames",
-    "diagnose": "mismatch",
+    "diagnose": "diagnosis",
     "fit_model": "fitting",
     "load_campaign": "recordings",
     "prediction_frame": "frames",

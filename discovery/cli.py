@@ -108,11 +108,17 @@ VERBS: dict[str, Callable[..., None]] = {
     "report": runs.report,
     "export": machine.export,
     "compensate": machine.compensate,
+    "watch": machine.watch,
     "challenge": proof.challenge,
     "update": machine.update,
 }
 for _name, _verb in VERBS.items():
     app.command(_name)(_verb)
+
+opcua = typer.Typer(no_args_is_help=True, help="Commission an OPC UA connection: certificates, nodes.")
+opcua.command("certificate")(machine.opcua_certificate)
+opcua.command("browse")(machine.opcua_browse)
+app.add_typer(opcua, name="opcua")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 from discovery.errors import UsageError, UserError
 from discovery.extras import need
 
-Target = Literal["json", "c", "fmu", "fmu3", "st"]
+Target = Literal["json", "c", "fmu", "fmu3", "st", "plcopen", "scl"]
 TARGETS: tuple[Target, ...] = get_args(Target)
 _COMPILED = ("c", "fmu", "fmu3")  # to be replayed against the Python model
 

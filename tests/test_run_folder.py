@@ -14,13 +14,13 @@ import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
+from discovery.diagnosis.summary import summary as diagnosis_summary
 from discovery.errors import UserError
 from discovery.experiment import diagnose, load_experiment, run
 from discovery.experiment.form import ExportForm
 from discovery.experiment.inputfiles import input_files
 from discovery.experiment.summary import comparison, summary
 from discovery.export import export_run, replay
-from discovery.mismatch.summary import summary as diagnosis_summary
 from discovery.report.run import load_run
 from discovery.targets import TARGETS
 from tests.small import CAMPAIGN, EXPERIMENT, write_small
@@ -208,6 +208,7 @@ def test_a_baseline_file_is_hashed_like_any_other_input(folder: Path) -> None:
 
 def test_a_model_is_discovered_once_and_then_diagnosed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import discovery.mismatch
+
     import discovery.sparse
 
     really, searches, diagnosed = discovery.sparse.discover, [], []

@@ -35,8 +35,8 @@ def test_a_script_is_pinned_while_it_computes_unless_the_user_says_otherwise(
 def test_what_computes_for_long_is_pinned_and_keeps_its_signature() -> None:
     from inspect import signature
 
+    from discovery.diagnosis import diagnose
     from discovery.fitting import fit_model
-    from discovery.mismatch import diagnose
     from discovery.sparse import discover
 
     for work in (fit_model, diagnose, discover):

@@ -10,13 +10,13 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from discovery.diagnosis.context import Context, make_context
+from discovery.diagnosis.proof import explained, improvements
+from discovery.diagnosis.scored import Assessment, assess
+from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis
 from discovery.experiment import Experiment, load_experiment
 from discovery.experiment.pipeline import starting_model
-from discovery.mismatch.assess import Assessment, assess
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.context import Context, make_context
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.prove import explained, improvements
 from discovery.models import Model
 
 Answer = dict[str, Any]  # the part of diagnosis.json that is scored

@@ -66,9 +66,9 @@ def diagnose(
     left in the folder stay. "no mismatch" and "unexplained" are answers too: nothing is named that the
     recordings cannot tell apart.
     """
+    from discovery.diagnosis.summary import summary
     from discovery.experiment import diagnose as find
     from discovery.experiment.summary import remarks
-    from discovery.mismatch.summary import summary
     from discovery.progress import shown
 
     with shown() as progress:

@@ -87,6 +87,7 @@ class Grid:
     unsure: Mapping[str, float] = field(default_factory=dict)  # s, of held channels perhaps logged late
     late: Mapping[str, float] = field(default_factory=dict)  # s, which `ends` has them earlier than stamped
     instants: int = 0  # nodes that there were before it was coarsened; 0: it was not
+    logged: Mapping[str, float] = field(default_factory=dict)  # s, median distance of the stamps of a channel
 
     def shifted(self, offset: Mapping[str, float], late: Mapping[str, float] | None = None) -> Grid:
         """The grid with channels moved by constants from what was recorded, in value and, held ones, in time
@@ -126,6 +127,12 @@ class Grid:
         return np.isfinite(self.readings)
 
 
+def first_interval(grid: Grid) -> Grid:
+    """The grid cut down to its first interval, for what is asked of the first instant alone."""
+    none = np.full((0, len(grid.outputs)), np.nan)
+    return replace(grid, time=grid.time[:2], read=np.zeros(0, dtype=np.intp), readings=none)
+
+
 def interleaved(left: Array, right: Array) -> Array:
     """Values at the left and right ends of intervals (K,) as one series (2K,)."""
     out = np.empty(2 * len(left))
@@ -140,10 +147,11 @@ def make_grid(
     outputs: Iterable[str],
     max_step: float = 600.0,
     coarse: int = COARSE_NODES,
+    most: int = MOST_NODES,
 ) -> Grid:
     """Grid of a recording: every stamp of an input or a reading is a node, long intervals are divided.
 
-    With more than `MOST_NODES` it is coarsened: a body of minutes or hours answers to the mean of what
+    With more than `most` nodes it is coarsened: a body of minutes or hours answers to the mean of what
     came within seconds. Every so many-th reading is taken, as a single reading still, so that stated
     noise, steps of quantised numbers and wrong readings keep their meaning; nodes are these, every so
     many-th stamp, and the stamps at which a held input has switched. Inputs are their means in between.
@@ -152,7 +160,8 @@ def make_grid(
         inputs: channels that the model uses.
         outputs: channels that were measured and are to be compared with the model.
         max_step: longest interval [s]; linear terms are exact whatever it is.
-        coarse: nodes, about, where there are more than `MOST_NODES`.
+        coarse: nodes, about, where there are more than `most`.
+        most: nodes of a grid that is left as it is.
 
     Raises:
         UserError: an input without any value in the recording.
@@ -173,16 +182,20 @@ def make_grid(
     stamps[[0, -1]] = True
     read = np.flatnonzero(taken)
     rows = np.flatnonzero(stamps)
-    instants = len(rows) if len(rows) > MOST_NODES else 0
+    instants = len(rows) if len(rows) > most else 0
     if instants:
-        read = read[:: _every(len(read), coarse)]
-        rows = _coarse_rows(rows, read, data.time, samples.values(), coarse)
+        read = read[:: _every(len(read), coarse, most)]
+        base = np.isin(rows, np.concatenate([rows[:: _every(len(rows), coarse, most)], rows[-1:], read]))
+        rows = _coarse_rows(rows, base, data.time, samples.values(), coarse)
     time = _divided(data.time[rows], max_step)
+    logged = {n: float(np.median(np.diff(s.time))) for n, s in samples.items() if len(s.time) > 1}
     if instants:
         samples = {name: s.averaged(time) for name, s in samples.items()}
     spread = {name: s for name in samples if (s := campaign.channels[name].spread) > 0}
     index = np.searchsorted(time, data.time[read])
-    return Grid(recording, time, samples, outputs, index, table[read], spread, instants=instants)
+    return Grid(
+        recording, time, samples, outputs, index, table[read], spread, instants=instants, logged=logged
+    )
 
 
 def _samples(campaign: Campaign, recording: str, inputs: Iterable[str]) -> dict[str, Samples]:
@@ -211,18 +224,19 @@ def _divided(time: Array, max_step: float) -> Array:
     return np.sort(np.concatenate([time, *extra])) if extra else time
 
 
-def _every(count: int, coarse: int) -> int:
+def _every(count: int, coarse: int, most: int) -> int:
     """Of so many, every which one is taken in a grid coarsened to about `coarse` nodes."""
-    return -(-count // coarse) if count > MOST_NODES else 1
+    return -(-count // coarse) if count > most else 1
 
 
-def _coarse_rows(rows: Ints, read: Ints, stamps: Array, samples: Iterable[Samples], coarse: int) -> Ints:
-    """Rows of the stamps (N,) that stay nodes: the readings taken, every so many-th and the last of `rows`,
-    and those at which a held input is far from what it was at the node before.
+def _coarse_rows(
+    rows: Ints, base: NDArray[np.bool_], stamps: Array, samples: Iterable[Samples], coarse: int
+) -> Ints:
+    """Rows of the stamps (N,) that stay nodes: those of `base`, and those at which a held input is far from
+    what it was at the node before.
 
     What switches more often than the nodes allow (a heater on a pulsed supply) is averaged.
     """
-    base = np.isin(rows, np.concatenate([rows[:: _every(len(rows), coarse)], rows[-1:], read]))
     held = [s.at(stamps[rows]) for s in samples if not s.linear and np.ptp(s.value) > 0]
     if not held:
         return rows[base]

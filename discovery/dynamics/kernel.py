@@ -214,20 +214,35 @@ def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_sca
 
 
 @njit(cache=True)
-def between(which, e, w0, w1, read):  # type: ignore[no-untyped-def]
-    """Transition and response to a held rate from each reading instant to the next: (R - 1, n, n) twice."""
+def between(which, e, read):  # type: ignore[no-untyped-def]
+    """Transition from each reading instant to the next, (R - 1, n, n)."""
     n = e.shape[1]
     count = read.shape[0] - 1
     f = np.empty((count, n, n))
-    b = np.empty((count, n, n))
     work = np.empty((n, n))
     for r in range(count):
         f[r] = np.eye(n)
+        for k in range(read[r], read[r + 1]):
+            _matmul(e[which[k]], f[r], work)
+            f[r] = work
+    return f
+
+
+@njit(cache=True)
+def driven(which, e, w0, w1, read, gain):  # type: ignore[no-untyped-def]
+    """Response (R - 1, n, n) of the states, from each reading instant to the next, to a force at each state
+    whose size in interval k is gain[k] (K, n) times a number that is held in between.
+    """
+    n = e.shape[1]
+    count = read.shape[0] - 1
+    b = np.empty((count, n, n))
+    work = np.empty((n, n))
+    for r in range(count):
         b[r] = 0.0
         for k in range(read[r], read[r + 1]):
             u = which[k]
-            _matmul(e[u], f[r], work)
-            f[r] = work
             _matmul(e[u], b[r], work)
-            b[r] = work + w0[u] + w1[u]
-    return f, b
+            for i in range(n):
+                for j in range(n):
+                    b[r, i, j] = work[i, j] + (w0[u, i, j] + w1[u, i, j]) * gain[k, j]
+    return b

@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import kernel
-from discovery.dynamics.system import Trajectory, first_values, output_matrix, outputs, shifted
+from discovery.dynamics.system import (
+    Trajectory,
+    balanced,
+    first_values,
+    memories,
+    output_matrix,
+    outputs,
+    rates_at_start,
+    shifted,
+)
 from discovery.terms import evaluate, names
 
 Array = NDArray[np.float64]
@@ -113,9 +122,8 @@ def _moved_terms(trajectory: Trajectory, parameters: Sequence[str]) -> list[Colu
     env = trajectory.at_ends()
     return [
         Column(parameters.index(name), term.into, np.asarray(partial), term.source)
-        for term in system.model.terms
-        if not wanted.isdisjoint(names(term.expression))
-        for name, partial in evaluate(term.expression, env, wanted, system.ends).partials.items()
+        for term, dual in zip(system.model.terms, system.rates(env, wanted, system.ends), strict=True)
+        for name, partial in dual.partials.items()
     ]
 
 
@@ -125,12 +133,27 @@ def _start_slopes(
     """Slopes of the start values, (n, M)."""
     system, wanted = trajectory.system, frozenset(parameters)
     start = np.zeros((len(system.states), total))
-    for k, name in enumerate(starts):
-        start[system.states.index(name), len(parameters) + k] = 1.0
     for i, state in enumerate(system.model.states.values()):
         # one that also moves freely does so around what its formula says
         if state.start is not None and not wanted.isdisjoint(names(state.start)):
             known = {**first_values(system.grid), **trajectory.values}
             for name, slope in evaluate(state.start, known, wanted).partials.items():
                 start[i, parameters.index(name)] = float(np.mean(slope))
+    free = balanced(system)
+    wrt = [*dict.fromkeys((*system.states, *parameters))]
+    slopes = rates_at_start(system, trajectory.values, trajectory.x[0], wrt)[1] if free else np.zeros((0, 0))
+
+    def settle(some: Sequence[int]) -> None:
+        others = [i for i in range(len(system.states)) if i not in some]
+        moved = slopes[np.ix_(some, others)] @ start[others]
+        for k, name in enumerate(parameters):
+            moved[:, k] += slopes[some, wrt.index(name)]
+        start[some] = np.linalg.lstsq(slopes[np.ix_(some, some)], -moved, rcond=1e-10)[0]
+
+    if free:
+        settle(free)
+    for k, name in enumerate(starts):
+        start[system.states.index(name), len(parameters) + k] += 1.0
+    if starts and (late := memories(system, free)):
+        settle(late)
     return start

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import kernel
-from discovery.dynamics.grid import Grid, interleaved
+from discovery.dynamics.grid import Grid, first_interval, interleaved
 from discovery.dynamics.memory import Memory
 from discovery.errors import RunsAwayError, UserError
 from discovery.models import Model, expanded
+from discovery.models.model import read_at_start
 from discovery.recordings import Campaign
-from discovery.terms import Dual, degree, evaluate
+from discovery.terms import Dual, Program, compiled, degree, evaluate
 
 Array = NDArray[np.float64]
+Value = float | Array
 
 _FAR = 1e50  # in any unit: beyond it a model has run away, before its squares overflow
 _ROUNDS = 30  # of Newton on the trajectory
@@ -25,7 +27,7 @@ _TOLERANCE = 1e-8  # largest change of a state in its unit, relative to 1 + its 
 
 @dataclass(frozen=True)
 class System:
-    """A model bound to a grid, with index tables made once."""
+    """A model bound to a grid, with index tables made once and its terms compiled once."""
 
     model: Model  # expanded: no lag() left
     grid: Grid
@@ -36,6 +38,14 @@ class System:
     scale: Array  # (states,)
     ends: Memory
     nodes: Memory
+
+    def rates(self, values: Mapping[str, Value], wrt: frozenset[str], memory: Memory) -> list[Dual]:
+        """What each term lets flow, with derivatives by some names."""
+        if wrt not in self.programs:
+            self.programs[wrt] = compiled(tuple(t.expression for t in self.model.terms), wrt)
+        return self.programs[wrt].run(values, memory)
+
+    programs: dict[frozenset[str], Program] = field(default_factory=dict, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -62,7 +72,8 @@ class Trajectory:
 
 def make_system(model: Model, grid: Grid) -> System:
     """Bind a model to a grid."""
-    model = expanded(model, {*grid.samples, *grid.outputs})
+    taken = [name for name, seen in zip(grid.outputs, grid.measured.any(axis=0), strict=True) if seen]
+    model = read_at_start(expanded(model, {*grid.samples, *grid.outputs}), taken)
     states = tuple(model.states)
     index = {name: i for i, name in enumerate(states)}
     variables = frozenset(states)
@@ -79,17 +90,19 @@ def make_system(model: Model, grid: Grid) -> System:
     )
 
 
-def start_values(system: System, values: Mapping[str, float]) -> Array:
-    """Declared start values (n,): an expression at the first instant, or the first reading of the state's
-    channel.
+def start_values(
+    system: System, values: Mapping[str, float], moved: Mapping[str, float] | None = None
+) -> Array:
+    """Start values (n,): an expression at the first instant, or the balance of the state's terms there.
+
+    Args:
+        moved: how far states begin from that; memories are settled with it.
     """
-    first = first_values(system.grid)
-    known: dict[str, float] = {**first, **values}
+    known: dict[str, float] = {**first_values(system.grid), **values}
     out = np.zeros(len(system.states))
     for i, name in enumerate(system.states):
         start = system.model.states[name].start
         if start is None:
-            out[i] = first.get(name, 0.0)
             continue
         try:
             out[i] = float(np.mean(evaluate(start, known, memory=None).value))
@@ -98,7 +111,63 @@ def start_values(system: System, values: Mapping[str, float]) -> Array:
                 f"model '{system.model.name}': the start of state '{name}' needs {missing}, "
                 f"which recording '{system.grid.recording}' does not give"
             ) from None
-    return out
+    free = balanced(system)
+    out = _balanced(system, values, out, free)
+    for name, change in (moved or {}).items():
+        out[system.states.index(name)] += change
+    return _balanced(system, values, out, memories(system, free)) if moved else out
+
+
+def balanced(system: System) -> list[int]:
+    """States that start in the balance of their terms."""
+    return [i for i, name in enumerate(system.states) if system.model.states[name].start is None]
+
+
+def memories(system: System, free: Sequence[int]) -> list[int]:
+    """Those of some states that are what a lag() remembers."""
+    return [i for i in free if system.model.states[system.states[i]].memory]
+
+
+def at_start(system: System, values: Mapping[str, float], start: Array) -> dict[str, Value]:
+    """States, channels and parameters at the first instant, ready for `evaluate`; series of one interval."""
+    ends: dict[str, Value] = {name: series[:2] for name, series in system.grid.ends.items()}
+    return {**ends, **values, **dict(zip(system.states, start.tolist(), strict=True))}
+
+
+def rates_at_start(
+    system: System, values: Mapping[str, float], start: Array, wrt: Sequence[str]
+) -> tuple[Array, Array]:
+    """Rates (n,) of the states at the first instant, and their derivatives (n, M) by the names of `wrt`."""
+    rates, slopes = np.zeros(len(system.states)), np.zeros((len(system.states), len(wrt)))
+    env, wanted = at_start(system, values, start), frozenset(wrt)
+    memory = Memory(first_interval(system.grid), True)
+    for dual, i, j in zip(system.rates(env, wanted, memory), system.into, system.source, strict=True):
+        for k, sign in ((i, 1.0), (j, -1.0)):
+            if k >= 0:
+                rates[k] += sign * system.scale[k] * float(np.ravel(dual.value)[0])
+                for name, partial in dual.partials.items():
+                    slopes[k, wrt.index(name)] += sign * system.scale[k] * float(np.ravel(partial)[0])
+    return rates, slopes
+
+
+def _balanced(system: System, values: Mapping[str, float], start: Array, free: Sequence[int]) -> Array:
+    """The start values (n,) with some states in the balance of their terms, given the others."""
+    names = [system.states[i] for i in free]
+    for _ in range(_ROUNDS if free else 0):
+        rates, slopes = rates_at_start(system, values, start, names)
+        if not (np.isfinite(rates).all() and np.isfinite(slopes).all()):
+            raise RunsAwayError(
+                f"model '{system.model.name}' has no finite rate at the start of recording "
+                f"'{system.grid.recording}'; check its parameters and start values"
+            )
+        # what never balances (a sum of its input) stays where it is
+        change = np.linalg.lstsq(slopes[free], -rates[free], rcond=1e-10)[0]
+        if not np.all(np.isfinite(change)):
+            break
+        start[free] += change
+        if np.max(np.abs(change)) < _TOLERANCE * (1.0 + np.max(np.abs(start[free]))):
+            break
+    return start
 
 
 def shifted(system: System, offset: Mapping[str, float], late: Mapping[str, float] | None = None) -> System:
@@ -146,8 +215,7 @@ def _linearise(system: System, values: Mapping[str, float], x: Array) -> tuple[A
     rates = np.zeros((2 * count, n))
     a = np.zeros((count, n, n))
     variables = frozenset(system.states)
-    for term, i, j in zip(system.model.terms, system.into, system.source, strict=True):
-        dual = evaluate(term.expression, env, variables, system.ends)
+    for dual, i, j in zip(system.rates(env, variables, system.ends), system.into, system.source, strict=True):
         rates[:, i] += system.scale[i] * dual.value
         if j >= 0:
             rates[:, j] -= system.scale[j] * dual.value
@@ -164,6 +232,23 @@ def _linearise(system: System, values: Mapping[str, float], x: Array) -> tuple[A
     g0 = rates[0::2] - np.matmul(a, x[:-1, :, None])[:, :, 0]
     g1 = rates[1::2] - np.matmul(a, x[1:, :, None])[:, :, 0]
     return a, g0, g1
+
+
+def flows(trajectory: Trajectory) -> Array:
+    """Size (K, n) of what flows through each state in each interval: the root of the sum of squares of its
+    terms, W at a body, else a rate in the unit of the state per time unit.
+    """
+    system = trajectory.system
+    squares = np.zeros((len(system.grid.step), len(system.states)))
+    env = trajectory.at_ends()
+    found = system.rates(env, frozenset(), system.ends)
+    for dual, i, j in zip(found, system.into, system.source, strict=True):
+        ends = np.square(dual.value)
+        mean = 0.5 * (ends[0::2] + ends[1::2]) if np.ndim(ends) else ends
+        squares[:, i] += mean
+        if j >= 0:
+            squares[:, j] += mean
+    return np.sqrt(squares)
 
 
 def simulate(

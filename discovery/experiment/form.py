@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
+from discovery.effects.own import EffectForm
 from discovery.fitting.solve import Loss
-from discovery.mismatch.catalogue.form import EffectForm
 from discovery.schema import Strict, suggest
 from discovery.sparse.options import SparseOptions
 from discovery.targets import Target

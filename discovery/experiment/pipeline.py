@@ -40,7 +40,7 @@ from discovery.sparse.options import SparseOptions
 from discovery.targets import check_targets
 
 if TYPE_CHECKING:
-    from discovery.mismatch import Diagnosis
+    from discovery.diagnosis import Diagnosis
 
 
 def run(
@@ -95,8 +95,7 @@ def run(
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
         seconds = clock.perf_counter() - began
         progress("writing the report")
-        document = found.document() if found else None
-        write_run(temporary, "run", experiment, fitted, document, seconds, findings)
+        write_run(temporary, "run", experiment, fitted, _written(found), seconds, findings)
         write_report(temporary)
     if experiment.form.export:
         progress(f"exporting {experiment.form.export.model}")
@@ -141,19 +140,23 @@ def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -
     folder = out or default_folder(experiment.name)
     check_joins(folder, experiment, name)
     with staged(folder) as temporary:
-        found = diagnosis(experiment, progress)
+        fitted = {name: fit_entry(experiment, name, entry, progress)}
+        found = diagnosis(experiment, progress, fitted)
         assert found is not None
-        model = replace(found.context.model, name=name)
-        fitted = {name: fit_model_of(experiment.seen_by(entry), name, entry.kind, model)}
         if found.repaired is not None:
             name = _free_name("repaired", form.models)
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
         progress("writing the report")
         seconds = clock.perf_counter() - began
-        write_run(temporary, "diagnose", experiment, fitted, found.document(), seconds)
+        write_run(temporary, "diagnose", experiment, fitted, _written(found), seconds)
         join(folder, temporary)
         write_report(temporary)
     return folder
+
+
+def _written(found: Diagnosis | None) -> dict[str, Any] | None:
+    """A diagnosis as its file holds it; what does not apply is left out."""
+    return found.document().model_dump(exclude_unset=True) if found else None
 
 
 def _free_name(wanted: str, taken: Collection[str]) -> str:
@@ -205,7 +208,8 @@ def repaired_of(
     """The repaired model of a diagnosis with the very numbers that the diagnosis found and proved."""
     if (wanted := experiment.form.mismatch) is not None:
         experiment = experiment.seen_by(experiment.form.models[wanted.model])
-    fit = written_with(found.after.fit, repaired, experiment.fitting)
+    assert found.after is not None
+    fit = written_with(found.after, repaired, experiment.fitting)
     return judged(experiment, name, "repaired", repaired, fit, None, found.seconds, progress)
 
 
@@ -244,30 +248,28 @@ def discovered(
     return with_coefficient_units(found.model, experiment.campaign.channels), dict(found.report)
 
 
-def diagnosis(
-    experiment: Experiment, progress: Progress = silent, fitted: Mapping[str, Fitted] | None = None
-) -> Diagnosis | None:
+def diagnosis(experiment: Experiment, progress: Progress, fitted: Mapping[str, Fitted]) -> Diagnosis | None:
     """What the model of [mismatch] leaves out, where the experiment asks.
 
     Args:
-        fitted: models whose start values are known already: a search for one is not made twice.
+        fitted: models of the experiment; the proof compares with the one that was asked about as it stands.
     """
     wanted = experiment.form.mismatch
     if wanted is None:
         return None
-    from discovery.mismatch import diagnose as find_missing
+    from discovery.diagnosis import diagnose as find_missing
 
     name, entry = wanted.model, experiment.form.models[wanted.model]
     experiment = experiment.seen_by(entry)
-    model = fitted[name].start if fitted else starting_model(experiment, name, entry, progress)[0]
     progress(f"looking for what {name} leaves out")
     return find_missing(
-        model,
+        fitted[name].start,
         experiment.campaign,
         experiment.fit,
         experiment.held_out,
         experiment.outputs_of(entry),
         [form.effect() for form in wanted.effects],
         physical=entry.kind == "file",
+        fitted=fitted[name].fit,
         tell=progress,
     )

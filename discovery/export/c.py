@@ -1,22 +1,25 @@
 """C99 of a compiled model: one header, one source file; double, or float with -DDISCOVERY_FLOAT.
 
 No malloc, no recursion, no libraries but the mathematics of the standard; every array has a fixed size. What
-a controller calls is `<name>_start` once and `<name>_step` each step.
+a controller calls is `<name>_begin` once and `<name>_tick` each step (guarded inputs, limited offsets), or
+`<name>_start` and `<name>_step` (the model alone).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from discovery import __version__
+from discovery.export.c_guard import guard_source, real, settings
 from discovery.export.compiled import Compiled, Delay
 from discovery.export.document import Exported
-from discovery.export.identifiers import comment, identifier, identifiers
+from discovery.export.guarding import compensated
+from discovery.export.identifiers import comment, formula, identifier, identifiers
 from discovery.export.kernel import LARGEST_NORM, LARGEST_SUBSTEPS, ORDER
 from discovery.export.program import Instruction, Program
 from discovery.export.statements import Language, statements
 from discovery.export.templated import templated
+from discovery.terms import names
 
 _CALL = {"exp": "R_EXP", "log": "R_LOG", "sqrt": "R_SQRT", "tanh": "R_TANH", "abs": "R_ABS", "**": "R_POW"}
 _COMPARE = ("<", "<=", ">", ">=", "==", "!=")
@@ -30,23 +33,20 @@ _TAKEN = frozenset(
 )
 
 
+_KEYWORDS = frozenset(
+    (
+        "auto", "break", "case", "char", "const", "continue", "default", "do", "double",
+        "else", "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long",
+        "register", "restrict", "return", "short", "signed", "sizeof", "static", "struct",
+        "switch", "typedef", "union", "unsigned", "void", "volatile", "while", "real",
+    )
+)  # fmt: skip
+
+
 def c_prefix(exported: Exported) -> str:
     """Beginning of every name in the C files of a model, and name of its files."""
     word = identifier(exported.model.name).lower()
     return f"{word}_model" if word in _TAKEN else word
-
-
-def real(value: float) -> str:
-    """A number as the macro R() takes it.
-
-    >>> real(0.1), real(-3.0)
-    ('R(0.1)', 'R(-3.0)')
-    """
-    if math.isnan(value):
-        return "(R(0.0)/R(0.0))"
-    if math.isinf(value):
-        return "R_HUGE" if value > 0 else "(-R_HUGE)"
-    return f"R({float(value)!r})"
 
 
 def _expression(instruction: Instruction, words: Sequence[str]) -> str:
@@ -69,13 +69,28 @@ def _expression(instruction: Instruction, words: Sequence[str]) -> str:
     return f"{_CALL[op]}({', '.join(a)})"
 
 
-_C = Language(
-    real,
-    {"input": "u[{}]", "state": "x[{}]", "delayed": "d[{}]", "played": "p[{}]", "time": "t"},
-    _expression,
-    "    const real {} = {};",
-    "    {} = {};",
-)
+def parameter_words(c: Compiled) -> list[str]:
+    """Names of the parameters as C has them."""
+    return [f"{w}_" if w in _KEYWORDS else w for w in identifiers([name for name, _ in c.parameters])]
+
+
+def _language(c: Compiled) -> Language:
+    words = parameter_words(c)
+    return Language(
+        real,
+        {
+            "input": "u[{}]",
+            "parameter": [f"k->{word}" for word in words],
+            "state": "x[{}]",
+            "delayed": "d[{}]",
+            "played": "p[{}]",
+            "time": "t",
+        },
+        _expression,
+        "    const real {} = {};",
+        "    {} = {};",
+        "    /* {} */",
+    )
 
 
 def c_files(exported: Exported) -> dict[str, str]:
@@ -83,7 +98,7 @@ def c_files(exported: Exported) -> dict[str, str]:
     prefix = c_prefix(exported)
     return {
         f"{prefix}.h": _header(exported, prefix),
-        f"{prefix}.c": _source(exported.compiled, prefix, _title(exported)),
+        f"{prefix}.c": _source(exported, prefix),
     }
 
 
@@ -95,8 +110,10 @@ def _title(exported: Exported) -> str:
     )
 
 
-def _sizes(c: Compiled) -> dict[str, int]:
+def _sizes(exported: Exported) -> dict[str, int]:
+    c = exported.compiled
     return {
+        "OFFSETS": len(compensated(exported)),
         "INPUTS": len(c.inputs),
         "OUTPUTS": len(c.outputs),
         "STATES": len(c.states),
@@ -104,6 +121,19 @@ def _sizes(c: Compiled) -> dict[str, int]:
         "PLAYS": c.plays,
         "RING": sum(delay.length for delay in c.delays),
     }
+
+
+def _parameter_lines(exported: Exported, line: str) -> str:
+    """A line for each parameter: its word, its value, what it is."""
+    model, rows = exported.model, []
+    for word, (name, value) in zip(
+        parameter_words(exported.compiled), exported.compiled.parameters, strict=True
+    ):
+        used = [term.name for term in model.terms if name in names(term.expression)]
+        used += [output for output, expression in model.outputs.items() if name in names(expression)]
+        said = f"{name} [{model.parameters[name].unit}]: {', '.join(used) or 'not used'}"
+        rows.append(line.format(word=word, value=real(value), note=formula(said)))
+    return "\n".join(rows) or line.format(word="none", value=real(0.0), note="this model has no parameters")
 
 
 def _header(exported: Exported, prefix: str) -> str:
@@ -119,30 +149,43 @@ def _header(exported: Exported, prefix: str) -> str:
         for kind, short, group in (("input", "IN", c.inputs), ("output", "OUT", c.outputs))
         if group
     ]
+    errors = [exported.outputs[k].name for k in compensated(exported)]
+    offsets = ",\n".join(
+        f"    {up}_OFFSET_{word} = {k} /* {comment(name)} [{comment(units[name])}] */"
+        for k, (name, word) in enumerate(zip(errors, identifiers(errors), strict=True))
+    )
     return templated(
         "model.h",
         prefix,
         TITLE=_title(exported),
         STEP=f"{c.step_s:g}",
-        SIZES="\n".join(f"#define {up}_{name} {size}" for name, size in _sizes(c).items()),
+        SIZES="\n".join(f"#define {up}_{name} {size}" for name, size in _sizes(exported).items()),
         STEP_S=repr(c.step_s),
         PLACES="\n".join(places),
+        FIXED=", except durations of delays" if c.delays else "",
+        PARAMETERS=_parameter_lines(exported, f"    {prefix}_real {{word}}; /* {{note}} */"),
+        SETTINGS=settings(exported, prefix)[0],
+        OFFSET_PLACES=f"enum {prefix}_offset {{\n{offsets}\n}};" if errors else "",
     )
 
 
-def _function(kind: str, program: Program, results: Sequence[str], outputs: str) -> str:
-    given = "const real x[], const real u[], const real d[], const real p[], real t"
-    names = [word.split()[-1].removesuffix("[]") for word in f"{given}, {outputs}".split(", ")]
-    body = "\n".join(statements(program, results, _C))
+def _function(
+    c: Compiled, kind: str, program: Program, results: Sequence[str], outputs: str, prefix: str
+) -> str:
+    given = f"const {prefix}_parameters *k, const real x[], const real u[], const real d[], "
+    given += "const real p[], real t"
+    words = [word.split()[-1].removesuffix("[]").lstrip("*") for word in f"{given}, {outputs}".split(", ")]
+    body = "\n".join(statements(program, results, _language(c)))
     return f"""static void {kind}({given}, {outputs})
 {{
 {body}
-    {" ".join(f"(void){name};" for name in names)}
+    {" ".join(f"(void){name};" for name in words)}
 }}
 """
 
 
-def _source(c: Compiled, prefix: str, title: str) -> str:
+def _source(exported: Exported, prefix: str) -> str:
+    c = exported.compiled
     n = len(c.states)
     plays = [f"moved[{k}]" for k in range(c.plays)]
     first = [f"first[{i}]" for i in range(n)]
@@ -152,13 +195,16 @@ def _source(c: Compiled, prefix: str, title: str) -> str:
     return templated(
         "model.c",
         prefix,
-        TITLE=title,
+        TITLE=_title(exported),
+        DEFAULTS=_parameter_lines(exported, "    {value}, /* {note} */"),
         STATES=n,
         NONZEROS=len(c.nonzeros),
         STEP=real(c.step_s),
-        START_VALUES=_function("start_values", c.start, first + plays, "real first[], real moved[]"),
-        RATES=_function("rates", c.rates, rates + plays, "real f[], real a[], real moved[]"),
-        OUTPUTS=_function("outputs", c.results, read + plays, "real y[], real moved[]"),
+        START_VALUES=_function(
+            c, "start_values", c.start, first + plays, "real first[], real moved[]", prefix
+        ),
+        RATES=_function(c, "rates", c.rates, rates + plays, "real f[], real a[], real moved[]", prefix),
+        OUTPUTS=_function(c, "outputs", c.results, read + plays, "real y[], real moved[]", prefix),
         PRODUCT="\n".join(f"    w[{i}] = {row};" for i, row in enumerate(_rows(c, "a[{k}] * v[{j}]"))),
         SUMS="\n".join(sums.format(row) for row in _rows(c, "R_ABS(a[{k}])")),
         LARGEST_NORM=real(LARGEST_NORM),
@@ -169,6 +215,7 @@ def _source(c: Compiled, prefix: str, title: str) -> str:
         HERE="    uint32_t here;\n" if c.delays else "",
         DELAYED="\n".join(map(_delayed, range(len(c.delays)), c.delays, c.offsets)),
         MOVED_ON="\n".join(map(_moved_on, range(len(c.delays)), c.delays)),
+        GUARD=guard_source(exported, prefix),
     )
 
 

@@ -10,7 +10,7 @@ from discovery.errors import UserError
 from discovery.export.differentiate import Node, compile_expression
 from discovery.export.program import Builder, Program
 from discovery.models import Model, expanded
-from discovery.terms import Apply, Expression, Name, names
+from discovery.terms import Apply, Expression, Name, Term, names, text
 from discovery.terms.expression import rewrite
 
 MAX_DELAY_STEPS = 20_000  # a controller keeps every one of them
@@ -48,6 +48,7 @@ class Compiled:
     delays: tuple[Delay, ...]
     plays: int
     nonzeros: tuple[tuple[int, int], ...]  # (row, column) of the Jacobian
+    parameters: tuple[tuple[str, float], ...]  # name and value, in the order of their loads
     start: Program
     rates: Program
     results: Program
@@ -108,9 +109,10 @@ def compile_model(model: Model, step_s: float) -> Compiled:
     model = expanded(model)
     inputs, states = model_inputs(model), tuple(model.states)
     build = Builder()
-    common = {name: Node(build.constant(p.value)) for name, p in model.parameters.items()}
+    common = {name: Node(build.load("parameter", k)) for k, name in enumerate(model.parameters)}
+    fixed = {name: Node(build.constant(p.value)) for name, p in model.parameters.items()}
     fed = {name: Node(build.load("input", i)) for i, name in enumerate(inputs)}
-    delays, plays = _with_memory(model, build, {**common, **fed}, inputs, step_s)
+    delays, plays = _with_memory(model, build, {**fixed, **fed}, inputs, step_s)
     kept = {apply: k for k, apply in enumerate(delays)}
     slots = {apply: k for k, apply in enumerate(plays)}
 
@@ -119,9 +121,13 @@ def compile_model(model: Model, step_s: float) -> Compiled:
     one = build.constant(1.0)
     env = {**common, **fed, "time": Node(build.load("time"))}
     env |= {name: Node(build.load("state", i), {name: one}) for i, name in enumerate(states)}
-    rates, jacobian = _rates(model, build, env, running)
+    rates, jacobian, notes = _rates(model, build, env, running)
     read = [
         compile_expression(build, expression, env, running).value for expression in model.outputs.values()
+    ]
+    shown = [
+        (node, f"{name} = {text(expression)}")
+        for node, (name, expression) in zip(read, model.outputs.items(), strict=True)
     ]
     for apply in plays:
         compile_expression(build, apply, env, running)
@@ -135,9 +141,10 @@ def compile_model(model: Model, step_s: float) -> Compiled:
         tuple(delays.values()),
         len(plays),
         tuple(jacobian),
+        tuple((name, p.value) for name, p in model.parameters.items()),
         start,
-        build.program([*rates, *jacobian.values(), *moved]),
-        build.program([*read, *moved]),
+        build.program([*rates, *jacobian.values(), *moved], notes),
+        build.program([*read, *moved], shown),
     )
 
 
@@ -160,9 +167,10 @@ def _start_program(
 
 def _rates(
     model: Model, build: Builder, env: Mapping[str, Node], running: _Running
-) -> tuple[list[int], dict[tuple[int, int], int]]:
-    """dx/dt of each state, and the nonzeros of their Jacobian by row and column."""
+) -> tuple[list[int], dict[tuple[int, int], int], list[tuple[int, str]]]:
+    """dx/dt of each state, the nonzeros of their Jacobian by row and column, and a note on each term."""
     nodes = [compile_expression(build, term.expression, env, running) for term in model.terms]
+    notes = [(node.value, _said(term)) for node, term in zip(nodes, model.terms, strict=True)]
     rates, jacobian = [], {}
     for i, (name, state) in enumerate(model.states.items()):
         scale = build.constant(state.scale)
@@ -178,7 +186,13 @@ def _rates(
             )
             if build.constant_of(gain) != 0.0:
                 jacobian[i, j] = gain
-    return rates, jacobian
+    return rates, jacobian, notes
+
+
+def _said(term: Term) -> str:
+    """A term in words, for a comment beside its number."""
+    leaving = f", out of {term.source}" if term.source is not None else ""
+    return f"{term.name}: {text(term.expression)}, into {term.into}{leaving}"
 
 
 def _net(build: Builder, scale: int, entering: list[int], leaving: list[int]) -> int:

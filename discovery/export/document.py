@@ -113,7 +113,13 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
         model,
         compile_model(model, document["step_s"]),
         tuple(
-            Input(i["name"], i["role"], i["unit"], i["between"], InputRange(**{k: i[k] for k in ranges}))
+            Input(
+                i["name"],
+                i["role"],
+                i["unit"],
+                i["between"],
+                InputRange(**{k: i[k] for k in ranges if k in i}),
+            )
             for i in document["inputs"]
         ),
         tuple(

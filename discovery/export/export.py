@@ -7,15 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from discovery.errors import UsageError, UserError
 from discovery.export.agreement import agreement
 from discovery.export.c import c_files
-from discovery.export.document import Exported, from_document, render
+from discovery.export.document import Exported, from_document, read_document, render
 from discovery.export.fmu import fmu_bytes, prove_fmu
 from discovery.export.identifiers import identifier
 from discovery.export.makedocument import make_document
 from discovery.export.ranges import sampled_inputs
 from discovery.export.replay import (
+    LONGEST,
     Proof,
     Reference,
     make_reference,
@@ -25,7 +29,7 @@ from discovery.export.replay import (
     write_files,
 )
 from discovery.export.seal import open_seal
-from discovery.export.st import KINDS, prove_st, st_name, st_text
+from discovery.export.st import KINDS, plcopen_text, prove_st, scl_text, st_name, st_text
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.runfolder import read_results
@@ -36,21 +40,27 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 
+Array = NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class Export:
     """What an export wrote, and the proofs that it is the model."""
 
     files: tuple[Path, ...]
     proofs: tuple[Proof, ...]
-    agreement: Mapping[str, float]  # of the fixed step with discovery.dynamics, um
+    agreement: Mapping[str, float] | None  # of the fixed step with discovery.dynamics, um
 
     def lines(self) -> list[str]:
         """What a user wants to know of it."""
+        lines = [*(str(path) for path in self.files), *(str(proof) for proof in self.proofs)]
+        if self.agreement is None:
+            return lines
         step = (
             f"the fixed step is {self.agreement['integrator_um']:.2g} um from the fitted model under the "
             f"same inputs, {self.agreement['held_inputs_um']:.2g} um where inputs are held over a step"
         )
-        return [*(str(path) for path in self.files), *(str(proof) for proof in self.proofs), step]
+        return [*lines, step]
 
 
 def export_model(
@@ -145,12 +155,30 @@ def _st(exported: Exported, reference: Reference, stem: str) -> Made:  # noqa: A
     }, proofs
 
 
+def _plcopen(exported: Exported, reference: Reference, stem: str) -> Made:  # noqa: ARG001
+    texts = {
+        f"st/{st_name(exported)}_{kind}.xml": plcopen_text(exported, precision)
+        for precision, kind in KINDS.items()
+    }
+    return dict(texts), prove_st(exported, reference)
+
+
+def _scl(exported: Exported, reference: Reference, stem: str) -> Made:  # noqa: ARG001
+    texts = {
+        f"st/{st_name(exported)}_{kind}.scl": scl_text(exported, precision)
+        for precision, kind in KINDS.items()
+    }
+    return dict(texts), prove_st(exported, reference, scl_text)
+
+
 _TARGETS = {
     "json": _json,
     "c": _c,
     "fmu": lambda *a: _fmu(2, "", *a),
     "fmu3": lambda *a: _fmu(3, "_fmi3", *a),
     "st": _st,
+    "plcopen": _plcopen,
+    "scl": _scl,
 }
 
 
@@ -193,6 +221,56 @@ def export_run(
     return export_model(
         model, loaded, fit, to, out_dir, step_s=step_s, states=states, key=key, provenance=provenance
     )
+
+
+def export_document(
+    path: Path, to: str | Sequence[str], out_dir: Path | None = None, *, key: Ed25519PrivateKey | None = None
+) -> Export:
+    """Export a model that is a document already, a revision for example, to further targets.
+
+    Its recordings are not at hand: the reference inputs run through its trained ranges.
+
+    Args:
+        out_dir: default a folder beside the document that bears its name.
+        key: signs the document anew; without one it is copied as it is, with its signature.
+
+    Raises:
+        UsageError: an unknown target.
+        UserError: a document that cannot be read, or a target that is not equal; then nothing is written.
+    """
+    targets = (to,) if isinstance(to, str) else tuple(to)
+    check_targets(targets)
+    exported = read_document(path)
+    data = render(exported.document, key) if key is not None else path.read_bytes()
+    reference = make_reference(exported.compiled, _through_the_ranges(exported))
+    stem = identifier(exported.model.name)
+    files: dict[str, str | bytes] = {f"{stem}.json": data}
+    proofs: list[Proof] = []
+    for target in dict.fromkeys(targets):
+        made, proved = _TARGETS[target](exported, reference, stem)
+        files |= made
+        proofs += proved
+    out_dir = out_dir or path.with_suffix("")
+    write_files(out_dir, files)
+    return Export(tuple(out_dir / name for name in files), tuple(proofs), None)
+
+
+def _through_the_ranges(exported: Exported, hours: float = 12.0) -> Array:
+    """Inputs (K, U) within the trained ranges, the same every time: held ones switch, temperatures wander."""
+    rng = np.random.default_rng(2026)
+    steps = max(60, min(LONGEST, int(hours * 3600.0 / exported.compiled.step_s)))
+    columns = []
+    for spec in exported.inputs:
+        low, high = spec.range.low, spec.range.high
+        if spec.between == "held":
+            levels = rng.choice([0.0, 0.25, 0.5, 1.0], steps // 60 + 1)
+            share = np.repeat(levels, 60)[:steps]
+            share = np.ceil(share) if spec.role == "fluid flow" else share
+        else:
+            turns = rng.uniform(1.0, 4.0)
+            share = 0.5 + 0.45 * np.sin(2 * np.pi * turns * np.arange(steps) / steps + rng.uniform(0.0, 6.0))
+        columns.append(low + share * (high - low))
+    return np.column_stack(columns) if columns else np.zeros((steps, 0))
 
 
 def _campaign_of(run: Path, results: Mapping[str, Any]) -> Path:

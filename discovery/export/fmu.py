@@ -1,4 +1,6 @@
-"""FMI 2.0 and 3.0 co-simulation units (source and linux64 binary) of an exported model.
+"""FMI 2.0 and 3.0 co-simulation units of an exported model: sources, a binary for linux64 and, where the
+cross compiler is installed, for win64. Inputs are guarded and offsets limited as in the runtime; parameters
+can be tuned.
 
 Inputs are declared discrete: a simulator then holds them, as the reference does, and does not interpolate.
 The headers of the standard (2-clause BSD) are taken from FMPy and travel with the sources.
@@ -7,20 +9,20 @@ The headers of the standard (2-clause BSD) are taken from FMPy and travel with t
 from __future__ import annotations
 
 import io
+import shutil
 import subprocess
 import tempfile
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from discovery import __version__
 from discovery.errors import UserError
 from discovery.export.c import c_files, c_prefix
 from discovery.export.document import Exported
-from discovery.export.identifiers import comment
+from discovery.export.fmu_description import description2, description3, start_inputs, token, variables
 from discovery.export.replay import (
     CFLAGS,
     LIMITS,
@@ -37,16 +39,8 @@ _HEADERS = {
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
 }
 _BINARY = {2: "binaries/linux64", 3: "binaries/x86_64-linux"}
-_BASE = {
-    "degC": 'K="1" factor="1" offset="273.15"',
-    "K": 'K="1"',
-    "um": 'm="1" factor="1e-06"',
-    "mm": 'm="1" factor="0.001"',
-    "um/m": 'rad="1" factor="1e-06"',
-    "W": 'kg="1" m="2" s="-3"',
-    "rpm": 'rad="1" s="-1" factor="0.10471975511965977"',
-    "l/min": 'm="3" s="-1" factor="1.6666666666666667e-05"',
-}
+_WINDOWS_BINARY = {2: "binaries/win64", 3: "binaries/x86_64-windows"}
+WINDOWS = "x86_64-w64-mingw32-gcc"
 
 
 def fmu_bytes(exported: Exported, version: int) -> bytes:
@@ -57,9 +51,15 @@ def fmu_bytes(exported: Exported, version: int) -> bytes:
     """
     headers = Path(_fmpy().__file__).parent / "c-code"
     prefix = c_prefix(exported)
-    start = "".join(f"{value!r}, " for value in _start(exported)).rstrip(" ")
+    start = "".join(f"{value!r}, " for value in start_inputs(exported)).rstrip(" ")
     sources = c_files(exported) | {
-        "instance.h": templated("instance.h", prefix, GUID=_token(exported), START=start),
+        "instance.h": templated(
+            "instance.h",
+            prefix,
+            GUID=token(exported),
+            START=start,
+            PARAMETERS=len(exported.compiled.parameters),
+        ),
         f"fmi{version}.c": templated(f"fmi{version}.c"),
     }
     with tempfile.TemporaryDirectory() as name:
@@ -67,17 +67,20 @@ def fmu_bytes(exported: Exported, version: int) -> bytes:
         write_files(folder, dict(sources))
         library = folder / f"{prefix}.so"
         names = [f"{prefix}.c", f"fmi{version}.c"]
-        command = ["gcc", *CFLAGS, "-fPIC", "-shared", f"-I{headers}", *names, "-lm", "-o", str(library)]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise UserError(
-                f"the FMI {version}.0 sources do not compile without warnings: {done.stderr.strip()[-400:]}"
+        binary = _compiled(version, ["gcc", "-fPIC", f"-I{headers}", *names, "-lm"], library)
+        windows = None
+        if shutil.which(WINDOWS) is not None:
+            windows = _compiled(
+                version,
+                [WINDOWS, "-static-libgcc", f"-I{headers}", *names, "-lm"],
+                folder / f"{prefix}.dll",
             )
-        binary = library.read_bytes()
     files: dict[str, str | bytes] = {f"sources/{name}": text for name, text in sources.items()}
     files |= {f"sources/{name}": (headers / name).read_bytes() for name in _HEADERS[version]}
-    files["modelDescription.xml"] = _description2(exported) if version == 2 else _description3(exported)
+    files["modelDescription.xml"] = description2(exported) if version == 2 else description3(exported)
     files[f"{_BINARY[version]}/{prefix}.so"] = binary
+    if windows is not None:
+        files[f"{_WINDOWS_BINARY[version]}/{prefix}.dll"] = windows
     if version == 3:
         listed = "".join(f'      <SourceFile name="{name}"/>\n' for name in names)
         files["sources/buildDescription.xml"] = (
@@ -90,6 +93,18 @@ def fmu_bytes(exported: Exported, version: int) -> bytes:
         for name, content in sorted(files.items()):  # a fixed date: the same model gives the same bytes
             archive.writestr(zipfile.ZipInfo(name, (2000, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
     return buffer.getvalue()
+
+
+def _compiled(version: int, command: Sequence[str], library: Path) -> bytes:
+    """A shared library of the sources beside it, without a warning."""
+    whole = [command[0], *CFLAGS, "-shared", *command[1:], "-o", str(library)]
+    done = subprocess.run(whole, cwd=library.parent, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise UserError(
+            f"the FMI {version}.0 sources do not compile without warnings ({command[0]}): "
+            f"{done.stderr.strip()[-400:]}"
+        )
+    return library.read_bytes()
 
 
 def prove_fmu(exported: Exported, reference: Reference, version: int, data: bytes) -> Proof:
@@ -110,7 +125,11 @@ def prove_fmu(exported: Exported, reference: Reference, version: int, data: byte
             raise UserError(f"the FMI {version}.0 unit is not valid: {problems[0]}")
         step, steps = exported.compiled.step_s, len(reference.u)
         names = exported.compiled.inputs
-        signals = np.zeros(steps, dtype=[("time", float), *((name, float) for name in names)])
+        switches = [v for v in variables(exported) if v.kind == "Boolean" and v.causality == "input"]
+        kinds = [*((name, float) for name in names), *((v.name, bool) for v in switches)]
+        signals = np.zeros(steps, dtype=[("time", float), *kinds])
+        for v in switches:
+            signals[v.name] = v.start == "true"
         signals["time"] = np.arange(steps) * step
         for i, name in enumerate(names):
             signals[name] = reference.u[:, i]
@@ -120,113 +139,24 @@ def prove_fmu(exported: Exported, reference: Reference, version: int, data: byte
             step_size=step,
             output_interval=step,
             input=signals if names else None,
-            start_values=dict(zip(names, reference.u[0].tolist(), strict=True)),
+            start_values=dict(zip(names, reference.u[0].tolist(), strict=True)) | {"runtime.guards": False},
             output=list(exported.compiled.outputs),
             fmi_type="CoSimulation",
         )
         y = np.column_stack([result[name] for name in exported.compiled.outputs])[1:]
         deviation = float(np.max(np.abs(y - reference.y))) if len(y) == steps else float("nan")
-    return within(Proof(f"FMI {version}.0", deviation, LIMITS["double"], "validated and simulated with FMPy"))
-
-
-def _token(exported: Exported) -> str:
-    h = exported.seal.sha256
-    return f"{{{h[:8]}-{h[8:12]}-{h[12:16]}-{h[16:20]}-{h[20:32]}}}"
-
-
-def _start(exported: Exported) -> list[float]:
-    """Inputs before any is set: the middle of the trained range."""
-    return [0.5 * (i.range.low + i.range.high) for i in exported.inputs]
-
-
-def _units(exported: Exported) -> str:
-    names = sorted({i.unit for i in exported.inputs} | {o.unit for o in exported.outputs})
-    lines = []
-    for name in names:
-        base = f"<BaseUnit {_BASE[name]}/>" if name in _BASE else ""
-        lines.append(
-            f"    <Unit name={quoteattr(name)}>{base}</Unit>"
-            if base
-            else f"    <Unit name={quoteattr(name)}/>"
+    return within(
+        Proof(
+            f"FMI {version}.0", deviation, LIMITS["double"], "validated and simulated with FMPy, " + _where()
         )
-    return "  <UnitDefinitions>\n" + "\n".join(lines) + "\n  </UnitDefinitions>\n"
-
-
-def _head(exported: Exported) -> str:
-    text = f"{comment(exported.model.name)}, revision {exported.revision}, sha256 {exported.seal.sha256}"
-    name, tool = quoteattr(comment(exported.model.name)), quoteattr(f"discovery {__version__}")
-    return f"modelName={name} description={quoteattr(text)} generationTool={tool}"
-
-
-def _variables(exported: Exported) -> list[tuple[str, str, str]]:
-    """Name and shared attributes, unit, and start of each variable; its place is its value reference."""
-    found = []
-    for k, (i, start) in enumerate(zip(exported.inputs, _start(exported), strict=True)):
-        shared = (
-            f'valueReference="{k}" causality="input" variability="discrete" description={quoteattr(i.role)}'
-        )
-        found.append(
-            (f"name={quoteattr(i.name)} {shared}", f"unit={quoteattr(i.unit)}", f' start="{start!r}"')
-        )
-    for k, o in enumerate(exported.outputs, start=len(exported.inputs)):
-        shared = f'valueReference="{k}" causality="output" variability="discrete" initial="calculated"'
-        shared += f" description={quoteattr(o.role)}"
-        found.append((f"name={quoteattr(o.name)} {shared}", f"unit={quoteattr(o.unit)}", ""))
-    return found
-
-
-_XML = '<?xml version="1.0" encoding="UTF-8"?>'
-
-
-def _description2(exported: Exported) -> str:
-    prefix, n, step = c_prefix(exported), len(exported.inputs), exported.compiled.step_s
-    rows = "\n".join(
-        f"    <ScalarVariable {attributes}><Real {unit}{start}/></ScalarVariable>"
-        for attributes, unit, start in _variables(exported)
     )
-    unknowns = "".join(f'<Unknown index="{n + k + 1}"/>' for k in range(len(exported.outputs)))
-    names = "".join(f'<File name="{name}"/>' for name in (f"{prefix}.c", "fmi2.c"))
-    return f"""{_XML}
-<fmiModelDescription fmiVersion="2.0" guid="{_token(exported)}" {_head(exported)} numberOfEventIndicators="0">
-  <CoSimulation modelIdentifier="{prefix}" canHandleVariableCommunicationStepSize="true"
-                canGetAndSetFMUstate="true" canSerializeFMUstate="true">
-    <SourceFiles>{names}</SourceFiles>
-  </CoSimulation>
-{_units(exported)}  <DefaultExperiment startTime="0" stopTime="{3600 * step!r}" stepSize="{step!r}"/>
-  <ModelVariables>
-{rows}
-  </ModelVariables>
-  <ModelStructure>
-    <Outputs>{unknowns}</Outputs>
-    <InitialUnknowns>{unknowns}</InitialUnknowns>
-  </ModelStructure>
-</fmiModelDescription>
-"""
 
 
-def _description3(exported: Exported) -> str:
-    prefix, n, step = c_prefix(exported), len(exported.inputs), exported.compiled.step_s
-    time = n + len(exported.outputs)
-    rows = "\n".join(
-        f"    <Float64 {attributes} {unit}{start}/>" for attributes, unit, start in _variables(exported)
-    )
-    outputs = "".join(f'<Output valueReference="{r}"/>' for r in range(n, time))
-    unknowns = "".join(f'<InitialUnknown valueReference="{r}"/>' for r in range(n, time))
-    return f"""{_XML}
-<fmiModelDescription fmiVersion="3.0" instantiationToken="{_token(exported)}" {_head(exported)}>
-  <CoSimulation modelIdentifier="{prefix}" canHandleVariableCommunicationStepSize="true"
-                canGetAndSetFMUState="true" canSerializeFMUState="true"/>
-{_units(exported)}  <DefaultExperiment startTime="0" stopTime="{3600 * step!r}" stepSize="{step!r}"/>
-  <ModelVariables>
-    <Float64 name="time" valueReference="{time}" causality="independent" variability="continuous"/>
-{rows}
-  </ModelVariables>
-  <ModelStructure>
-    {outputs}
-    {unknowns}
-  </ModelStructure>
-</fmiModelDescription>
-"""
+def _where() -> str:
+    """For which systems a binary is inside."""
+    if shutil.which(WINDOWS) is not None:
+        return "binaries for linux64 and win64"
+    return f"binary for linux64 alone: {WINDOWS} (Debian: gcc-mingw-w64-x86-64) is not installed"
 
 
 def _fmpy() -> Any:

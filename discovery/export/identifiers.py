@@ -41,3 +41,14 @@ def comment(text: str) -> str:
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "replace").decode()
     plain = "".join(c if " " <= c <= "~" else " " for c in plain)
     return re.sub(r"[*?\\(){}$]", lambda m: {"*": "x", "(": "[", ")": "]"}.get(m[0], "."), plain)[:200]
+
+
+def formula(text: str) -> str:
+    """A formula that is safe inside a comment of C and of structured text, and still reads as a formula.
+
+    >>> formula("G*(b - a)**2 */ (* x*)")
+    'G* (b - a)**2 * / ( * x* )'
+    """
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "replace").decode()
+    plain = "".join(c if " " <= c <= "~" and c not in "{}$\\?" else "." for c in plain)[:400]
+    return re.sub(r"\*(?=[/()])|\((?=\*)|/(?=\*)", lambda m: f"{m[0]} ", plain)

@@ -16,7 +16,7 @@ LARGEST_NORM = 0.5  # of A times the sub-step
 LARGEST_SUBSTEPS = 4096  # stiffer than this is no thermal model
 
 (
-    _CONSTANT, _INPUT, _STATE, _DELAYED, _PLAYED, _TIME,
+    _CONSTANT, _INPUT, _, _STATE, _DELAYED, _PLAYED, _TIME,
     _NEG, _ABS, _EXP, _LOG, _SQRT, _TANH, _SIGN,
     _ADD, _SUB, _MUL, _DIV, _POW, _LT, _LE, _GT, _GE, _EQ, _NE, _MIN, _MAX, _SELECT,
 ) = (int(CODE[name]) for name in OPERATIONS)  # fmt: skip

@@ -16,10 +16,10 @@ Meaning of the instructions (the same in every target):
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-LOADS = ("input", "state", "delayed", "played", "time")  # values that come from outside
+LOADS = ("input", "parameter", "state", "delayed", "played", "time")  # values that come from outside
 UNARY = ("neg", "abs", "exp", "log", "sqrt", "tanh", "sign")
 BINARY = ("+", "-", "*", "/", "**", "<", "<=", ">", ">=", "==", "!=", "min", "max")
 OPERATIONS = ("constant", *LOADS, *UNARY, *BINARY, "select")
@@ -37,10 +37,11 @@ class Instruction:
 
 @dataclass(frozen=True)
 class Program:
-    """Instructions in order and which of them are the results."""
+    """Instructions in order, which of them are the results, and what some of them are in words."""
 
     instructions: tuple[Instruction, ...]
     results: tuple[int, ...]
+    notes: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
 
 
 def _divide(a: float, b: float) -> float:
@@ -152,8 +153,8 @@ class Builder:
             total = self.apply("+", total, node)
         return total
 
-    def program(self, results: Sequence[int]) -> Program:
-        """The program of `results`, without the instructions that none of them needs."""
+    def program(self, results: Sequence[int], notes: Sequence[tuple[int, str]] = ()) -> Program:
+        """The program of `results`, without the instructions that none of them needs; `notes` on numbers."""
         needed: set[int] = set()
         stack = list(results)
         while stack:
@@ -167,4 +168,8 @@ class Builder:
             Instruction(i.operation, tuple(place[a] for a in i.arguments), i.value, i.index)
             for i in (self.instructions[node] for node in order)
         )
-        return Program(instructions, tuple(place[node] for node in results))
+        said: dict[int, tuple[str, ...]] = {}
+        for node, text in notes:
+            if node in place:
+                said[place[node]] = (*said.get(place[node], ()), text)
+        return Program(instructions, tuple(place[node] for node in results), said)

@@ -24,13 +24,20 @@ STEP_MARGIN = 3.0  # times the largest step between samples that the recordings 
 LIMIT_MARGIN = 1.5  # times the largest output
 RATE_MARGIN = 2.0  # times the fastest output
 AGES = 5.0  # times the usual spacing of the samples until a value is too old
+STILL_MARGIN, STILL_LEAST_S = 5.0, 3600.0  # times the longest stretch in which a temperature stood still
+WIDE = 10.0  # times the size of an input in its training: what a machine may do beyond it
+# Largest step [K] that physics allows within minutes: a hall door, a chiller, a tank filled up with cold
+# fluid.
+SUDDEN = {"ambient temperature": 8.0, "fluid temperature": 12.0, "coolant temperature": 12.0}
 
 
 @dataclass(frozen=True)
 class InputRange:
     """Of one input, in its unit: trained range, physically plausible range, largest step between two samples
     beyond what `rate` [1/s] explains, and the age [s] at which a value is too old. `step` is None where any
-    step is normal."""
+    step is normal. `sudden`: largest step that physics allows within minutes (None: any). `still_s`:
+    longest time [s]
+    that a value may stand exactly still; None: for ever."""
 
     low: float
     high: float
@@ -39,6 +46,8 @@ class InputRange:
     step: float | None
     rate: float | None
     age_s: float
+    sudden: float | None = None
+    still_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -77,7 +86,7 @@ def sampled_inputs(campaign: Campaign, recording: str, inputs: Sequence[str], st
 def input_range(campaign: Campaign, recordings: Sequence[str], name: str) -> InputRange:
     """Range of an input over the recordings of the fit."""
     channel = campaign.channels[name]
-    series, steps, rates, gaps = [], [0.0], [0.0], [1.0]
+    series, steps, rates, gaps, still = [], [0.0], [0.0], [1.0], [0.0]
     for recording in recordings:
         data = campaign.recordings[recording]
         known = np.isfinite(data.values[name])
@@ -86,6 +95,7 @@ def input_range(campaign: Campaign, recordings: Sequence[str], name: str) -> Inp
         if len(value) > 1:
             steps.append(float(np.max(np.abs(np.diff(value)))))
             gaps.append(float(np.median(np.diff(time))))
+            still.append(_longest_still(time, value))
             window = max(1, int(900.0 / max(gaps[-1], 1e-9)))  # over 15 min noise no longer counts as a rate
             if len(value) > window:
                 rates.append(
@@ -95,8 +105,12 @@ def input_range(campaign: Campaign, recordings: Sequence[str], name: str) -> Inp
     low, high = float(together.min()), float(together.max())
     usual = next((r.usual for unit, r in ROLES[channel.role].ranges.items() if unit == channel.unit), None)
     span = max(high - low, 1e-9)
-    plausible = usual or (low - 10 * span, high + 10 * span)
+    plausible = usual or (low - WIDE * span, high + WIDE * span)
     straight = channel.between == "linear"
+    size = max(high - low, abs(low), abs(high))
+    if usual and not straight and size > 0.0:  # of a machine that takes 1 kW, 50 kW are a fault
+        plausible = max(usual[0], low - WIDE * size), min(usual[1], high + WIDE * size)
+    moves = high > low and max(still) < 0.5 * max(float(campaign.recordings[r].time[-1]) for r in recordings)
     return InputRange(
         low,
         high,
@@ -105,7 +119,16 @@ def input_range(campaign: Campaign, recordings: Sequence[str], name: str) -> Inp
         STEP_MARGIN * max(steps) if straight else None,
         STEP_MARGIN * max(rates) if straight else None,
         AGES * max(gaps),
+        SUDDEN.get(channel.role, STEP_MARGIN * span) if straight else None,
+        max(STILL_MARGIN * max(still), STILL_LEAST_S) if straight and moves else None,
     )
+
+
+def _longest_still(time: Array, value: Array) -> float:
+    """Longest time [s] in which a series does not change at all."""
+    edges = np.flatnonzero(np.diff(value))
+    marks = np.concatenate([[time[0]], time[edges + 1], [time[-1]]])
+    return float(np.max(np.diff(marks)))
 
 
 def output_ranges(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from discovery.export.identifiers import formula
 from discovery.export.program import Instruction, Program
 
 
@@ -13,10 +14,11 @@ class Language:
     """How a language says the pieces of a program; {} is a place, then a value."""
 
     literal: Callable[[float], str]
-    loads: Mapping[str, str]  # operation: where its value stands, by index
+    loads: Mapping[str, str | Sequence[str]]  # operation: where its value stands, by index
     expression: Callable[[Instruction, Sequence[str]], str]  # from the words of all numbers before it
     definition: str
     assignment: str
+    comment: str
 
 
 def statements(program: Program, results: Sequence[str], language: Language) -> list[str]:
@@ -24,10 +26,14 @@ def statements(program: Program, results: Sequence[str], language: Language) -> 
     words: list[str] = []
     lines: list[str] = []
     for k, instruction in enumerate(program.instructions):
+        lines += [language.comment.format(formula(note)) for note in program.notes.get(k, ())]
         if instruction.operation == "constant":
             words.append(language.literal(instruction.value))
         elif instruction.operation in language.loads:
-            words.append(language.loads[instruction.operation].format(instruction.index))
+            place = language.loads[instruction.operation]
+            words.append(
+                place.format(instruction.index) if isinstance(place, str) else place[instruction.index]
+            )
         else:
             words.append(f"v{k}")
             lines.append(language.definition.format(f"v{k}", language.expression(instruction, words)))

@@ -13,6 +13,7 @@ no memory allocated.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -167,9 +168,10 @@ class _Tables:
     """The programs of a model as arrays for the kernel."""
 
     def __init__(self, compiled: Compiled) -> None:
-        self.start = _table(compiled.start)
-        self.rates = _table(compiled.rates)
-        self.outputs = _table(compiled.results)
+        values = [value for _, value in compiled.parameters]
+        self.start = _table(compiled.start, values)
+        self.rates = _table(compiled.rates, values)
+        self.outputs = _table(compiled.results, values)
         self.row = np.array([i for i, _ in compiled.nonzeros], dtype=np.int64)
         self.column = np.array([j for _, j in compiled.nonzeros], dtype=np.int64)
         delays = compiled.delays
@@ -178,10 +180,16 @@ class _Tables:
         self.part = np.array([delay.part for delay in delays])
 
 
-def _table(program: Program) -> Table:
-    rows = [(kernel.CODE[i.operation], *(*i.arguments, 0, 0, 0)[:3], i.index) for i in program.instructions]
+def _table(program: Program, parameters: Sequence[float]) -> Table:
+    """A program for the kernel, which knows parameters as constants."""
+    rows, values = [], []
+    for i in program.instructions:
+        given = i.operation == "parameter"
+        code = kernel.CODE["constant" if given else i.operation]
+        rows.append((code, *(*i.arguments, 0, 0, 0)[:3], i.index))
+        values.append(parameters[i.index] if given else i.value)
     table = np.array(rows, dtype=np.int64).reshape(-1, 5)
-    return table, np.array([i.value for i in program.instructions]), np.array(program.results, dtype=np.int64)
+    return table, np.array(values, dtype=float), np.array(program.results, dtype=np.int64)
 
 
 def _run(table: Table, u: Array, x: Array, d: Array, p: Array, time: float = 0.0) -> Array:

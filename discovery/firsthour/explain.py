@@ -9,7 +9,7 @@ from discovery.errors import UsageError
 from discovery.schema import suggest
 
 if TYPE_CHECKING:
-    from discovery.mismatch.catalogue import Effect
+    from discovery.effects.catalogue import Effect
 
 MODELS = {
     "file": 'a model of your own: { file = "model.toml" }, a sparse sum of terms with named parameters',
@@ -36,7 +36,7 @@ def list_words(what: str) -> Iterator[str]:
 
 
 def _effects() -> Iterator[str]:
-    from discovery.mismatch.catalogue import catalogue
+    from discovery.effects.catalogue import catalogue
 
     groups = dict.fromkeys(effect.group for effect in catalogue().values())
     for group in groups:
@@ -74,7 +74,7 @@ def explain(word: str) -> Iterator[str]:
     Raises:
         UsageError: no such effect.
     """
-    from discovery.mismatch.catalogue import catalogue
+    from discovery.effects.catalogue import catalogue
 
     known = catalogue()
     if word not in known:

@@ -3,11 +3,12 @@
 from discovery.fitting.fit import Fit, fit_model
 from discovery.fitting.heldout import predict_recording
 from discovery.fitting.noise import Noise
-from discovery.fitting.problem import Problem, Unknown, make_problem
+from discovery.fitting.problem import Prior, Problem, Unknown, make_problem
 
 __all__ = [
     "Fit",
     "Noise",
+    "Prior",
     "Problem",
     "Unknown",
     "fit_model",

@@ -86,4 +86,6 @@ def with_intervals(problem: Problem, theta: Array, errors: Array) -> Model:
             continue
         low, high = interval or (None, None)
         parameters[u.name] = replace(p, value=value, low=low, high=high)
-    return replace(model, parameters=parameters)
+    spreads = {u.name: u.prior[1] for u in problem.unknowns if u.spread == "fitted" and u.prior}
+    states = {n: replace(s, start_sd=spreads[n]) if n in spreads else s for n, s in model.states.items()}
+    return replace(model, parameters=parameters, states=states)

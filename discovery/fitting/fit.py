@@ -15,7 +15,7 @@ from discovery.dynamics import Grid, Trajectory
 from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.kalman import innovations
 from discovery.fitting.noise import Noise, readings_as_one, resolution, white_noise
-from discovery.fitting.problem import Problem, make_problem
+from discovery.fitting.problem import Prior, Problem, make_problem
 from discovery.fitting.solve import Loss, Solution, solve
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -24,6 +24,7 @@ from discovery.threads import one_thread
 Array = NDArray[np.float64]
 
 _ROUNDS = 3  # of a fit that also finds the noise, or how much a prior counts
+_BEGINS = 0.05  # of what a state moves in a recording, how far from its start it may begin
 _ROUGH = 15  # of Levenberg-Marquardt in a round between the first and the last
 
 
@@ -75,7 +76,7 @@ def fit_model(
     noise: Noise | None = None,
     loss: Loss = "linear",
     grids: Mapping[str, Grid] | None = None,
-    priors: Mapping[str, tuple[float, float]] | None = None,
+    priors: Mapping[str, Prior] | None = None,
     belief: float | None = None,
     guess: Mapping[str, float] | None = None,
     begin: Fit | None = None,
@@ -85,8 +86,9 @@ def fit_model(
     """Fit the free parameters and start values of a model to recordings.
 
     Minimises the sum over recordings of rho(L (y - y_model)) plus ((x0 - start)/start_sd)^2 plus
-    n (offset/spread)^2 for inputs known only within a spread, where L whitens with the noise model and n
-    readings count as one (`readings_as_one`: 1 where the model lacks nothing). Without `noise` the reading
+    (offset/spread)^2 for inputs known only within a spread, these priors n times, where L whitens with the
+    noise model and n readings count as one (`readings_as_one`: 1 where the model lacks nothing). A state that
+    is read starts at its first reading, known to its noise. Without `noise` the reading
     noise is the channel's `noise` where the campaign states it, else it is estimated from the residual.
 
     Args:
@@ -113,9 +115,10 @@ def fit_model(
     readings = [system.grid.readings for system in problem.systems]
     least = resolution(readings)
     current = noise or white_noise(problem.outputs, stated, readings, least)
-    uncertain = any(u.is_offset for u in problem.unknowns)
+    nuisance = any(u.is_nuisance for u in problem.unknowns)
+    problem = problem.spread(current, _first_spreads(problem, theta))
     together = 1.0
-    rounds = _ROUNDS if noise is None or uncertain else 1
+    rounds = _ROUNDS if noise is None or nuisance else 1
     for k in range(rounds):
         most = max_rounds if k in (0, rounds - 1) else _ROUGH
         solution = solve(problem, theta, current, loss, most, tolerance, together)
@@ -128,17 +131,20 @@ def fit_model(
             updated = white_noise(problem.outputs, stated, left, least)
             change = max(abs(np.log(a / b)) for a, b in zip(updated.white, current.white, strict=True))
             settled, current = change < 0.02, updated
-        if uncertain:
+        if nuisance:
             alone = [innovations(t, current, r) for t, r in zip(solution.trajectories, left, strict=True)]
             before, together = together, readings_as_one(alone)
             settled = settled and abs(np.log(together / before)) < 0.1
+            spreads = _found_spreads(problem, solution.jacobian, theta, together)
+            settled = settled and all(abs(np.log(new / old)) < 0.1 for new, old in spreads.values())
+            problem = problem.spread(current, {name: new for name, (new, _) in spreads.items()})
         if settled:
             break
     covariance, lost = covariance_of(problem, solution.jacobian, theta)
     if noise is None and loss == "linear":
         covariance = covariance * _excess(problem, solution)
-    if uncertain:  # their priors were counted `together` times: back to one
-        times = np.sqrt([together if u.is_offset else 1.0 for u in problem.unknowns])
+    if nuisance:  # their priors were counted `together` times: back to one
+        times = np.sqrt([together if u.is_nuisance else 1.0 for u in problem.unknowns])
         covariance = covariance * np.outer(times, times)
     return Fit(
         problem,
@@ -172,6 +178,41 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
         covariance=fit.covariance[np.ix_(index, index)],
         trajectories=tuple(problem.run(s, theta) for s in problem.systems),
     )
+
+
+def _first_spreads(problem: Problem, theta: Array) -> dict[str, float]:
+    """A first guess of how far states begin from their start that are neither read nor given a spread: a
+    share of what they move.
+    """
+    asked = [u for u in problem.unknowns if u.spread == "fitted"]
+    runs = [problem.run(s, theta) for s in problem.systems] if asked else []
+    moved: dict[str, float] = {}
+    for run in runs:
+        for u in (u for u in asked if u.recording == run.system.grid.recording):
+            series = run.x[:, run.system.states.index(u.name)]
+            moved[u.name] = max(moved.get(u.name, 0.0), _BEGINS * float(np.ptp(series)), 1e-6)
+    return moved
+
+
+def _found_spreads(
+    problem: Problem, jacobian: Array, theta: Array, together: float
+) -> dict[str, tuple[float, float]]:
+    """By state: the spread of its starts that makes them most likely, and the one before.
+
+    One step of expectation maximisation over the recordings, with the one before as two of them.
+    """
+    asked = {u.name for u in problem.unknowns if u.spread == "fitted"}
+    if not asked:
+        return {}
+    covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+    found = {}
+    for name in asked:
+        mine = [i for i, u in enumerate(problem.unknowns) if u.name == name and u.is_start]
+        before = problem.unknowns[mine[0]].prior
+        assert before is not None
+        squares = sum(theta[i] ** 2 + together * covariance[i, i] for i in mine)
+        found[name] = (float(np.sqrt((2 * before[1] ** 2 + squares) / (2 + len(mine)))), before[1])
+    return found
 
 
 def _excess(problem: Problem, solution: Solution) -> float:

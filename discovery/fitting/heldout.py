@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid, Trajectory, make_grid, make_system, sensitivities, simulate, start_values
+from discovery.dynamics import (
+    Grid,
+    System,
+    Trajectory,
+    make_grid,
+    make_system,
+    sensitivities,
+    simulate,
+    start_values,
+)
 from discovery.dynamics.system import inputs_of, predict, shifted, uncertain
-from discovery.models import Model, expanded
+from discovery.fitting.problem import read_spread
+from discovery.models import Model, State, expanded
 from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
@@ -37,22 +47,31 @@ def predict_recording(
     grid = grid or make_grid(campaign, recording, inputs_of(model, campaign, outputs), outputs)
     system = make_system(model, grid)
     values = model.values(recording)
-    start = start_values(system, values)
-    free = [name for name in system.states if model.states[name].start_sd > 0]
+    noise = white if white is not None else np.ones(len(outputs))
+    spreads = {
+        name: sd
+        for name, state in system.model.states.items()
+        if (sd := _spread(system, state, dict(zip(outputs, noise, strict=True)))) > 0
+    }
     inputs = uncertain(system)
-    trajectory = simulate(system, values, start)
-    if not (free or inputs) or not len(grid.read):
+    trajectory = simulate(system, values)
+    if not (spreads or inputs) or not len(grid.read):
         return trajectory
     residual = grid.readings - predict(trajectory)
     seen = np.isfinite(residual[0])
-    sd = np.array(white if white is not None else np.ones(len(outputs)))[seen]
-    spread = np.array([*(grid.spread[n] for n in inputs), *(model.states[n].start_sd for n in free)])
-    c = sensitivities(trajectory, inputs, free)[0][seen] / sd[:, None]
+    sd = np.array(noise)[seen]
+    spread = np.array([*(grid.spread[n] for n in inputs), *spreads.values()])
+    c = sensitivities(trajectory, inputs, list(spreads))[0][seen] / sd[:, None]
     gram = c.T @ c + np.diag(1 / spread**2)
     shift = np.linalg.solve(gram, c.T @ (residual[0][seen] / sd))
     if inputs:
         system = shifted(system, dict(zip(inputs, shift[: len(inputs)].tolist(), strict=True)))
-        start = start_values(system, values)
-    for name, change in zip(free, shift[len(inputs) :], strict=True):
-        start[system.states.index(name)] += change
-    return simulate(system, values, start, trajectory.x)
+    moved = dict(zip(spreads, shift[len(inputs) :].tolist(), strict=True))
+    return simulate(system, values, start_values(system, values, moved), trajectory.x)
+
+
+def _spread(system: System, state: State, white: Mapping[str, float]) -> float:
+    """How far a state may begin from its start; one that no fit has seen begins where it is said to."""
+    if state.start_sd is not None:
+        return state.start_sd
+    return read_spread(system, state.name, white) if state.read_as else 0.0

@@ -3,26 +3,28 @@
 White reading noise, slow sensor noise and small random heat at the bodies are one linear Gaussian state-space
 model around a trajectory,
 
-    z = (dx, w, v):   dx' = A dx + w/C,   w_i and v_j first-order noise,   residual = H dx + v + white,
+    z = (dx, w, v):   dx' = A dx + s(t) w/C,   w_i and v_j first-order noise,   residual = H dx + v + white,
 
 so a Kalman filter whitens residuals and sensitivity columns alike in one pass (Sarkka & Solin, Applied
 Stochastic Differential Equations, 2019, ch. 10) and gives the likelihood of the variances. `w` is held
-between readings: its time constant is hours, readings come in minutes. An input that switches a little before
+between readings: its time constant is hours, readings come in minutes. Its size s(t) follows what flows
+through the body (`Noise`): a time-varying gain, no further state. An input that switches a little before
 or after its stamp leaves an impulse at the bodies, each time another one.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
-from discovery.dynamics.kernel import between
+from discovery.dynamics.kernel import between, driven
 from discovery.dynamics.sensitivity import moved_in_time
-from discovery.dynamics.system import output_matrix
+from discovery.dynamics.system import flows, output_matrix
 from discovery.fitting.noise import Noise
 
 Array = NDArray[np.float64]
@@ -49,7 +51,7 @@ def _propagate(f, b, heat_decay, slow_decay, x, top):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, jumps):  # type: ignore[no-untyped-def]
-    """Kalman gains (R, Y, size) and standard deviations (R, Y) of the innovations, half the log-determinant.
+    """Kalman gains (R, Y, size) and standard deviations (R, Y) of the innovations.
 
     They do not depend on the data: columns that are whitened later under the same noise share them.
     """
@@ -62,7 +64,6 @@ def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, jumps):
     for j in range(nv):
         p[n + nh + j, n + nh + j] = slow[j] ** 2
     gains, roots = np.zeros((readings, outs, size)), np.ones((readings, outs))
-    logdet = 0.0
     ph = np.zeros(size)
     top_p = np.zeros((n, size))
     for r in range(readings):
@@ -89,13 +90,12 @@ def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, jumps):
             for j in range(n):
                 s += h[r, y, j] * ph[j]
             roots[r, y] = np.sqrt(s)
-            logdet += np.log(roots[r, y])
             for i in range(size):
                 gain = ph[i] / s
                 gains[r, y, i] = gain
                 for j in range(size):
                     p[i, j] -= gain * ph[j]
-    return gains, roots, logdet
+    return gains, roots
 
 
 @njit(cache=True)
@@ -115,18 +115,27 @@ def _whitened(f, b, h, measured, gains, roots, nv, slow_decay, heat_decay, data)
         for y in range(outs):
             if not measured[r, y]:
                 continue
-            own = size - nv + y if nv else -1
-            for c in range(m):
-                innovation = data[r, y, c] - (z[own, c] if nv else 0.0)
-                for j in range(n):
-                    innovation -= h[r, y, j] * z[j, c]
-                out[r, y, c] = innovation
+            row = out[r, y]
+            row[:] = data[r, y]
+            if nv:
+                slow = z[size - nv + y]
+                for c in range(m):
+                    row[c] -= slow[c]
+            for j in range(n):
+                factor = h[r, y, j]
+                if factor != 0.0:
+                    state = z[j]
+                    for c in range(m):
+                        row[c] -= factor * state[c]
             for i in range(size):
                 gain = gains[r, y, i]
-                for c in range(m):
-                    z[i, c] += gain * out[r, y, c]
+                if gain != 0.0:
+                    part = z[i]
+                    for c in range(m):
+                        part[c] += gain * row[c]
+            root = 1.0 / roots[r, y]
             for c in range(m):
-                out[r, y, c] /= roots[r, y]
+                row[c] *= root
     return out
 
 
@@ -134,16 +143,16 @@ def _whitened(f, b, h, measured, gains, roots, nv, slow_decay, heat_decay, data)
 class Filter:
     """The parts of the whitening filter that do not depend on the variances, made once for a trajectory."""
 
-    states: tuple[str, ...]
+    trajectory: Trajectory
     f: Array
-    b: Array  # response to held heat in W
+    flow: Array  # (K, n) what flows through each state
     h: Array
     step: Array
     measured: NDArray[np.bool_]
     jumps: Array  # covariance of impulses between readings for a jitter of one, none where none can be
-    last: dict[str, tuple[Noise, tuple[Array, Array, float]]] = field(default_factory=dict, repr=False)
+    last: dict[str, tuple[Noise, Any]] = field(default_factory=dict, repr=False)
 
-    def gains(self, noise: Noise) -> tuple[Array, Array, float]:
+    def gains(self, noise: Noise) -> tuple[Array, Array]:
         """What `_gains` gives under a noise. The last one is kept: a residual and its sensitivities, or the
         columns of one search after another, are whitened alike.
         """
@@ -154,30 +163,45 @@ class Filter:
                 self.f, response, self.h, self.measured, white, slow, heat, *decays, noise.jitter**2 * jumps
             )
             self.last["gains"] = (noise, found)
-        return self.last["gains"][1]
+        known: tuple[Array, Array] = self.last["gains"][1]
+        return known
 
     def _parts(self, noise: Noise) -> tuple[Array, Array, Array, tuple[Array, Array]]:
-        """Levels of the heats and slow noises that are not zero, responses to these heats, both decays."""
-        heat = np.array([(noise.heat or {}).get(name, 0.0) for name in self.states])
+        """Levels of the forces and slow noises that are not zero, responses to these forces, both decays."""
+        if "parts" not in self.last or self.last["parts"][0] != noise:
+            self.last["parts"] = (noise, self._made(noise))
+        made: tuple[Array, Array, Array, tuple[Array, Array]] = self.last["parts"][1]
+        return made
+
+    def _made(self, noise: Noise) -> tuple[Array, Array, Array, tuple[Array, Array]]:
+        t, heat = self.trajectory, noise.heat or {}
+        system = t.system
+        there = np.array([heat.get(name, 0.0) > 0 for name in system.states])
+        floor = np.array([heat.get(name, 0.0) for name in system.states])
+        times = np.array([(noise.force or {}).get(name, 1.0) for name in system.states])
+        gain = np.sqrt(floor**2 + (noise.share * self.flow) ** 2) * system.scale * there * times
+        read = system.grid.read.astype(np.int64)
+        response = driven(t.which, t.e, t.w0, t.w1, read, gain) if there.any() else np.zeros((0, 0, 0))
         slow = np.array(noise.slow or ())
         return (
-            heat[heat > 0],
+            np.ones(int(there.sum())),
             slow if slow.any() else np.zeros(0),
-            np.ascontiguousarray(self.b[:, :, heat > 0]),
+            np.ascontiguousarray(response[:, :, there])
+            if there.any()
+            else np.zeros((max(len(read) - 1, 0), len(system.states), 0)),
             (np.exp(-self.step / noise.slow_time), np.exp(-self.step / noise.heat_time)),
         )
 
-    def apply(self, noise: Noise, data: Array) -> tuple[Array, float]:
-        """Whitened columns (measured readings, M) of data (R, Y, M), and half the log-determinant of the
-        covariance.
+    def whitened(self, noise: Noise, data: Array) -> tuple[Array, Array]:
+        """Columns (measured readings, M) of data (R, Y, M), whitened, and the logarithm (measured readings,)
+        of the standard deviation of each innovation.
         """
         clean = np.where(self.measured[:, :, None], data, 0.0)
         if noise.is_white:
-            white = np.array(noise.white)
-            flat = (clean / white[None, :, None])[self.measured]
-            return flat, float(np.sum(np.log(white)[None, :] * self.measured))
+            white = np.broadcast_to(np.array(noise.white), self.measured.shape)[self.measured]
+            return clean[self.measured] / white[:, None], np.log(white)
         _, slow, response, decays = self._parts(noise)
-        gains, roots, logdet = self.gains(noise)
+        gains, roots = self.gains(noise)
         out = _whitened(
             self.f,
             response,
@@ -189,18 +213,17 @@ class Filter:
             *decays,
             np.ascontiguousarray(clean),
         )
-        return out[self.measured], float(logdet)
+        return out[self.measured], np.log(roots[self.measured])
 
 
 def make_filter(trajectory: Trajectory) -> Filter:
     """Filter of a trajectory."""
     system = trajectory.system
     read = system.grid.read.astype(np.int64)
-    f, b = between(trajectory.which, trajectory.e, trajectory.w0, trajectory.w1, read)
     return Filter(
-        system.states,
-        f,
-        b * system.scale[None, None, :],
+        trajectory,
+        between(trajectory.which, trajectory.e, read),
+        flows(trajectory),
         output_matrix(trajectory),
         np.diff(system.grid.time[read]),
         system.grid.measured,
@@ -238,7 +261,7 @@ def whiten(trajectory: Trajectory, noise: Noise, data: Array, part: Filter | Non
         return np.asarray(
             (np.where(measured[:, :, None], data, 0.0) / np.array(noise.white)[None, :, None])[measured]
         )
-    return (part or make_filter(trajectory)).apply(noise, data)[0]
+    return (part or make_filter(trajectory)).whitened(noise, data)[0]
 
 
 def innovations(trajectory: Trajectory, noise: Noise, residual: Array) -> Array:

@@ -18,14 +18,19 @@ HEAT_TIME = 3 * 3600.0  # s, time constant of small random heat
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: white (Y,) and slow (Y,) in the unit of each output, heat (n,) in W or rate per
-    time unit.
+    """Standard deviations: white (Y,) and slow (Y,) in the unit of each output, process noise of the states.
+
+    A lumped model errs the more the more flows: the process noise of a state is the root of `heat`^2 (W, or
+    a rate per time unit) and (`share` times what flows through the state)^2, at each instant. States that
+    `heat` does not hold have none, those of `force` so many times as much.
     """
 
     outputs: tuple[str, ...]
     white: tuple[float, ...]
     slow: tuple[float, ...] = ()
     heat: Mapping[str, float] | None = None
+    share: float = 0.0
+    force: Mapping[str, float] | None = None
     slow_time: float = SLOW_TIME
     heat_time: float = HEAT_TIME
     jitter: float = 0.0  # of single switches of inputs that may be logged late, as a share of `Grid.unsure`

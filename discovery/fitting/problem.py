@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,21 @@ from discovery.dynamics import (
 )
 from discovery.dynamics.sensitivity import moved_in_time
 from discovery.dynamics.system import inputs_of, predict, shifted, uncertain
-from discovery.models import Model, expanded
+from discovery.fitting.noise import Noise
+from discovery.models import Model, Parameter, State, expanded
 from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
 
 MOST = 2.0  # of what is expected, the most that an input is logged late
+
+
+class Prior(NamedTuple):
+    """What is known of a parameter before: mean and standard deviation, of its logarithm with `is_log`."""
+
+    mean: float
+    sd: float
+    is_log: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +55,9 @@ class Unknown:
     low: float
     high: float
     prior: tuple[float, float] | None = None  # mean and standard deviation
+    is_log: bool = False  # ... of its logarithm
     belief: float | None = None  # the start value is believed within a factor exp(belief), with heavy tails
+    spread: Literal["given", "read", "fitted"] = "given"  # how the prior of a start is known
     is_offset: bool = False  # `name` is the channel
     is_late: bool = False  # likewise
 
@@ -87,22 +99,39 @@ class Problem:
         """Indices of the unknowns that act in a recording."""
         return [i for i, u in enumerate(self.unknowns) if u.recording in (None, system.grid.recording)]
 
+    def spread(self, noise: Noise, found: Mapping[str, float] | None = None) -> Problem:
+        """The problem with the priors of its start values as a noise has them.
+
+        Args:
+            found: spread of each state that is neither read nor given one; default as it is.
+        """
+        white = dict(zip(noise.outputs, noise.white, strict=True))
+        unknowns = list(self.unknowns)
+        for i, u in enumerate(unknowns):
+            if u.spread == "read":
+                system = next(s for s in self.systems if s.grid.recording == u.recording)
+                unknowns[i] = replace(u, prior=(0.0, read_spread(system, u.name, white)))
+            elif u.spread == "fitted" and found and u.name in found:
+                unknowns[i] = replace(u, prior=(0.0, found[u.name]))
+        return replace(self, unknowns=tuple(unknowns))
+
     def prior_rows(self, theta: Array, together: float = 1.0) -> tuple[Array, Array]:
         """What priors and beliefs add to the least squares: residual (K,) and its derivative (K, U).
 
         Args:
             together: readings that count as one (`readings_as_one`). A thousand of them in a row that are
-                off by what the model lacks must not outvote what is known of an input: its prior counts as
-                often.
+                off by what the model lacks must not outvote what is known of a start or an input: the prior
+                of each counts as often.
         """
         rows: list[float] = []
         slopes: list[tuple[int, float]] = []
         for i, u in enumerate(self.unknowns):
             if u.prior:
                 mean, sd = u.prior
-                sd /= np.sqrt(together) if u.is_offset else 1.0
-                rows.append((theta[i] - mean) / sd)
-                slopes.append((i, 1.0 / sd))
+                sd /= np.sqrt(together) if u.is_nuisance else 1.0
+                value = np.log(theta[i]) if u.is_log else theta[i]
+                rows.append((value - mean) / sd)
+                slopes.append((i, 1.0 / (sd * theta[i]) if u.is_log else 1.0 / sd))
             elif u.belief:
                 residual, slope = _belief(float(theta[i]), u.start, u.belief)
                 rows.append(residual)
@@ -128,10 +157,7 @@ class Problem:
         late = {u.name: value for u, value in mine if u.is_late}
         if offset or late:
             system = shifted(system, offset, late)
-        start = start_values(system, values)
-        for u, value in mine:
-            if u.is_start:
-                start[system.states.index(u.name)] += value
+        start = start_values(system, values, {u.name: value for u, value in mine if u.is_start})
         return simulate(system, values, start, guess)
 
     def residual(self, trajectory: Trajectory) -> Array:
@@ -165,7 +191,7 @@ def make_problem(
     recordings: Sequence[str],
     outputs: Sequence[str] | None = None,
     grids: Mapping[str, Grid] | None = None,
-    priors: Mapping[str, tuple[float, float]] | None = None,
+    priors: Mapping[str, Prior] | None = None,
     belief: float | None = None,
 ) -> Problem:
     """Bind a model to recordings and lay out its unknowns.
@@ -173,7 +199,7 @@ def make_problem(
     Args:
         outputs: measured channels to compare; default every output of the model that the campaign measures.
         grids: grids made before, by recording (a model with the same inputs may share them).
-        priors: (mean, standard deviation) by parameter.
+        priors: by parameter.
         belief: believe positive start values within a factor exp(belief), with heavy tails; default not at
         all.
     """
@@ -194,7 +220,7 @@ def _unknowns(
     model: Model,
     systems: Sequence[System],
     recordings: Sequence[str],
-    priors: Mapping[str, tuple[float, float]],
+    priors: Mapping[str, Prior],
     belief: float | None,
 ) -> list[Unknown]:
     """Parameters in the order of the model, then starts, offsets and lateness recording by recording."""
@@ -205,15 +231,16 @@ def _unknowns(
             own = (
                 [r for r in recordings if r in p.values] if p.values else recordings
             )  # the others keep the common value
-            unknowns += [Unknown(name, r, False, p.at(r), p.min, p.max, priors.get(name)) for r in own]
+            unknowns += [_parameter(name, r, p, priors.get(name), None) for r in own]
         else:
             believed = belief if name not in priors and p.value > 0 and p.min >= 0 else None
-            unknowns.append(Unknown(name, None, False, p.value, p.min, p.max, priors.get(name), believed))
+            unknowns.append(_parameter(name, None, p, priors.get(name), believed))
     for system in systems:
         unknowns += [
-            Unknown(state.name, system.grid.recording, True, 0.0, -np.inf, np.inf, (0.0, state.start_sd))
+            Unknown(state.name, system.grid.recording, True, 0.0, -np.inf, np.inf, (0.0, sd), spread=kind)
             for state in system.model.states.values()
-            if state.start_sd > 0
+            for sd, kind in [_start_spread(state)]
+            if sd > 0
         ]
         unknowns += [
             Unknown(n, system.grid.recording, False, 0.0, -np.inf, np.inf, (0.0, sd), is_offset=True)
@@ -226,6 +253,36 @@ def _unknowns(
             if n in system.model.inputs
         ]
     return unknowns
+
+
+def _parameter(
+    name: str, recording: str | None, p: Parameter, prior: Prior | None, belief: float | None
+) -> Unknown:
+    is_log = bool(prior and prior.is_log)
+    low = max(p.min, 1e-12) if is_log else p.min
+    known = (prior.mean, prior.sd) if prior else None
+    return Unknown(name, recording, False, p.at(recording or ""), low, p.max, known, is_log, belief)
+
+
+def _start_spread(state: State) -> tuple[float, Literal["given", "read", "fitted"]]:
+    """Standard deviation of a start before anything is known of noise and size, and how it is known."""
+    if state.start_sd is not None:
+        return state.start_sd, "given"
+    return 1.0, "read" if state.read_as else "fitted"
+
+
+def read_spread(system: System, state: str, white: Mapping[str, float]) -> float:
+    """How well the first reading of a state knows its start: the noise of a reading, and what the state moves
+    from the first instant to it.
+    """
+    output = system.model.states[state].read_as
+    series = system.grid.readings[:, system.grid.outputs.index(output)]
+    seen = np.flatnonzero(np.isfinite(series))
+    time = system.grid.time[system.grid.read]
+    late = float(time[seen[0]] - system.grid.time[0])
+    if late > 0 and len(seen) > 1:
+        late *= abs(float(series[seen[1]] - series[seen[0]])) / float(time[seen[1]] - time[seen[0]])
+    return float(np.hypot(white[output], late if len(seen) > 1 else 0.0))
 
 
 def _belief(value: float, start: float, width: float) -> tuple[float, float]:

@@ -1,4 +1,9 @@
-"""Least squares on the whitened residual of a problem: what a fit does once its noise is given."""
+"""Least squares on the whitened residual of a problem: what a fit does once its noise is given.
+
+Gauss-Newton on the normal equations with Marquardt's damping (Nocedal & Wright, Numerical Optimization, 2006,
+ch. 10) and bounds by an active set: unknowns are few and readings many, so each step is one p x p system, and
+a trial step that is refused costs a free run and no sensitivities.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +22,12 @@ from discovery.fitting.problem import Problem
 Array = NDArray[np.float64]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 
+_DAMPING = 1e-4  # of the first step, relative to the diagonal of the normal equations
+_EASE, _TIGHTEN = 0.1, 5.0  # factors of the damping after a step that is taken, or refused
+_HOPELESS = 1e10  # damping at which no shorter step helps any more
+_STILL = 1e-11  # relative change of the unknowns below which the search has ended
+_FAR = 0.5  # what a step has to take off the cost for the whitening filters to be made anew behind it
+
 
 @dataclass(frozen=True)
 class Solution:
@@ -26,6 +37,17 @@ class Solution:
     trajectories: tuple[Trajectory, ...]
     jacobian: Array  # (N, U) of whitened residuals and priors
     cost: float  # half the sum of their squares
+
+
+@dataclass(frozen=True)
+class _Run:
+    """The model at one place: trajectories and whitened residual with priors (N,)."""
+
+    trajectories: tuple[Trajectory, ...]
+    residual: Array
+
+
+Filters = tuple[Filter | None, ...]
 
 
 def solve(
@@ -39,59 +61,157 @@ def solve(
 ) -> Solution:
     """The unknowns (U,) with the least cost under a noise, sought from `theta` (U,).
 
+    The whitening filter belongs to a trajectory. It follows steps that change something and is held for the
+    rest, so that the cost of the last ones is one function.
+
     Args:
-        loss: bounds the pull of outliers, as in scipy.optimize.least_squares.
-        max_rounds: of Levenberg-Marquardt.
-        tolerance: relative change of the cost that ends them.
-        together: readings that count as one against the priors of offsets (`Problem.prior_rows`).
+        loss: bounds the pull of outliers, with the formulas of scipy.optimize.least_squares.
+        max_rounds: of linearisation.
+        tolerance: relative change of the cost that ends the search.
+        together: readings that count as one against the priors (`Problem.prior_rows`).
 
     Raises:
         RunsAwayError: the model does not stay finite where the search begins.
     """
-    from scipy.optimize import least_squares
-
     low, high = problem.bounds
-    guesses: dict[str, Array] = {}
-    last: dict[bytes, tuple[Array, tuple[tuple[Trajectory, Filter | None], ...]]] = {}
+    x = np.clip(theta, low, high)
+    runs = _trajectories(problem, x, None)
+    filters = _filters(runs, noise)
+    now = _whitened(problem, x, noise, together, runs, filters)
+    cost, damping = _cost(now.residual, loss), _DAMPING
+    jacobian = _jacobian(problem, x, noise, together, now, filters)
+    for _ in range(max_rounds if len(x) else 0):
+        weight, slope = _weights(now.residual, loss)
+        rows = jacobian * weight[:, None]
+        gram, gradient = rows.T @ rows, jacobian.T @ slope
+        found = None
+        while damping < _HOPELESS:
+            moved = np.clip(x + _step(x, gram, gradient, damping, low, high), low, high)
+            change = moved - x
+            expected = -float(gradient @ change) - 0.5 * float(change @ gram @ change)
+            if np.all(np.abs(change) <= _STILL * (1.0 + np.abs(x))):
+                break
+            try:
+                runs = _trajectories(problem, moved, now)
+                trial = _whitened(problem, moved, noise, together, runs, filters)
+            except RunsAwayError:
+                trial = None
+            if trial is not None and _cost(trial.residual, loss) < cost:
+                found = trial
+                break
+            if expected < tolerance * cost:
+                break
+            damping *= _TIGHTEN
+        if found is None:
+            break
+        gained = cost - _cost(found.residual, loss)
+        x, now = moved, found
+        if gained > 0.5 * expected:
+            damping = max(damping * _EASE, 1e-12)
+        done = gained < tolerance * cost
+        if gained > _FAR and not noise.is_white:
+            filters = _filters(now.trajectories, noise)
+            now = _whitened(problem, x, noise, together, now.trajectories, filters)
+        cost = _cost(now.residual, loss)
+        jacobian = _jacobian(problem, x, noise, together, now, filters)
+        if done:
+            break
+    return Solution(x, now.trajectories, jacobian, 0.5 * float(now.residual @ now.residual))
 
-    def run(x: Array) -> tuple[Array, tuple[tuple[Trajectory, Filter | None], ...]]:
-        key = x.tobytes()
-        if key not in last:
-            trajectories = tuple(problem.run(s, x, guesses.get(s.grid.recording)) for s in problem.systems)
-            for t in trajectories:
-                guesses[t.system.grid.recording] = t.x
-            runs = tuple((t, None if noise.is_white else make_filter(t)) for t in trajectories)
-            parts = [whiten(t, noise, problem.residual(t)[:, :, None], part)[:, 0] for t, part in runs]
-            last.clear()
-            last[key] = (np.concatenate([*parts, problem.prior_rows(x, together)[0]]), runs)
-        return last[key]
 
-    def jacobian(x: Array) -> Array:
-        parts = [whiten(t, noise, -problem.jacobian(t), part) for t, part in run(x)[1]]
-        return np.concatenate([*parts, problem.prior_rows(x, together)[1]])
+def _trajectories(problem: Problem, x: Array, near: _Run | None) -> tuple[Trajectory, ...]:
+    """Free runs at a place; `near`: a run close by, whose trajectories Newton begins from."""
+    guesses = {t.system.grid.recording: t.x for t in near.trajectories} if near else {}
+    return tuple(problem.run(s, x, guesses.get(s.grid.recording)) for s in problem.systems)
 
-    def residual(x: Array) -> Array:
-        try:
-            return run(x)[0]
-        except RunsAwayError:  # a trial step: the solver takes a shorter one
-            return np.full(rows, np.inf)
 
-    # scipy refuses a start on the bound's wrong side by rounding, and moves one that lies on it inside
-    x0 = np.clip(theta, low, high)
-    rows = len(run(x0)[0])
-    if len(x0):
-        result = least_squares(
-            residual,
-            x0,
-            jac=jacobian,
-            bounds=(low, high),
-            x_scale="jac",
-            loss=loss,
-            max_nfev=max_rounds,
-            ftol=tolerance,  # alone: scipy's xtol measures all unknowns on one scale, W/K and seconds alike
-            xtol=1e-13,
-            gtol=1e-12,
-        )
-        x0 = result.x
-    left, runs = run(x0)
-    return Solution(x0, tuple(t for t, _ in runs), jacobian(x0), 0.5 * float(left @ left))
+def _filters(trajectories: tuple[Trajectory, ...], noise: Noise) -> Filters:
+    return tuple(None if noise.is_white else make_filter(t) for t in trajectories)
+
+
+def _whitened(
+    problem: Problem,
+    x: Array,
+    noise: Noise,
+    together: float,
+    trajectories: tuple[Trajectory, ...],
+    filters: Filters,
+) -> _Run:
+    parts = [
+        whiten(t, noise, problem.residual(t)[:, :, None], part)[:, 0]
+        for t, part in zip(trajectories, filters, strict=True)
+    ]
+    return _Run(trajectories, np.concatenate([*parts, problem.prior_rows(x, together)[0]]))
+
+
+def _jacobian(
+    problem: Problem, x: Array, noise: Noise, together: float, run: _Run, filters: Filters
+) -> Array:
+    parts = [
+        whiten(t, noise, -problem.jacobian(t), part)
+        for t, part in zip(run.trajectories, filters, strict=True)
+    ]
+    return np.concatenate([*parts, problem.prior_rows(x, together)[1]])
+
+
+def _step(x: Array, gram: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
+    """Damped step (U,); an unknown that would leave its range goes to the end of it, and the others are
+    asked again.
+    """
+    free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
+    step = np.zeros(len(x))
+    while free.any():
+        held = gradient + gram[:, ~free] @ step[~free]
+        scale = np.sqrt(np.maximum(np.diag(gram)[free], 1e-300))
+        scaled = gram[np.ix_(free, free)] / np.outer(scale, scale)
+        scaled[np.diag_indices_from(scaled)] = 1.0 + damping
+        step[free] = -_solved(scaled, held[free] / scale) / scale
+        over = free & ((x + step < low) | (x + step > high))
+        if not over.any():
+            break
+        step[over] = np.clip(x + step, low, high)[over] - x[over]
+        free &= ~over
+    return step
+
+
+def _solved(matrix: Array, vector: Array) -> Array:
+    from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+    if not np.isfinite(matrix).all():  # sensitivities that overflow: no step from here
+        return np.zeros(len(vector))
+    try:
+        return np.asarray(cho_solve(cho_factor(matrix), vector))
+    except LinAlgError:
+        return np.asarray(np.linalg.lstsq(matrix, vector, rcond=1e-12)[0])
+
+
+def _rho(z: Array, loss: Loss) -> tuple[Array, Array, Array]:
+    """rho(z) and its first two derivatives for z the squared residual."""
+    match loss:
+        case "linear":
+            return z, np.ones_like(z), np.zeros_like(z)
+        case "soft_l1":
+            t = 1.0 + z
+            return 2 * (np.sqrt(t) - 1), t**-0.5, -0.5 * t**-1.5
+        case "huber":
+            inside = z <= 1
+            far = np.where(inside, 1.0, z)
+            return (
+                np.where(inside, z, 2 * np.sqrt(far) - 1),
+                np.where(inside, 1.0, far**-0.5),
+                np.where(inside, 0.0, -0.5 * far**-1.5),
+            )
+        case "cauchy":
+            t = 1.0 + z
+            return np.log1p(z), 1 / t, -1 / t**2
+
+
+def _cost(residual: Array, loss: Loss) -> float:
+    return 0.5 * float(np.sum(_rho(residual**2, loss)[0]))
+
+
+def _weights(residual: Array, loss: Loss) -> tuple[Array, Array]:
+    """Weights (N,) of the rows of the Jacobian, and the slope of the cost by each residual (N,)."""
+    z = residual**2
+    _, first, second = _rho(z, loss)
+    return np.sqrt(np.maximum(first + 2 * second * z, 1e-10)), first * residual

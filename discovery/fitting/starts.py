@@ -131,7 +131,8 @@ class _Bank:
             states = {"x": State("x", "", None, Number(0.0), 0.0)}
             terms = (Term("follow", "x", parse(f"({u} - x)/tau")),)
             system = make_system(
-                Model("filter", {"tau": Parameter(1.0)}, states, terms, {}), replace(grid, outputs=())
+                Model("filter", {"tau": Parameter(1.0)}, states, terms, {}),
+                replace(grid, outputs=(), readings=grid.readings[:, :0]),
             )
             filtered[u] = np.array([simulate(system, {"tau": tau}).x[grid.read, 0] for tau in taus])
         since = grid.time[grid.read] - grid.time[0]

@@ -7,10 +7,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count
 
-from discovery.terms import Apply, Expression, Name, Number, Term, names, substitute
-from discovery.terms.expression import MEMORY, rewrite
+from discovery.terms import Apply, Expression, Name, Number, Term, names
+from discovery.terms.expression import rewrite
 
-_ZERO = Number(0.0)
 TIME_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
@@ -42,18 +41,21 @@ class Parameter:
 class State:
     """A state. With a capacity [J/K] its terms are heat flows in W, without it rates in `unit` per time unit.
 
-    `start` is an expression of channels and parameters at the first instant, or None: the first reading of
-    the channel of that name. `start_sd` is the spread that a fit allows around it (0: exact). `scale` turns
-    the sum of its terms into unit per second. `memory`: it is what a lag() remembers, no part of the machine.
+    `start` is an expression of channels and parameters at the first instant, or None: the balance of its
+    terms there. `start_sd` is the spread around it (0: exact). Without one, a state that an output shows as
+    it is starts at the first reading of that output, known to the noise of a reading, and any other state
+    has a spread that a fit finds. `scale` turns the sum of its terms into unit per second. `memory`: it is
+    what a lag() remembers, no part of the machine.
     """
 
     name: str
     unit: str = "degC"
     capacity: float | None = None
-    start: Expression | None = _ZERO
-    start_sd: float = 0.5
+    start: Expression | None = None
+    start_sd: float | None = None
     scale: float = 1.0
     memory: bool = False
+    read_as: str = ""  # output at whose first reading it starts; set where a model meets recordings
 
 
 @dataclass(frozen=True)
@@ -155,8 +157,32 @@ def in_time_unit(model: Model) -> Model:
     return replace(model, terms=tuple(terms), states=states)
 
 
+def shown_states(model: Model, outputs: Collection[str]) -> dict[str, str]:
+    """States that an output shows as they are: state -> output."""
+    shown = {name: model.outputs.get(name, Name(name)) for name in outputs}
+    return {e.id: name for name, e in reversed(shown.items()) if isinstance(e, Name) and e.id in model.states}
+
+
+def read_at_start(model: Model, outputs: Collection[str]) -> Model:
+    """An expanded model with the start of each state that is read, and has no spread of its own, at its first
+    reading; one that is read through a lag starts there, too.
+    """
+    shown, states = shown_states(model, outputs), dict(model.states)
+    for name, output in shown.items():
+        if states[name].start_sd is None or states[name].memory:
+            states[name] = replace(states[name], start=Name(output), start_sd=None, read_as=output)
+        if not states[name].memory:
+            continue
+        followed = next((t.expression for t in model.terms if t.into == name), None)
+        match followed:
+            case Apply("/", (Apply("-", (Name(body), _)), _)) if body in states and body not in shown:
+                if states[body].start_sd is None:
+                    states[body] = replace(states[body], start=Name(output))
+    return replace(model, states=states)
+
+
 def expanded(model: Model, channels: Collection[str] = ()) -> Model:
-    """The model with every lag(e, tau) written out as a hidden state: tau ds/dt = e - s, s(0) = e(0).
+    """The model with every lag(e, tau) written out as a hidden state: tau ds/dt = e - s, settled at first.
 
     One mechanism then serves its dynamics, its sensitivities to e and to tau, its report and its export.
     Equal lags share one state.
@@ -183,14 +209,7 @@ def expanded(model: Model, channels: Collection[str] = ()) -> Model:
     states, extra = dict(model.states), []
     for apply, name in found.items():
         inner, tau = apply.arguments
-        starts = {s: state.start for s, state in states.items() if state.start is not None}
-        spread = max((states[s].start_sd for s in names(inner) if s in states), default=0.0)
-        start = rewrite(substitute(inner, starts), _settled)
-        states[name] = State(name, "", None, start, spread, 1.0, memory=True)
+        # its balance is what it is fed with: a memory starts settled
+        states[name] = State(name, "", start_sd=0.0, memory=True)
         extra.append(Term(f"{name} follows", name, Apply("/", (Apply("-", (inner, Name(name))), tau))))
     return replace(model, states=states, terms=terms + tuple(extra), outputs=outputs)
-
-
-def _settled(apply: Apply) -> Expression | None:
-    """At the first instant nothing has moved yet: what remembers shows what it is fed with."""
-    return apply.arguments[0] if apply.function in MEMORY else None

@@ -49,9 +49,14 @@ class StateForm(Strict):
         None, gt=0, description="heat capacity in J/K; its terms are then heat flows in W"
     )
     start: float | str | None = Field(
-        None, description="number or expression; without it the first reading, else 0"
+        None, description="number or expression; without it the balance of the first inputs"
     )
-    start_sd: float | None = Field(None, ge=0, description="spread of the start value; default 0.5 K or 1 um")
+    start_sd: float | None = Field(
+        None,
+        ge=0,
+        description="spread of the start value; without it a state that is read starts at its first reading, "
+        "and the spread of any other is found by the fit",
+    )
     memory: bool = Field(False, description="true: what a lag() remembers, no body (written by a fit)")
 
 
@@ -161,10 +166,8 @@ def _state(name: str, entry: StateForm, per_unit: float, place: str) -> State:
     if entry.start is not None:
         start = parse(entry.start, place)
         check_start(start, place)
-    usual = 0.5 if entry.unit in ("degC", "K", "kelvin") else 1.0
-    spread = usual if entry.start_sd is None else entry.start_sd
     scale = 1.0 / entry.capacity if entry.capacity else per_unit
-    return State(name, entry.unit, entry.capacity, start, spread, scale, entry.memory)
+    return State(name, entry.unit, entry.capacity, start, entry.start_sd, scale, entry.memory)
 
 
 def _term(i: int, entry: TermForm, states: Mapping[str, State], at: Callable[..., str]) -> Term:

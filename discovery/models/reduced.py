@@ -36,9 +36,7 @@ def reduced(inputs: Sequence[str], outputs: Sequence[str], channels: Mapping[str
     terms: list[Term] = []
     for output in outputs:
         unit = channels[output].unit
-        # it starts at its first reading, which is known to the noise of a reading
-        spread = max(1.0, channels[output].noise or 0.0)
-        states[output] = State(output, unit, None, None, spread, 1.0 / TIME_UNITS[TIME_UNIT])
+        states[output] = State(output, unit, scale=1.0 / TIME_UNITS[TIME_UNIT])
         pole = f"p1_{output}"
         parameters[pole] = Parameter(-0.5, f"1/{TIME_UNIT}", max=POLE_MAX)
         terms.append(Term(f"{output} itself", output, Apply("*", (Name(pole), Name(output)))))

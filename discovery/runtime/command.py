@@ -7,21 +7,27 @@ import math
 import sys
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
+from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from discovery.errors import UsageError, UserError
 from discovery.export.document import Exported, read_document
 from discovery.export.seal import public_key, require_trusted
-from discovery.runtime.compensator import Compensator, Settings, Tick
-from discovery.runtime.rows import csv_rows, ticks
-from discovery.runtime.session import Say, Session
+from discovery.runtime.compensator import Settings
+from discovery.runtime.events import instant
+from discovery.runtime.output import Output
+from discovery.runtime.rows import Dropped, csv_rows, ticks
+from discovery.runtime.session import Say, Session, header
 from discovery.runtime.shadow import Rule
+from discovery.runtime.signals import Stopped, listening
 from discovery.runtime.store import step_back
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+    from discovery.runtime.learning import Learner
 
 
 def trusted_model(
@@ -46,16 +52,12 @@ def trusted_model(
 
 
 def one_source(
-    sources: Mapping[str, object],
-    *,
-    only_inputs: Mapping[str, object],
-    only_opcua: Mapping[str, object],
-    shadow_hours: float,
+    sources: Mapping[str, object], *, only_opcua: Mapping[str, object], shadow: Mapping[str, float | None]
 ) -> None:
     """Refuse options of `discovery compensate` that do not go together; None: an option was not given.
 
     Raises:
-        UsageError: no source of readings or two, an option of the other source, a time that is none.
+        UsageError: no source of readings or two, an option of the other source, a number that cannot be.
     """
     given = [name for name, value in sources.items() if value is not None]
     if not given:
@@ -64,11 +66,12 @@ def one_source(
         )
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)}: the readings come from one of them; leave the other out")
-    for name, value in (only_opcua if given == ["--inputs"] else only_inputs).items():
+    for name, value in (only_opcua if given == ["--inputs"] else {}).items():
         if value is not None:
             raise UsageError(f"{name} does not go with {given[0]}; leave it out")
-    if not 0.0 <= shadow_hours < math.inf:
-        raise UsageError(f"--shadow-hours {shadow_hours:g} is no length of time; give 0 or more hours")
+    for name, number in shadow.items():
+        if number is not None and not 0.0 <= number < math.inf:
+            raise UsageError(f"{name} {number:g} cannot be; give 0 or more")
 
 
 def compensate_rows(
@@ -79,66 +82,71 @@ def compensate_rows(
     model: Path,
     folder: Path | None = None,
     trusted: Ed25519PublicKey | None = None,
-    shadow_hours: float = 24.0,
+    rule: Rule | None = None,
+    acknowledge: bool = False,
+    learn: Learner | None = None,
     say: Say = lambda _: None,
 ) -> None:
     """Ticks over the rows of a CSV file, or of standard input (`-`), to `out` or standard output.
 
-    With `folder` the state is kept there: a restart goes on after the last state saved, and ticks done again
-    stand twice in `out`; the later ones count.
+    With `folder` the state is kept there: a restart goes on after the last state saved, and `out` is cut to
+    what that state stands for, so that no line is lost and none stands twice. `out` is opened with the first
+    tick, `folder` with the first row: inputs that cannot be read leave both as they were.
 
-    `out` is opened with the first tick, `folder` with the first row: inputs that cannot be read leave both as
-    they were.
+    SIGTERM and SIGINT end the run in state OFF, saved; SIGUSR1 is an operator's acknowledge.
 
     Raises:
-        UserError: `out` is the file of the inputs or of the model, or inputs that cannot be read.
+        UserError: `out` is the file of the inputs or of the model, inputs that cannot be read, no offset was
+        given out, or the run ended in trouble.
     """
     for option, used in (("--inputs", Path(source)), ("the model", model)):
         if out is not None and out.exists() and used.exists() and out.samefile(used):
             raise UserError(f"{out}: --out names the same file as {option}; name another file")
-    step = exported.compiled.step_s
-    settings, rule = Settings(tick_s=step), Rule(hours=shadow_hours)
+    step, live, dropped = exported.compiled.step_s, source == "-", Dropped()
+    settings = Settings(tick_s=step)
     with ExitStack() as stack:
-        lines: Iterable[str] = sys.stdin if source == "-" else stack.enter_context(_open(Path(source)))
-        rows = csv_rows(lines, exported.compiled.inputs, say)
+        lines: Iterable[str] = sys.stdin if live else stack.enter_context(_open(Path(source)))
+        oldest = max((i.range.age_s for i in exported.inputs), default=math.inf)
+        rows = csv_rows(lines, exported.compiled.inputs, say, dropped, oldest)
         first = next(rows, None)  # inputs that are refused leave no trace in the folder
         if first is None:
-            say("no row with a time came; nothing was done")
+            say("no row with a time came; nothing was done" + (f"; {dropped}" if dropped.counts else ""))
             return
         session = Session(
-            exported, model=model, folder=folder, trusted=trusted, settings=settings, rule=rule, say=say
-        )
-        goes_on = out is not None and out.exists() and session.resumed is not None
-        stream: TextIO | None = None
-        last = None
-        for now, newest in ticks(chain([first], rows), step, session.resumed):
-            found = session.tick(newest, now)
-            if stream is None:
-                stream = _output(out, stack, "a" if goes_on else "w")
-                stream.write("" if goes_on else header(session.compensator))
-            stream.write(line(session.compensator, found))
-            if source == "-":
-                stream.flush()
-            last = now
+            exported, model=model, folder=folder, trusted=trusted, settings=settings, rule=rule, learn=learn,
+            now=first[0] if live else None, say=say,
+        )  # fmt: skip
+        session.opens = partial(_output, session, out, live=live)
+        asked, last = stack.enter_context(listening()), None
+        asked.acknowledge = acknowledge
+        try:
+            for now, newest in ticks(chain([first], rows), step, session.resumed):
+                with asked.busy():
+                    session.tick(newest, now, acknowledge=asked.acknowledged())
+                    last = now
+        except Stopped:
+            say("stopped: the compensation is switched off and its state is saved")
+            if last is not None:
+                session.tick({}, last, enabled=False)
+        except BaseException:
+            session.close(last if last is not None else first[0])
+            raise
         if last is None:
-            after = " after the saved state" if session.resumed is not None else ""
+            after = f" after the saved state of {instant(session.resumed)}" if session.resumed else ""
             say(f"no row with a time came{after}; nothing was done")
-        else:
-            session.close(last)
+        session.close(last if last is not None else first[0])
+        if dropped.counts:
+            say(str(dropped))
+        if last is not None:
+            say(session.summary())
+            session.judge()
 
 
-def header(compensator: Compensator) -> str:
-    """First line of the output: time [s] at which the offsets are valid, state, status word, heartbeat,
-    offsets, model.
-    """
-    return ",".join(["time", "state", "status", "heartbeat", *compensator.names, "model"]) + "\n"
-
-
-def line(compensator: Compensator, tick: Tick) -> str:
-    """A tick as a line of CSV."""
-    numbers = [f"{tick.offsets[name]:.4f}" for name in compensator.names]
-    cells = [f"{tick.valid_at:.10g}", tick.state.name, str(tick.status), str(tick.heartbeat), *numbers]
-    return ",".join([*cells, compensator.exported.seal.sha256[:12]]) + "\n"
+def _output(session: Session, out: Path | None, *, live: bool) -> Output:
+    """The output as the restored state knows it; of a stream no line can be made again, so none is cut."""
+    at = session.resume_at if session.resume_at is not None or session.resumed is None else 0
+    replay = not live and session.resume_at is not None
+    return Output(out, header(session.compensator), at, replay=replay)
 
 
 def go_back(folder: Path, say: Say) -> None:
@@ -148,13 +156,6 @@ def go_back(folder: Path, say: Say) -> None:
         f"revision {back.revision} of '{back.model.name}' is at work again; its offsets "
         "begin where the last ones were"
     )
-
-
-def _output(out: Path | None, stack: ExitStack, mode: Literal["a", "w"]) -> TextIO:
-    if out is None:
-        return sys.stdout
-    out.parent.mkdir(parents=True, exist_ok=True)
-    return stack.enter_context(out.open(mode, encoding="utf-8"))
 
 
 def _open(path: Path) -> TextIO:

@@ -1,7 +1,7 @@
 """The compensator: one tick after the other, readings in, offsets out.
 
 Whatever comes in, an offset is finite, within its limit, and moves from tick to tick no faster than its rate
-allows.
+allows. Every state but OFF ends by itself once the inputs have been good for `recover_s`.
 """
 
 from __future__ import annotations
@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.export.document import Exported
+from discovery.export.guarding import Times, compensated
 from discovery.export.stepper import Stepper
+from discovery.runtime.events import Change, Event, state_event
 from discovery.runtime.fastforward import fast_forward
-from discovery.runtime.guards import Fault, Reading, guards
+from discovery.runtime.guards import Checked, Fault, Reading, guards, number
+from discovery.runtime.hindsight import LONGEST_S, Hindsight
 
 Array = NDArray[np.float64]
 
@@ -28,15 +31,15 @@ class State(Enum):
 
     OFF = 0  # offsets are zero, or on their way there
     COLD = 1  # started without a saved state: the start values still count
-    WARM = 2  # started from a saved state through a gap
+    WARM = 2  # started from a saved state through a gap, or after a fault
     ACTIVE = 3
     DEGRADED = 4  # an input is replaced by its last good value, for a limited time
     FROZEN = 5  # the model failed: offsets are held until the part is done
-    FAULT = 6  # offsets ramp to zero; goes on after `acknowledge`
+    FAULT = 6  # offsets ramp to zero until the inputs are good again
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Times):
     """Times of the runtime in s."""
 
     tick_s: float | None = (
@@ -44,13 +47,12 @@ class Settings:
     )
     catch_up_s: float = 600.0  # late ticks are made up for as far as this; a longer gap is fast-forwarded
     longest_gap_s: float = 30 * 24 * 3600.0  # beyond this the model starts anew
-    hold_limit_s: float = 4 * 3600.0  # longest replacement of an input
-    freeze_limit_s: float = 2 * 3600.0  # longest hold of the outputs
-    settle_s: float = 8 * 3600.0  # COLD and WARM last as long
     bump_s: float = 1800.0  # time constant with which the difference at a change of model fades
+    hindsight: bool = True  # go through a gap of an input again once it is back; controllers cannot
 
 
 BUMP, LATE, LIMITED, RATED, UNTIMELY = 1 << 16, 1 << 17, 1 << 18, 1 << 19, 1 << 20
+TROUBLE = (State.DEGRADED, State.FROZEN, State.FAULT)
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,7 @@ class Tick:
     status: int
     heartbeat: int
     faults: Mapping[str, Fault]
+    events: tuple[Event, ...] = ()
 
 
 class Compensator:
@@ -74,7 +77,7 @@ class Compensator:
         self.exported, self.settings = exported, settings or Settings()
         self.stepper = Stepper(exported.compiled)
         self.guards = guards(exported.inputs)
-        self.places = [k for k, output in enumerate(exported.outputs) if output.role == "error"]
+        self.places = compensated(exported)
         self.names = [exported.outputs[k].name for k in self.places]
         self.limit = [exported.outputs[k].range.limit for k in self.places]
         self.rate = [exported.outputs[k].range.rate for k in self.places]
@@ -85,47 +88,96 @@ class Compensator:
         self.inputs: Array | None = None  # inputs (U,) of that step
         self.origin: float | None = None  # instant of the model's first step
         self.last: float | None = None  # instant of the last tick
-        self.since = 0.0  # when the present spell of trouble, or of settling, began
+        self.since = 0.0  # when the model failed
+        self.good_since: float | None = None  # since when all inputs are good; None: they are not
         self.settling = State.COLD
         self.started_at = 0.0
         self.heartbeat = 0
+        self.gain = 1.0
+        self.hindsight: Hindsight | None = None  # since an input is replaced
+        self.acknowledged = False  # an operator has looked since the last tick
+        self.shift = 0.0  # added to the clock of the readings where it was set back [s]
+        self.events: list[Event] = []  # of the present tick
         self.inherited: Mapping[str, float] | None = (
             None  # states of the model before this one, taken over at the start
         )
 
     def tick(
-        self, readings: Mapping[str, Reading], now: float, *, enabled: bool = True, part_done: bool = False
+        self,
+        readings: Mapping[str, Reading],
+        now: float,
+        *,
+        enabled: bool = True,
+        part_done: bool = False,
+        acknowledge: bool = False,
     ) -> Tick:
-        """One tick at `now` [s on the clock of the readings]; see `Tick`. Never raises for what comes in."""
+        """One tick at `now` [s on the clock of the readings]; see `Tick`. Never raises for what comes in.
+
+        `part_done`: a FROZEN compensation may let go of its offsets. `acknowledge`: an operator has looked;
+        steps that wait are accepted, and a FAULT ends with the next good inputs.
+        """
         self.heartbeat += 1
-        flags = 0
-        if not math.isfinite(now) or (self.last is not None and now < self.last):
-            flags |= UNTIMELY
-            now = self.last if self.last is not None else 0.0
+        self.events = []
+        now, flags = self._on_time(now)
         elapsed = 0.0 if self.last is None else now - self.last
         self.last = now
         if elapsed > self.settings.catch_up_s:
             for guard in self.guards:
                 guard.fresh = True
-        checked = [guard.check(readings.get(guard.spec.name), now) for guard in self.guards]
+        if acknowledge:
+            self.acknowledge()
+        hurry, self.acknowledged = self.acknowledged, False
+        checked = self._checked(readings, now)
         faults = {
             g.spec.name: c.fault if c else Fault.NOT_FINITE for g, c in zip(self.guards, checked, strict=True)
         }
         good = [c for c in checked if c is not None]
-        gain = min((c.gain for c in good), default=1.0)
         failed = False
         if len(good) == len(checked):
-            late, failed = self._advance(np.array([c.value for c in good]), now)
+            lost = np.array([bool(c.fault & ~Fault.UNTRAINED) for c in good])
+            late, failed = self._advance(np.array([c.value for c in good]), lost, now)
             flags |= LATE * late
-        self._change_state(faults, failed, now, enabled=enabled, part_done=part_done)
-        flags |= self._move(gain, elapsed)
+        self._tell_accepted(now)
+        self._tell_gain(min((c.gain for c in good), default=1.0), now)
+        was = self.state
+        self._change_state(faults, failed, now, enabled=enabled, part_done=part_done, hurry=hurry)
+        if self.state is not was:
+            on = was is State.OFF and self.started_at < now
+            change = Change(was.name, self.state.name, failed=failed, switched_on=on)
+            self.events.append(state_event(change, self.guards, faults, readings, now))
+        flags |= self._move(elapsed)
         for fault in faults.values():
             flags |= int(fault)
         valid = now + self.exported.compiled.step_s
         offsets = dict(zip(self.names, self.offsets, strict=True))
-        return Tick(valid, offsets, self.state, flags | self.state.value, self.heartbeat, faults)
+        status = flags | self.state.value
+        return Tick(valid, offsets, self.state, status, self.heartbeat, faults, tuple(self.events))
 
-    def _advance(self, u: Array, now: float) -> tuple[bool, bool]:
+    def _on_time(self, now: float) -> tuple[float, int]:
+        """The instant of this tick on a clock that never goes back, and the flag that it did."""
+        if not math.isfinite(now):
+            return (self.last if self.last is not None else 0.0), UNTIMELY
+        now += self.shift
+        if self.last is None or now >= self.last:
+            return now, 0
+        if self.last - now > self.settings.catch_up_s:  # not a tick out of order: the clock was set
+            back = self.last - now
+            self.shift += back
+            self.events.append(Event(self.last, "clock", f"the clock of the ticks went back by {back:.0f} s"))
+        return self.last, UNTIMELY
+
+    def _checked(self, readings: Mapping[str, Reading], now: float) -> list[Checked | None]:
+        ways = [guard.direction for guard in self.guards]
+        found = []
+        for k, guard in enumerate(self.guards):
+            reading = readings.get(guard.spec.name)
+            if reading is not None and self.shift:
+                reading = Reading(reading.value, number(reading.time) + self.shift, reading.good)
+            others = any(way and way == ways[k] for j, way in enumerate(ways) if j != k)
+            found.append(guard.check(reading, now, others))
+        return found
+
+    def _advance(self, u: Array, lost: NDArray[np.bool_], now: float) -> tuple[bool, bool]:
         """Bring the model to `now`: whether it was late, whether it failed."""
         step = self.exported.compiled.step_s
         if self.origin is None or now - self.origin - self.stepper.count * step > self.settings.longest_gap_s:
@@ -134,6 +186,7 @@ class Compensator:
             except UserError:  # these inputs give no start: stay off, try again with the next ones
                 return False, True
             self.origin, self.started_at, self.settling = now, now, State.COLD
+            self.hindsight = None
             if self.inherited is not None:
                 self._take_over(self.inherited)
         due = math.floor((now - self.origin) / step + 1e-9) + 1 - self.stepper.count
@@ -141,7 +194,7 @@ class Compensator:
         if late:
             before = self.stepper.count
             fast_forward(self.exported, self.stepper, u if self.inputs is None else self.inputs, u, due - 1)
-            self.settling, self.started_at = State.WARM, now
+            self.settling, self.started_at, self.hindsight = State.WARM, now, None
             due -= self.stepper.count - before
         if due <= 0:
             return False, False
@@ -149,6 +202,8 @@ class Compensator:
             u if self.inputs is None else self.inputs, (due, 1)
         )  # missed steps: as the inputs were
         held[-1] = u
+        if self.hindsight is None and lost.any() and self.inputs is not None and self.settings.hindsight:
+            self.hindsight = Hindsight(self.stepper.snapshot(), self.inputs)
         y = self.stepper.run(held)
         if len(y):
             if self.inherited is not None:
@@ -156,30 +211,70 @@ class Compensator:
             self.predicted = y[-1]
         if len(y) == due:  # inputs that the model fails on are never held
             self.inputs = u
+        self._look_back(held, lost, failed=len(y) < due)
+        self.origin += (due - len(y)) * step  # steps that failed are left out, not made up for
         return late or due > 1, len(y) < due
 
+    def _look_back(self, rows: Array, lost: NDArray[np.bool_], *, failed: bool) -> None:
+        """Remember steps under replaced inputs; once none is, take them again with what is known now."""
+        if self.hindsight is None:
+            return
+        self.hindsight.add(rows, lost)
+        if failed or len(self.hindsight.rows) * self.exported.compiled.step_s > LONGEST_S:
+            self.hindsight = None
+        elif not lost.any():
+            found = self.hindsight.replay(self.exported, self.stepper)
+            self.predicted = self.predicted if found is None else found
+            self.hindsight = None
+
     def _change_state(
-        self, faults: Mapping[str, Fault], failed: bool, now: float, *, enabled: bool, part_done: bool
+        self,
+        faults: Mapping[str, Fault],
+        failed: bool,
+        now: float,
+        *,
+        enabled: bool,
+        part_done: bool,
+        hurry: bool,
     ) -> None:
         s, replaced = self.settings, any(fault & ~Fault.UNTRAINED for fault in faults.values())
+        if replaced or failed:
+            self.good_since = None
+        elif self.good_since is None:
+            self.good_since = now
+        good = self.good_since is not None and (hurry or now - self.good_since >= s.recover_s)
+        settled = self.settling if now - self.started_at < s.settle_s else State.ACTIVE
+        held = (
+            max(now - guard.held_at for guard in self.guards) if replaced and self.origin is not None else 0.0
+        )
         if not enabled:
             self.state = State.OFF
-        elif self.state is State.FAULT or self.origin is None:
+        elif self.origin is None:
             pass
         elif failed:
-            if self.state is not State.FROZEN:
-                self.state, self.since = State.FROZEN, now
-            if part_done or now - self.since > s.freeze_limit_s:
-                self.state = State.FAULT
-        elif replaced:
-            if self.state is not State.DEGRADED:
-                self.state, self.since = State.DEGRADED, now
-            if now - self.since > s.hold_limit_s:
-                self.state = State.FAULT
-        else:
-            self.state = self.settling if now - self.started_at < s.settle_s else State.ACTIVE
+            self._fail(now, part_done=part_done)
+        elif held > s.hold_limit_s:
+            self.since = self.since if self.state is State.FAULT else now
+            self.state = State.FAULT
+        elif self.state is State.FAULT and good:
+            self.settling, self.started_at = State.WARM, now
+            self.state = State.WARM if s.settle_s > 0.0 else State.ACTIVE
+        elif self.state is not State.FAULT:
+            recovering = self.state in TROUBLE and not good
+            self.state = State.DEGRADED if replaced or recovering else settled
 
-    def _move(self, gain: float, elapsed: float) -> int:
+    def _fail(self, now: float, *, part_done: bool) -> None:
+        """The model gave no number: hold, then ramp out; in FAULT it starts anew in the end."""
+        if self.state is State.FAULT:
+            if now - self.since > self.settings.freeze_limit_s:  # its state may be what fails
+                self.origin, self.since = None, now
+            return
+        if self.state is not State.FROZEN:
+            self.state, self.since = State.FROZEN, now
+        if part_done or now - self.since > self.settings.freeze_limit_s:
+            self.state, self.since = State.FAULT, now
+
+    def _move(self, elapsed: float) -> int:
         """Move the offsets towards their targets, as far as limit and rate allow."""
         flags = 0
         fade = math.exp(-elapsed / self.settings.bump_s)
@@ -191,7 +286,7 @@ class Compensator:
             if self.state in (State.OFF, State.FAULT):
                 target = 0.0
             elif self.state is not State.FROZEN and self.predicted is not None:
-                target = self.bump[k] - gain * float(self.predicted[place])
+                target = self.bump[k] - self.gain * float(self.predicted[place])
             if abs(self.bump[k]) > 1e-3:
                 flags |= BUMP
             if not math.isfinite(target):
@@ -203,6 +298,22 @@ class Compensator:
                 target, flags = self.offsets[k] + math.copysign(most, target - self.offsets[k]), flags | RATED
             self.offsets[k] = target
         return flags
+
+    def _tell_accepted(self, now: float) -> None:
+        for guard in self.guards:
+            if guard.accepted:
+                stayed = f"{guard.spec.name} stepped to {guard.held:.4g} {guard.spec.unit} and stayed there"
+                self.events.append(Event(now, "step accepted", stayed))
+
+    def _tell_gain(self, gain: float, now: float) -> None:
+        if (gain < 1.0) is not (self.gain < 1.0):
+            far = [g.spec.name for g in self.guards if g.held is not None and g.gain(g.held) < 1.0]
+            cause = (
+                f"{', '.join(far)} far outside of the training" if far else "inputs are back in the training"
+            )
+            remedy = "record there and fit the model again" if far else ""
+            self.events.append(Event(now, "gain falls" if far else "full gain", cause, remedy))
+        self.gain = gain
 
     def states(self) -> dict[str, float]:
         """States of the model by name."""
@@ -229,9 +340,9 @@ class Compensator:
         self.inherited = None
 
     def acknowledge(self) -> None:
-        """Go on after a FAULT: the model starts anew with the next good inputs, the offsets from where they
-        are.
+        """An operator has looked: steps that wait are accepted with the next readings, and good inputs end
+        a FAULT at once.
         """
-        self.state, self.origin, self.predicted = State.OFF, None, None
-        self.settling = State.COLD
-        self.bump = [0.0] * len(self.places)
+        self.acknowledged = True
+        for guard in self.guards:
+            guard.accept()

@@ -14,25 +14,12 @@ from typing import Any
 
 from discovery.export.document import Exported, Input
 from discovery.files import write_toml
-from discovery.runtime.opcua_link import need_asyncua
+from discovery.runtime.opcua_connect import need_asyncua
+from discovery.runtime.opcua_form import CLIENT_URI
+from discovery.runtime.opcua_tools import make_certificate
 
 NAMESPACE = "urn:discovery:offsets"
-SERVER_URI, CLIENT_URI = "urn:discovery:machine", "urn:discovery:compensator"
-
-
-async def make_certificate(folder: Path, name: str, uri: str) -> None:
-    """Self-signed certificate (`name`.der) and key (`name`.pem) for trying out."""
-    from asyncua.crypto.cert_gen import setup_self_signed_certificate
-    from cryptography.x509.oid import ExtendedKeyUsageOID
-
-    await setup_self_signed_certificate(
-        folder / f"{name}.pem",
-        folder / f"{name}.der",
-        uri,
-        "localhost",
-        [ExtendedKeyUsageOID.CLIENT_AUTH, ExtendedKeyUsageOID.SERVER_AUTH],
-        {"countryName": "CH", "commonName": name},
-    )
+SERVER_URI = "urn:discovery:machine"
 
 
 @contextlib.asynccontextmanager
@@ -44,8 +31,8 @@ async def simulated_machine(exported: Exported, folder: Path, update_s: float = 
     from asyncua.common.utils import ServiceError
     from asyncua.crypto.uacrypto import load_certificate
 
-    await make_certificate(folder, "server", SERVER_URI)
-    await make_certificate(folder, "client", CLIENT_URI)
+    make_certificate(folder, "server", SERVER_URI)
+    make_certificate(folder, "client", CLIENT_URI)
     trusted = await load_certificate(folder / "client.der")
 
     async def only_the_client(certificate: Any, description: Any) -> None:  # noqa: ARG001
@@ -72,6 +59,9 @@ async def simulated_machine(exported: Exported, folder: Path, update_s: float = 
     offsets = {n: await _variable(ua, machine, space, f"offset {n}", 0.0, kinds.Double, True) for n in names}
     status = await _variable(ua, machine, space, "status", 0, kinds.UInt32, True)
     heartbeat = await _variable(ua, machine, space, "heartbeat", 0, kinds.UInt32, True)
+    message = await _variable(ua, machine, space, "message", "", kinds.String, True)
+    part_done = await _variable(ua, machine, space, "part_done", False, kinds.Boolean)
+    acknowledge = await _variable(ua, machine, space, "acknowledge", False, kinds.Boolean, True)
     enable = await _variable(ua, machine, space, "enable", True, kinds.Boolean)
     file = folder / "connection.toml"
     write_toml(
@@ -84,7 +74,10 @@ async def simulated_machine(exported: Exported, folder: Path, update_s: float = 
             "application_uri": CLIENT_URI,
             "status": status.nodeid.to_string(),
             "heartbeat": heartbeat.nodeid.to_string(),
+            "message": message.nodeid.to_string(),
             "enable": enable.nodeid.to_string(),
+            "part_done": part_done.nodeid.to_string(),
+            "acknowledge": acknowledge.nodeid.to_string(),
             "inputs": {name: node.nodeid.to_string() for name, node in inputs.items()},
             "offsets": {name: node.nodeid.to_string() for name, node in offsets.items()},
         },

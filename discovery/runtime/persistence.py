@@ -6,36 +6,91 @@ import hashlib
 import json
 import math
 import os
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from discovery.errors import UserError
 from discovery.export.stepper import Snapshot
 from discovery.runtime.compensator import Compensator, State
 
 NAMES = ("state.json", "state.previous.json")
+# What a guard remembers
+KEPT = (
+    *("held", "held_at", "mean", "fresh", "seen", "seen_at", "still_since"),
+    *("waiting", "waiting_from", "stayed"),
+)
 
 
-def save(compensator: Compensator, folder: Path, beside: Executor | None = None) -> Future[None]:
+FUTURE_S = 60.0  # a saved state that claims to be later than now by more is refused
+
+
+class Lock:
+    """One writer a folder: held until it is closed, or until the process ends.
+
+    Raises:
+        UserError: another process holds it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        import fcntl
+
+        folder.mkdir(parents=True, exist_ok=True)
+        self.file = (folder / "lock").open("a+")
+        try:
+            fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self.file.seek(0)
+            owner = self.file.read().strip() or "another process"
+            self.file.close()
+            raise UserError(
+                f"{folder}: a compensation is already at work with this folder ({owner}); stop it first, or "
+                "name another folder with --state"
+            ) from None
+        self.file.truncate(0)
+        self.file.write(f"process {os.getpid()}")
+        self.file.flush()
+
+    def close(self) -> None:
+        """Let go."""
+        self.file.close()
+
+
+def save(
+    compensator: Compensator,
+    folder: Path,
+    beside: Executor | None = None,
+    *,
+    more: Mapping[str, Any] | None = None,
+    first: Callable[[], object] = lambda: None,
+) -> Future[None]:
     """Write the state of a compensator; what was there before becomes the previous copy.
 
     A crash at any instant leaves at least one whole copy.
 
     Args:
         beside: writes in a thread of its own (one worker), so that a slow disk delays no tick.
+        more: what else belongs to the state (see `Saved`).
+        first: what has to be on the disk before the state says so.
 
     Returns:
         What became of it: an OSError where the disk did not take it.
     """
-    body = json.dumps(_content(compensator), allow_nan=True)
+    body = json.dumps(_content(compensator) | {"more": dict(more or {})}, allow_nan=True)
+
+    def work() -> None:
+        first()
+        _write(body, folder)
+
     if beside is not None:
-        return beside.submit(_write, body, folder)
+        return beside.submit(work)
     done: Future[None] = Future()
     try:
-        _write(body, folder)
+        work()
         done.set_result(None)
     except OSError as error:
         done.set_exception(error)
@@ -53,24 +108,56 @@ def _write(body: str, folder: Path) -> None:
     if now.exists():
         now.replace(before)
     new.replace(now)
+    place = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(place)  # the names as well: a power cut leaves the old copy or the new one
+    finally:
+        os.close(place)
 
 
-def restore(compensator: Compensator, folder: Path) -> float | None:
-    """Go on from the newest whole copy of this model's state; returns its instant [s], None where there is
-    none.
+@dataclass(frozen=True)
+class Saved:
+    """What a saved state says of itself: its instant [s], bytes of the output that it stands for, and the
+    clock it was saved with (see `Clock.saved`)."""
+
+    time: float
+    output: int | None
+    clock: Mapping[str, Any]
+
+
+def peek(compensator: Compensator, folder: Path) -> Saved | None:
+    """What the newest whole copy of this model's state says of itself."""
+    for name in NAMES:
+        content = _read(folder / name)
+        if content is not None and content["model"] == compensator.exported.seal.sha256:
+            return _saved(content)
+    return None
+
+
+def restore(compensator: Compensator, folder: Path, now: float = math.inf) -> Saved | None:
+    """Go on from the newest whole copy of this model's state that is not from after `now` [s]; None where
+    there is none.
 
     The offsets go on from where they were; the model catches up with the next tick, through a gap by
     fast-forward.
     """
     for name in NAMES:
         content = _read(folder / name)
-        if content is not None and content["model"] == compensator.exported.seal.sha256:
-            try:
-                _apply(compensator, content)
-            except Exception:  # a copy that is whole but does not fit: the older one may
-                continue
-            return float(content["time"])
+        if content is None or content["model"] != compensator.exported.seal.sha256:
+            continue
+        if float(content["time"]) > now + FUTURE_S:
+            continue
+        try:
+            _apply(compensator, content)
+        except Exception:  # a copy that is whole but does not fit: the older one may
+            continue
+        return _saved(content)
     return None
+
+
+def _saved(content: Mapping[str, Any]) -> Saved:
+    more = content.get("more", {})
+    return Saved(float(content["time"]), more.get("output"), more.get("clock", {}))
 
 
 def succeed(compensator: Compensator, folder: Path) -> bool:
@@ -104,7 +191,9 @@ def _content(c: Compensator) -> dict[str, Any]:
         "bump": c.bump,
         "predicted": None if c.predicted is None else c.predicted.tolist(),
         "inputs": None if c.inputs is None else c.inputs.tolist(),
-        "held": [[guard.held, guard.held_at, guard.latched, guard.fresh] for guard in c.guards],
+        "good_since": c.good_since,
+        "gain": c.gain,
+        "held": [[getattr(guard, name) for name in KEPT] for guard in c.guards],
         "snapshot": snapshot,
     }
 
@@ -137,5 +226,7 @@ def _apply(c: Compensator, content: dict[str, Any]) -> None:
     c.predicted = None if content["predicted"] is None else np.array(content["predicted"])
     c.inputs = None if content["inputs"] is None else np.array(content["inputs"])
     for guard, kept in zip(c.guards, content["held"], strict=True):
-        guard.held, guard.held_at, guard.latched, guard.fresh = kept
+        for name, value in zip(KEPT, kept, strict=True):
+            setattr(guard, name, value)
+    c.good_since, c.gain = content["good_since"], float(content["gain"])
     c.heartbeat = 1

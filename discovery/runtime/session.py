@@ -4,24 +4,43 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from discovery.errors import UserError
 from discovery.export.document import Exported
-from discovery.runtime.compensator import Compensator, Settings, Tick
+from discovery.runtime.clock import Clock
+from discovery.runtime.compensator import Compensator, Settings, State, Tick
+from discovery.runtime.events import Event, instant
+from discovery.runtime.firsttick import refuse_wrong_units
 from discovery.runtime.guards import Reading
-from discovery.runtime.persistence import restore, save, succeed
+from discovery.runtime.history import History
+from discovery.runtime.output import Output
+from discovery.runtime.persistence import Lock, peek, restore, save, succeed
 from discovery.runtime.shadow import Rule, Shadow, begin_shadow, take_over
-from discovery.runtime.store import open_store, refuse_candidate, replace_active
+from discovery.runtime.store import offer, open_store, refuse_candidate, replace_active
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+    from discovery.runtime.learning import Learner
 
 Say = Callable[[str], None]
 
 
 class Session:
-    """Runs a compensator and everything around it."""
+    """Runs a compensator and everything around it.
+
+    Args:
+        model, folder, trusted: file of the model, folder of its memory, key that must have signed it.
+        beside: a thread that writes the state, so that a slow disk delays no tick.
+        clock: the steady clock of a live source; None: the stamps of the readings are the only clock.
+        now: instant [s] of the first tick, where it is known; a saved state from after it is refused.
+
+    Raises:
+        UserError: another process works with this folder, or a model that may not be run.
+    """
 
     def __init__(
         self,
@@ -34,15 +53,28 @@ class Session:
         rule: Rule | None = None,
         save_every_s: float = 600.0,
         beside: Executor | None = None,
+        clock: Clock | None = None,
+        learn: Learner | None = None,
+        now: float | None = None,
         say: Say = lambda _: None,
     ) -> None:
         self.folder, self.say, self.save_every_s, self.beside = folder, say, save_every_s, beside
-        self.settings = settings or Settings()
+        self.learn, self.rule = learn, rule or Rule()
+        self.clock, self.settings = clock, settings or Settings()
         self.shadow: Shadow | None = None
         self.resumed: float | None = None
+        self.resume_at: int | None = None  # bytes of the output that the restored state stands for
         self.saved: float | None = None
         self.saving: Future[None] | None = None  # the last save, which may still be under way
-        self.unsaved = False  # it has been said that saves fail
+        self.failing: set[str] = set()  # what cannot be written, and was told
+        self.opens: Callable[[], Output] | None = None  # the output, with the first tick
+        self.output: Output | None = None
+        self.found: Tick | None = None  # the last tick
+        self.events = 0
+        self.counts: dict[str, int] = {}  # ticks by state
+        self.told: list[Event] = []  # of the present tick
+        self.history: History | None = None
+        self.lock = Lock(folder) if folder is not None else None
         if folder is not None and model is not None:
             models = open_store(folder, model, exported, trusted)
             exported = models.active
@@ -52,61 +84,256 @@ class Session:
                     f"revision {models.candidate.revision} runs in the shadow of revision {exported.revision}"
                 )
         self.compensator = Compensator(exported, self.settings)
+        if self.learn is not None:
+            self.learn.begin(self.compensator)
+            if folder is not None:
+                self.learn.load(self.compensator, folder)
         if folder is not None:
-            self.resumed = restore(self.compensator, folder)
-            if self.resumed is None:
-                succeed(self.compensator, folder)
+            facts = {
+                "model": exported.model.name,
+                "sha256": exported.seal.sha256,
+                "revision": exported.revision,
+            }
+            facts["units"] = {o.name: o.unit for o in exported.outputs} | {
+                i.name: i.unit for i in exported.inputs
+            }
+            self.history = History(folder, facts)
+            self._restore(folder, now)
 
-    def tick(self, readings: Mapping[str, Reading], now: float, *, enabled: bool = True) -> Tick:
-        """One tick with the newest readings, measured errors among them if there are any."""
-        found = self.compensator.tick(readings, now, enabled=enabled)
+    def _restore(self, folder: Path, now: float | None) -> None:
+        before = peek(self.compensator, folder)
+        if self.clock is not None:
+            if before is not None:
+                self.clock.resume(dict(before.clock))
+            now = self.clock.now()
+        found = restore(self.compensator, folder, now if now is not None else float("inf"))
+        if found is not None:
+            self.resumed, self.resume_at = found.time, found.output
+            gap = f", {now - found.time:.0f} s ago" if now is not None else ""
+            self.tell(found.time, "restart", f"goes on from the state of {instant(found.time)}{gap}")
+        elif before is not None and now is not None:
+            self.tell(
+                now,
+                "saved state refused",
+                f"it is of {instant(before.time)}, which has not come yet; the model starts anew",
+                "set the clock of this computer",
+            )
+        if found is None:
+            succeed(self.compensator, folder)
+
+    def tell(self, time: float, what: str, cause: str, remedy: str = "") -> None:
+        """An event of the session: one line, and kept in the history."""
+        self._tell(Event(time, what, cause, remedy))
+
+    def _tell(self, event: Event) -> None:
+        self.told.append(event)
+        self.events += 1
+        self.say(str(event))
+        if self.history is not None:
+            self.history.event(event)
+
+    def tick(
+        self,
+        readings: Mapping[str, Reading],
+        now: float,
+        *,
+        enabled: bool = True,
+        part_done: bool = False,
+        acknowledge: bool = False,
+    ) -> Tick:
+        """One tick with the newest readings, measured errors among them if there are any.
+
+        Raises:
+            UserError: at the first tick, readings in a wrong unit.
+        """
+        self.told = []
+        compensator = self.compensator
+        if compensator.origin is None and compensator.heartbeat == 0:
+            refuse_wrong_units(compensator.exported.inputs, readings)
+        found = compensator.tick(readings, now, enabled=enabled, part_done=part_done, acknowledge=acknowledge)
+        for event in found.events:
+            self._tell(event)
+        self.counts[found.state.name] = self.counts.get(found.state.name, 0) + 1
         if self.shadow is not None:
             self.shadow.tick(self.compensator, readings, now)
             verdict = self.shadow.verdict(now)
             if verdict is not None:
-                self._decide(*verdict)
-        if self.folder is not None and (self.saved is None or now - self.saved >= self.save_every_s):
+                self._decide(*verdict, now)
+        self.found = found
+        if self.output is None and self.opens is not None:
+            self.output = self.opens()
+        self._write(found, readings, now)
+        if self.learn is not None:
+            self._learn(self.learn, readings, now)
+        if self.folder is not None and (self.saved is None or not 0 <= now - self.saved < self.save_every_s):
             self.save(now)
         return found
 
-    def _decide(self, passed: bool, why: str) -> None:
+    def _write(self, found: Tick, readings: Mapping[str, Reading], now: float) -> None:
+        if self.output is not None:
+            error = self.output.write(line(self.compensator, found))
+            self._heard("output", f"{self.output.path}: the offsets cannot be written", error, now)
+        if self.history is not None:
+            self.history.tick(self.compensator, found, readings, now)
+            error_of_history = self.history.flush(now)
+            self._heard(
+                "history", f"{self.history.path}: the history cannot be written", error_of_history, now
+            )
+
+    def _heard(self, what: str, text: str, error: Exception | None, now: float) -> None:
+        """Tell the first of several failures to write, and when it is over."""
+        if error is not None and what not in self.failing:
+            self.failing.add(what)
+            remedy = "make room on the disk; what is not written yet is kept in memory"
+            self.tell(now, f"{what} failing", f"{text} ({error}); the compensation goes on", remedy)
+        elif error is None and what in self.failing and not self._pending(what):
+            self.failing.discard(what)
+            self.tell(now, f"{what} written again", "the disk takes it again, nothing is missing")
+
+    def _pending(self, what: str) -> bool:
+        return what == "output" and self.output is not None and bool(self.output.pending)
+
+    def _decide(self, passed: bool, why: str, now: float) -> None:
         assert self.shadow is not None
         assert self.folder is not None
+        old, new = self.compensator.exported, self.shadow.compensator.exported
         if passed:
             self.compensator = take_over(self.compensator, self.shadow.compensator)
             replace_active(self.folder)
             self.saved = None
         else:
             refuse_candidate(self.folder)
-        self.say(f"the new model {'takes over' if passed else 'is refused'}: {why}")
+        if self.learn is not None and passed:
+            self.learn.begin(self.compensator)
+        what = "the new model takes over" if passed else "the new model is refused"
+        self.tell(now, what, f"revision {new.revision} after revision {old.revision}: {why}")
         self.shadow = None
 
+    def summary(self) -> str:
+        """How the run went, in a line."""
+        total = max(sum(self.counts.values()), 1)
+        shares = ", ".join(f"{name} {100 * n / total:.1f} %" for name, n in self.counts.items())
+        last = self.found.state.name if self.found is not None else "OFF"
+        return f"{total} ticks: {shares}; {self.events} events; ended {last}"
+
+    def judge(self) -> None:
+        """What the exit status has to say.
+
+        Raises:
+            UserError: no offset was ever given out, the run ended in trouble, or lines were not written.
+        """
+        if self.compensator.origin is None:
+            absent = [g.spec.name for g in self.compensator.guards if g.held is None]
+            raise UserError(
+                f"no offset was given out: no good reading of {', '.join(absent) or 'the inputs'} ever came; "
+                "give a reading of each input of the model"
+            )
+        if self.output is not None and (self.output.pending or self.output.lost):
+            raise UserError(f"{self.output.path}: the last offsets are not written; make room on the disk")
+        if self.found is not None and self.found.state in (State.FAULT, State.FROZEN):
+            raise UserError(f"the compensation ended in {self.found.state.name}; its last event says why")
+
+    def _learn(self, learn: Learner, readings: Mapping[str, Reading], now: float) -> None:
+        """Measured errors as they come: when to measure, when to update, and the update."""
+        advised = learn.advice
+        due = learn.observe(self.compensator, readings, now)
+        if self.folder is not None:
+            learn.save(self.compensator, self.folder, now)
+        if learn.advice and not advised:
+            self.tell(now, "action limit", "the errors left are beyond the action limit", learn.advice)
+        elif advised and not learn.advice:
+            self.tell(now, "action limit kept", "the errors left are within the action limit again")
+        if not due or self.shadow is not None or self.folder is None:
+            return
+        try:
+            found, revised = learn.compare(self.compensator, now)
+        except UserError as error:
+            self.learn = None
+            self.tell(now, "learning ends", str(error))
+            return
+        if found.verdict == "nothing":
+            return
+        remedy = {
+            "input sensor": f"check the sensor of {found.what}",
+            "something else": "record, and let `discovery diagnose` name what changed",
+            "undecided": "measure more often, wet and dry",
+        }.get(found.verdict, "")
+        self.tell(now, f"learning: {found.verdict}", str(found), remedy)
+        if revised is not None:
+            self._offer(revised, now)
+
+    def _offer(self, data: bytes, now: float) -> None:
+        """A new revision runs in the shadow; measured errors must confirm it."""
+        assert self.folder is not None
+        candidate = offer(self.folder, data)
+        rule = Rule(hours=self.rule.hours, most_um=None)
+        self.shadow = begin_shadow(candidate, self.settings, rule)
+        self.tell(now, "shadow run", f"revision {candidate.revision} runs beside the one at work")
+
     def save(self, now: float) -> None:
-        """Write the state to disk, unless the save before is still under way."""
+        """Write the state to disk, unless the save before is still under way; what the output holds first."""
         if self.folder is None or self.compensator.origin is None:
             return
         if self.saving is not None and not self.saving.done():
             return
-        self._hear()
-        self.saving = save(self.compensator, self.folder, self.beside)
+        self._hear(now)
+        output = self.output
+        if output is not None and output.flush() is not None:
+            return  # a state may not claim lines that no disk has
+        more = {
+            "output": output.size if output is not None and output.file is not None else None,
+            "clock": self.clock.saved() if self.clock is not None else {},
+        }
+        first = output.sync if output is not None else lambda: None
+        self.saving = save(self.compensator, self.folder, self.beside, more=more, first=first)
         self.saved = now
         if self.beside is None:
-            self._hear()
+            self._hear(now)
 
     def close(self, now: float) -> None:
         """Write the state a last time, and wait until it stands on the disk."""
-        self._hear()
+        self._hear(now)
         self.save(now)
-        self._hear()
+        self._hear(now)
+        if self.output is not None:
+            self.output.close()
+        if self.history is not None:
+            self.history.close(now)
+        if self.lock is not None:
+            self.lock.close()
 
-    def _hear(self) -> None:
+    def _hear(self, now: float) -> None:
         """What became of the last save; the first of several that fail is told, the compensation goes on."""
         if self.saving is None:
             return
+        with suppress(BaseException):
+            self.saving.result()
         error, self.saving = self.saving.exception(), None
-        if error is not None and not self.unsaved:
-            self.say(
-                f"{self.folder}: the state cannot be saved ({error}); the compensation goes on, but a "
-                "restart would begin from an older state: make room or give it another folder with --state"
+        if error is not None and "state" not in self.failing:
+            self.tell(
+                now,
+                "state failing",
+                f"{self.folder}: the state cannot be saved ({error}); the compensation goes on, but "
+                f"a restart "
+                "would begin from an older state",
+                "make room, or give it another folder with --state",
             )
-        self.unsaved = error is not None
+        if error is not None:
+            self.failing.add("state")
+        elif "state" in self.failing:
+            self.failing.discard("state")
+            self.tell(now, "state saved again", "the disk takes it again")
+
+
+def header(compensator: Compensator) -> str:
+    """First line of the output: time [s] at which the offsets are valid, state, status word, heartbeat,
+    offsets, model.
+    """
+    return ",".join(["time", "state", "status", "heartbeat", *compensator.names, "model"]) + "\n"
+
+
+def line(compensator: Compensator, tick: Tick) -> str:
+    """A tick as a line of CSV."""
+    numbers = [f"{tick.offsets[name]:.4f}" for name in compensator.names]
+    cells = [f"{tick.valid_at:.10g}", tick.state.name, str(tick.status), str(tick.heartbeat), *numbers]
+    return ",".join([*cells, compensator.exported.seal.sha256[:12]]) + "\n"

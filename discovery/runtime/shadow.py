@@ -15,13 +15,14 @@ LONGEST_AHEAD_S = 60.0  # of the clock of a reading; one that claims more would 
 
 @dataclass(frozen=True)
 class Rule:
-    """When a shadow run is passed. `least_readings` measured errors decide by their residual; fewer, and the
-    two models may not differ by more than `most_um`."""
+    """When a shadow run is passed: `least_readings` measured errors decide by their residual. With fewer the
+    new model is refused, for a small difference on a quiet day does not say which model is right; unless
+    `most_um` allows a difference of so much without measured errors."""
 
     hours: float = 24.0
     least_readings: int = 5
     worse: float = 1.05
-    most_um: float = 20.0
+    most_um: float | None = None
 
 
 @dataclass
@@ -82,6 +83,8 @@ class Shadow:
             old, new = self._rms(0), self._rms(1)
             text = f"rms of {count} measured errors {new:.2f} with the new model, {old:.2f} with the old one"
             return new <= self.rule.worse * old, text
+        if self.rule.most_um is None:
+            return False, f"only {count} measured errors came, {self.rule.least_readings} are needed"
         text = f"the two models differ by at most {self.difference:.2f} um"
         return self.difference <= self.rule.most_um, text
 

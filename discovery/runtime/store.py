@@ -42,10 +42,26 @@ def open_store(
     active = read_document(folder / ACTIVE)
     if trusted is not None:
         require_trusted(active.seal, trusted, folder / ACTIVE)
-    if active.seal.sha256 == exported.seal.sha256:
-        return Models(active, None)
+    if exported.seal.sha256 in (active.seal.sha256, *(entry.get("of") for entry in active.changelog)):
+        return Models(active, _waiting(folder, trusted))  # the model at work, or one that it came from
     write_atomic(folder / CANDIDATE, data)
     return Models(active, exported)
+
+
+def _waiting(folder: Path, trusted: Ed25519PublicKey | None) -> Exported | None:
+    """A candidate whose shadow run was cut short by a restart."""
+    if not (folder / CANDIDATE).exists():
+        return None
+    found = read_document(folder / CANDIDATE)
+    if trusted is not None:
+        require_trusted(found.seal, trusted, folder / CANDIDATE)
+    return found
+
+
+def offer(folder: Path, data: bytes) -> Exported:
+    """A new revision as candidate."""
+    write_atomic(folder / CANDIDATE, data)
+    return read_document(folder / CANDIDATE)
 
 
 def replace_active(folder: Path) -> None:

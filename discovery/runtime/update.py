@@ -4,82 +4,107 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from discovery.export.document import Exported, read_document, write_document
+from discovery.export.document import Exported, from_document, read_document, render, write_document
+from discovery.export.seal import open_seal
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.runtime.belief import AS_NEW, Belief, Finding, belief_of, residual_levels, update_belief
+from discovery.runtime.hypotheses import Comparison, begun, compare, model_with
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 
+AS_NEW = 1.3  # residual after a change, as a multiple of the fit's, beyond which wear does not explain it
+MAY = 0.95  # residual after a change, as a share of that before: a revision that gains less is not written
+
+
 @dataclass(frozen=True)
 class Update:
-    """What an update found and wrote; `path` None: nothing to change."""
+    """What an update found and wrote; `path` None: nothing to change. `after`: residual of the next
+    revision in
+    units of that of the fit."""
 
-    findings: tuple[Finding, ...]
+    comparison: Comparison
     path: Path | None
+    after: float | None
     diagnosis: Mapping[str, Any] | None
 
     def lines(self) -> list[str]:
         """What a user wants to know of it."""
-        lines = [str(finding) for finding in self.findings]
+        lines = [str(self.comparison)]
         if self.diagnosis is not None:
             named = ", ".join(
                 f"{p['effect']} at {'+'.join(p['states'])}" for p in self.diagnosis.get("physics", [])
             )
-            lines.append(f"the mismatch method says: {self.diagnosis['verdict']}{named and ': ' + named}")
-        if self.path is None:
-            lines.append(f"the model stays as it is{self._dropped()}")
-        else:
+            lines.append(f"the diagnosis says: {self.diagnosis['verdict']}{named and ': ' + named}")
+        if self.path is not None:
             lines.append(
-                f"{self.path}: the next revision; `discovery compensate` runs it in the "
-                "shadow of the one at work first"
+                f"{self.path}: the next revision, residual {self.after:.2f} of the fit's; "
+                f"`discovery compensate` "
+                "runs it in the shadow of the one at work first"
             )
+            return lines
+        lines.append(f"the model stays as it is: {_why(self.comparison)}")
         return lines
 
-    def _dropped(self) -> str:
-        """Why a drift of earlier recordings makes no revision: the last one is the machine of today."""
-        drifted = [f.recording for f in self.findings if f.verdict == "drift"]
-        if not drifted:
-            return ""
-        last = self.findings[-1]
-        why = (
-            "asks for a new effect, which no parameters stand in for"
-            if last.verdict == "new effect"
-            else "is predicted as well as when the model was fitted"
-            if last.before <= AS_NEW
-            else "shows none"
-        )
-        left = f"the drift in {', '.join(drifted)} is not taken up"
-        return f": the last recording decides, and {last.recording} {why}; {left}"
+
+def _why(found: Comparison) -> str:
+    match found.verdict:
+        case "nothing":
+            return "these recordings show no change of the machine"
+        case "input sensor":
+            return f"the sensor of {found.what} is off, which no parameter may hide; check it"
+        case "undecided":
+            return f"{found.what}: these recordings do not tell them apart; measure more often, wet and dry"
+        case "something else":
+            return (
+                "something changed that wear does not; add what the diagnosis names, and fit the model again"
+            )
+        case _:
+            return "the change would not make it better"
 
 
 def update_file(
     path: Path, campaign: Campaign, recordings: Sequence[str], out: Path, key: Ed25519PrivateKey | None = None
 ) -> Update:
-    """`discovery update`: take in recordings one after the other and write the next revision where they ask
-    for it.
+    """`discovery update`: compare what may have changed, and write the next revision where it is wear.
 
     Raises:
         UserError: a model that cannot be updated, or recordings without readings.
     """
     exported = read_document(path)
-    belief, levels, findings = belief_of(exported), residual_levels(exported), []
-    for recording in recordings:
-        belief, finding = update_belief(belief, levels, campaign, recording)
-        findings.append(finding)
-    strange = [f.recording for f in findings if f.verdict == "new effect"]
-    diagnosis = _diagnosis(belief.at_work, campaign, strange) if strange else None
-    written = None
-    if findings and findings[-1].verdict == "drift":
-        write_document(out, next_revision(exported, belief, findings), key)
-        written = out
-    return Update(tuple(findings), written, diagnosis)
+    found = compare(exported, campaign, recordings)
+    revised = revision_of(exported, campaign, found)
+    if found.verdict == "wear" and revised is None:
+        found = replace(found, verdict="something else", what="wear leaves too much of it")
+    if found.verdict == "something else":
+        return Update(found, None, None, _diagnosis(exported.model, campaign, recordings))
+    if revised is None:
+        return Update(found, None, None, None)
+    document, after = revised
+    write_document(out, document, key)
+    return Update(found, out, after, None)
+
+
+def revision_of(
+    exported: Exported, campaign: Campaign, found: Comparison, begin: Mapping[str, float] | None = None
+) -> tuple[dict[str, Any], float] | None:
+    """The document of the next revision and the residual that it leaves; None where there is no wear, or
+    where it gains nothing.
+
+    Args:
+        begin: states of the model where the recordings begin; default its own start.
+    """
+    if found.verdict != "wear":
+        return None
+    document = next_revision(exported, found)
+    again = from_document(*open_seal(render(document), exported.model.name), exported.model.name)
+    after = compare(begun(again, begin) if begin is not None else again, campaign, found.recordings).rms
+    return (document, after) if after < min(MAY * found.rms, AS_NEW) else None
 
 
 def next_name(path: Path) -> Path:
@@ -89,30 +114,34 @@ def next_name(path: Path) -> Path:
     return path.with_name(f"{stem}.r{revision}{path.suffix}")
 
 
-def next_revision(exported: Exported, belief: Belief, findings: Sequence[Finding]) -> dict[str, Any]:
-    """The document of the updated model with its changelog entry; ranges and limits stay those of the fit."""
-    document = {**exported.document}
+def next_revision(exported: Exported, found: Comparison) -> dict[str, Any]:
+    """The document of the updated model with its changelog entry; only what wear can change has moved, and
+    ranges, limits and what the fit knew of its parameters stay: the next comparison holds the revision to it.
+    """
+    document, model = {**exported.document}, model_with(exported.model, found.change)
     entries = []
     for entry in document["parameters"]:
-        p = belief.model.parameters[entry["name"]]
+        p = model.parameters[entry["name"]]
         entries.append({**entry, "value": p.value, "low": p.low, "high": p.high})
     revision = exported.revision + 1
+    moved = ", ".join(
+        f"{n} {exported.model.parameters[n].value:.4g} -> {model.parameters[n].value:.4g}"
+        for n in found.change
+    )
     note = {
         "revision": revision,
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "text": "; ".join(map(str, findings)),
+        "text": f"{found}; {moved}",
         "of": exported.seal.sha256,
     }
-    known = {**document["knowledge"], "covariance": belief.covariance.tolist()}
     return document | {
         "revision": revision,
         "parameters": entries,
-        "knowledge": known,
         "changelog": [*document["changelog"], note],
     }
 
 
 def _diagnosis(model: Model, campaign: Campaign, recordings: Sequence[str]) -> dict[str, Any]:
-    from discovery.mismatch import diagnose
+    from discovery.diagnosis import diagnose
 
     return dict(diagnose(model, campaign, recordings).document())

@@ -1,7 +1,7 @@
 """Terms: safe expressions with exact derivatives, the letters every model is written in."""
 
 from discovery.terms.delays import delays_at
-from discovery.terms.dual import Dual, evaluate
+from discovery.terms.dual import Dual, Program, compiled, evaluate
 from discovery.terms.expression import Apply, Expression, Name, Number, degree, names, substitute
 from discovery.terms.parsing import parse
 from discovery.terms.printing import text
@@ -13,7 +13,9 @@ __all__ = [
     "Expression",
     "Name",
     "Number",
+    "Program",
     "Term",
+    "compiled",
     "degree",
     "delays_at",
     "evaluate",

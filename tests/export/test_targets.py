@@ -100,7 +100,11 @@ def test_a_unit_goes_on_after_its_state_is_restored(folder: Path, suffix: str) -
     assert any(n.startswith("binaries/") and n.endswith(".so") for n in names)
     description = fmpy.read_model_description(str(path))
     inputs = [v for v in description.modelVariables if v.causality == "input"]
-    outputs = [v.valueReference for v in description.modelVariables if v.causality == "output"]
+    outputs = [
+        v.valueReference
+        for v in description.modelVariables
+        if v.causality == "output" and v.type in ("Real", "Float64")
+    ]
     assert all(v.variability == "discrete" for v in inputs)
     unit = fmpy.instantiate_fmu(fmpy.extract(str(path)), description, "CoSimulation")
     three = suffix != ""
@@ -333,6 +337,6 @@ def test_an_output_that_is_no_channel_is_not_compensated(
         ("E_A0C", "error", "um/m"),
     ]
     assert Compensator(back).names == ["E_Z0T", "E_A0C"]
-    assert done.agreement["integrator_um"] < 1e-3
+    assert (done.agreement or {})["integrator_um"] < 1e-3
     with pytest.raises(UserError, match="no output is a channel"):
         export_model(replace(model, outputs={"T_guess": parse("a")}), campaign, ["fit"], "json", tmp_path)

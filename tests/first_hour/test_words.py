@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
+from discovery.effects.catalogue import catalogue
 from discovery.firsthour.schemas import schema
-from discovery.mismatch.catalogue import catalogue
 
 ROOT = Path(__file__).parents[2]
 FILES = [

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
-from discovery.mismatch.catalogue import Effect
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.hypothesis import Hypothesis
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import Effect
+from discovery.effects.hypothesis import Hypothesis
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, names, parse

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from discovery.design.next_experiment import believed, next_experiment
+from discovery.design.question import APART, CONFIRM, aim, look_back
+from discovery.diagnosis.context import Context, make_context
+from discovery.diagnosis.diagnose import diagnose
+from discovery.diagnosis.printed import printed
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis
 from discovery.fitting import Noise
-from discovery.mismatch.ask import APART, CONFIRM, aim, look_back
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.context import Context, make_context
-from discovery.mismatch.diagnosis import diagnose
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.pattern import believed, next_experiment
-from discovery.mismatch.printed import printed
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from discovery.diagnosis.scales import scaled
 from discovery.dynamics.system import predict
-from discovery.mismatch.catalogue import Effect, catalogue
-from discovery.mismatch.catalogue.effect import ROLE_OF
-from discovery.mismatch.catalogue.worked import worked
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.scales import scaled
+from discovery.effects.catalogue import Effect, catalogue
+from discovery.effects.form import ROLE_OF
+from discovery.effects.hypothesis import Hypothesis
+from discovery.effects.worked import worked
 from discovery.models import Model, read_model, write_model
 from discovery.models.dimensions import check_dimensions
 from discovery.recordings.roles import ROLES
@@ -80,7 +80,7 @@ def test_an_entry_is_complete(effect: Effect) -> None:
     assert all(ROLE_OF[n] in ROLES for n in names(parse(effect.formula)) if n in ROLE_OF)
     assert 0 < effect.prior <= 1
     file = next(name for name, e in catalogue().items() if e is effect)
-    said = import_module(f"discovery.mismatch.catalogue.{file}").__doc__ or ""
+    said = import_module(f"discovery.effects.catalogue.{file}").__doc__ or ""
     assert "Source:" in said
     assert "Limits:" in said
     assert ("at 1000 rpm" in said) == (effect.at == "1000 rpm")  # what the formula divides the speed by

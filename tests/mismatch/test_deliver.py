@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from discovery.diagnosis.context import Context, make_context
+from discovery.diagnosis.repair import delivered
+from discovery.diagnosis.scored import Assessment, assess
 from discovery.dynamics.system import predict
 from discovery.fitting import predict_recording
-from discovery.mismatch.assess import Assessment, assess
-from discovery.mismatch.context import Context, make_context
-from discovery.mismatch.deliver import delivered
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse

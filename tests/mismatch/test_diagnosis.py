@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from discovery.diagnosis import Diagnosis, diagnose
+from discovery.diagnosis.context import make_context
+from discovery.diagnosis.proof import Improvement, improvements
+from discovery.diagnosis.scored import assess
+from discovery.diagnosis.vetoes import objections
 from discovery.dynamics.system import predict
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import catalogue
 from discovery.fitting import Noise, predict_recording
-from discovery.mismatch import Diagnosis, diagnose
-from discovery.mismatch.assess import assess
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.context import make_context
-from discovery.mismatch.gates import objections
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.prove import Improvement, improvements
 from discovery.models import Model, Parameter, read_model, write_model
 from discovery.models.reduced import reduced
 from discovery.recordings import Recording

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.stats import norm
 
+from discovery.diagnosis.context import make_context
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.bayes import Board, by_claim, make_board, scores
+from discovery.evidence.signatures import signatures
+from discovery.evidence.whitening import Lens, View
 from discovery.fitting import Noise
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.context import make_context
-from discovery.mismatch.evidence import Board, by_claim, make_board, scores
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.lens import Lens, View
-from discovery.mismatch.signatures import signatures
 from tests.mismatch import machine
 
 Array = NDArray[np.float64]

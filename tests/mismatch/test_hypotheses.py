@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from discovery.dynamics.system import predict
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.hypothesis import Hypothesis
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis
 from discovery.models import Model, read_model, write_model
 from discovery.terms import Term, parse, substitute
 from tests.mismatch.sample import CHANNELS, RUNS, expand, inside, sample, trajectory

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from discovery.diagnosis.context import make_context
+from discovery.diagnosis.selection import search
 from discovery.dynamics import make_grid
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.context import make_context
-from discovery.mismatch.late import beside_switches, perhaps_late
-from discovery.mismatch.search import search
+from discovery.effects.catalogue import catalogue
+from discovery.evidence.late import beside_switches, perhaps_late
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -78,7 +78,7 @@ def found(seen: Campaign) -> tuple[str, ...]:
 def test_a_power_that_is_logged_late_is_no_missing_physics(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = campaign(light(1, 40.0), light(2, 35.0))
     assert found(seen) == ()
-    monkeypatch.setattr("discovery.mismatch.context.perhaps_late", lambda _, grids: grids)
+    monkeypatch.setattr("discovery.diagnosis.context.perhaps_late", lambda _, grids: grids)
     assert found(seen) != ()
 
 
@@ -86,7 +86,7 @@ def test_switches_off_the_grid_of_the_logger_are_no_missing_physics(monkeypatch:
     """Each is logged at the next stamp: 0 to 60 s late."""
     seen = campaign(light(1, 30.0, 30.0), light(2, 30.0, 30.0))
     assert found(seen) == ()
-    monkeypatch.setattr("discovery.mismatch.everyday.JITTER", 0.0)
+    monkeypatch.setattr("discovery.evidence.process_noise.JITTER", 0.0)
     assert found(seen) != ()
 
 

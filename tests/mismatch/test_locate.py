@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discovery.mismatch.assess import assess
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.context import make_context
-from discovery.mismatch.describe import describe
-from discovery.mismatch.forcing import BLOCKS, Forcing, free_forcing
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.regime import of_effects, of_free_heat
-from discovery.mismatch.scales import lags
+from discovery.diagnosis.context import make_context
+from discovery.diagnosis.description import describe
+from discovery.diagnosis.regime import of_effects, of_free_heat
+from discovery.diagnosis.scales import lags
+from discovery.diagnosis.scored import assess
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import catalogue
+from discovery.evidence.latent_force import BLOCKS, Forcing, free_forcing
 from tests.mismatch.machine import SEEN, Array, campaign, model, simulated
 from tests.mismatch.test_ask import plate, ten_minutes
 

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from discovery.mismatch.assess import assess, refit
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.context import Context, make_context
-from discovery.mismatch.diagnosis import diagnose
-from discovery.mismatch.gates import objections
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.look import look
+from discovery.diagnosis.context import Context, make_context
+from discovery.diagnosis.diagnose import diagnose
+from discovery.diagnosis.scan import look
+from discovery.diagnosis.scored import assess, refit
+from discovery.diagnosis.vetoes import objections
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis
 from discovery.recordings import Recording
 from discovery.terms import Apply, Expression, names
 from tests.mismatch.machine import SEEN, campaign, changed, model, simulated

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import make_grid
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import catalogue
+from discovery.evidence.outliers import find_outliers
 from discovery.fitting import fit_model
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.outliers import find_outliers
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from discovery.diagnosis.context import make_context
+from discovery.diagnosis.idle import not_offered
+from discovery.effects.catalogue import catalogue
 from discovery.errors import UserError
 from discovery.experiment import diagnose, load_experiment
 from discovery.experiment.pipeline import diagnosis
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.context import make_context
-from discovery.mismatch.idle import not_offered
 from discovery.models import read_model, write_model
 from tests.mismatch import machine
 from tests.mismatch.machine import CHANNELS, Array, Inputs, model, simulated

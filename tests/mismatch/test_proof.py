@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import binom
 
+from discovery.diagnosis.proof import Improvement, compare, explained, improvements, noise_floor, unit_of
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
 from discovery.fitting import Noise
-from discovery.mismatch.prove import Improvement, compare, explained, improvements, noise_floor, unit_of
 from discovery.models import Model, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import parse

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discovery.mismatch.context import make_context
-from discovery.mismatch.diagnosis import diagnose
+from discovery.diagnosis.context import make_context
+from discovery.diagnosis.diagnose import diagnose
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse

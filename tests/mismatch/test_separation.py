@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
+from discovery.design.separation import separation
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
 from discovery.fitting import Noise
-from discovery.mismatch.separation import separation
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse

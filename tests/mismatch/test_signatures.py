@@ -7,11 +7,11 @@ import pytest
 
 from discovery.dynamics import make_grid, make_system, simulate
 from discovery.dynamics.system import predict
-from discovery.mismatch.catalogue import Effect, catalogue
-from discovery.mismatch.events import heat_steps
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.signatures import signatures
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import Effect, catalogue
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.events import heat_steps
+from discovery.evidence.signatures import signatures
 from tests.mismatch import machine
 from tests.mismatch.sample import expand, inside, sample, trajectory
 

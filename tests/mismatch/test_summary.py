@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from discovery.mismatch.summary import summary
+from discovery.diagnosis.summary import summary
 
 
 def number(value: float, low: float | None, high: float | None, unit: str) -> dict[str, Any]:

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discovery.mismatch.assess import Assessment, assess, misfits
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.context import Context, make_context
-from discovery.mismatch.gates import matters, unseen_lag
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.leftout import least_added, least_taken, left_out
-from discovery.mismatch.look import look
-from discovery.mismatch.question import BLUNT, CLEAR, supported
-from discovery.mismatch.search import Search, search
-from discovery.mismatch.verdict import decide
+from discovery.diagnosis.context import Context, make_context
+from discovery.diagnosis.crossvalidation import least_added, least_taken, left_out
+from discovery.diagnosis.question import BLUNT, CLEAR, supported
+from discovery.diagnosis.scan import look
+from discovery.diagnosis.scored import Assessment, assess, misfits
+from discovery.diagnosis.selection import Search, search
+from discovery.diagnosis.verdict import decide
+from discovery.diagnosis.vetoes import matters, unseen_lag
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import catalogue
 from discovery.models import Model, expanded
 from discovery.terms import Term, parse
 from tests.mismatch.machine import CHANNELS, SEEN, Array, Inputs, campaign, changed, model, simulated
@@ -120,7 +120,7 @@ def test_what_is_bent_to_its_limit_objects_less(
     claim = replace(whole.claims[0], hypothesis=h, gain=20.0, size=tuple(context.spread(h)))
     both = replace(assess(context, (*answer.hypotheses, h)), evidence=answer.evidence + 28.0)
     found = Search(before, answer, (both,), whole.board, ((claim,), (claim,)))
-    monkeypatch.setattr("discovery.mismatch.doubts.bent", lambda _, o: pressed and o.key == h.key)
+    monkeypatch.setattr("discovery.diagnosis.doubts.bent", lambda _, o: pressed and o.key == h.key)
     assert decide(context, found, (), (), answer).word == word
 
 
@@ -197,7 +197,7 @@ def test_what_is_little_beside_a_link_has_to_add_more(
     seen = campaign(*(simulated(seed, concealed=gap, noise=1.3) for seed in (1, 2)))
     seen = replace(seen, channels=noisy)
     context = make_context(seen, model(), ("r1", "r2"), tuple(SEEN), [catalogue()["flooded_gap"]])
-    monkeypatch.setattr("discovery.mismatch.context.COARSE_LINK", share)
+    monkeypatch.setattr("discovery.diagnosis.context.COARSE_LINK", share)
     found = search(context)
     assert 0.0 < found.tried[0].evidence - found.baseline.evidence < BLUNT
     assert decide(context, found, (), (), found.best).word == word

@@ -9,17 +9,17 @@ from math import exp
 import numpy as np
 import pytest
 
-from discovery.mismatch.assess import Assessment, assess
-from discovery.mismatch.catalogue import catalogue
-from discovery.mismatch.context import Context, make_context
-from discovery.mismatch.evidence import Score
-from discovery.mismatch.forcing import Forcing
-from discovery.mismatch.gates import objections
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.look import look
-from discovery.mismatch.search import Search
-from discovery.mismatch.verdict import Verdict, decide
+from discovery.diagnosis.context import Context, make_context
+from discovery.diagnosis.scan import look
+from discovery.diagnosis.scored import Assessment, assess
+from discovery.diagnosis.selection import Search
+from discovery.diagnosis.verdict import Verdict, decide
+from discovery.diagnosis.vetoes import objections
+from discovery.effects.candidates import hypotheses
+from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.bayes import Score
+from discovery.evidence.latent_force import Forcing
 from tests.mismatch.machine import SEEN, campaign, model, simulated
 
 RUNS = ("r1", "r2")

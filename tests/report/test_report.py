@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from discovery.challenge import scoring
+from discovery.diagnosis.verdict import RIVAL
 from discovery.errors import UserError
-from discovery.mismatch.verdict import RIVAL
 from discovery.models import Parameter
 from discovery.report import equations, write_comparison, write_figures, write_report
 from discovery.report.chart import thinned

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from discovery.challenge.methods.forward_selection import with_white_noise
 from discovery.challenge.methods.named import named_entry
 from discovery.challenge.problem import Answer, Problem
+from discovery.diagnosis.scored import Assessment, assess
 from discovery.dynamics import Trajectory
 from discovery.dynamics.system import output_matrix
+from discovery.effects.candidates import hypotheses
+from discovery.effects.hypothesis import Hypothesis
 from discovery.errors import UserError
-from discovery.mismatch.assess import Assessment, assess
-from discovery.mismatch.hypotheses import hypotheses
-from discovery.mismatch.hypothesis import Hypothesis
 from discovery.sparse.derivative import discrepancy_terms, smoothed_derivative
 from discovery.terms import evaluate
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from discovery.challenge.methods.named import named_entry, windows_of
 from discovery.challenge.problem import Answer, Problem
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.scan import look
+from discovery.diagnosis.scored import Assessment, assess
+from discovery.effects.hypothesis import Hypothesis
 from discovery.errors import UserError
 from discovery.fitting.noise import white_noise
-from discovery.mismatch.assess import Assessment, assess
-from discovery.mismatch.context import Context
-from discovery.mismatch.hypothesis import Hypothesis
-from discovery.mismatch.look import look
 
 MOST = 3  # effects that may be added
 REFITS = 6  # claims that are refitted at each step

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from discovery.challenge.problem import Answer, Problem
-from discovery.mismatch.doubts import FREE
-from discovery.mismatch.forcing import free_forcing
-from discovery.mismatch.locate import locate
-from discovery.mismatch.verdict import NO_MISMATCH, UNEXPLAINED
+from discovery.diagnosis.doubts import FREE
+from discovery.diagnosis.location import locate
+from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED
+from discovery.evidence.latent_force import free_forcing
 
 
 def free_forcing_only(problem: Problem) -> Answer:

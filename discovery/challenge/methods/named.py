@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from discovery.mismatch.assess import Assessment
-from discovery.mismatch.hypothesis import Hypothesis
+from discovery.diagnosis.scored import Assessment
+from discovery.effects.hypothesis import Hypothesis
 
 
 def named_entry(found: Assessment, h: Hypothesis, probability: float) -> dict[str, Any]:

@@ -11,12 +11,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from discovery import __version__
-from discovery.export.compiled import Compiled
 from discovery.export.document import Exported
-from discovery.export.identifiers import comment, identifier, identifiers
-from discovery.export.st.language import KINDS
+from discovery.export.guarding import (
+    CONFIRM_S,
+    FADE_FROM,
+    FADE_TO,
+    FAR_S,
+    FURTHER,
+    LEAK,
+    MEAN_S,
+    MEANING,
+    TOGETHER,
+    compensated,
+)
+from discovery.export.identifiers import comment, formula, identifier, identifiers
+from discovery.export.st.guards import settable
+from discovery.export.st.language import KINDS, literal
 from discovery.export.st.step import step_text
 from discovery.export.templated import templated
+from discovery.terms import names as names_in
 
 
 def st_name(exported: Exported) -> str:
@@ -25,24 +38,44 @@ def st_name(exported: Exported) -> str:
 
 
 def st_text(exported: Exported, precision: str = "double") -> str:
-    """The function block and the functions it calls. `precision`: "double" (LREAL) or "float" (REAL)."""
+    """The function block and what it calls. `precision`: "double" (LREAL) or "float" (REAL)."""
     c, kind, name = exported.compiled, KINDS[precision], st_name(exported)
     function = f"{identifier(exported.model.name)}_{kind}"[:60]
     units = {i.name: i.unit for i in exported.inputs} | {o.name: o.unit for o in exported.outputs}
+    errors = [exported.outputs[k].name for k in compensated(exported)]
     top = "300.0" if precision == "double" else "69.0"  # of EXP, before the type overflows
+    ok = "".join(f"    ok_{word} : BOOL := TRUE;\n" for word in identifiers(c.inputs))
     return templated(
         "block.st",
         TITLE=f"{comment(exported.model.name)}, revision {exported.revision}",
         VERSION=__version__,
         SEAL=exported.seal.sha256,
         NAME=name,
+        KIND=kind,
         STEP=f"{c.step_s:g}",
         FUNCTIONS=templated("functions.st", F=function, KIND=kind, TOP=top),
-        INPUTS=_interface("in", c.inputs, units, kind),
-        OUTPUTS=_interface("out", c.outputs, units, kind),
-        VARIABLES=_declarations(c, kind),
-        BODY=step_text(c, kind, function),
+        GUARD=_guard(name, kind),
+        INPUTS=_interface("in", c.inputs, units, kind) + ok,
+        OUTPUTS=_interface("out", c.outputs, units, kind) + _interface("offset", errors, units, kind),
+        PARAMETERS=_parameters(exported, kind),
+        VARIABLES=_declarations(exported, kind),
+        BODY=step_text(exported, kind, function),
     )
+
+
+def _guard(name: str, kind: str) -> str:
+    numbers = {
+        "FURTHER": FURTHER,
+        "FADE_FROM": FADE_FROM,
+        "FADE_TO": FADE_TO,
+        "LEAK": LEAK,
+        "MEAN_S": MEAN_S,
+        "FAR_S": FAR_S,
+        "CONFIRM_S": CONFIRM_S,
+        "TOGETHER": TOGETHER,
+    }
+    words = {word: literal(value, kind) for word, value in numbers.items()}
+    return templated("guard.st", NAME=name, KIND=kind, **words)
 
 
 def _interface(prefix: str, names: Sequence[str], units: Mapping[str, str], kind: str) -> str:
@@ -53,16 +86,52 @@ def _interface(prefix: str, names: Sequence[str], units: Mapping[str, str], kind
     )
 
 
-def _declarations(c: Compiled, kind: str) -> str:
+def _parameters(exported: Exported, kind: str) -> str:
+    """The parameter block: each with its number for `set_parameter`, its unit, and the terms that use it."""
+    model = exported.model
+    lines = []
+    for k, (word, name, _) in enumerate(settable(exported), start=1):
+        if name in model.parameters and word.startswith("par_"):
+            used = [term.name for term in model.terms if name in names_in(term.expression)]
+            used += [o for o, expression in model.outputs.items() if name in names_in(expression)]
+            said = f"{name} [{model.parameters[name].unit}]: {', '.join(used) or 'not used'}"
+        else:
+            said = f"{name}: {MEANING['limit' if word.startswith('limit_') else 'rate_of_offset']}"
+        lines.append(f"    {word} : {kind}; (* {k}: {formula(said)} *)\n")
+    return "".join(lines)
+
+
+def _declarations(exported: Exported, kind: str) -> str:
+    c = exported.compiled
     sizes = {
         "u": len(c.inputs), "x": len(c.states), "c": len(c.states), "p": c.plays,
         "e": len(c.delays), "f": len(c.states), "a": len(c.nonzeros), "m": c.plays, "z": len(c.states),
         "xn": len(c.states), "cn": len(c.states), "y": len(c.outputs), "w": len(c.states), "term":
         len(c.states), "ring": sum(delay.length for delay in c.delays),
     }  # fmt: skip
-    lines = [f"    {name} : ARRAY [0..{size}] OF {kind};\n" for name, size in sizes.items()]
-    lines += [f"    position : ARRAY [0..{len(c.delays)}] OF DINT;\n", "    running : BOOL;\n"]
-    lines += [f"    {name} : DINT;\n" for name in ("count", "here", "k", "j", "substeps")]
-    lines += [f"    {name} : {kind};\n" for name in ("t", "norm", "sum", "tau", "part")]
+    lines = [f"    guard_{word} : {st_name(exported)}_GUARD;\n" for word in identifiers(c.inputs)]
+    lines += [f"    {name} : ARRAY [0..{size}] OF {kind};\n" for name, size in sizes.items()]
+    lines += [f"    together : ARRAY [0..{len(c.inputs)}] OF BOOL;\n"]
+    lines += [f"    position : ARRAY [0..{len(c.delays)}] OF DINT;\n"]
+    flags = ("running", "configured", "ticked", "known", "replaced", "recovered", "has_y")
+    bits = [f"bit_{k}" for k in (8, 9, 10, 11, 12, 13, 18, 19)]
+    lines += [f"    {name} : BOOL;\n" for name in (*flags, *bits)]
+    lines += [
+        f"    {name} : DINT;\n" for name in ("count", "here", "k", "j", "substeps", "settling", "settled")
+    ]
+    numbers = (
+        "t",
+        "norm",
+        "sum",
+        "tau",
+        "part",
+        "dt",
+        "good_s",
+        "fail_s",
+        "started_s",
+        "oldest_held",
+        "target",
+    )
+    lines += [f"    {name} : {kind};\n" for name in numbers]
     used = max(len(program.instructions) for program in (c.start, c.rates, c.results))
     return "".join(lines) + "".join(f"    v{k} : {kind};\n" for k in range(used))

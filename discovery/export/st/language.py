@@ -17,19 +17,28 @@ def literal(value: float, kind: str) -> str:
     """A typed literal.
 
     >>> literal(-1e-06, "LREAL")
-    'LREAL#-1.0e-06'
+    '(-LREAL#1.0e-06)'
     """
     if not math.isfinite(value):
         return f"{kind}#1.0e30"
+    if value < 0.0:  # compilers differ on where the sign of a typed literal stands; here all agree
+        return f"(-{literal(-value, kind)})"
     mantissa, mark, exponent = repr(float(value)).partition("e")
     return f"{kind}#{mantissa}{'' if '.' in mantissa else '.0'}{mark}{exponent}"
 
 
 def program_lines(
-    program: Program, results: Sequence[str], kind: str, function: str, state: str = "x", plays: str = "p"
+    program: Program,
+    results: Sequence[str],
+    kind: str,
+    function: str,
+    parameters: Sequence[str],
+    state: str = "x",
+    plays: str = "p",
 ) -> list[str]:
-    """Statements of a program; `state`, `plays`: arrays that it reads."""
-    loads = {
+    """Statements of a program; `parameters`: their variables, `state`, `plays`: arrays that it reads."""
+    loads: dict[str, str | Sequence[str]] = {
+        "parameter": parameters,
         "input": "u[{}]",
         "state": f"{state}[{{}}]",
         "delayed": "e[{}]",
@@ -42,6 +51,7 @@ def program_lines(
         partial(_expression, kind=kind, function=function),
         "{} := {};",
         "{} := {};",
+        "(* {} *)",
     )
     return statements(program, results, language)
 
@@ -60,7 +70,7 @@ def _expression(instruction: Instruction, words: Sequence[str], kind: str, funct
     if op == "neg":
         return f"{zero} - {a[0]}"
     if op == "sign":
-        return f"SEL({a[0]} > {zero}, SEL({a[0]} < {zero}, {zero}, {kind}#-1.0), {one})"
+        return f"SEL({a[0]} > {zero}, SEL({a[0]} < {zero}, {zero}, (-{kind}#1.0)), {one})"
     if op == "abs":
         return f"ABS({a[0]})"
     call = {"/": "DIV", "**": "POW", "exp": "EXP", "log": "LOG", "sqrt": "SQRT", "tanh": "TANH"}[op]

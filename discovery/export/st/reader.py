@@ -1,7 +1,9 @@
-"""A reader of the structured text that `block.py` writes, to replay it where no compiler is installed.
+"""A reader of the structured text that `block.py` writes, and of the SCL made from it, to replay it where no
+compiler is installed.
 
-It knows the subset that is written and nothing more: assignments, IF, WHILE, arrays, calls of functions. It
-computes in the type that the text declares (REAL: 32 bit), and refuses an untyped real literal.
+It knows the subset that is written and nothing more: assignments, IF, WHILE, arrays, calls of functions and
+of function blocks. It computes in the type that the text declares (REAL: 32 bit), and refuses an untyped
+real literal.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ Scope = dict[str, Any]
 Compute = Callable[[Scope], Any]
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:LREAL|REAL)#-?\d+\.\d+(?:[eE][+-]?\d+)?|\d+(?!\d|\.\d))|(?P<word>[A-Za-z_]\w*)|(?P<sign>:=|<>|<=|>=|\.\.|[-+*/<>=()\[\],;:]))"
+    r"\s*(?:(?P<number>(?:LREAL|REAL)#-?\d+\.\d+(?:[eE][+-]?\d+)?|\d+(?!\d|\.\d))|(?P<word>[A-Za-z_]\w*)|(?P<sign>:=|<>|<=|>=|\.\.|\*\*|[-+*/<>=()\[\],;:.]))"
 )
 
 
@@ -29,15 +31,20 @@ class Block:
     name: str
     inputs: list[str] = field(default_factory=list)
     variables: dict[str, tuple[str, int | None]] = field(default_factory=dict)  # type, last index of an array
+    initial: dict[str, bool] = field(default_factory=dict)
+    blocks: dict[str, Block] = field(default_factory=dict)  # those of its text
     run: Callable[[Scope], None] = lambda _: None
 
     def scope(self) -> Scope:
         """Variables at their initial values."""
         made: Scope = {}
         for name, (kind, last) in self.variables.items():
+            if kind in self.blocks:
+                made[name] = self.blocks[kind].scope()
+                continue
             zero: Any = {"LREAL": 0.0, "REAL": np.float32(0), "DINT": 0, "BOOL": False}[kind]
             made[name] = zero if last is None else [zero] * (last + 1)
-        return made
+        return made | self.initial
 
 
 def read_structured_text(text: str) -> dict[str, Block]:
@@ -51,7 +58,9 @@ def read_structured_text(text: str) -> dict[str, Block]:
 
 class _Reader:
     def __init__(self, text: str) -> None:
-        text = re.sub(r"\(\*.*?\*\)", " ", text, flags=re.DOTALL).strip()
+        text = re.sub(r"\(\*.*?\*\)|//[^\n]*|\{.*?\}|VERSION : [\d.]+", " ", text, flags=re.DOTALL)
+        text = re.sub(r"[#\"](?=[A-Za-z_])|\"", " ", re.sub(r"(?<=REAL)#", "~", text)).replace("~", "#")
+        text = text.replace("VAR_TEMP", "VAR").strip()
         self.tokens: list[str] = []
         at = 0
         while at < len(text):
@@ -62,6 +71,7 @@ class _Reader:
             at = found.end()
         self.at = 0
         self.found: dict[str, Block] = {}
+        self.block = Block("")
 
     def peek(self) -> str:
         return self.tokens[self.at] if self.at < len(self.tokens) else ""
@@ -76,12 +86,15 @@ class _Reader:
     def blocks(self) -> dict[str, Block]:
         while self.peek():
             kind = self.take()
-            block = Block(self.take())
+            block = Block(self.take(), blocks=self.found)
             if kind == "FUNCTION":
                 self.take(":")
                 block.variables[block.name] = (self.take(), None)
+            self.block = block
             while self.peek().startswith("VAR"):
                 self._declarations(block)
+            if self.peek() == "BEGIN":
+                self.take()
             statements = self._statements((f"END_{kind}",))
             self.take(f"END_{kind}")
             block.run = _sequence(statements)
@@ -101,6 +114,9 @@ class _Reader:
                 self.take("]")
                 self.take("OF")
                 kind = self.take()
+            if self.peek() == ":=":
+                self.take(":=")
+                block.initial[name] = self.take() == "TRUE"
             self.take(";")
             block.variables[name] = (kind, last)
             if section == "VAR_INPUT":
@@ -122,6 +138,8 @@ class _Reader:
                 self.take("END_WHILE")
                 self.take(";")
                 yield _loop(condition, inner)
+            elif self.peek() == "(":
+                yield self._block_call(word)
             else:
                 index = None
                 if self.peek() == "[":
@@ -132,6 +150,27 @@ class _Reader:
                 value = self._expression()
                 self.take(";")
                 yield _assign(word, index, value)
+
+    def _block_call(self, instance: str) -> Callable[[Scope], None]:
+        """A call of a function block: `instance(name := value, ...);`."""
+        given: list[tuple[str, Compute]] = []
+        self.take("(")
+        while self.peek() != ")":
+            name = self.take()
+            self.take(":=")
+            given.append((name, self._expression()))
+            if self.peek() == ",":
+                self.take(",")
+        self.take(")")
+        self.take(";")
+        block = self.found[self.block.variables[instance][0]]
+
+        def call(s: Scope) -> None:
+            inner = s[instance]
+            inner.update({name: value(s) for name, value in given})
+            block.run(inner)
+
+        return call
 
     def _choice(self) -> Callable[[Scope], None]:
         branches = []
@@ -150,7 +189,7 @@ class _Reader:
         self.take(";")
         return _branch(branches, otherwise)
 
-    _LEVELS = (("OR",), ("<", "<=", ">", ">=", "=", "<>"), ("+", "-"), ("*", "/", "MOD"))
+    _LEVELS = (("OR",), ("AND",), ("<", "<=", ">", ">=", "=", "<>"), ("+", "-"), ("*", "/", "MOD"), ("**",))
 
     def _expression(self, level: int = 0) -> Compute:
         if level == len(self._LEVELS):
@@ -166,6 +205,9 @@ class _Reader:
             inner = self._unary()
             return lambda s: not inner(s)
         token = self.take()
+        if token == "-":
+            negated = self._unary()
+            return lambda s: -negated(s)
         if token == "(":
             inside = self._expression()
             self.take(")")
@@ -180,18 +222,21 @@ class _Reader:
             whole = int(token)
             return lambda _: whole
         if self.peek() == "(":
-            self.take("(")
-            arguments = [self._expression()]
-            while self.peek() == ",":
-                self.take(",")
+            arguments = []
+            while self.take() != ")":  # "(" or "," before each
+                if self.tokens[self.at + 1] == ":=":  # SCL names its arguments, in order
+                    self.at += 2
                 arguments.append(self._expression())
-            self.take(")")
             return self._call(token, arguments)
         if self.peek() == "[":
             self.take("[")
             index = self._expression()
             self.take("]")
             return lambda s: s[token][index(s)]
+        if self.peek() == ".":
+            self.take(".")
+            member = self.take()
+            return lambda s: s[token][member]
         return lambda s: s[token]
 
     def _call(self, name: str, arguments: list[Compute]) -> Compute:
@@ -229,6 +274,7 @@ _STANDARD: dict[str, Callable[..., Any]] = {
 
 _OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
     "OR": lambda a, b: a or b,
+    "AND": lambda a, b: a and b,
     "<": lambda a, b: a < b,
     "<=": lambda a, b: a <= b,
     ">": lambda a, b: a > b,
@@ -240,6 +286,7 @@ _OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
     "*": lambda a, b: a * b,
     "/": lambda a, b: a / b,
     "MOD": lambda a, b: a % b,
+    "**": _same(math.pow),
 }
 
 

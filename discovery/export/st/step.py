@@ -5,30 +5,56 @@ from __future__ import annotations
 from collections.abc import Sequence, Sized
 
 from discovery.export.compiled import Compiled
+from discovery.export.document import Exported
+from discovery.export.guarding import times
 from discovery.export.identifiers import identifiers
 from discovery.export.kernel import LARGEST_NORM, LARGEST_SUBSTEPS, ORDER
+from discovery.export.st.guards import configured, guards, offsets, settable
 from discovery.export.st.language import literal, program_lines
+from discovery.export.templated import templated
 
 
-def step_text(c: Compiled, kind: str, function: str) -> str:
-    """One call: the start where asked for, then one step; nothing changes where a number is not finite."""
+def step_text(exported: Exported, kind: str, function: str) -> str:
+    """One call: guards, the start where needed, one step, modes, offsets. The model does not change where a
+    number is not finite.
+    """
+    c = exported.compiled
+    parameters = [word for word, _, _ in settable(exported)][: len(c.parameters)]
     rates = [*_places("f", c.states), *_places("a", c.nonzeros), *_moved(c)]
+    step = literal(c.step_s, kind)
     lines = [
-        *(f"u[{k}] := in_{word};" for k, word in enumerate(identifiers(c.inputs))),
+        *configured(exported, kind),
+        f"dt := {kind}#0.0;",
+        f"IF ticked THEN dt := {step}; END_IF;",
+        "ticked := TRUE;",
+        "fail_s := fail_s + dt;",
+        "started_s := started_s + dt;",
+        *guards(exported, kind),
         "failed := FALSE;",
-        *_restart(c, kind, function),
-        "IF NOT failed THEN",
-        f"t := DINT_TO_{kind}(count) * {literal(c.step_s, kind)};",
+        "IF known THEN",
+        *_restart(c, kind, function, parameters),
+        "IF running AND NOT failed THEN",
+        f"t := DINT_TO_{kind}(count) * {step};",
         *_delayed(c, kind),
-        *program_lines(c.rates, rates, kind, function),
+        *program_lines(c.rates, rates, kind, function, parameters),
         *_substeps(c, kind),
         *_increment(c, kind),
         *_new_states(c, kind),
-        *_outputs(c, kind, function),
+        *_outputs(c, kind, function, parameters),
         *_taken_over(c),
         "END_IF;",
+        "END_IF;",
     ]
-    return _indented(lines)
+    found = times()
+    modes = templated(
+        "modes.st",
+        KIND=kind,
+        RECOVER=literal(found["recover_s"], kind),
+        SETTLE=literal(found["settle_s"], kind),
+        FREEZE=literal(found["freeze_limit_s"], kind),
+        HOLD=literal(found["hold_limit_s"], kind),
+    )
+    return _indented(lines) + "\n" + modes + _indented(offsets(exported, kind))
 
 
 def _places(array: str, entries: Sized) -> list[str]:
@@ -49,7 +75,7 @@ def _fails(places: Sequence[str], kind: str) -> list[str]:
     return [f"IF NOT (ABS({place}) < {kind}#1.0e30) THEN failed := TRUE; END_IF;" for place in places]
 
 
-def _restart(c: Compiled, kind: str, function: str) -> list[str]:
+def _restart(c: Compiled, kind: str, function: str, parameters: Sequence[str]) -> list[str]:
     """Start values, delayed inputs as they always were; nothing changes where one is not finite."""
     first = [*_places("xn", c.states), *_moved(c)]
     rings = [
@@ -64,11 +90,13 @@ def _restart(c: Compiled, kind: str, function: str) -> list[str]:
     ]
     return [
         "IF restart OR NOT running THEN",
-        *program_lines(c.start, first, kind, function),
+        *program_lines(c.start, first, kind, function, parameters),
         *_fails(first, kind),
         "IF NOT failed THEN",
         "running := TRUE;",
         "count := 0;",
+        f"started_s := {kind}#0.0;",
+        "settling := 1;",
         *(f"x[{i}] := xn[{i}]; c[{i}] := {kind}#0.0;" for i in range(len(c.states))),
         *_settled(c),
         *rings,
@@ -152,11 +180,11 @@ def _new_states(c: Compiled, kind: str) -> list[str]:
     ]
 
 
-def _outputs(c: Compiled, kind: str, function: str) -> list[str]:
+def _outputs(c: Compiled, kind: str, function: str, parameters: Sequence[str]) -> list[str]:
     read = _places("y", c.outputs)
     return [
         f"t := DINT_TO_{kind}(count + 1) * {literal(c.step_s, kind)};",
-        *program_lines(c.results, [*read, *_moved(c)], kind, function, "xn", "m"),
+        *program_lines(c.results, [*read, *_moved(c)], kind, function, parameters, "xn", "m"),
         *_fails(read, kind),
     ]
 
@@ -170,6 +198,7 @@ def _taken_over(c: Compiled) -> list[str]:
         *(f"out_{word} := y[{k}];" for k, word in enumerate(identifiers(c.outputs))),
         *(f"position[{k}] := (position[{k}] + 1) MOD {d.length};" for k, d in enumerate(c.delays)),
         "count := count + 1;",
+        "has_y := TRUE;",
         "END_IF;",
     ]
 

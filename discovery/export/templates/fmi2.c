@@ -30,20 +30,25 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, f
                                fmi2Boolean stop_defined, fmi2Real stop)
 {
     (void)tolerance_defined; (void)tolerance; (void)stop_defined; (void)stop;
+    if (((instance *)c)->phase != SET_UP) { return fmi2Error; }
     ((instance *)c)->start_time = start;
     return fmi2OK;
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component c) { (void)c; return fmi2OK; }
+fmi2Status fmi2EnterInitializationMode(fmi2Component c)
+{
+    instance *m = (instance *)c;
+    return STATUS(begin(m, m->start_time));
+}
 
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return STATUS(initialise((instance *)c)); }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return STATUS(run((instance *)c)); }
 
-fmi2Status fmi2Terminate(fmi2Component c) { (void)c; return fmi2OK; }
+fmi2Status fmi2Terminate(fmi2Component c) { return STATUS(terminate((instance *)c)); }
 fmi2Status fmi2Reset(fmi2Component c) { set_up((instance *)c); return fmi2OK; }
 
 fmi2Status fmi2GetReal(fmi2Component c, const reference vr[], size_t n, fmi2Real value[])
 {
-    return STATUS(get((const instance *)c, vr, n, value));
+    return STATUS(get((instance *)c, vr, n, value));
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const reference vr[], size_t n, const fmi2Real value[])
@@ -56,9 +61,43 @@ fmi2Status fmi2SetReal(fmi2Component c, const reference vr[], size_t n, const fm
     { (void)c; (void)vr; (void)value; return n == 0 ? fmi2OK : fmi2Error; } \
     fmi2Status fmi2Set##kind(fmi2Component c, const reference vr[], size_t n, const fmi2##kind value[]) \
     { (void)c; (void)vr; (void)value; return n == 0 ? fmi2OK : fmi2Error; }
-NONE(Integer)
-NONE(Boolean)
 NONE(String)
+
+fmi2Status fmi2GetBoolean(fmi2Component c, const reference vr[], size_t n, fmi2Boolean value[])
+{
+    size_t k;
+    for (k = 0; k < n; ++k) {
+        const int *at = boolean_at((instance *)c, vr[k]);
+        if (at == NULL) { return fmi2Error; }
+        value[k] = *at ? fmi2True : fmi2False;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component c, const reference vr[], size_t n, const fmi2Boolean value[])
+{
+    size_t k;
+    for (k = 0; k < n; ++k) {
+        int *at = boolean_at((instance *)c, vr[k]);
+        if (at == NULL) { return fmi2Error; }
+        *at = value[k] != fmi2False;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetInteger(fmi2Component c, const reference vr[], size_t n, fmi2Integer value[])
+{
+    size_t k;
+    for (k = 0; k < n; ++k) {
+        int found;
+        if (integer((const instance *)c, vr[k], &found) != 0) { return fmi2Error; }
+        value[k] = found;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetInteger(fmi2Component c, const reference vr[], size_t n, const fmi2Integer value[])
+{ (void)c; (void)vr; (void)value; return n == 0 ? fmi2OK : fmi2Error; }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) { return STATUS(copied(state, c)); }
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) { memcpy(c, state, sizeof(instance)); return fmi2OK; }

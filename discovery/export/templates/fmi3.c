@@ -7,7 +7,7 @@ typedef fmi3ValueReference reference;
 #include "instance.h"
 
 #define STATUS(failed) ((failed) != 0 ? fmi3Error : fmi3OK)
-#define TIME VARIABLES /* its reference is the next one */
+#define TIME (STATE_WORD + 1) /* its reference is the next one */
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
@@ -49,22 +49,19 @@ void fmi3FreeInstance(fmi3Instance i) { free(i); }
 fmi3Status fmi3EnterInitializationMode(fmi3Instance i, fmi3Boolean tolerance_defined, fmi3Float64 tolerance, fmi3Float64 start,
                                        fmi3Boolean stop_defined, fmi3Float64 stop)
 {
-    instance *m = (instance *)i;
     (void)tolerance_defined; (void)tolerance; (void)stop_defined; (void)stop;
-    m->start_time = start;
-    m->time = start;
-    return fmi3OK;
+    return STATUS(begin((instance *)i, start));
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance i) { return STATUS(initialise((instance *)i)); }
+fmi3Status fmi3ExitInitializationMode(fmi3Instance i) { return STATUS(run((instance *)i)); }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance i) { (void)i; return fmi3Error; }
-fmi3Status fmi3Terminate(fmi3Instance i) { (void)i; return fmi3OK; }
+fmi3Status fmi3Terminate(fmi3Instance i) { return STATUS(terminate((instance *)i)); }
 fmi3Status fmi3Reset(fmi3Instance i) { set_up((instance *)i); return fmi3OK; }
 
 fmi3Status fmi3GetFloat64(fmi3Instance i, const reference vr[], size_t n, fmi3Float64 value[], size_t values)
 {
-    const instance *m = (const instance *)i;
+    instance *m = (instance *)i;
     size_t k;
     if (values != n) { return fmi3Error; }
     for (k = 0; k < n; ++k) {
@@ -89,12 +86,49 @@ NONE(Int8)
 NONE(UInt8)
 NONE(Int16)
 NONE(UInt16)
-NONE(Int32)
 NONE(UInt32)
 NONE(Int64)
 NONE(UInt64)
-NONE(Boolean)
 NONE(String)
+
+fmi3Status fmi3GetBoolean(fmi3Instance i, const reference vr[], size_t n, fmi3Boolean value[], size_t values)
+{
+    size_t k;
+    if (values != n) { return fmi3Error; }
+    for (k = 0; k < n; ++k) {
+        const int *at = boolean_at((instance *)i, vr[k]);
+        if (at == NULL) { return fmi3Error; }
+        value[k] = *at != 0;
+    }
+    return fmi3OK;
+}
+
+fmi3Status fmi3SetBoolean(fmi3Instance i, const reference vr[], size_t n, const fmi3Boolean value[], size_t values)
+{
+    size_t k;
+    if (values != n) { return fmi3Error; }
+    for (k = 0; k < n; ++k) {
+        int *at = boolean_at((instance *)i, vr[k]);
+        if (at == NULL) { return fmi3Error; }
+        *at = value[k] ? 1 : 0;
+    }
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetInt32(fmi3Instance i, const reference vr[], size_t n, fmi3Int32 value[], size_t values)
+{
+    size_t k;
+    if (values != n) { return fmi3Error; }
+    for (k = 0; k < n; ++k) {
+        int found;
+        if (integer((const instance *)i, vr[k], &found) != 0) { return fmi3Error; }
+        value[k] = found;
+    }
+    return fmi3OK;
+}
+
+fmi3Status fmi3SetInt32(fmi3Instance i, const reference vr[], size_t n, const fmi3Int32 value[], size_t values)
+{ (void)i; (void)vr; (void)value; (void)values; return n == 0 ? fmi3OK : fmi3Error; }
 
 fmi3Status fmi3GetBinary(fmi3Instance i, const reference vr[], size_t n, size_t sizes[], fmi3Binary value[], size_t values)
 { (void)i; (void)vr; (void)sizes; (void)value; (void)values; return n == 0 ? fmi3OK : fmi3Error; }

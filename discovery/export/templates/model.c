@@ -29,6 +29,10 @@ typedef @PREFIX@_real real;
 #define A @NONZEROS@
 #define H @STEP@
 
+const @PREFIX@_parameters @PREFIX@_defaults = {
+@DEFAULTS@
+};
+
 @START_VALUES@
 @RATES@
 @OUTPUTS@
@@ -67,12 +71,13 @@ static int increment(const real a[], const real f[], real z[])
     return 0;
 }
 
-int @PREFIX@_start(@PREFIX@_state *s, const real u[])
+/* Start values for inputs u, with the parameters that the state holds. */
+static int restart(@PREFIX@_state *s, const real u[])
 {
     real x[N + 1];
     real moved[@UP@_PLAYS + 1];
     int i;
-@COUNTER@    start_values(s->x, u, s->d, s->p, R(0.0), x, moved);
+@COUNTER@    start_values(&s->k, s->x, u, s->d, s->p, R(0.0), x, moved);
     for (i = 0; i < N; ++i) { if (!(R_ABS(x[i]) < R(1e30))) { return 1; } }
     for (i = 0; i < @UP@_PLAYS; ++i) { if (!(R_ABS(moved[i]) < R(1e30))) { return 1; } }
     for (i = 0; i < N; ++i) { s->x[i] = x[i]; s->c[i] = R(0.0); }
@@ -82,10 +87,18 @@ int @PREFIX@_start(@PREFIX@_state *s, const real u[])
     return 0;
 }
 
+int @PREFIX@_start_with(@PREFIX@_state *s, const @PREFIX@_parameters *k, const real u[])
+{
+    s->k = *k;
+    return restart(s, u);
+}
+
+int @PREFIX@_start(@PREFIX@_state *s, const real u[]) { return @PREFIX@_start_with(s, &@PREFIX@_defaults, u); }
+
 void @PREFIX@_outputs(const @PREFIX@_state *s, const real u[], real y[])
 {
     real moved[@UP@_PLAYS + 1];
-    outputs(s->x, u, s->d, s->p, (real)s->count * H, y, moved);
+    outputs(&s->k, s->x, u, s->d, s->p, (real)s->count * H, y, moved);
 }
 
 int @PREFIX@_step(@PREFIX@_state *s, const real u[], real y[])
@@ -101,7 +114,7 @@ int @PREFIX@_step(@PREFIX@_state *s, const real u[], real y[])
     real out[@UP@_OUTPUTS + 1];
     int i;
 @HERE@@DELAYED@
-    rates(s->x, u, d, s->p, (real)s->count * H, f, a, moved);
+    rates(&s->k, s->x, u, d, s->p, (real)s->count * H, f, a, moved);
     if (increment(a, f, z) != 0) { return 1; }
     for (i = 0; i < N; ++i) {
         const real step = z[i] - s->c[i];
@@ -109,7 +122,7 @@ int @PREFIX@_step(@PREFIX@_state *s, const real u[], real y[])
         c[i] = (x[i] - s->x[i]) - step;
         if (!(R_ABS(x[i]) < R(1e30))) { return 1; }
     }
-    outputs(x, u, d, moved, (real)(s->count + 1u) * H, out, settled);
+    outputs(&s->k, x, u, d, moved, (real)(s->count + 1u) * H, out, settled);
     for (i = 0; i < @UP@_OUTPUTS; ++i) { if (!(R_ABS(out[i]) < R(1e30))) { return 1; } }
     for (i = 0; i < N; ++i) { s->x[i] = x[i]; s->c[i] = c[i]; }
     for (i = 0; i < @UP@_PLAYS; ++i) { s->p[i] = settled[i]; }
@@ -118,3 +131,5 @@ int @PREFIX@_step(@PREFIX@_state *s, const real u[], real y[])
     ++s->count;
     return 0;
 }
+
+@GUARD@

@@ -1,0 +1,145 @@
+"""What to do next: which experiment decides, where to look, or what these recordings would have shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from discovery.design.next_experiment import Aim, believed, next_experiment
+from discovery.design.when import instants, told
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.selection import Search
+from discovery.diagnosis.thresholds import RIVAL
+from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, Verdict
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.bayes import Score
+from discovery.models import Model
+from discovery.printed import printed
+
+INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
+
+NOTHING_CLOSE = (
+    "look at what happened in the windows in which heat is missing, and record what nothing records at that "
+    "body: its temperature, and whatever else heats or cools it"
+)
+
+APART = Aim("tells the rivals apart", "the two answers differ there")
+CONFIRM = Aim("would confirm the answer", "the model with and without it differs there")
+
+
+def ask(context: Context, found: Search, verdict: Verdict) -> str:
+    """A sentence: the experiment that would decide, where to look, or what would have been seen."""
+    if verdict.word == NO_MISMATCH:
+        return _smallest(found)
+    if verdict.word == FAULT:
+        return (
+            "check the device and repeat the recording; a fault of the measuring chain needs no new physics"
+        )
+    shown = verdict.named or verdict.candidates
+    if not shown:
+        return NOTHING_CLOSE
+    rivals = [
+        r.hypothesis
+        for n in shown
+        for r in n.rivals
+        if r.below <= RIVAL and not (r.hypothesis.recording and n.hypothesis.recording)
+    ]  # no pattern tells two events of the past apart
+    answer = verdict.answer
+    rival = _rival_model(found, answer, rivals[0]) if rivals else None
+    claims = [n.hypothesis for n in shown]
+    if rival is None and all(h.recording for h in claims):
+        return look_back(context, claims)
+    purpose = aim(claims, rivals[0] if rival else None, bool(verdict.named))
+    noise = answer.noise
+    other = rival or _without(answer)
+    return next_experiment(context, answer.fit.model, other, noise, purpose, believed(context))
+
+
+def aim(shown: Sequence[Hypothesis], rival: Hypothesis | None, answered: bool) -> Aim:
+    """What can be asked about what was named, or, where nothing was, about what came closest.
+
+    An event of one recording does not act in another one: there, only the laws beside it can be confirmed.
+    """
+    if answered and rival:
+        return APART
+    laws = _called([h for h in shown if h.recording is None])
+    if answered:
+        does = CONFIRM.does if all(h.recording is None for h in shown) else f"would confirm {laws}"
+        return Aim(does, CONFIRM.differ)
+    if rival:
+        what = f"would tell apart what came closest ({_called(shown)}, or {_called([rival])})"
+        return Aim(what, "the two differ there")
+    return Aim(f"would put to the test what came closest ({laws})", CONFIRM.differ)
+
+
+def look_back(context: Context, events: Sequence[Hypothesis]) -> str:
+    """What to do about events, which no pattern brings back: look at what happened, and wait for it again."""
+    what = " and ".join(_happened(context, h) for h in events)
+    runs = " and ".join(dict.fromkeys(str(h.recording) for h in events))
+    return f"look at {what}; repeat {runs} and see whether it comes again"
+
+
+def _happened(context: Context, h: Hypothesis) -> str:
+    """Heat and jumps have their hours; a loss that is another in a whole recording was changed before it."""
+    if h.effect.is_physics and not instants(context.campaign, h):
+        return f"what was changed at {h.where} before {h.recording}"
+    return f"what happened {told(context.campaign, h)}"
+
+
+def _called(shown: Sequence[Hypothesis]) -> str:
+    return " and ".join(f"{h.effect.word} at {h.where}" for h in shown)
+
+
+def _without(best: Scored) -> Model:
+    """The model with its effects switched off and everything else as it is with them."""
+    return best.fit.model.with_values({name: 0.0 for h in best.hypotheses for name in h.amplitudes})
+
+
+def _rival_model(found: Search, answer: Scored, rival: Hypothesis) -> Model | None:
+    for one in found.tried.values():
+        if len(one.hypotheses) == len(answer.hypotheses) and rival.key in one.keys:
+            return one.fit.model
+    return None
+
+
+def _smallest(found: Search) -> str:
+    """What would have been seen: the size at which usual effects reach the threshold, and where."""
+    texts, scanned = [], found.claims
+    for word in (
+        "fluid_convection",
+        "friction_speed",
+        "evaporation_drying",
+        "flooded_gap",
+        "second_thermal_mass",
+    ):
+        claims = [c for c in scanned if c.hypothesis.effect.word == word]
+        seen = [c for c in claims if _size_is_told(c)]
+        if not seen:
+            continue
+        size, c = max(((4.5 * abs(c.size[0] / c.t), c) for c in seen), key=lambda item: item[0])
+        h = c.hypothesis
+        speed = f" at {h.effect.at}" if h.effect.at else ""
+        places = list(dict.fromkeys(" and ".join(c.hypothesis.places) for c in seen))
+        everywhere = len(seen) == len(claims) and len(places) > 1 and h.effect.place in _ANYWHERE
+        where = _ANYWHERE[h.effect.place] if everywhere else f"at {'; '.join(places)}"
+        unit = h.units.get(h.amplitudes[0], "")
+        texts.append(f"{word} of {printed(size, 2)} {unit}{speed} {where}")
+    return (
+        "these recordings would have shown " + ", ".join(texts)
+        if texts
+        else "nothing is missing that these recordings could show"
+    )
+
+
+def _size_is_told(claim: Score) -> bool:
+    h = claim.hypothesis
+    is_size = h.effect.amplitude.fixed is None and h.recording is None
+    return is_size and claim.t != 0 and claim.share > INVISIBLE
+
+
+_ANYWHERE = {
+    "body": "at any body",
+    "fluid-free body": "at any body without fluid",
+    "driven body": "at any driven body",
+    "any pair": "between any two bodies",
+}

@@ -1,0 +1,214 @@
+"""The diagnosis from start to end: fit, noise, search, posterior, verdict, proof, location, next experiment."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from discovery.design.question import ask
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.context import Context, make_context, with_noise_of
+from discovery.diagnosis.description import Curve, Description, curves, describe
+from discovery.diagnosis.location import Location, locate
+from discovery.diagnosis.posterior import Posterior, posterior
+from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement
+from discovery.diagnosis.repair import written
+from discovery.diagnosis.scored import Scored, with_effects, with_force
+from discovery.diagnosis.selection import Search
+from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide, idle, refuted
+from discovery.effects.catalogue import catalogue
+from discovery.effects.form import Effect
+from discovery.effects.hypothesis import Hypothesis
+from discovery.effects.not_offered import not_offered
+from discovery.errors import UserError
+from discovery.evidence.late import told
+from discovery.evidence.latent_force import Force, latent_forces
+from discovery.fitting import Fit, fit_model
+from discovery.models import Model
+from discovery.recordings import Campaign
+from discovery.threads import one_thread
+
+if TYPE_CHECKING:
+    from discovery.diagnosis.document import DiagnosisDocument
+
+ANOTHER_NOISE = 0.05  # relative change of a channel's reading noise that calls for another search
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything a diagnosis found. `document()` is the content of diagnosis.json."""
+
+    context: Context
+    search: Search
+    posterior: Posterior
+    verdict: Verdict
+    before: Fit  # the model as the user gave it, fitted as any model of an experiment
+    after: Fit | None  # with what was named; None where nothing is
+    location: Location
+    forces: tuple[Force, ...]  # on what the baseline leaves
+    fit: Improvement  # free runs of the recordings to fit
+    held_out: dict[str, Improvement]
+    description: Description | None
+    curves: tuple[Curve, ...]
+    question: str
+    seconds: float
+
+    @property
+    def repaired(self) -> Model | None:
+        """The model with what was named, fitted and written plainly; None where nothing is named."""
+        return written(self.after.model, [n.hypothesis for n in self.verdict.named]) if self.after else None
+
+    @property
+    def explained(self) -> float | None:
+        """Share of the closable mismatch of the held-out recordings that the repair removes."""
+        if self.after is None or all(n.hypothesis.effect.is_event for n in self.verdict.named):
+            return None
+        return explained(self.held_out)
+
+    def interval(self, h: Hypothesis, name: str) -> tuple[float | None, float | None]:
+        """95 % interval of a parameter of what was named: of the diagnosis and of the fit that goes out, which
+        need not agree, each wider by what a law slightly off in form leaves open.
+        """
+        assert self.after is not None
+        p = self.after.model.parameters[name]
+        wider = thresholds.FORM * abs(p.value) if h.effect.is_physics and name in h.amplitudes else 0.0
+        known = [s for s in (self.verdict.answer.interval(name), (p.low, p.high)) if s and None not in s]
+        lows = [p.value - np.hypot(p.value - s[0], wider) for s in known if s[0] is not None]
+        highs = [p.value + np.hypot(s[1] - p.value, wider) for s in known if s[1] is not None]
+        low, high = min(lows, default=None), max(highs, default=None)
+        return None if low is None else max(low, p.min), None if high is None else min(high, p.max)
+
+    def document(self) -> DiagnosisDocument:
+        """The content of diagnosis.json, contract section 6."""
+        from discovery.diagnosis.document import document
+
+        return document(self)
+
+
+@one_thread
+def diagnose(
+    model: Model,
+    campaign: Campaign,
+    fit: Sequence[str],
+    held_out: Sequence[str] = (),
+    outputs: Sequence[str] | None = None,
+    effects: Sequence[Effect] = (),
+    *,
+    physical: bool = True,
+    fitted: Fit | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """Find what a model leaves out.
+
+    Args:
+        model: the baseline, start values as its author believes them.
+        fit: recordings that fits and searches see.
+        held_out: recordings for the proof at the end, touched by nothing before.
+        outputs: measured channels; default all that model and campaign share.
+        effects: entries added to the catalogue's, or replacing those of the same word.
+        physical: the start values of the model are an engineer's beliefs (not those of a builder).
+        fitted: the baseline as an experiment has fitted it already.
+        tell: receives what begins.
+
+    Raises:
+        UserError: a model that does not run, or recordings without readings.
+    """
+    began = clock.perf_counter()
+    shared = [n for n in {**model.outputs, **model.states} if n in campaign.channels]
+    outputs = tuple(dict.fromkeys(outputs or shared))
+    outputs = tuple(n for n in outputs if n in model.outputs or n in model.states)
+    if not outputs:
+        raise UserError(f"model '{model.name}' predicts no measured channel; name one under [outputs]")
+    if what := campaign.unread(fit, outputs):
+        raise UserError(what)
+    own = {e.word for e in effects}
+    entries = [*(e for e in catalogue().values() if e.word not in own), *effects]
+    seen = replace(campaign, recordings={r: campaign.recordings[r] for r in fit})  # nothing else can leak in
+    tell("fitting the baseline and its noise")
+    context = make_context(seen, model, fit, outputs, entries, _after(campaign, fit), physical)
+    tell("scoring the catalogue")
+    found = Search(context, lambda what: tell(f"found so far: {what}")).run()
+    other = with_noise_of(context, found.best.fit)
+    change = np.log(np.array(other.white.white) / np.array(context.white.white))
+    if found.best.hypotheses and np.max(np.abs(change)) > ANOTHER_NOISE:
+        tell("once more, with the reading noise that the answer leaves")
+        context, found = other, found.again(other)
+    tell("weighing the answers")
+    chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
+    verdict = decide(context, found, chances)
+    tell("proving in free runs")
+    before = fitted or fit_model(model, seen, fit, outputs)
+    after = _repaired(context, verdict, model, seen, before) if verdict.named else None
+    noise = verdict.answer.noise
+    read = [r for r in held_out if not campaign.unread([r], outputs)]
+    runs = free_runs(campaign, [*fit, *read], before, after or before, noise)
+    fitting = improvement([runs[r] for r in fit if r in runs], outputs)
+    proof = {r: improvement([runs[r]], outputs) for r in read if r in runs}
+    verdict = refuted(idle(verdict, fitting), proof)
+    if not verdict.named and after is not None:
+        after = None
+    verdict = replace(verdict, reasons=(*verdict.reasons, *_reasons(context, verdict, read, proof, effects)))
+    tell("locating")
+    setting = found.baseline.settings[found.baseline.best]
+    forces = latent_forces(found.baseline.seen, setting, context.floor)
+    unexplained = verdict.word == UNEXPLAINED and bool(forces)
+    return Diagnosis(
+        context=context,
+        search=found,
+        posterior=chances,
+        verdict=verdict,
+        before=before,
+        after=after,
+        location=locate(context, found.baseline, verdict, chances, forces),
+        forces=tuple(forces),
+        fit=fitting,
+        held_out=proof,
+        description=describe(context, found.baseline, forces[0]) if unexplained else None,
+        curves=tuple(curves(found.baseline, forces[0])) if forces and verdict.word != NO_MISMATCH else (),
+        question=ask(context, found, verdict),
+        seconds=clock.perf_counter() - began,
+    )
+
+
+def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """By recording to fit, the recordings of the campaign made then or later: by their dates where all have
+    one, else in the order of the campaign.
+    """
+    origin = {name: recording.origin for name, recording in campaign.recordings.items()}
+    names = list(campaign.recordings)
+    if all(origin.values()):
+        names.sort(key=lambda name: str(origin[name]))
+    return {run: tuple(names[names.index(run) :]) for run in fit}
+
+
+def _unknown(context: Context, found: Search) -> list[Scored]:
+    """A latent force at each state: instead of everything, and with the best answer."""
+    models = {one.keys: one for one in (found.baseline, found.best)}.values()
+    return [with_force(context, one, state) for one in models for state in context.floor]
+
+
+def _repaired(context: Context, verdict: Verdict, model: Model, seen: Campaign, before: Fit) -> Fit:
+    """The model with what was named, fitted as the baseline of the proof is."""
+    grown = with_effects(model, [n.hypothesis for n in verdict.named])
+    values = verdict.answer.fit.model.parameters
+    start = {n: values[n].value for n in grown.free if n in values}
+    return fit_model(grown, seen, context.recordings, context.outputs, guess=start, begin=before)
+
+
+def _reasons(
+    context: Context,
+    verdict: Verdict,
+    read: Sequence[str],
+    proof: dict[str, Improvement],
+    effects: Sequence[Effect],
+) -> list[str]:
+    """What a reader should know of the recordings and of what was asked for."""
+    said = []
+    if lost := ", ".join(r for r in read if r not in proof):
+        said.append(f"the model itself runs away on unseen recording {lost}: nothing can be proved there")
+    said += not_offered(context.model, context.scene, effects)
+    return [*said, *told(verdict.answer.fit)]

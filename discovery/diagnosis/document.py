@@ -1,0 +1,424 @@
+"""diagnosis.json: its schema, and what a diagnosis writes there (contract section 6, and what a report wants)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic import Field
+
+from discovery.design.when import instants
+from discovery.diagnosis.proof import Improvement, unit_of
+from discovery.diagnosis.thresholds import RIVALS_SHOWN
+from discovery.diagnosis.verdict import FAULT, UNEXPLAINED, Named
+from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.latent_force import alike, heat_over_time
+from discovery.schema import Strict
+from discovery.terms import text
+
+if TYPE_CHECKING:
+    from discovery.diagnosis.diagnose import Diagnosis
+
+CONSIDERED = 12  # claims on what the baseline leaves that are listed
+WRONG_READINGS = 12  # single wrong readings that are named
+
+Number = float | None
+
+
+class Size(Strict):
+    """A parameter of an effect that was found."""
+
+    value: Number
+    low: Number = Field(description="95 % interval")
+    high: Number
+    unit: str
+    at: str | None = Field(None, description="speed that it is a size at")
+    output: str | None = Field(None, description="output that it is a size of, where each has its own")
+
+
+class Claim(Strict):
+    """An effect at a place."""
+
+    effect: str
+    states: list[str] = Field(description="states it enters; for a measurement fault the output or input")
+    recording: str | None = Field(None, description="the one in which it acts, or begins to act")
+
+
+class Physics(Claim):
+    """An effect that the repaired model adds."""
+
+    title: str
+    moved: list[str] | None = Field(None, description="outputs that it moves beyond the interval of each")
+    probability: float
+    expression: str
+    expressions: list[str] | None = Field(None, description="all, where it has several")
+    parameters: dict[str, Size]
+    source: str
+    confused_with: list[str]
+
+
+class Alternative(Claim):
+    """Another answer to one part of the question."""
+
+    log_evidence_below_best: float
+    instead_of: str
+
+
+class Considered(Claim):
+    """A claim on what the baseline leaves, from the first scan."""
+
+    channels: list[str] = Field(default_factory=list, description="inputs that it follows")
+    instants_s: list[float] | None = None
+    log_evidence: Number
+    log_odds: Number = Field(description="with the prior odds of its place")
+    score: Number = Field(description="standard deviations")
+    share_that_a_refit_leaves: Number
+
+
+class Detection(Strict):
+    """What the baseline leaves, and the noise it is held against."""
+
+    p_value: Number = Field(description="probability that nothing is missing")
+    log_evidence: Number = Field(description="log posterior odds of the answer over the baseline")
+    latent_force_log_evidence: Number
+    noise: dict[str, Number]
+    slow_noise: dict[str, Number]
+    process_noise: dict[str, Number] = Field(description="floor at each state, W or a rate")
+    form_error: float = Field(description="process noise as a share of what flows")
+    residual_rms: dict[str, Number]
+
+
+class Window(Strict):
+    """A span in which heat is missing."""
+
+    recording: str
+    start_s: Number
+    end_s: Number
+    state: str
+    heat_W: Number
+
+
+class LocationDocument(Strict):
+    """Where and when."""
+
+    outputs: dict[str, float]
+    states: dict[str, float]
+    alike: list[list[str]] = Field(description="states at which missing heat looks the same in the readings")
+    windows: list[Window]
+    regime: str | None
+    unmodelled_heat_W: dict[str, Number]
+
+
+class Gain(Strict):
+    """rms of free runs before and after the repair, in `unit` of the improvement."""
+
+    rms_before: Number
+    rms_after: Number
+    noise_floor: Number
+    gain_low: Number = None
+    gain_high: Number = None
+    outputs: dict[str, tuple[Number, Number]] = Field(
+        default_factory=dict, description="rms of each output before and after, in its unit"
+    )
+    runs_away: bool | None = None
+
+
+class ImprovementDocument(Strict):
+    """The proof."""
+
+    unit: str
+    fit: Gain
+    held_out: dict[str, Gain]
+    contradicted_by: list[str]
+    explained: Number
+
+
+class WrongReading(Strict):
+    """A single reading that was set aside."""
+
+    output: str
+    recording: str
+    time_s: Number
+    size: Number
+
+
+class Against(Strict):
+    """Missing heat against one input or state."""
+
+    value: list[Number]
+    heat: list[Number]
+    error: list[Number]
+
+
+class MissingHeat(Strict):
+    """The latent force at the most likely state."""
+
+    state: str
+    over_time: dict[str, dict[str, list[float]]]
+    against: dict[str, Against]
+    named: bool
+
+
+class DescriptionDocument(Strict):
+    """A formula that follows heat of unknown cause."""
+
+    state: str
+    formula: str
+    log_evidence: Number
+    note: str = "describes the missing heat; it is not its cause"
+
+
+class DiagnosisDocument(Strict):
+    """The content of diagnosis.json."""
+
+    model: str
+    verdict: str
+    reasons: list[str]
+    about: str
+    detection: Detection
+    location: LocationDocument
+    physics: list[Physics]
+    alternatives: list[Alternative]
+    considered: list[Considered]
+    closest: list[Claim]
+    improvement: ImprovementDocument
+    set_aside: list[WrongReading]
+    missing_heat: MissingHeat | None
+    description: DescriptionDocument | None
+    next_experiment: str
+    seconds: float
+
+
+def document(d: Diagnosis) -> DiagnosisDocument:
+    """diagnosis.json of a diagnosis."""
+    rate = not any(s.capacity for s in d.context.model.states.values())
+    return DiagnosisDocument(
+        model=d.context.model.name,
+        verdict=d.verdict.word,
+        reasons=list(d.verdict.reasons),
+        about="the model has no heat capacities: effects act on rates" if rate else "heat flows in W",
+        detection=_detection(d),
+        location=_location(d),
+        physics=[_physics(d, n) for n in d.verdict.named] or _wrong_readings(d),
+        alternatives=_alternatives([*d.verdict.named]),
+        considered=_considered(d),
+        closest=[Claim(**_claim(n.hypothesis)) for n in d.verdict.candidates],
+        improvement=_improvement(d),
+        set_aside=[
+            WrongReading(
+                output=o.output, recording=o.recording, time_s=number(o.time, 7), size=number(o.size, 4)
+            )
+            for o in d.context.outliers
+        ],
+        missing_heat=_missing_heat(d),
+        description=DescriptionDocument(
+            state=d.description.state,
+            formula=d.description.formula,
+            log_evidence=number(d.description.gain, 4),
+        )
+        if d.description
+        else None,
+        next_experiment=d.question,
+        seconds=round(d.seconds, 2),
+    )
+
+
+def number(value: float | None, digits: int = 5) -> Number:
+    """A number as JSON holds it: so many digits, null for what is none."""
+    return None if value is None or not np.isfinite(value) else float(f"{value:.{digits}g}")
+
+
+def _claim(h: Hypothesis) -> dict[str, object]:
+    return {"effect": h.effect.word, "states": list(h.places), "recording": h.recording}
+
+
+def _physics(d: Diagnosis, n: Named) -> Physics:
+    h, after = n.hypothesis, d.after
+    assert after is not None
+    several = len(h.amplitudes) > 1 and h.shown  # else one size for all outputs, or one for each body
+    output = dict(zip(h.amplitudes, h.shown, strict=True)) if several else {}
+    sizes = {}
+    for name in (*h.amplitudes, *h.shapes):
+        low, high = h.spans.get(name) or d.interval(h, name)
+        p = after.model.parameters[name]
+        sizes[name] = Size(
+            value=number(p.value),
+            low=number(p.value if p.fixed and name not in h.spans else low),
+            high=number(p.value if p.fixed and name not in h.spans else high),
+            unit=p.unit,
+            at=h.effect.at or None if name in h.amplitudes else None,
+            output=output.get(name),
+        )
+    beyond = [s for s in sizes.values() if s.output and s.low is not None and s.high is not None]
+    moved = [str(s.output) for s in beyond if not (s.low or 0.0) <= 0.0 <= (s.high or 0.0)]
+    shown = h.shows(d.context.model)
+    expressions = [text(t.expression) for t in h.terms] or [
+        text(e) for name, e in shown.items() if name in (moved or list(shown)[:1])
+    ]
+    return Physics(
+        **_claim(h),
+        title=h.effect.title,
+        moved=moved or None,
+        probability=round(n.probability, 4),
+        expression=expressions[0],
+        expressions=expressions if len(expressions) > 1 else None,
+        parameters=sizes,
+        source=h.effect.source,
+        confused_with=list(h.effect.confused_with),
+    )
+
+
+def _wrong_readings(d: Diagnosis) -> list[Physics]:
+    """Single wrong readings, largest first, where they are all that is wrong."""
+    if d.verdict.word != FAULT:
+        return []
+    entry, rows = catalogue()["outlier"], []
+    for o in sorted(d.context.outliers, key=lambda o: -abs(o.size / o.noise))[:WRONG_READINGS]:
+        half = 1.96 * o.noise
+        rows.append(
+            Physics(
+                effect=entry.word,
+                title=entry.title,
+                states=[o.output],
+                recording=o.recording,
+                probability=0.98,
+                expression=f"{o.size:.4g} at {o.time:.0f} s",
+                parameters={
+                    "outlier": Size(
+                        value=number(o.size),
+                        low=number(o.size - half),
+                        high=number(o.size + half),
+                        unit=d.context.campaign.channels[o.output].unit,
+                    )
+                },
+                source=entry.source,
+                confused_with=list(entry.confused_with),
+            )
+        )
+    return rows
+
+
+def _alternatives(named: Sequence[Named]) -> list[Alternative]:
+    rows = [
+        Alternative(
+            **_claim(r.hypothesis),
+            log_evidence_below_best=round(r.below, 2),
+            instead_of=n.hypothesis.effect.word,
+        )
+        for n in named
+        for r in n.rivals
+    ]
+    return sorted(rows, key=lambda row: row.log_evidence_below_best)[:RIVALS_SHOWN]
+
+
+def _considered(d: Diagnosis) -> list[Considered]:
+    rows = []
+    for c in d.search.claims[:CONSIDERED]:
+        found = instants(d.context.campaign, c.hypothesis)
+        rows.append(
+            Considered(
+                **_claim(c.hypothesis),
+                channels=list(c.hypothesis.channels),
+                instants_s=[round(t, 1) for t in found] if found else None,
+                log_evidence=number(c.gain, 4),
+                log_odds=number(c.odds, 4),
+                score=number(c.t, 4),
+                share_that_a_refit_leaves=number(c.share, 3),
+            )
+        )
+    return rows
+
+
+def _detection(d: Diagnosis) -> Detection:
+    noise = d.verdict.answer.noise
+    left = d.before.residuals().values()
+    slow = noise.slow or (0.0,) * len(noise.outputs)
+    return Detection(
+        p_value=number(d.posterior.nothing, 3),
+        log_evidence=number(d.search.gain),
+        latent_force_log_evidence=number(d.forces[0].gain) if d.forces else None,
+        noise={n: number(v) for n, v in zip(noise.outputs, noise.white, strict=True)},
+        slow_noise={n: number(v) for n, v in zip(noise.outputs, slow, strict=True)},
+        process_noise={n: number(v) for n, v in (noise.heat or {}).items()},
+        form_error=noise.share,
+        residual_rms={
+            name: number(_rms(np.concatenate([r[:, y] for r in left])))
+            for y, name in enumerate(d.context.outputs)
+        },
+    )
+
+
+def _rms(residual: np.ndarray) -> float:
+    """NaN of an output that was never read."""
+    read = residual[np.isfinite(residual)]
+    return float(np.sqrt(np.mean(read**2))) if len(read) else float("nan")
+
+
+def _location(d: Diagnosis) -> LocationDocument:
+    return LocationDocument(
+        outputs=dict(d.location.outputs),
+        states=dict(d.location.states),
+        alike=[list(group) for group in alike(d.forces) if len(group) > 1],
+        windows=[
+            Window(
+                recording=w.recording,
+                start_s=number(w.start_s, 7),
+                end_s=number(w.end_s, 7),
+                state=w.state,
+                heat_W=number(w.heat, 4),
+            )
+            for w in d.location.windows
+        ],
+        regime=d.location.regime,
+        unmodelled_heat_W={
+            f.state: number(float(np.sqrt(np.mean(np.concatenate(list(f.heat.values())) ** 2))), 3)
+            for f in d.forces
+        },
+    )
+
+
+def _improvement(d: Diagnosis) -> ImprovementDocument:
+    return ImprovementDocument(
+        unit=unit_of(d.context.campaign, d.context.outputs),
+        fit=_gain(d.fit),
+        held_out={run: _gain(i) for run, i in d.held_out.items()},
+        contradicted_by=[run for run, i in d.held_out.items() if i.contradicts],
+        explained=number(d.explained, 4),
+    )
+
+
+def _gain(i: Improvement) -> Gain:
+    each: Mapping[str, tuple[Number, Number]] = {
+        name: (number(old), number(new)) for name, (old, new) in i.outputs.items()
+    }
+    return Gain(
+        rms_before=number(i.before),
+        rms_after=number(i.after),
+        noise_floor=number(i.floor),
+        gain_low=number(i.low),
+        gain_high=number(i.high),
+        outputs=dict(each),
+        runs_away=True if np.isinf(i.after) else None,
+    )
+
+
+def _missing_heat(d: Diagnosis) -> MissingHeat | None:
+    if not d.curves or not d.forces:
+        return None
+    force = d.forces[0]
+    offsets = {r: d.context.campaign.recordings[r].start for r in d.context.recordings}
+    return MissingHeat(
+        state=force.state,
+        over_time=heat_over_time(force, offsets, d.context.recordings),
+        against={
+            c.variable: Against(
+                value=[number(v, 5) for v in c.centre],
+                heat=[number(v, 4) for v in c.heat],
+                error=[number(v, 3) for v in c.error],
+            )
+            for c in d.curves
+        },
+        named=d.verdict.word != UNEXPLAINED,
+    )

@@ -1,0 +1,92 @@
+"""How sure an answer is: the posterior over everything that was tried, bagged.
+
+A posterior of approximate models is too sure of itself: a little more data, other priors or one recording less
+and another model wins. So it is averaged over resampled blocks of time and over wider and narrower priors
+(Huggins & Miller, Bayesian Analysis 18, 2023). The models stay where they were fitted; everything else is
+algebra on their normal equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.scored import Scored
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.whitening import log_sum_exp
+
+Array = NDArray[np.float64]
+
+WIDTHS = (1 / 3, 1.0, 3.0)  # of the priors, relative to what they are
+FAR = 40.0  # log evidence below the best from which a model takes no part
+MOST = 40  # models that take part
+IN_PLAY = 8.0  # log evidence below the best of a model within which a noise setting counts
+SETTINGS = 3  # of these, at most
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Models and their log evidence (M, D) on each draw, the most likely model first.
+
+    A statement is compared by the best model in which it holds and the best one in which it does not: the
+    search tries more models near its answer than elsewhere, and their number must not count.
+    """
+
+    models: tuple[Scored, ...]
+    evidence: Array
+
+    @property
+    def best(self) -> Scored:
+        """The most likely model, with what has no name."""
+        return max(self.models, key=lambda m: m.evidence)
+
+    @property
+    def shares(self) -> Array:
+        """(M,) share of each model among those that were tried."""
+        return np.exp(self.evidence - log_sum_exp(self.evidence)[None, :]).mean(axis=1)
+
+    def of(self, holds: Callable[[Scored], bool]) -> float:
+        """Probability of a statement about the machine."""
+        true = np.array([holds(m) for m in self.models])
+        if true.all() or not true.any():
+            return float(true.all())
+        odds = self.evidence[true].max(axis=0) - self.evidence[~true].max(axis=0)
+        return float(np.mean(1.0 / (1.0 + np.exp(-np.clip(odds, -500, 500)))))
+
+    def of_claim(self, h: Hypothesis) -> float:
+        """Probability that an effect acts, wherever, in the recordings in which a hypothesis has it."""
+        claim = (h.effect.word, h.recording)
+        return self.of(lambda m: any((o.effect.word, o.recording) == claim for o in m.hypotheses))
+
+    @property
+    def nothing(self) -> float:
+        """Probability that the model lacks nothing."""
+        return self.of(lambda m: not m.hypotheses and not m.forced)
+
+
+def posterior(context: Context, models: Collection[Scored], seed: int = 0) -> Posterior:
+    """The posterior of models over bootstrap draws of blocks and over prior widths."""
+    best = max(m.evidence for m in models)
+    taking = sorted((m for m in models if m.evidence > best - FAR), key=lambda m: -m.evidence)[:MOST]
+    draws, widths = _draws(len(context.recordings), seed)
+    return Posterior(tuple(taking), np.array([_evidence(m, draws, widths) for m in taking]))
+
+
+def _draws(recordings: int, seed: int) -> tuple[Array, Array]:
+    """How often each block counts (D, B), the number in each recording kept; the width of priors (D,)."""
+    rng = np.random.default_rng(seed)
+    blocks, count = thresholds.BLOCKS, thresholds.DRAWS
+    one = [rng.multinomial(blocks, np.full(blocks, 1 / blocks), count) for _ in range(recordings)]
+    return np.concatenate(one, axis=1).astype(float), rng.choice(WIDTHS, count)
+
+
+def _evidence(model: Scored, draws: Array, widths: Array) -> Array:
+    """Log evidence (D,) of a model on each draw."""
+    order = np.argsort(-model.levels)[:SETTINGS]
+    near = [int(k) for k in order if model.levels[k] > model.levels[order[0]] - IN_PLAY]
+    return np.asarray(log_sum_exp(np.array([model.drawn(k, draws, widths) for k in near]))) + model.prior

@@ -1,0 +1,362 @@
+"""A scored model: a set of effects added, everything refitted, and its log marginal likelihood."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.context import Context
+from discovery.effects.candidates import with_shapes
+from discovery.effects.form import Shape
+from discovery.effects.hypothesis import Hypothesis, Key
+from discovery.errors import RunsAwayError
+from discovery.evidence.bayes import Score, Slab, Without, scan
+from discovery.evidence.events import place_events
+from discovery.evidence.form_error import effect_form
+from discovery.evidence.process_noise import Setting
+from discovery.evidence.signatures import signatures
+from discovery.evidence.whitening import Grams, Whitened, log_sum_exp
+from discovery.fitting import Fit, Noise, Prior, fit_model
+from discovery.fitting.covariance import Z95
+from discovery.models import Model
+
+Array = NDArray[np.float64]
+
+ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
+NEAR = 4.0  # log evidence below the best within which a noise setting leads to its neighbours
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A model with a set of effects, fitted, and how likely it makes the readings.
+
+    `settings` are those that were tried, `grams` under each; `sizes` (A,) index of each free amplitude among
+    the unknowns that move, -1 for one that presses against zero.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    fit: Fit
+    seen: Whitened
+    settings: tuple[Setting, ...]
+    grams: tuple[Grams, ...]
+    slab: Slab
+    sizes: NDArray[np.intp]
+    at: Array  # (A,) the amplitudes where the fit stands
+    forced: str = ""  # state at which a latent force acts, too
+    log_odds_force: float = 0.0
+
+    @property
+    def keys(self) -> frozenset[Key]:
+        """What it claims."""
+        return frozenset(h.key for h in self.hypotheses)
+
+    @cached_property
+    def model(self) -> Model:
+        """The fitted model, with intervals."""
+        return self.fit.model
+
+    @property
+    def prior(self) -> float:
+        """Log prior odds of its effects, of the instants of its events, and of a latent force."""
+        unknown = self.log_odds_force if self.forced else 0.0
+        return sum(h.log_odds + (h.log_weight if h.spans else 0.0) for h in self.hypotheses) + unknown
+
+    @cached_property
+    def levels(self) -> Array:
+        """(S,) log marginal likelihood under each noise setting that was tried, its weight included."""
+        return np.array([self.level(k) for k in range(len(self.grams))])
+
+    @cached_property
+    def evidence(self) -> float:
+        """Log marginal likelihood with everything integrated out, plus the prior odds of what acts."""
+        return float(log_sum_exp(self.levels)) + self.prior
+
+    @cached_property
+    def best(self) -> int:
+        """The noise setting that is most likely, among those that were tried."""
+        return int(np.argmax(self.levels))
+
+    @property
+    def noise(self) -> Noise:
+        """The noise that is most likely."""
+        return self.settings[self.best].noise
+
+    def level(self, k: int) -> float:
+        """Log marginal likelihood under one noise setting."""
+        if (self.sizes < 0).any():  # what presses against zero does not act
+            return -np.inf
+        return float(log_sum_exp(np.array([self._level(g, k) for g in self._forms(k)])))
+
+    def _forms(self, k: int) -> tuple[Grams, ...]:
+        """The laws of the effects as they are, and each off by a share that depends on the operating point."""
+        spread = self.seen.spread[self.seen.form :]
+        return (self.grams[k].without(spread), self.grams[k]) if len(spread) else (self.grams[k],)
+
+    @property
+    def _count(self) -> int:
+        return 2 if len(self.seen.spread) > self.seen.form else 1
+
+    def _level(self, gram: Grams, k: int) -> float:
+        level, step, covariance = gram.solved()
+        level += self.settings[k].log_weight - float(np.log(self._count))
+        if not len(self.sizes):
+            return level
+        mean, variance = self.at + step[self.sizes], covariance[self.sizes, self.sizes]
+        return level + float(np.sum(self.slab.average(mean, variance) + 0.5 * np.log(2 * np.pi)))
+
+    def drawn(self, k: int, weights: Array, widths: Array) -> Array:
+        """(D,) `level` under a noise setting for many draws at once: (D, B) weights, (D,) prior widths."""
+        if (self.sizes < 0).any():
+            return np.full(len(weights), -np.inf)
+        found = []
+        for gram in self._forms(k):
+            level, step, variance = gram.drawn(weights, widths)
+            level = level + self.settings[k].log_weight - float(np.log(self._count))
+            for j, i in enumerate(self.sizes):
+                one = self.slab.take(np.full(len(level), j))
+                level = level + one.average(self.at[j] + step[:, i], variance[:, i]) + 0.5 * np.log(2 * np.pi)
+            found.append(level)
+        return np.asarray(log_sum_exp(np.array(found)))
+
+    def interval(self, name: str) -> tuple[float, float] | None:
+        """The 95 % interval of a parameter under the most likely noise; None where it is at a bound."""
+        unknowns = self.fit.problem.unknowns
+        index = next((i for i, u in enumerate(unknowns) if u.name == name and not u.is_nuisance), -1)
+        place = np.flatnonzero(self.seen.moving == index)
+        if not len(place):
+            return None
+        _, step, covariance = self._forms(self.best)[0].solved()
+        k = int(place[0])
+        middle, half = float(self.fit.theta[index] + step[k]), Z95 * float(np.sqrt(covariance[k, k]))
+        return max(middle - half, unknowns[index].low), min(middle + half, unknowns[index].high)
+
+    def rms(self, apart: Collection[str] = ()) -> float:
+        """Root mean square of the residuals over their reading noise, but those of some recordings."""
+        white = np.array(self.grams[0].noise.white)
+        runs = [t.system.grid.recording for t in self.fit.trajectories]
+        parts = zip(runs, self.seen.residuals, strict=True)
+        z = np.concatenate([(r / white).ravel() for run, r in parts if run not in apart])
+        return float(np.sqrt(np.nanmean(z**2)))
+
+
+def with_effects(model: Model, chosen: Sequence[Hypothesis]) -> Model:
+    """The model with effects added, nothing fitted."""
+    # what moves the zero of a sensor comes behind what smooths it: no lag makes a slope of a jump
+    for h in sorted(chosen, key=lambda h: h.shifts_the_zero):
+        model = h.added_to(model)
+    return model
+
+
+def refit(
+    context: Context,
+    chosen: Sequence[Hypothesis],
+    noise: Noise,
+    start: Fit | None = None,
+    sizes: Mapping[str, float] | None = None,
+) -> Fit:
+    """The model with effects added, everything fitted to the recordings of the context.
+
+    Sizes are free; shapes have the prior that the scan integrated over.
+
+    Raises:
+        RunsAwayError: the model does not stay finite with them.
+    """
+    priors = {
+        name: _prior(shape)
+        for h in chosen
+        for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
+        if not shape.instant
+    }
+    return fit_model(
+        with_effects(context.model, chosen),
+        context.campaign,
+        context.recordings,
+        context.outputs,
+        noise=noise,
+        grids=context.grids,
+        priors=priors,
+        belief=context.belief,
+        guess=sizes,
+        begin=start or context.baseline,
+        max_rounds=25,
+        tolerance=ENOUGH,
+    )
+
+
+def _prior(shape: Shape) -> Prior:
+    assert shape.middle is not None
+    if shape.factor:
+        return Prior(float(np.log(shape.middle)), float(np.log(shape.factor)), is_log=True)
+    return Prior(shape.middle, shape.spread)
+
+
+def score(
+    context: Context,
+    chosen: Sequence[Hypothesis],
+    noise: Noise,
+    start: Fit | None = None,
+    sizes: Mapping[str, float] | None = None,
+) -> Scored | None:
+    """Refit with a set of effects and score it; None where the model runs away: what it cannot run with is no
+    explanation.
+    """
+    try:
+        fit = refit(context, chosen, noise, start, sizes)
+    except RunsAwayError:
+        return None
+    return scored(context, chosen, fit)
+
+
+def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
+    """The score of a fit with a set of effects."""
+    own = effect_form(fit.trajectories, chosen)
+    extra = tuple(np.concatenate(parts, axis=2) for parts in zip(context.form, own, strict=True))
+    model, effects = context.form[0].shape[2], own[0].shape[2]
+    spread = np.concatenate([np.ones(model), np.full(effects, thresholds.FORM)])
+    seen = Whitened(fit, thresholds.BLOCKS, extra, spread, model)
+    free = [h for h in chosen if h.effect.amplitude.fixed is None]
+    place = {u.name: i for i, u in enumerate(fit.problem.unknowns) if not u.is_nuisance}
+    index = np.array([place[name] for h in free for name in h.amplitudes], dtype=np.intp)
+    moving = {int(i): k for k, i in enumerate(seen.moving)}
+    bare = Scored(
+        tuple(chosen),
+        fit,
+        seen,
+        (),
+        (),
+        context.slab(free) if free else Slab(np.zeros(0), np.zeros(0), np.zeros(0)),
+        np.array([moving.get(int(i), -1) for i in index], dtype=np.intp),
+        fit.theta[index],
+    )
+    return _over_noise(context, bare)
+
+
+def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | None = None) -> Scored:
+    """The score over the noise settings that matter: from the one of the fit to the most likely one, and all
+    that lie next to a likely one.
+    """
+    known: dict[int, Scored] = {}
+
+    def level(k: int) -> float:
+        if k not in known:
+            setting = context.settings[k]
+            gram = bare.seen.grams(replace(setting.noise, force=force) if force else setting.noise)
+            known[k] = replace(bare, settings=(setting,), grams=(gram,))
+        return float(known[k].levels[0])
+
+    # a force on top of form error that is larger than usual would be the same noise once more
+    usual = [k for k, s in enumerate(context.settings) if not force or s.noise.share <= thresholds.SHARE]
+    start = min(usual, key=lambda k: _distance(context.settings[k].noise, bare.fit.noise))
+    queue = [start]
+    while queue:
+        here = queue.pop(0)
+        if level(here) < max(level(k) for k in known) - NEAR:
+            continue
+        queue += [
+            k
+            for k in usual
+            if k not in known and k not in queue
+            if context.settings[k].is_next_to(context.settings[here])
+        ]
+    order = sorted(known)
+    return replace(
+        bare,
+        settings=tuple(context.settings[k] for k in order),
+        grams=tuple(known[k].grams[0] for k in order),
+    )
+
+
+def _distance(one: Noise, other: Noise) -> float:
+    """How far two noises are apart in slow noise, form error and jitter."""
+    slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
+    return slow + abs(one.share - other.share) + abs(one.jitter - other.jitter)
+
+
+def with_force(context: Context, one: Scored, state: str) -> Scored:
+    """The same fit with a latent force at a state: process noise that is many times as large there."""
+    odds = float(np.log(thresholds.ODDS) - np.log(len(context.floor)))
+    forced = replace(one, forced=state, log_odds_force=odds)
+    return _over_noise(context, forced, {state: thresholds.UNKNOWN_FORCE})
+
+
+def light(one: Scored) -> Scored:
+    """A score without what takes memory and is not asked for again: its sensitivities."""
+    return replace(one, seen=replace(one.seen, last={}))
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Claims on what a model leaves, the best odds first, and on what it leaves without one of its effects."""
+
+    claims: tuple[Score, ...]
+    without: Mapping[Key, tuple[Score, ...]]
+
+
+def scan_model(context: Context, current: Scored) -> Scan:
+    """Every effect at every place, scored on what a model leaves."""
+    found = [h for h in context.candidates if h.key not in current.keys]
+    found = [h for h in found if h.effect.search != "single readings"]
+    settings = _in_play(context, current)
+    events = [h for h in found if h.effect.search in ("window", "step")]
+    placed = place_events(current.seen, settings[0], events, [context.slab([h]) for h in events])
+    moved = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
+    shaped = [one for h in found if h.effect.search == "shapes" for one in with_shapes(h)]
+    every = [*shaped, *placed, *moved]
+    own = [_without(current, h) for h in current.hypotheses]
+    first, *others = scan(current.seen, settings, every, context.slab(every), own)
+    by_effect = zip(current.hypotheses, others, strict=True)
+    return Scan(tuple(first), {h.key: tuple(claims) for h, claims in by_effect})
+
+
+def _alike(h: Hypothesis, other: Hypothesis) -> bool:
+    """Whether two events are the same at two places of one recording."""
+    return h.recording == other.recording and h.effect.word == other.effect.word
+
+
+def _at_instants(h: Hypothesis, other: Hypothesis) -> Hypothesis:
+    """An event at the instants of another one."""
+    shapes = dict(zip(h.shapes, other.shapes.values(), strict=True))
+    spans = dict(zip(h.shapes, other.spans.values(), strict=True))
+    return replace(h.at(shapes, other.log_weight), spans=spans)
+
+
+def _without(current: Scored, h: Hypothesis) -> Without:
+    """One of the effects of a model, to be taken out: what it shows, and its unknowns."""
+    fitted = current.fit.model.parameters
+    sizes = {name: fitted[name].value for name in (*h.amplitudes, *h.shapes)}
+    here = replace(h, shapes={name: sizes[name] for name in h.shapes})
+    amounts = np.array([sizes[name] for name in h.amplitudes])
+    shown = tuple(signatures(t, [here]) @ amounts for t in current.fit.trajectories)
+    names = {*h.amplitudes, *h.shapes}
+    unknowns = current.fit.problem.unknowns
+    mine = [k for k, i in enumerate(current.seen.moving) if unknowns[i].name in names]
+    return Without(shown, np.array(mine, dtype=np.intp))
+
+
+def _in_play(context: Context, current: Scored) -> list[Setting]:
+    """Noise settings to scan under: the most likely one first, and one with little process noise, for which
+    what is missing may have passed.
+    """
+    best = current.settings[current.best]
+    quiet = min(s.noise.share for s in context.settings)
+    other = next(s for s in context.settings if s.noise.share == quiet and s.place[:2] == best.place[:2])
+    return [best] if other.place == best.place else [best, other]
+
+
+def attempt(
+    context: Context, current: Scored, others: Sequence[Hypothesis], claim: Score | None
+) -> Scored | None:
+    """Refit with others and a claim with them, from the sizes that the scan gives."""
+    if claim is None:
+        return score(context, others, current.noise, current.fit)
+    h = claim.hypothesis
+    sizes: dict[str, float] = {}
+    if h.effect.amplitude.fixed is None:
+        low = np.where(h.effect.amplitude.sign > 0, 0.0, -h.effect.amplitude.most)
+        sizes = {n: float(max(s, low)) for n, s in zip(h.amplitudes, claim.size, strict=True)}
+    return score(context, (*others, h), current.noise, current.fit, sizes)

@@ -1,0 +1,134 @@
+"""The search for the set of effects that makes the readings most likely, one refit at a time.
+
+Effects are added while they add to the posterior; then each one is questioned: is it needed, and would another
+one stand better in its place? Everything that is refitted on the way is kept: these models share the posterior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.scored import Scan, Scored, attempt, light, scan_model, score, scored
+from discovery.effects.hypothesis import Hypothesis, Key
+from discovery.evidence.bayes import Score
+
+MOST = 6  # effects at once
+REFITS = 5  # claims that are refitted at each step
+RIVALS = 3  # ... in the place of another one
+HOPE = 4.0  # log odds below those of the model without it from which a claim is not refitted
+HALF = 0.6  # of the log odds of an effect: claims in its place that reach it are refitted
+FAR = 40.0  # log evidence below the best from which a model is not scored again
+
+Keys = frozenset[Key]
+
+
+@dataclass
+class Search:
+    """The course of a search under one context.
+
+    `tried`: the best refit of each set of effects; `scans`: of each model taken up; `first`: claims of an
+    earlier search under another noise.
+    """
+
+    context: Context
+    tell: Callable[[str], None] = lambda _: None
+    tried: dict[Keys, Scored] = field(default_factory=dict)
+    scans: dict[Keys, Scan] = field(default_factory=dict)
+    first: tuple[Score, ...] = ()
+
+    @property
+    def baseline(self) -> Scored:
+        """The model without any effect."""
+        return self.tried[frozenset()]
+
+    @property
+    def claims(self) -> tuple[Score, ...]:
+        """Claims on what the baseline leaves, as they were first seen."""
+        return self.first or self.scanned(self.baseline).claims
+
+    @property
+    def best(self) -> Scored:
+        """The most likely model."""
+        return max(self.tried.values(), key=lambda one: one.evidence)
+
+    @property
+    def gain(self) -> float:
+        """Log posterior odds of the best model over the baseline."""
+        return self.best.evidence - self.baseline.evidence
+
+    def run(self) -> Search:
+        """Search from the most likely model that was tried, or from the baseline."""
+        if not self.tried:
+            settings = self.context.settings
+            rough = score(self.context, (), settings[len(settings) // 2].noise)
+            assert rough is not None  # the context has fitted it
+            self.keep(score(self.context, (), rough.noise, rough.fit) or rough)
+        current = self.best
+        while True:
+            start = current.keys
+            current = self._questioned(self._grown(current))
+            if current.keys == start or len(current.hypotheses) >= MOST:
+                return self
+
+    def again(self, context: Context) -> Search:
+        """The search under another noise, from what was tried: scored again, and gone on with."""
+        best = self.best.evidence
+        other = Search(context, self.tell, first=self.claims)
+        for one in self.tried.values():
+            if not one.hypotheses or one.evidence > best - FAR:
+                other.keep(scored(context, one.hypotheses, one.fit))
+        return other.run()
+
+    def keep(self, one: Scored) -> Scored:
+        """Note a refit where none of the same effects is better."""
+        if one.keys not in self.tried or self.tried[one.keys].evidence < one.evidence:
+            self.tried[one.keys] = light(one) if one.hypotheses else one
+        return one
+
+    def scanned(self, one: Scored) -> Scan:
+        """What the scan says of a model."""
+        if one.keys not in self.scans:
+            self.scans[one.keys] = scan_model(self.context, one)
+        return self.scans[one.keys]
+
+    def _grown(self, current: Scored) -> Scored:
+        """Add the claim that adds most, while one does."""
+        while len(current.hypotheses) < MOST:
+            pool = [c for c in self.scanned(current).claims[:REFITS] if c.odds > -HOPE]
+            best = self._refitted(current, current.hypotheses, pool)
+            if best.evidence <= current.evidence:
+                break
+            current = best
+            self.tell(f"{best.hypotheses[-1].effect.title}, {best.hypotheses[-1].where}")
+        return current
+
+    def _questioned(self, current: Scored) -> Scored:
+        """Take each effect out, and see whether it is needed and what would stand in its place."""
+        scan = self.scanned(current) if current.hypotheses else None
+        for h in current.hypotheses if scan else ():
+            others = tuple(o for o in current.hypotheses if o.key != h.key)
+            without = self.tried.get(frozenset(o.key for o in others)) or score(
+                self.context, others, current.noise, current.fit
+            )
+            if scan is None or without is None:
+                continue
+            own = current.evidence - self.keep(without).evidence
+            least = max(-HOPE, HALF * own - HOPE)  # the scan sees but the first order of a large effect
+            pool = [c for c in scan.without[h.key] if c.odds > least]
+            same = [c for c in scan.without[h.key] if c.hypothesis.effect.word == h.effect.word][:1]
+            best = self._refitted(without, others, [*pool[:RIVALS], *(c for c in same if c.odds > 0)])
+            if max(best.evidence, without.evidence) > current.evidence:
+                return self._questioned(max(best, without, key=lambda a: a.evidence))
+        return current
+
+    def _refitted(self, start: Scored, others: Sequence[Hypothesis], pool: Sequence[Score]) -> Scored:
+        """The best refit with one of some claims added to others; `start` where none is better."""
+        best = start
+        for claim in pool:
+            keys = frozenset((*(o.key for o in others), claim.hypothesis.key))
+            one = self.tried.get(keys) or attempt(self.context, start, others, claim)
+            if one is not None and self.keep(one).evidence > best.evidence:
+                best = one
+        return best

@@ -1,0 +1,66 @@
+"""A diagnosis in a few lines for the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from discovery.diagnosis.thresholds import RIVAL
+from discovery.printed import printed
+from discovery.runfolder import read_diagnosis
+
+
+def summary(folder: Path) -> list[str]:
+    """Lines that say what the diagnosis.json of a folder says."""
+    d = read_diagnosis(folder)
+    lines = [f"{d['verdict']} in '{d['model']}'"]
+    for p in d["physics"]:
+        sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q, p))
+        said = f"  {p['effect']} {_place(p)}, probability {p['probability']:.2f}"
+        lines.append(f"{said}: {sizes}" if sizes else said)
+    near = [a for a in d["alternatives"] if a["log_evidence_below_best"] <= RIVAL]
+    lines += [f"  could also be {a['effect']} {_place(a)}" for a in near]
+    lines += [f"  {reason}" for reason in d["reasons"]]
+    if about := d["description"]:
+        what = f"the missing heat at {about['state']} follows {about['formula']}"
+        lines.append(f"  {what} (a description, not a cause)")
+    worse, unit = d["improvement"]["contradicted_by"], _unit(d["improvement"])
+    for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
+        after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
+        rms = f"rms {printed(i['rms_before'])} -> {after}{unit} (noise {printed(i['noise_floor'])})"
+        lines.append(f"  unseen recording {run}: {rms}{', worse than without' if run in worse else ''}")
+    if worse:
+        lines.append("  do not use the repaired model: unseen recordings contradict it; fit more recordings")
+    lines.append(f"  next: {d['next_experiment']}")
+    return lines
+
+
+def _unit(improvement: dict[str, Any]) -> str:
+    """The unit of the proof as it stands behind a number."""
+    unit = improvement.get("unit") or "1"
+    return "" if unit == "1" else f" {unit}"
+
+
+def _place(claim: dict[str, Any]) -> str:
+    """Where an effect acts, in which recording."""
+    states = claim.get("moved") or claim["states"]
+    places = [f"at {', '.join(states)}"] if states else []
+    return " ".join([*places, *([f"in {claim['recording']}"] if claim.get("recording") else [])])
+
+
+def _is_told(q: dict[str, Any], claim: dict[str, Any]) -> bool:
+    """Whether a number says something: a switch that is fixed at 1 only says that its effect is there, and a
+    jump that may be none says nothing.
+    """
+    if claim.get("moved") and q.get("output", claim["moved"][0]) not in claim["moved"]:
+        return False
+    switch = q["unit"] == "1" and q["low"] == q["value"] == q["high"] == 1.0
+    return q["low"] is not None and not switch
+
+
+def _size(name: str, q: dict[str, Any]) -> str:
+    """A number with its unit, the speed it is a size at, and its 95 % interval."""
+    unit = "" if q["unit"] == "1" else f" {q['unit']}"
+    unit += f" at {q['at']}" if q.get("at") else ""
+    interval = f" ({printed(q['low'], 4)} to {printed(q['high'], 4)})" if q["low"] != q["high"] else ""
+    return f"{name} = {printed(q['value'], 4)}{unit}{interval}"

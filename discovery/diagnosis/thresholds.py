@@ -1,0 +1,47 @@
+"""Every number that decides in a diagnosis, with its meaning in the model of `docs/explanation/diagnosis.md`.
+
+    C_i dx_i/dt = terms + sum_k z_k a_k phi_k(x, u; eta_k) + s_i(t) w_i(t)
+    y_j         = output(x) + sensor effects + slow_j(t) + white noise
+
+`python -m benchmarks.thresholds` shows what each one does on cases of several families of machines. What is
+here are priors (what is believed before the recordings are read), the resolution of integrals, and the
+probabilities from which something is said. A rule that is neither does not exist.
+"""
+
+from __future__ import annotations
+
+# --- process noise: what a lumped model misses everywhere -------------------------------------------------
+FLOOR = 0.02  # of the largest rms flow of the model, at level one: heat at a body that nobody records
+SHARE = 0.08  # of what flows through a body at level one: form error of a lumped model
+LEVELS = (0.3, 1.0, 3.0, 10.0)  # of process noise, integrated over ...
+LEVEL_WEIGHTS = (0.45, 0.4, 0.12, 0.03)  # ... with these weights
+SLOW = (
+    0.0,
+    0.3,
+    1.0,
+    3.0,
+    10.0,
+)  # slow noise of outputs, as shares of the reading noise, integrated over ...
+SLOW_WEIGHTS = (0.35, 0.35, 0.2, 0.08, 0.02)  # ... with these weights
+FORM = 0.2  # of the flow of a named effect, at each operating point: a law of the catalogue is not that of nature
+UNKNOWN_FORCE = 10.0  # of the process noise of a body: a latent force, "none of these"
+
+# --- effects ----------------------------------------------------------------------------------------------
+BELIEF = 0.5  # log of the factor within which the start values of a hand-built model are believed
+ODDS = 0.02  # prior odds of each effect of the catalogue to act, shared by the places where it can
+EVENT_ODDS = 0.02  # the same of events and faults in each recording
+USUAL = 0.2  # median size of an effect: what it makes flow, as a share of the largest flow of the model
+FACTOR = 3.5  # 68 % of sizes lie within this factor of the median (log-normal: zero at zero)
+JUMP = 8.0  # median size of what a sensor shows too much, in reading noises
+JUMP_FACTOR = 4.0
+
+# --- what is said -----------------------------------------------------------------------------------------
+SUREST = 0.98  # probability that is never exceeded: causes that nobody thought of
+DETECTED = 0.9  # probability of any mismatch from which one is reported
+NAMED = 0.7  # probability from which an effect is named
+SHORT = 6.0  # log evidence that what is named may be short of the best model of all
+SMALL = 0.2  # ... or this share of the log evidence of all of it
+RIVAL = 3.0  # log evidence within which another answer may as well be right
+RIVALS_SHOWN = 12  # other answers in the document
+DRAWS = 200  # bootstrap draws over blocks and priors
+BLOCKS = 12  # of time in each recording

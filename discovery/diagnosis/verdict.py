@@ -1,0 +1,176 @@
+"""The verdict: what is named, how sure it is, what else it could be, and when to say that nothing is known.
+
+An effect is named where its probability says so, where it also predicts recordings that a fit has not seen, and
+where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf, isfinite, log
+
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.crossvalidation import left_out
+from discovery.diagnosis.posterior import Posterior
+from discovery.diagnosis.proof import Improvement
+from discovery.diagnosis.scored import Scored, score
+from discovery.diagnosis.selection import Search
+from discovery.diagnosis.vetoes import vetoed
+from discovery.effects.hypothesis import Hypothesis
+from discovery.printed import printed
+
+NO_MISMATCH, MISSING, FAULT, UNEXPLAINED = (
+    "no mismatch",
+    "missing physics",
+    "measurement fault",
+    "unexplained",
+)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another answer to one part of the question."""
+
+    hypothesis: Hypothesis
+    below: float  # log evidence below the best
+
+
+@dataclass(frozen=True)
+class Named:
+    """One effect that the repaired model adds."""
+
+    hypothesis: Hypothesis
+    probability: float
+    rivals: tuple[Rival, ...]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The answer and the reasons for it. `answer`: the model that the named effects belong to."""
+
+    word: str
+    answer: Scored
+    named: tuple[Named, ...]
+    candidates: tuple[Named, ...]  # what stood closest where nothing is named
+    reasons: tuple[str, ...]
+
+
+def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
+    """What the recordings to fit say."""
+    answer = found.best
+    candidates = tuple(
+        sorted(
+            (_named(found, posterior, answer, h) for h in answer.hypotheses),
+            key=lambda n: -_added(found, answer, n.hypothesis),
+        )
+    )
+    if posterior.nothing > 1 - thresholds.DETECTED:
+        return _nothing(context, answer, candidates)
+    sure = [n for n in candidates if n.probability >= thresholds.NAMED]
+    named = tuple(n for n in sure if not vetoed(context, answer, n.hypothesis))
+    reasons = [text for n in sure if (text := vetoed(context, answer, n.hypothesis))]
+    short = _short(context, found, posterior, answer, [n.hypothesis for n in named])
+    if short > max(thresholds.SHORT, thresholds.SMALL * found.gain):
+        if unknown := posterior.best.forced:
+            reasons.append(f"heat of unknown cause at {unknown} explains more than what can be named")
+        reasons.append(f"what can be named explains too little (log evidence {short:.0f} below the best)")
+        named = ()
+    if not named and not reasons:
+        reasons.append(f"no effect reaches a probability of {thresholds.NAMED:g}")
+    for n in named:
+        outside = left_out(context, answer, n.hypothesis)
+        if outside and outside.contradicts:
+            named = ()
+            rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
+            reasons.append(
+                f"{n.hypothesis.effect.word} at {n.hypothesis.where} makes free runs worse on recordings that "
+                f"are left out of the fit (rms over the reading noise: {rms})"
+            )
+    reasons += _apart(candidates, (*named, *sure))
+    if not named:
+        return Verdict(UNEXPLAINED, answer, (), candidates, tuple(reasons))
+    kinds = {n.hypothesis.effect.is_physics for n in named}
+    return Verdict(MISSING if True in kinds else FAULT, answer, named, (), tuple(reasons))
+
+
+def _short(
+    context: Context, found: Search, posterior: Posterior, answer: Scored, named: Sequence[Hypothesis]
+) -> float:
+    """Log evidence by which the model of named effects alone is short of the best of all."""
+    keys = frozenset(h.key for h in named)
+    alone = found.tried.get(keys) or score(context, named, answer.noise, answer.fit)
+    return posterior.best.evidence - alone.evidence if alone is not None else inf
+
+
+def idle(verdict: Verdict, fit: Improvement) -> Verdict:
+    """The verdict with its names withdrawn where they do nothing for free runs, even of the recordings that
+    were fitted.
+    """
+    if not verdict.named or fit.low > 0:
+        return verdict
+    reason = "with what was named, free runs of the fitted recordings are no better than without it"
+    return replace(
+        verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
+    )
+
+
+def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
+    """The verdict with its names withdrawn where unseen recordings are predicted worse with them, on average
+    over the recordings (of the logarithm of the rms).
+    """
+    lasting = [n for n in verdict.named if not n.hypothesis.effect.is_event]
+    worse = [run for run, i in proof.items() if i.contradicts]
+    if not lasting or not worse:
+        return verdict
+    names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in lasting)
+    if sum(log(max(i.after, 1e-12) / max(i.before, 1e-12)) for i in proof.values()) <= 0:
+        reason = (
+            f"{names} holds on the other unseen recordings but not on {', '.join(worse)}: check whether the "
+            "machine was the same there"
+        )
+        return replace(verdict, reasons=(*verdict.reasons, reason))
+    reason = f"{names} is refuted on {', '.join(worse)}: with it, free runs there are worse than without it"
+    return replace(
+        verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
+    )
+
+
+def _nothing(context: Context, answer: Scored, candidates: tuple[Named, ...]) -> Verdict:
+    if context.outliers:
+        reason = f"{len(context.outliers)} single wrong readings, nothing else"
+        return Verdict(FAULT, answer, (), (), (reason,))
+    return Verdict(NO_MISMATCH, answer, (), (), _apart(candidates, ()))
+
+
+def _apart(candidates: Sequence[Named], named: Sequence[Named]) -> tuple[str, ...]:
+    """A sentence for each effect of the answer that is not sure enough to be named."""
+    return tuple(
+        f"{n.hypothesis.effect.word} at {n.hypothesis.where} may act, too (probability {n.probability:.2f})"
+        for n in candidates
+        if n not in named
+    )
+
+
+def _added(found: Search, answer: Scored, h: Hypothesis) -> float:
+    """Log evidence that goes with an effect: what the model without it lacks."""
+    without = found.tried.get(answer.keys - {h.key}, found.baseline)
+    return answer.evidence - without.evidence
+
+
+def _named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis) -> Named:
+    others = answer.keys - {h.key}
+    below: dict[object, Rival] = {}
+    for one in found.tried.values():
+        if h.key in one.keys or not others <= one.keys or len(one.keys) != len(others) + 1:
+            continue
+        rival = next(o for o in one.hypotheses if o.key not in others)
+        gap = max(answer.evidence - one.evidence, 0.0)
+        label = (rival.effect.word, rival.places)
+        if not isfinite(gap):
+            continue
+        if label != (h.effect.word, h.places) and (label not in below or gap < below[label].below):
+            below[label] = Rival(rival, gap)
+    rivals = tuple(sorted(below.values(), key=lambda r: r.below))
+    return Named(h, min(posterior.of_claim(h), thresholds.SUREST), rivals)

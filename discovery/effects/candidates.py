@@ -1,0 +1,319 @@
+"""Where each effect of the catalogue could act in a model: a hypothesis for each effect, place and shape."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from math import log
+
+from discovery.effects.form import INPUT, LEVEL, RATE, ROLE_OF, TERM, Effect
+from discovery.effects.hypothesis import BEFORE, Hypothesis
+from discovery.effects.places import TEMPERATURES, Spot, spots
+from discovery.models import Model
+from discovery.models.units import differences, same_dimension
+from discovery.recordings import Channel
+from discovery.terms import Apply, Expression, Name, Number, Term, delays_at, names, parse, substitute
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What candidates are made for.
+
+    `after`: by recording to fit, the recordings of the campaign that were made then or later, it included.
+    `largest`: the largest magnitude of each input that moves, over the recordings to fit.
+    `unused`: inputs that the model does not use. `odds` of each effect to act, `event_odds` of each event in
+    each recording.
+    """
+
+    channels: Mapping[str, Channel]
+    outputs: tuple[str, ...]
+    recordings: tuple[str, ...]
+    after: Mapping[str, tuple[str, ...]]
+    largest: Mapping[str, float]
+    unused: frozenset[str]
+    odds: float
+    event_odds: float
+
+
+def candidates(model: Model, effects: Sequence[Effect], scene: Scene) -> list[Hypothesis]:
+    """Every effect at every place where it can act, with its prior odds, at its middle shape values.
+
+    An effect has the same odds whatever the number of places at which it could act.
+    """
+    found = [h for effect in effects for h in _claims(effect, model, scene)]
+    places = Counter((h.effect.word, h.recording if h.effect.is_event else None) for h in found)
+    return [
+        replace(
+            h,
+            log_odds=log(scene.event_odds if h.effect.is_event else scene.odds)
+            - log(places[h.effect.word, h.recording if h.effect.is_event else None]),
+        )
+        for h in found
+    ]
+
+
+def with_shapes(h: Hypothesis) -> list[Hypothesis]:
+    """A hypothesis at each of the shape values that a search integrates over."""
+    grids = [
+        [(name, value, weight) for value, weight in shape.values]
+        for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
+    ]
+    return [
+        h.at({name: value for name, value, _ in point}, sum(weight for _, _, weight in point))
+        for point in product(*grids)
+    ]
+
+
+def _claims(effect: Effect, model: Model, scene: Scene) -> Iterator[Hypothesis]:
+    used = names(parse(effect.formula, f"effect {effect.word}"))
+    any_input = () if effect.place in ("input temperature", "inputs of a recording") else (INPUT, LEVEL, RATE)
+    wanted = [variable for variable in (*ROLE_OF, *any_input) if variable in used]
+    choices = [_choices(variable, effect, model, scene) for variable in wanted]
+    told = [v in (INPUT, LEVEL) or len(choice) > 1 for v, choice in zip(wanted, choices, strict=True)]
+    runs: tuple[str | None, ...] = (None,) if effect.acts == "always" else scene.recordings
+    if effect.acts == "from a recording on" and effect.place != "input temperature":
+        runs = scene.recordings[1:]  # what is common to all recordings is the model's own parameter
+    for chosen in product(*choices):
+        binding = {v: _bound(v, c, scene) for v, c in zip(wanted, chosen, strict=True)}
+        if LEVEL in used and INPUT in used:
+            binding[INPUT] = Name(chosen[wanted.index(LEVEL)])
+        for spot in spots(effect, model, scene.outputs, scene.channels):
+            if {INPUT, LEVEL} & set(wanted) and _stands(chosen[-1], spot, model, effect):
+                continue
+            for run in runs:
+                named = tuple(c for c, one in zip(chosen, told, strict=True) if one)
+                yield _claim(effect, model, spot, run, named, binding, scene)
+
+
+def _bound(variable: str, channel: str, scene: Scene) -> Expression:
+    if variable not in (LEVEL, RATE):
+        return Name(channel)
+    return Apply("/", (Name(channel), Number(float(f"{scene.largest[channel]:.3g}"))))
+
+
+def _choices(variable: str, effect: Effect, model: Model, scene: Scene) -> list[str]:
+    """Channels that may stand for a variable of a formula."""
+    there = [n for n in scene.channels if n not in model.states and n not in model.outputs]
+    if variable in ROLE_OF:
+        fits = [n for n in there if scene.channels[n].role == ROLE_OF[variable]]
+        if variable == "flow":  # of several, those of the model wet it; another one is an input of its own
+            fits = [n for n in fits if n not in scene.unused] or fits
+        if variable == "other_input" and effect.amplitude.unit == "1":  # a share of it is heat
+            fits = [n for n in fits if same_dimension(scene.channels[n].unit, "W")]
+        return fits
+    if variable == RATE:
+        return [n for n in there if n in scene.largest and _is_flow(scene.channels[n])]
+    is_temperature = variable == INPUT
+    return [
+        n
+        for n in there
+        if n in scene.largest
+        and (scene.channels[n].unit in TEMPERATURES) == is_temperature
+        and scene.channels[n].role in effect.roles
+        and (effect.place == "output" or scene.channels[n].role != "fluid flow" or _is_second(n, scene))
+    ]
+
+
+def _is_second(name: str, scene: Scene) -> bool:
+    """Whether a flow is none that the laws of the fluid follow: these are the model's, or all of a dry one."""
+    flows = [n for n, c in scene.channels.items() if c.role == "fluid flow"]
+    return name in scene.unused and not scene.unused.issuperset(flows)
+
+
+def _is_flow(channel: Channel) -> bool:
+    return channel.role == "fluid flow" or same_dimension(channel.unit, "l/min")
+
+
+def _is_second(name: str, scene: Scene) -> bool:
+    """Whether a flow is none that the laws of the fluid follow: these are the model's, or all of a dry one."""
+    flows = [n for n, c in scene.channels.items() if c.role == "fluid flow"]
+    return name in scene.unused and not scene.unused.issuperset(flows)
+
+
+def _stands(channel: str, spot: Spot, model: Model, effect: Effect) -> bool:
+    """Whether the model already has that input at that body, in proportion: a refit would absorb it."""
+    if spot.outputs or len(spot.bodies) != 1 or "other" in effect.formula or "ambient" in effect.formula:
+        return False
+    return any(
+        t.into == spot.bodies[0] and names(t.expression) - set(model.parameters) == {channel}
+        for t in model.terms
+        if not t.effect
+    )
+
+
+@dataclass(frozen=True)
+class _Naming:
+    """Names that the parameters of a hypothesis get in a model, and what stands for those of the formula."""
+
+    amplitudes: tuple[str, ...]
+    shapes: Mapping[str, float]
+    switch: str
+    known: Mapping[str, Expression]
+
+    def sized(self, effect: Effect, k: int = 0) -> dict[str, Expression]:
+        """What stands for each variable, with the k-th amplitude as the size."""
+        size: Expression = Name(self.amplitudes[k])
+        if self.switch:
+            size = Apply("*", (Name(self.switch), size))
+        return {**self.known, effect.amplitude.name: size}
+
+
+def _claim(
+    effect: Effect,
+    model: Model,
+    spot: Spot,
+    run: str | None,
+    chosen: tuple[str, ...],
+    binding: Mapping[str, Expression],
+    scene: Scene,
+) -> Hypothesis:
+    channels = (*chosen, *((spot.channel,) if spot.channel else ()))
+    naming = _naming(effect, model, spot, run, channels, binding, scene)
+    terms, shown = _changes(effect, model, spot, naming, scene)
+    acting = () if run is None else (run,) if effect.is_event else scene.after[run]
+    h = Hypothesis(
+        effect,
+        spot.bodies,
+        naming.amplitudes,
+        terms,
+        shown,
+        () if spot.bodies else spot.outputs,
+        run,
+        acting,
+        naming.switch,
+        naming.shapes,
+        channels,
+    )
+    return replace(h, units=_units(h, model, scene.channels))
+
+
+def _naming(
+    effect: Effect,
+    model: Model,
+    spot: Spot,
+    run: str | None,
+    channels: tuple[str, ...],
+    binding: Mapping[str, Expression],
+    scene: Scene,
+) -> _Naming:
+    everywhere = spot.each or (spot.terms and len(spot.bodies) > 1)
+    at = () if everywhere else spot.bodies or spot.outputs[: 1 if len(spot.outputs) == 1 else 0]
+    suffix = "_".join([*channels, *at, *((run,) if run else ())])
+    taken = {*model.parameters, *model.states, *scene.channels}
+
+    def own(*parts: str) -> str:
+        full = "_".join(part for part in (*parts, suffix) if part)
+        while full in taken:
+            full += "_x"
+        taken.add(full)
+        return full
+
+    names_of = {shape.name: own(shape.name) for shape in effect.shapes}
+    amplitudes = tuple(own(effect.amplitude.name, extra) for extra in _extras(effect, model, spot))
+    return _Naming(
+        amplitudes,
+        {names_of[s.name]: s.values[len(s.values) // 2][0] for s in effect.shapes},
+        own("acts") if run else "",
+        {**binding, **{short: Name(full) for short, full in names_of.items()}},
+    )
+
+
+def _extras(effect: Effect, model: Model, spot: Spot) -> tuple[str, ...]:
+    """What the names of several amplitudes end with: one for each error that is seen by itself, and, in a
+    model without capacities, where what leaves one body in K/h is not what enters the other, one for each.
+    """
+    if len(spot.outputs) > 1 and effect.place != "seat":
+        return spot.outputs
+    if _is_exchange(effect, spot) and not model.states[spot.bodies[0]].capacity:
+        return tuple(f"into_{body}" for body in spot.bodies)
+    return ("",)
+
+
+def _is_exchange(effect: Effect, spot: Spot) -> bool:
+    """Whether what enters the first body leaves the second."""
+    pair = len(spot.bodies) == 2 and not spot.each and not spot.terms
+    return pair and effect.place != "driven and another"
+
+
+def _changes(
+    effect: Effect, model: Model, spot: Spot, naming: _Naming, scene: Scene
+) -> tuple[tuple[Term, ...], dict[str, Expression]]:
+    """Terms that come in addition, and what outputs show more."""
+    formula = parse(effect.formula, f"effect {effect.word}")
+    if spot.terms:
+        inputs = set(scene.channels) - set(model.states)
+        return tuple(_changed(effect, formula, naming, spot, term, inputs) for term in spot.terms), {}
+    if spot.outputs:
+        body: dict[str, Expression] = {"body": Name(spot.bodies[0])} if spot.bodies else {"y": BEFORE}
+        several = len(naming.amplitudes) > 1
+        return (), {
+            name: substitute(formula, {**naming.sized(effect, k if several else 0), **body})
+            for k, name in enumerate(spot.outputs)
+        }
+    if spot.each:
+        return tuple(_flow(effect, formula, naming.sized(effect), (b,)) for b in spot.bodies), {}
+    if len(naming.amplitudes) > 1:
+        ways = (spot.bodies, spot.bodies[::-1])
+        flows = (_flow(effect, formula, naming.sized(effect, k), way) for k, way in enumerate(ways))
+        return tuple(flows), {}
+    flow = _flow(effect, formula, naming.sized(effect), spot.bodies)
+    return (replace(flow, source=spot.bodies[1]) if _is_exchange(effect, spot) else flow,), {}
+
+
+def _flow(
+    effect: Effect, formula: Expression, known: Mapping[str, Expression], states: tuple[str, ...]
+) -> Term:
+    """A heat flow into the first of some bodies."""
+    bodies = {"body": Name(states[0]), **({"other": Name(states[1])} if len(states) > 1 else {})}
+    name = f"{effect.title}, {' and '.join(states)}"
+    return Term(name, states[0], substitute(formula, {**known, **bodies}), None, effect.word)
+
+
+def _changed(
+    effect: Effect, formula: Expression, naming: _Naming, spot: Spot, term: Term, inputs: set[str]
+) -> Term:
+    """What a term changes by: the formula where it speaks of the term, else the term with a channel replaced
+    by the formula, less the term.
+    """
+    known = naming.sized(effect)
+    if TERM in names(formula):
+        change = substitute(formula, {**known, TERM: term.expression, "body": Name(term.into)})
+        return Term(f"{effect.title}: {term.name}", term.into, change, term.source, effect.word)
+    if effect.place == "inputs of a recording":
+        used = names(term.expression) & inputs
+        swaps = {c: substitute(formula, {**known, "input": Name(c)}) for c in used}
+    else:
+        replaced = spot.channel or next(
+            n.id for v in ("fluid", "cooling", "flow") if isinstance(n := naming.known.get(v), Name)
+        )
+        swaps = {replaced: substitute(formula, {**known, "input": Name(replaced)})}
+    changed = delays_at(inputs, substitute(term.expression, swaps))  # the term may delay the channel itself
+    difference = Apply("-", (changed, term.expression))
+    if effect.amplitude.name not in names(formula):  # then it switches the replacement on
+        difference = Apply("*", (known[effect.amplitude.name], difference))
+    return Term(f"{effect.title}: {term.name}", term.into, difference, term.source, effect.word)
+
+
+def _units(h: Hypothesis, model: Model, channels: Mapping[str, Channel]) -> dict[str, str]:
+    """Unit of each parameter at its place: um of the catalogue stands for the unit of the output, W for what
+    enters the state (a rate, where it has no capacity).
+    """
+    outputs = tuple(h.shown)
+
+    def at(unit: str, output: str) -> str:
+        if output and unit.startswith("um"):
+            return differences(channels[output].unit) + unit.removeprefix("um")
+        if h.terms and unit.startswith("W") and h.states and not model.states[h.states[0]].capacity:
+            of = differences(model.states[h.states[0]].unit)
+            rate = f"1/{model.time_unit}" if unit == f"W/{of}" else f"{of}/{model.time_unit}"
+            return rate if unit == f"W/{of}" else rate + unit.removeprefix("W")
+        return unit
+
+    several = len(h.amplitudes) > 1 and outputs
+    shown = outputs if several else outputs[:1] * len(h.amplitudes) or ("",) * len(h.amplitudes)
+    first = outputs[0] if outputs else ""
+    return {name: at(h.effect.amplitude.unit, y) for name, y in zip(h.amplitudes, shown, strict=True)} | {
+        name: at(shape.unit, first) for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
+    }

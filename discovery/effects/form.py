@@ -1,0 +1,183 @@
+"""What the catalogue knows of an effect: a formula with holes for bodies and channels, how it is searched."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import ceil, exp, inf, log, sqrt
+from typing import Literal
+
+Group = Literal[
+    "cutting fluid", "drive and cooling", "air and structure", "inputs", "measuring chain", "user"
+]
+
+# Where an effect can act. A word per rule of `places.py`; nothing is offered where it cannot act.
+Place = Literal[
+    "body",  # any body
+    "fluid-free body",  # a body that the model leaves dry
+    "wet body",  # a body that the model couples to the fluid
+    "driven body",  # a body that receives drive losses: of a heat load, or by a law of the speed
+    "air body",  # a body that the model couples to the air
+    "pair",  # two bodies without a path between them in the model
+    "any pair",  # two bodies, linked or not
+    "link",  # two bodies that the model links
+    "driven and another",  # a driven body and any other one; heat enters the driven one alone
+    "fluid terms",  # terms in which the fluid temperature stands
+    "cooling terms",  # terms in which the cooling power stands
+    "loss terms",  # terms in which a heat load stands, or a law of the speed
+    "air terms",  # terms in which the ambient temperature stands
+    "error state",  # a state that is an error: its terms are rates
+    "seat",  # a body as all errors see it; the formula is added to its temperature there
+    "lever",  # a body; each error sees the formula with a lever of its own
+    "output",  # one error, all recordings
+    "output of errors",  # the same, of a model whose states are errors
+    "output of a recording",  # one error in one recording
+    "input temperature",  # one recorded temperature, wherever the model uses it
+    "inputs of a recording",  # every input in one recording
+    "recording",  # all errors of one recording
+]
+TERM_PLACES = ("fluid terms", "cooling terms", "loss terms", "air terms", "input temperature")
+
+# Variables that a formula may use, and the role of the channel that stands for each
+ROLE_OF = {
+    "ambient": "ambient temperature",
+    "fluid": "fluid temperature",
+    "flow": "fluid flow",
+    "speed": "rotation speed",
+    "load": "heat load",
+    "cooling": "cooling power",
+    "coolant": "coolant temperature",
+    "height": "nozzle height",
+    "other_input": "other input",
+}
+# Variables that any recorded input may stand for: as it is, or over the largest value that was recorded;
+# `rate` is such a level of a flow
+INPUT, LEVEL, RATE = "input", "level", "rate"
+TERM = "term"  # the term of the model that an effect changes
+
+_RATIO = 3.0  # between neighbouring values of a shape in a search: signatures of both are much alike
+_REACH = 2.0  # standard deviations of a prior that a search covers
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """The number that switches the effect on: the formula is linear in it and zero at zero.
+
+    `plausible` is a usual size on machines of this class, `sign` +1 or -1 where physics fixes it, 0 where it
+    does not. `fixed`: the effect is on or off, its size sits in the shape parameters. `most` bounds a size
+    that cannot be larger (a share), in magnitude.
+    """
+
+    name: str
+    unit: str
+    plausible: float
+    sign: int = 1
+    fixed: float | None = None
+    most: float = inf
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A parameter inside the formula, with its prior: the same in a search, where it is integrated over a few
+    values, and in a refit.
+
+    With `factor`: 68 % of values lie within this factor of `middle` (log-normal). With `spread`: normal
+    around `middle`. Without a `middle` any time constant that the recordings can show is as likely as any
+    other on a logarithmic scale. `instant`: a time in the recording, which is searched for by itself.
+    """
+
+    name: str
+    unit: str
+    middle: float | None
+    factor: float = 0.0
+    spread: float = 0.0
+    instant: bool = False
+
+    def within(self, shortest: float, longest: float) -> Shape:
+        """The shape for recordings that show time constants from `shortest` to `longest` [s]."""
+        if self.middle is not None:
+            return self
+        return replace(self, middle=sqrt(shortest * longest), factor=(longest / shortest) ** (0.5 / _REACH))
+
+    @property
+    def values(self) -> tuple[tuple[float, float], ...]:
+        """Values to integrate over, and the logarithm of the weight of each."""
+        if self.instant or self.middle is None:
+            return ((self.middle or 0.0, 0.0),)
+        count = 8  # of either sign, without the zero at which nothing acts
+        if self.factor:
+            count = max(3, ceil(2 * _REACH * log(self.factor) / log(_RATIO)) + 1)
+        steps = [-_REACH + 2 * _REACH * k / (count - 1) for k in range(count)]
+        weights = [exp(-0.5 * z * z) for z in steps]
+        total = log(sum(weights))
+        return tuple(
+            (self.middle * self.factor**z if self.factor else self.middle + self.spread * z, log(w) - total)
+            for z, w in zip(steps, weights, strict=True)
+        )
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """What the value may be at all."""
+        return (0.0, inf) if self.factor or self.instant or self.middle is None else (-inf, inf)
+
+
+@dataclass(frozen=True)
+class Example:
+    """A worked example: values of the names in the formula, and what it gives (to four digits, `worked.py`).
+
+    `before`: values of channels and bodies that held until they stepped to those in `values`, `since` seconds
+    ago; it matters to formulas with memory alone. Without it everything is settled.
+    """
+
+    values: Mapping[str, float]
+    expected: float
+    before: Mapping[str, float] = field(default_factory=dict)
+    since: float = inf
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One entry of the catalogue.
+
+    `formula` is a heat flow [W] into `body` (and out of `other` where it names one), or what an output shows
+    more; where `term` stands in it, it is what a term of the model changes by, and at other "terms" what
+    their fluid, cooling, flow or input channel becomes (the first of these that it names). For outputs `y` is
+    the error without the effect. Where states have no capacity (phenomenological models) it is a rate.
+
+    `search`: how its instants are found, if it has any; `acts`: in all recordings, in one, or from one on.
+    `shared`: also offered at all its places at once, with one size. `roles`: of the recorded inputs that its
+    formula may follow.
+    """
+
+    word: str
+    title: str
+    group: Group
+    place: Place
+    formula: str
+    amplitude: Amplitude
+    source: str
+    signature: str
+    confused_with: tuple[str, ...] = ()
+    shapes: tuple[Shape, ...] = ()
+    search: Literal["shapes", "window", "step", "single readings"] = "shapes"
+    acts: Literal["always", "in one recording", "from a recording on"] = "always"
+    shared: bool = False
+    roles: tuple[str, ...] = ()
+    examples: tuple[Example, ...] = field(default=())
+
+    @property
+    def is_physics(self) -> bool:
+        """False for faults of the measuring chain."""
+        return self.group != "measuring chain"
+
+    @property
+    def is_event(self) -> bool:
+        """Whether it belongs to one recording: other recordings neither confirm nor refute it."""
+        return self.acts == "in one recording"
+
+    @property
+    def at(self) -> str:
+        """The speed that the amplitude is a size at, "1000 rpm", where the formula divides by one."""
+        found = re.search(r"\bspeed\s*/\s*(\d+(?:\.\d+)?)", self.formula)
+        return f"{float(found[1]):g} rpm" if found else ""

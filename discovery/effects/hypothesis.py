@@ -1,0 +1,115 @@
+"""A hypothesis: one effect of the catalogue at one place in a model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import inf
+
+from discovery.effects.form import Effect
+from discovery.models import Model, Parameter
+from discovery.terms import Apply, Expression, Name, Term, names, substitute
+
+BEFORE = Name("what the output showed before")  # no channel has such a name
+Key = tuple[str, tuple[str, ...], tuple[str, ...], str | None, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect at a place with its shape parameters at given values.
+
+    `terms` enter states; `shown` is what outputs show in addition, in terms of what they showed before
+    (`BEFORE`), or by how much they see the body of `states` moved. Both hold the amplitudes and shapes as
+    parameters. `recording`: the one in which it acts, or begins to act; `switch` is then the parameter that
+    is one in the recordings of `acting` and zero in others.
+    """
+
+    effect: Effect
+    states: tuple[str, ...]
+    amplitudes: tuple[str, ...]
+    terms: tuple[Term, ...] = ()
+    shown: Mapping[str, Expression] = field(default_factory=dict)
+    outputs: tuple[str, ...] = ()
+    recording: str | None = None
+    acting: tuple[str, ...] = ()
+    switch: str = ""
+    shapes: Mapping[str, float] = field(default_factory=dict)  # parameter name -> value
+    channels: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)  # parameter name -> unit at this place
+    log_odds: float = 0.0  # prior log odds that it acts at this place
+    log_weight: float = 0.0  # ... of its shape values among all of them
+    spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # 95 % range of an instant
+
+    @property
+    def key(self) -> Key:
+        """What the hypothesis claims, whatever its shape values."""
+        return (self.effect.word, self.states, self.outputs, self.recording, self.channels)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """States, or outputs or channels for what happens in the measuring chain."""
+        return self.states or self.outputs or self.channels
+
+    @property
+    def where(self) -> str:
+        """The places, or the recording of what concerns all of it."""
+        return ", ".join(self.places) or self.recording or "all recordings"
+
+    @property
+    def shifts_the_zero(self) -> bool:
+        """Whether outputs are shifted by something that does not depend on what they showed before."""
+        return any(BEFORE.id not in names(change) for change in self.shown.values()) and not self.states
+
+    def acts_in(self, recording: str) -> bool:
+        """Whether it acts in a recording."""
+        return self.recording is None or recording in self.acting
+
+    def at(self, shapes: Mapping[str, float], log_weight: float = 0.0) -> Hypothesis:
+        """The same claim with other shape values."""
+        return replace(self, shapes={**self.shapes, **shapes}, log_weight=log_weight)
+
+    def values(self, recording: str, size: float = 1.0) -> dict[str, float]:
+        """Its parameters in a recording, with amplitudes of a size."""
+        switch = {self.switch: float(self.acts_in(recording))} if self.switch else {}
+        return {**self.shapes, **dict.fromkeys(self.amplitudes, size), **switch}
+
+    def added_to(self, model: Model, start: Mapping[str, float] | None = None) -> Model:
+        """The model with the effect, its amplitudes starting at `start` (default: a tenth of plausible)."""
+        start, amplitude = start or {}, self.effect.amplitude
+        usual = (
+            amplitude.fixed
+            if amplitude.fixed is not None
+            else 0.1 * amplitude.plausible * (amplitude.sign or 1)
+        )
+        parameters: dict[str, Parameter] = {}
+        low = 0.0 if amplitude.sign > 0 else -amplitude.most
+        high = 0.0 if amplitude.sign < 0 else amplitude.most
+        for name in self.amplitudes:
+            value, fixed = start.get(name, usual), amplitude.fixed is not None
+            parameters[name] = Parameter(value, self._unit(name), low, high, fixed)
+        for (name, value), shape in zip(self.shapes.items(), self.effect.shapes, strict=True):
+            low, high = shape.ends
+            parameters[name] = Parameter(start.get(name, value), self._unit(name), low, high, shape.instant)
+        if self.switch:
+            acting = dict.fromkeys(self.acting, 1.0)
+            parameters[self.switch] = Parameter(0.0, "1", -inf, inf, True, True, values=acting)
+        outputs = {
+            name: Apply("+", (model.outputs.get(name, Name(name)), extra))
+            for name, extra in self.shows(model).items()
+        }
+        return model.with_terms(*self.terms, parameters=parameters, outputs=outputs)
+
+    def shows(self, model: Model) -> dict[str, Expression]:
+        """What outputs show in addition where the effect comes to a model: whatever else that one has."""
+        found: dict[str, Expression] = {}
+        for name, change in self.shown.items():
+            y = model.outputs.get(name, Name(name))
+            if self.effect.place == "seat":
+                moved = Apply("+", (Name(self.states[0]), change))
+                found[name] = Apply("-", (substitute(y, {self.states[0]: moved}), y))
+            else:
+                found[name] = substitute(change, {BEFORE.id: y})
+        return found
+
+    def _unit(self, name: str) -> str:
+        return self.units.get(name, "1")

@@ -1,0 +1,177 @@
+"""The rules of place: at which bodies, links, terms, inputs or outputs of a model an effect can act."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+from discovery.effects.form import TERM, Effect
+from discovery.models import Model
+from discovery.recordings import Channel
+from discovery.terms import Name, Term, names, parse
+
+TEMPERATURES = ("degC", "K")
+
+
+@dataclass(frozen=True)
+class Spot:
+    """One place: `bodies` that heat enters (and, for an exchange, leaves), `terms` of the model that change,
+    `outputs` that show more. `each`: one law of one size at each of the bodies.
+    """
+
+    bodies: tuple[str, ...] = ()
+    terms: tuple[Term, ...] = ()
+    outputs: tuple[str, ...] = ()
+    channel: str = ""
+    each: bool = False
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a model is made of, in the words of the rules."""
+
+    bodies: tuple[str, ...]
+    errors: tuple[str, ...]  # states that are errors: what enters them is a rate
+    wet: tuple[str, ...]
+    loaded: tuple[str, ...]
+    turned: tuple[str, ...]
+    aired: tuple[str, ...]
+    links: frozenset[frozenset[str]]
+    own: tuple[Term, ...]  # neither those of an effect found before nor the memory behind its lag()
+
+
+def layout(model: Model, channels: Mapping[str, Channel]) -> Layout:
+    """The parts of a model. A body is a state with a capacity, or one that is a temperature."""
+    states = {n: s for n, s in model.states.items() if not s.memory}
+    bodies = tuple(n for n, s in states.items() if s.capacity or s.unit in TEMPERATURES)
+    role = {name: channel.role for name, channel in channels.items()}
+    own = tuple(t for t in model.terms if not t.effect and not model.states[t.into].memory)
+
+    def fed(wanted: str) -> tuple[str, ...]:
+        touched = {b for t in own for b in (t.into, t.source) if _holds(t, wanted, role)}
+        return tuple(b for b in bodies if b in touched)
+
+    return Layout(
+        bodies,
+        tuple(n for n in states if n not in bodies),
+        fed("fluid temperature"),
+        fed("heat load"),
+        tuple(b for b in bodies if any(t.into == b and _is_friction(t, model, role) for t in own)),
+        fed("ambient temperature"),
+        frozenset(frozenset((t.into, t.source)) for t in own if t.source),
+        own,
+    )
+
+
+def spots(
+    effect: Effect, model: Model, outputs: tuple[str, ...], channels: Mapping[str, Channel]
+) -> Iterator[Spot]:
+    """Every place at which an effect can act in a model."""
+    parts = layout(model, channels)
+    alone = _bodies(effect, parts)
+    if alone is not None:
+        yield from (Spot((b,)) for b in alone)
+        if effect.shared and len(group := _group(effect, parts, alone)) > 1:
+            yield Spot(group, each=True)
+        return
+    role = {name: channel.role for name, channel in channels.items()}
+    match effect.place:
+        case "pair" | "any pair" | "link":
+            for a, b in combinations(parts.bodies, 2):
+                is_link = frozenset((a, b)) in parts.links
+                if effect.place == "any pair" or is_link == (effect.place == "link"):
+                    yield Spot((a, b))
+        case "driven and another":
+            yield from (Spot((a, b)) for a in _driven(effect, parts) for b in parts.bodies if a != b)
+        case "fluid terms" | "cooling terms" | "loss terms" | "air terms":
+            yield from _of_terms(effect, model, parts, role)
+        case "input temperature":
+            yield from _of_inputs(model, parts, channels)
+        case "error state":
+            yield from (Spot((name,)) for name in parts.errors)
+        case "output of errors" if not parts.bodies:
+            yield from (Spot(outputs=(name,)) for name in outputs)
+        case "output" | "output of a recording":
+            yield from (Spot(outputs=(name,)) for name in outputs)
+        case "seat" | "lever":
+            for b in parts.bodies:
+                moved = tuple(y for y in outputs if b in names(model.outputs.get(y, Name(y))))
+                shown = outputs if effect.place == "lever" else moved
+                if moved and shown:
+                    yield Spot((b,), outputs=shown)
+        case "inputs of a recording":
+            terms = tuple(t for t in parts.own if names(t.expression) & set(channels) - set(model.states))
+            if terms:
+                yield Spot(terms=terms)
+        case "recording" if len(outputs) > 1:
+            yield Spot(outputs=outputs)
+
+
+def _bodies(effect: Effect, parts: Layout) -> tuple[str, ...] | None:
+    """Single bodies of a place; None where it is another kind of place."""
+    match effect.place:
+        case "body":
+            return parts.bodies
+        case "fluid-free body":
+            return tuple(b for b in parts.bodies if b not in parts.wet)
+        case "wet body":
+            return parts.wet
+        case "driven body":
+            return _driven(effect, parts)
+        case "air body":
+            return parts.aired
+    return None
+
+
+def _driven(effect: Effect, parts: Layout) -> tuple[str, ...]:
+    """Bodies with drive losses; a share of a recorded heat is asked for where that heat goes alone."""
+    turned = () if "load" in names(parse(effect.formula)) else parts.turned
+    return tuple(b for b in parts.bodies if b in (*parts.loaded, *turned))
+
+
+def _group(effect: Effect, parts: Layout, alone: tuple[str, ...]) -> tuple[str, ...]:
+    """Bodies on which a law of a fluid, or of the air, acts together where it can act at any."""
+    if effect.place != "body":
+        return alone
+    return parts.wet if effect.group == "cutting fluid" else parts.aired
+
+
+def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, str]) -> Iterator[Spot]:
+    """Terms of a kind: all of them, and, where a term itself is what changes, those of each body alone."""
+    wanted = {
+        "fluid terms": "fluid temperature",
+        "cooling terms": "cooling power",
+        "loss terms": "heat load",
+        "air terms": "ambient temperature",
+    }[effect.place]
+    terms = tuple(
+        t
+        for t in parts.own
+        if _holds(t, wanted, role) or (wanted == "heat load" and _is_friction(t, model, role))
+    )
+    bodies = tuple(dict.fromkeys(t.into for t in terms))
+    if terms:
+        yield Spot(bodies, terms)
+    if TERM in names(parse(effect.formula)) and len(bodies) > 1:
+        yield from (Spot((b,), tuple(t for t in terms if t.into == b)) for b in bodies)
+
+
+def _of_inputs(model: Model, parts: Layout, channels: Mapping[str, Channel]) -> Iterator[Spot]:
+    """Each recorded temperature with the terms that it drives."""
+    for name, channel in channels.items():
+        terms = tuple(t for t in parts.own if name in names(t.expression))
+        if terms and name not in model.states and channel.unit in TEMPERATURES:
+            yield Spot(terms=terms, channel=name)
+
+
+def _holds(term: Term, wanted: str, role: Mapping[str, str]) -> bool:
+    return any(role.get(n) == wanted for n in names(term.expression))
+
+
+def _is_friction(term: Term, model: Model, role: Mapping[str, str]) -> bool:
+    """Whether a term is a loss that follows the speed; with a temperature in it, it is an exchange."""
+    used: Collection[str] = names(term.expression)
+    roles = {role[n] for n in used if n in role}
+    warm = not set(used).isdisjoint(model.states) or any("temperature" in r for r in roles)
+    return "rotation speed" in roles and not warm

@@ -1,0 +1,253 @@
+"""Bayes factors of effects with a non-local prior of their size, vectorised.
+
+The size a of an effect has a log-normal prior: zero at zero, so that "nothing" wins where sizes are small
+(Johnson & Rossell, J. R. Stat. Soc. B 72, 2010), with tails that let it be large. Under a Gaussian likelihood
+with optimum m and variance v,
+
+    log BF = m^2/(2 v) + log int p(a) exp(-(a - m)^2/(2 v)) da
+
+which is a one-dimensional integral; shape parameters, noise settings and instants are summed over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.hermite_e import hermegauss
+from numpy.typing import NDArray
+
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.process_noise import Setting
+from discovery.evidence.signatures import signatures
+from discovery.evidence.whitening import Absorbed, Whitened, absorbed, log_sum_exp
+
+Array = NDArray[np.float64]
+
+_NODES, _WEIGHTS = hermegauss(11)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+_FINE = np.linspace(-3.5, 3.5, 43)  # standard deviations of the logarithm, for flat likelihoods
+_NARROW = 4.0  # standard deviations from zero beyond which the posterior is taken as Gaussian
+
+
+@dataclass(frozen=True)
+class Slab:
+    """Prior of sizes: `median` (A,) of their magnitudes, 68 % within `factor` (A,), sign +1, -1 or 0 (either)."""
+
+    median: Array
+    factor: Array
+    sign: Array
+
+    def take(self, index: NDArray[np.intp]) -> Slab:
+        """The prior of some of the sizes."""
+        return Slab(self.median[index], self.factor[index], self.sign[index])
+
+    def density(self, size: Array) -> Array:
+        """Prior density at sizes (..., A)."""
+        width = np.log(self.factor)
+        with np.errstate(divide="ignore"):
+            logs = np.log(np.abs(size) / self.median)
+        share = np.where(self.sign == 0, 0.5, (np.sign(size) == self.sign).astype(float))
+        near = np.exp(-0.5 * (logs / width) ** 2) / (np.abs(size) + 1e-300) / (width * np.sqrt(2 * np.pi))
+        return np.asarray(share * near)
+
+    def average(self, mean: Array, variance: Array) -> Array:
+        """log of the prior density, averaged over Gaussian sizes of `mean` (A,) and `variance` (A,)."""
+        sd = np.sqrt(np.maximum(variance, 1e-300))
+        narrow = np.abs(mean) > _NARROW * sd
+        out = np.zeros(len(mean))
+        for flat in (False, True):
+            index = np.flatnonzero(narrow != flat)
+            if len(index):
+                part = self.take(index)
+                out[index] = (
+                    part._wide(mean[index], sd[index]) if flat else part._narrow(mean[index], sd[index])
+                )
+        return out
+
+    def _narrow(self, mean: Array, sd: Array) -> Array:
+        near = self.density(mean + sd * _NODES[:, None])
+        return np.asarray(np.log(np.maximum(_WEIGHTS @ near, 1e-300)))
+
+    def _wide(self, mean: Array, sd: Array) -> Array:
+        wide = np.full(len(mean), -np.inf)
+        step = _FINE[1] - _FINE[0]
+        size = self.median * self.factor ** _FINE[:, None]
+        prior = np.exp(-0.5 * _FINE[:, None] ** 2) * step / np.sqrt(2 * np.pi)
+        for sign in (1.0, -1.0):
+            share = np.where(self.sign == 0, 0.5, (self.sign == sign).astype(float))
+            z = (sign * size - mean) / sd
+            part = np.log(np.maximum(prior * share, 1e-300)) - 0.5 * z**2 - np.log(sd * np.sqrt(2 * np.pi))
+            wide = np.logaddexp(wide, log_sum_exp(part))
+        return wide
+
+
+@dataclass(frozen=True)
+class Score:
+    """What the linear scan says of a claim.
+
+    `gain`: log Bayes factor against the model without it, integrated over noise settings and shapes; `t` the
+    signed score in standard deviations at the best of them, `size` its amplitudes there, `share` what a refit
+    leaves of the signature. `odds`: with the prior odds of its place.
+    """
+
+    hypothesis: Hypothesis
+    gain: float
+    t: float
+    size: tuple[float, ...]
+    share: float
+    noise: int  # setting at which it is largest
+
+    @property
+    def odds(self) -> float:
+        """Log posterior odds against the model without it."""
+        return self.gain + self.hypothesis.log_odds
+
+
+@dataclass(frozen=True)
+class Projected:
+    """Signatures (N, A) of hypotheses under one noise, seen through what a refit absorbs: `dot` (A,) with the
+    residual, `gram` (A,) with themselves, `length` (A,) before the projection.
+    """
+
+    columns: Array
+    basis: Array  # (N, U)
+    dot: Array
+    gram: Array
+    length: Array
+
+    def block(self, index: Sequence[int]) -> Array:
+        """Gram matrix of some of the signatures."""
+        z = self.columns[:, list(index)]
+        inside = self.basis.T @ z
+        return np.asarray(z.T @ z - inside.T @ inside)
+
+
+def project(seen: Whitened, setting: Setting, columns: Sequence[Array]) -> Projected:
+    """Columns (R, Y, A) by recording, whitened, with everything that a refit would absorb projected out."""
+    return _projected(seen.whiten(setting.noise, columns)[0], seen.absorbed(setting.noise))
+
+
+def _projected(z: Array, gone: Absorbed) -> Projected:
+    inside = gone.basis.T @ z
+    length = np.einsum("na,na->a", z, z)
+    gram = np.maximum(length - np.einsum("ua,ua->a", inside, inside), 0.0)
+    return Projected(z, gone.basis, z.T @ gone.residual - inside.T @ gone.slope, gram, np.sqrt(length))
+
+
+@dataclass(frozen=True)
+class Without:
+    """One of the effects of a fit taken out again: what it shows (R, Y) by recording, and its columns (K,)
+    among the unknowns that move.
+    """
+
+    shown: tuple[Array, ...]
+    columns: NDArray[np.intp]
+
+
+def scan(
+    seen: Whitened,
+    settings: Sequence[Setting],
+    hypotheses: Sequence[Hypothesis],
+    slab: Slab,
+    without: Sequence[Without] = (),
+) -> list[list[Score]]:
+    """Every claim among the hypotheses scored on what a fit leaves, the best odds first; then on what it leaves
+    with one of its own effects taken out, to first order, for each of `without`.
+
+    Args:
+        hypotheses: claims at all their shape values.
+        slab: prior of each amplitude, in their order.
+    """
+    runs = seen.fit.trajectories
+    columns = [signatures(t, hypotheses) for t in runs]
+    if without:
+        back = [np.stack([w.shown[k] for w in without], axis=2) for k in range(len(runs))]
+        columns = [np.concatenate([c, b], axis=2) for c, b in zip(columns, back, strict=True)]
+    count = len(slab.median)
+    levels = np.zeros((1 + len(without), len(settings)))
+    parts: list[list[Projected]] = [[] for _ in levels]
+    for k, setting in enumerate(settings):
+        z, log = seen.whiten(setting.noise, columns)
+        rows, prior = seen.rows(setting.noise)[0], seen.prior[0]
+        gone = [seen.absorbed(setting.noise)]
+        for i, one in enumerate(without):
+            kept = np.setdiff1d(np.arange(rows.shape[1]), 1 + one.columns)
+            fewer = rows[:, kept]
+            fewer[:, 0] += z[:, count + i]
+            gone.append(absorbed(fewer, prior[np.ix_(kept, kept)]))
+        for view, part in zip(gone, parts, strict=True):
+            part.append(_projected(z[:, :count], view))
+        levels[:, k] = [view.level - float(log.sum()) + setting.log_weight for view in gone]
+    return [_ranked(hypotheses, slab, level, part) for level, part in zip(levels, parts, strict=True)]
+
+
+def _ranked(
+    hypotheses: Sequence[Hypothesis], slab: Slab, levels: Array, parts: Sequence[Projected]
+) -> list[Score]:
+    """One score for each claim, over noise settings and shapes."""
+    if not hypotheses:
+        return []
+    owners = np.array([i for i, h in enumerate(hypotheses) for _ in h.amplitudes], dtype=np.intp)
+    single = np.array([len(h.amplitudes) == 1 for h in hypotheses])
+    fixed = np.array([h.effect.amplitude.fixed or 0.0 for h in hypotheses])
+    factors = np.array([_factors(p, hypotheses, owners, single, fixed, slab) for p in parts])
+    weights = np.array([h.log_weight for h in hypotheses])
+    total = float(log_sum_exp(levels))
+    with np.errstate(invalid="ignore"):
+        gains = log_sum_exp(levels[:, None] + factors) - total
+    best = np.argmax(levels[:, None] + factors, axis=0)
+    groups: dict[object, list[int]] = {}
+    for i, h in enumerate(hypotheses):
+        groups.setdefault(h.key, []).append(i)
+    found = []
+    for mine in groups.values():
+        top = max(mine, key=lambda i: gains[i] + weights[i])
+        joint = float(log_sum_exp(np.array([gains[i] + weights[i] for i in mine])))
+        found.append(
+            _score(hypotheses[top], joint, parts[best[top]], np.flatnonzero(owners == top), best[top])
+        )
+    return sorted(found, key=lambda s: -s.odds)
+
+
+def _factors(
+    part: Projected,
+    hypotheses: Sequence[Hypothesis],
+    owners: NDArray[np.intp],
+    single: NDArray[np.bool_],
+    fixed: Array,
+    slab: Slab,
+) -> Array:
+    """Log Bayes factor (H,) of each hypothesis under one noise."""
+    gram = np.maximum(part.gram, 1e-30)
+    mean, variance = part.dot / gram, 1.0 / gram
+    alone = 0.5 * part.dot**2 / gram + slab.average(mean, variance) + 0.5 * np.log(2 * np.pi * variance)
+    out = np.zeros(len(hypotheses))
+    first = np.searchsorted(owners, np.arange(len(hypotheses)))
+    out[single] = alone[first[single]]
+    on = np.flatnonzero(fixed)
+    out[on] = fixed[on] * part.dot[first[on]] - 0.5 * fixed[on] ** 2 * part.gram[first[on]]
+    for i in np.flatnonzero(~single):
+        mine = np.flatnonzero(owners == i)
+        matrix = part.block(mine) + 1e-9 * np.diag(part.length[mine] ** 2 + 1e-30)
+        inverse = np.linalg.inv(matrix)
+        at = inverse @ part.dot[mine]
+        out[i] = (
+            0.5 * float(part.dot[mine] @ at)
+            + float(np.sum(slab.take(mine).average(at, np.diag(inverse))))
+            + 0.5 * len(mine) * float(np.log(2 * np.pi))
+            - 0.5 * float(np.linalg.slogdet(matrix)[1])
+        )
+    nothing = part.length[first] <= 0
+    return np.where(nothing, -np.inf, out)
+
+
+def _score(h: Hypothesis, gain: float, part: Projected, mine: NDArray[np.intp], noise: int) -> Score:
+    matrix = part.block(mine) + 1e-9 * np.diag(part.length[mine] ** 2 + 1e-30)
+    size = np.linalg.solve(matrix, part.dot[mine])
+    t = float(np.sqrt(max(float(part.dot[mine] @ size), 0.0)))
+    t = float(np.copysign(t, size[0])) if len(mine) == 1 else t
+    length = float(part.length[mine].max())
+    share = float(np.sqrt(part.gram[mine].max())) / length if length > 0 else 0.0
+    return Score(h, gain, t, tuple(size.tolist()), share, int(noise))

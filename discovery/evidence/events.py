@@ -1,0 +1,209 @@
+"""The search of events: when did an unknown heat act, when did a sensor jump.
+
+Steps at many instants are seen through the model at once; a window is the difference of two of them, so all
+windows of a recording are scored from one Gram matrix. Every instant is as likely as any other before the
+recordings are read; a claim keeps, as the weight of its best instants, what share of all of them the readings
+leave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import Column, Trajectory, sensitivities
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.bayes import Projected, Slab, project
+from discovery.evidence.process_noise import Setting
+from discovery.evidence.whitening import Whitened, log_sum_exp
+
+Array = NDArray[np.float64]
+
+COARSE = 60  # steps per recording in the first look
+LEAST = 4  # readings before and after a jump, while heat acts and after it began: fewer may be wrong ones
+FINE = 8  # steps on each side of an edge in the second, closer look
+CLOSER = 6  # claims that get one
+
+
+def place_events(
+    seen: Whitened, setting: Setting, claims: Sequence[Hypothesis], slabs: Sequence[Slab]
+) -> list[Hypothesis]:
+    """Claims with the instants that the readings make most likely.
+
+    Args:
+        setting: noise under which they are sought.
+        claims: events (`search` "window" or "step"), each of one recording.
+        slabs: prior of the amplitudes of each claim.
+    """
+    rough: list[tuple[float, _Search, Hypothesis, Slab]] = []
+    for run in dict.fromkeys(h.recording for h in claims):
+        search = _Search(seen, setting, str(run))
+        for h, slab in zip(claims, slabs, strict=True):
+            if h.recording == run and (found := search.rough(h, slab)):
+                rough.append((found[0] + h.log_odds, search, found[1], slab))
+    rough.sort(key=lambda one: -one[0])
+    return [search.close(h, slab) for _, search, h, slab in rough[:CLOSER]] + [
+        h for _, _, h, _ in rough[CLOSER:]
+    ]
+
+
+class _Search:
+    """Instants of one recording under one noise."""
+
+    def __init__(self, seen: Whitened, setting: Setting, run: str) -> None:
+        self.seen, self.setting = seen, setting
+        self.index = [t.system.grid.recording for t in seen.fit.trajectories].index(run)
+        self.trajectory = seen.fit.trajectories[self.index]
+        grid = self.trajectory.system.grid
+        self.read = grid.time[grid.read]
+        self.every = max(1, len(self.read) // (2 * COARSE))
+        self.known: dict[str, Projected] = {}
+
+    def projected(self, columns: Array) -> Projected:
+        """Columns (R, Y, M) of the recording, seen through what a refit absorbs."""
+        shapes = [t.system.grid.readings.shape for t in self.seen.fit.trajectories]
+        padded = [np.zeros((*shape, columns.shape[2])) for shape in shapes]
+        padded[self.index] = columns
+        return project(self.seen, self.setting, padded)
+
+    def rough(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+        """The claim at the best of evenly spread instants, with what share of them the readings leave, and its
+        log Bayes factor; None where the recording is too short.
+        """
+        return self._rough_window(h, slab) if h.effect.search == "window" else self._rough_step(h, slab)
+
+    def close(self, h: Hypothesis, slab: Slab) -> Hypothesis:
+        """The claim at the best instants near those where it stands."""
+        return self._close_window(h, slab) if h.effect.search == "window" else self._close_step(h, slab)
+
+    def _rough_window(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+        """Heat at a body between two instants; it may begin before the recording and end after it."""
+        if len(self.read) < 2 * LEAST:
+            return None
+        coarse = self._coarse()
+        body = h.states[0]
+        if body not in self.known:
+            self.known[body] = self.projected(heat_steps(self.trajectory, body, coarse))
+        gains = self._allowed(self._of_windows(self.known[body], slab), coarse)
+        possible = int(np.isfinite(gains).sum())
+        if not possible:
+            return None
+        weight = float(log_sum_exp(gains.ravel()) - np.max(gains)) - float(np.log(possible))
+        edges = dict(zip(h.shapes, _best(gains, coarse), strict=True))
+        spans = {n: (t - coarse[1] + coarse[0], t + coarse[1] - coarse[0]) for n, t in edges.items()}
+        return float(np.max(gains)) + weight, replace(h.at(edges, weight), spans=spans)
+
+    def _close_window(self, h: Hypothesis, slab: Slab) -> Hypothesis:
+        coarse = self._coarse()
+        width, body = float(coarse[1] - coarse[0]), h.states[0]
+        begin, end = h.shapes
+
+        def gains(instants: Array) -> Array:
+            return self._allowed(self._windows(body, instants, slab), instants)
+
+        near = _around(h.shapes[begin], h.shapes[end], width, coarse[0], coarse[-1])
+        found = gains(near)
+        closer = _around(*_best(found, near), width / FINE, coarse[0], coarse[-1])
+        on, off = _best(gains(closer), closer)
+        with np.errstate(over="ignore"):
+            spans = {n: _span(log_sum_exp(found, axis), near) for n, axis in ((begin, 1), (end, 0))}
+        return replace(h.at({begin: on, end: off}, h.log_weight), spans=spans)
+
+    def _coarse(self) -> Array:
+        time = self.trajectory.system.grid.time
+        return np.linspace(time[0], time[-1], COARSE + 1)
+
+    def _allowed(self, gains: Array, instants: Array) -> Array:
+        """Windows that some readings see begin and end."""
+        gains[instants[None, :] - instants[:, None] < LEAST * float(np.median(np.diff(self.read)))] = -np.inf
+        gains[instants > float(self.read[-2 * LEAST])] = -np.inf
+        return gains
+
+    def _windows(self, body: str, instants: Array, slab: Slab) -> Array:
+        return self._of_windows(self.projected(heat_steps(self.trajectory, body, instants)), slab)
+
+    def _of_windows(self, part: Projected, slab: Slab) -> Array:
+        """Log Bayes factor of heat between each two instants."""
+        count = len(part.dot)
+        matrix = part.block(range(count))
+        diagonal = np.diag(matrix)
+        gram = np.maximum(diagonal[:, None] + diagonal[None, :] - 2 * matrix, 1e-30)
+        dot = np.subtract.outer(part.dot, part.dot)
+        upper = np.triu_indices(count, 1)
+        flat = Slab(*(np.broadcast_to(v, len(upper[0])) for v in (slab.median, slab.factor, slab.sign)))
+        out = np.full((count, count), -np.inf)
+        out[upper] = _log_bayes(dot[upper], gram[upper], flat)
+        return out
+
+    def _rough_step(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+        """A jump of one output, or of all, at an instant."""
+        coarse = self.read[max(self.every, LEAST) : len(self.read) - LEAST : self.every]
+        if not len(coarse):
+            return None
+        (name,) = h.shapes
+        gains = self._steps(h, coarse, slab)
+        weight = float(log_sum_exp(gains) - np.max(gains)) - float(np.log(len(gains)))
+        best = float(coarse[int(np.argmax(gains))])
+        around = {
+            name: (best - float(np.ptp(coarse)) / len(coarse), best + float(np.ptp(coarse)) / len(coarse))
+        }
+        return float(np.max(gains)) + weight, replace(h.at({name: best}, weight), spans=around)
+
+    def _close_step(self, h: Hypothesis, slab: Slab) -> Hypothesis:
+        (name,) = h.shapes
+        centre = int(np.searchsorted(self.read, h.shapes[name]))
+        last = len(self.read) - LEAST
+        near = self.read[max(LEAST, centre - self.every) : min(centre + self.every + 1, last)]
+        gains = self._steps(h, near, slab)
+        best = float(near[int(np.argmax(gains))])
+        return replace(h.at({name: best}, h.log_weight), spans={name: _span(gains, near)})
+
+    def _steps(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
+        """Log Bayes factor of a jump at each of the instants."""
+        outputs = self.trajectory.system.grid.outputs
+        steps = (self.read[:, None] >= instants[None, :]).astype(float)
+        count, total = len(instants), np.zeros(len(instants))
+        for k, output in enumerate(h.shown):
+            columns = np.zeros((len(self.read), len(outputs), count))
+            columns[:, outputs.index(output), :] = steps
+            part = self.projected(columns)
+            one = slab.take(np.full(count, min(k, len(slab.median) - 1)))
+            total += _log_bayes(part.dot, np.maximum(part.gram, 1e-30), one)
+        return total
+
+
+def _log_bayes(dot: Array, gram: Array, slab: Slab) -> Array:
+    mean, variance = dot / gram, 1.0 / gram
+    return np.asarray(0.5 * dot**2 / gram + slab.average(mean, variance) + 0.5 * np.log(2 * np.pi * variance))
+
+
+def heat_steps(trajectory: Trajectory, body: str, instants: Array) -> Array:
+    """Response (R, Y, M) to a unit heat at a body from each instant on."""
+    system = trajectory.system
+    time, step = system.grid.time, system.grid.step
+    # an interval that the step divides gets its share, so that edges need not lie on nodes
+    share = np.clip((time[1:, None] - instants[None, :]) / step[:, None], 0.0, 1.0)
+    columns = [Column(k, body, np.repeat(share[:, k], 2)) for k in range(len(instants))]
+    return sensitivities(trajectory, (), (), columns)
+
+
+def _best(gains: Array, instants: Array) -> tuple[float, float]:
+    """The two edges that are most likely."""
+    i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
+    return float(instants[i]), float(instants[j])
+
+
+def _around(on: float, off: float, width: float, first: float, last: float) -> Array:
+    """Instants within a width of two edges, in a recording from the first instant to the last."""
+    steps = np.linspace(-width, width, 2 * FINE + 1)
+    return np.unique(np.clip(np.concatenate([on + steps, off + steps]), first, last))
+
+
+def _span(gains: Array, instants: Array) -> tuple[float, float]:
+    """Where an instant lies at 95 %, by its log evidence: from one tried instant outside to another."""
+    share = np.cumsum(np.exp(gains - np.max(gains)))
+    first, last = np.searchsorted(share / share[-1], (0.025, 0.975))
+    return float(instants[max(first - 1, 0)]), float(instants[min(last + 1, len(instants) - 1)])

@@ -1,0 +1,106 @@
+"""Single wrong readings: found on the residual of the baseline, set aside before any test, reported."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import Grid, make_system
+from discovery.evidence.late import beside_switches
+from discovery.fitting import Fit
+
+Array = NDArray[np.float64]
+
+FAR = 6.5  # reading noises from the median of the readings around
+AROUND = 3  # readings on each side that a reading is compared with
+LONELY = 0.25  # these agree with each other within this share of the distance (median deviation)
+NEXT = 4.0  # reading noises from that median within which both neighbours lie ...
+CLOSE = 0.1  # ... or this share of the distance: what decays is no wrong reading
+MOST = 2  # wrong readings in a row
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """One reading that its neighbours contradict: `size` in the unit of the output, time as in the grid."""
+
+    output: str
+    recording: str
+    time: float
+    size: float
+    noise: float
+
+
+def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Outlier]:
+    """Readings far from those around while these agree; residuals are compared, so steps of inputs pass.
+
+    Args:
+        grids: all readings of each recording, also where the fit saw only some.
+        white: (Y,) reading noise.
+    """
+    found = []
+    for grid in grids.values():
+        trajectory = fit.problem.run(make_system(fit.problem.model, grid), fit.theta)
+        residual = fit.problem.residual(trajectory)
+        switched = beside_switches(grid)
+        for y, name in enumerate(grid.outputs):
+            rows = np.flatnonzero(np.isfinite(residual[:, y]))
+            r = residual[rows, y]
+            if len(r) < 2 * AROUND:
+                continue
+            middle, scatter = _around(r)
+            jump = r - middle
+            # whatever the model leaves out, the noise is no smaller than differences of readings show
+            steps = np.diff(r)
+            noise = max(float(white[y]), float(np.median(np.abs(steps - np.median(steps)))) / 0.954)
+            alone = scatter < LONELY * np.abs(jump)
+            suspect = np.abs(jump) > FAR * noise
+            limit = np.maximum(NEXT * noise, CLOSE * np.abs(jump))
+            alone &= _returns(r, middle, limit, suspect)
+            alone &= ~switched[rows]  # a short pulse that is logged late shows in one reading
+            for k in np.flatnonzero(suspect & alone):
+                at = float(grid.time[grid.read[rows[k]]])
+                found.append(Outlier(name, grid.recording, at, float(jump[k]), noise))
+    return found
+
+
+def _returns(r: Array, middle: Array, limit: Array, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether the readings (N,) next to each one, on both sides, are near the median of those around it; of
+    `MOST` suspects in a row, those next to the row. At its ends a recording may just have begun to move.
+    """
+    found = np.zeros(len(r), dtype=bool)
+    for k in np.flatnonzero(suspect):
+        before, after = k - 1, k + 1
+        while before > 0 and suspect[before] and after - before <= MOST:
+            before -= 1
+        while after < len(r) - 1 and suspect[after] and after - before <= MOST:
+            after += 1
+        if before < 0 or after >= len(r):
+            continue
+        found[k] = max(abs(r[before] - middle[k]), abs(r[after] - middle[k])) < limit[k]
+    return found
+
+
+def _around(r: Array) -> tuple[Array, Array]:
+    """Median (N,) of the readings around each one, itself left out, and their median deviation from it."""
+    offsets = np.array([k for k in range(-AROUND, AROUND + 1) if k])
+    rows = np.arange(len(r))[:, None] + offsets
+    window = np.where((rows >= 0) & (rows < len(r)), r[np.clip(rows, 0, len(r) - 1)], np.nan)
+    middle = np.nanmedian(window, axis=1)
+    return middle, np.nanmedian(np.abs(window - middle[:, None]), axis=1)
+
+
+def without(grids: Mapping[str, Grid], outliers: list[Outlier]) -> dict[str, Grid]:
+    """The grids with these readings taken out."""
+    out = dict(grids)
+    for run in {o.recording for o in outliers}:
+        grid = out[run]
+        readings = grid.readings.copy()
+        for o in outliers:
+            if o.recording == run:
+                row = int(np.argmin(np.abs(grid.time[grid.read] - o.time)))
+                readings[row, grid.outputs.index(o.output)] = np.nan
+        out[run] = replace(grid, readings=readings)
+    return out

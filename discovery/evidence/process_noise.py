@@ -1,0 +1,193 @@
+"""What a model misses everywhere: process noise that grows with the flows, slow sensors, late switches.
+
+    s_i(t)^2 = level^2 (floor_i^2 + (share flow_i(t))^2)
+
+A lumped model errs the more the more heat flows through a body; and no body is free of heat that nobody
+records. The level is unknown: evidence is integrated over a few of them, and over slow sensor noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import Column, Trajectory, sensitivities
+from discovery.dynamics.system import flows
+from discovery.evidence.whitening import Whitened
+from discovery.fitting import Fit, Noise
+from discovery.fitting.noise import resolution
+
+Array = NDArray[np.float64]
+
+JITTER = 12**-0.5  # of a logging interval: a switch that comes anywhere in it
+_TRIED = (
+    0.0,
+    0.3,
+    1.0,
+    3.0,
+    10.0,
+    30.0,
+)  # levels beside which the reading noise is sought where none is stated
+_BLOCKS = 72  # of a recording, in each of which process noise is one number
+_CLIPPED = 4.0  # standard deviations beyond which an innovation counts no more: single wrong readings
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A noise that may be, and the logarithm of its prior weight."""
+
+    noise: Noise
+    log_weight: float
+    place: tuple[int, int, int]  # on the grid of jitters, slow noises and levels
+
+    def is_next_to(self, other: Setting) -> bool:
+        """Whether the two are neighbours on the grid."""
+        return sum(abs(a - b) for a, b in zip(self.place, other.place, strict=True)) == 1
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is believed of process noise and slow noise before the recordings are read (`thresholds.py`)."""
+
+    floor: float  # of the largest rms flow of the model, at level one
+    share: float  # of the flow through each state, at level one
+    levels: tuple[float, ...]
+    weights: tuple[float, ...]
+    slow: tuple[float, ...]  # shares of the reading noise
+    slow_weights: tuple[float, ...]
+
+
+def floors(fit: Fit, share: float) -> dict[str, float]:
+    """Process noise that no state is free of, W at a body, else a rate: a share of the largest rms flow of
+    the model. Heat and rates are never compared: the bed of a machine follows the room at 1e-5 K/s beside
+    bodies that take 300 W.
+    """
+    largest = flow_sizes(fit)
+    states = {n: s for n, s in fit.problem.model.states.items() if not s.memory}
+    top = {
+        kind: max((largest[n] for n, s in states.items() if bool(s.capacity) == kind), default=0.0)
+        for kind in (True, False)
+    }
+    return {name: share * top[bool(state.capacity)] for name, state in states.items()}
+
+
+def flow_sizes(fit: Fit) -> dict[str, float]:
+    """rms of what flows through each state, W or a rate, in the recording where it is largest."""
+    found: dict[str, float] = {}
+    for trajectory in fit.trajectories:
+        size = np.sqrt(np.mean(flows(trajectory) ** 2, axis=0))
+        for name, one in zip(trajectory.system.states, size.tolist(), strict=True):
+            found[name] = max(found.get(name, 0.0), one)
+    return found
+
+
+def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: bool) -> tuple[Setting, ...]:
+    """The noise settings that evidence is integrated over.
+
+    Args:
+        white: reading noise and the two time constants.
+        floor: of each state, from `floors`.
+        unsure: inputs may be logged late, each switch by another time, or all by the same.
+    """
+    jitters = (0.0, JITTER) if unsure else (0.0,)
+    total = float(sum(prior.weights)) * float(sum(prior.slow_weights)) * len(jitters)
+    return tuple(
+        Setting(
+            _noise(white, floor, prior, level, slow, jitter),
+            float(np.log(weight * prior.slow_weights[j] / total)),
+            (i, j, k),
+        )
+        for i, jitter in enumerate(jitters)
+        for j, slow in enumerate(prior.slow)
+        for k, (level, weight) in enumerate(zip(prior.levels, prior.weights, strict=True))
+    )
+
+
+def _noise(
+    white: Noise, floor: Mapping[str, float], prior: Prior, level: float, slow: float, jitter: float
+) -> Noise:
+    return replace(
+        white,
+        slow=tuple(slow * w for w in white.white) if slow else (),
+        heat={name: level * value for name, value in floor.items()} if level else None,
+        share=level * prior.share,
+        jitter=jitter,
+    )
+
+
+def reading_noise(
+    fit: Fit, stated: Mapping[str, float | None], floor: Mapping[str, float], prior: Prior
+) -> Noise:
+    """White reading noise: what is stated, else the most likely level with slow noise and process noise of any
+    size.
+
+    Process noise far above the usual is offered, so that a mismatch passes for that and not for reading
+    noise. Time constants are 2 h of slow noise and 3 h of process noise, or a share of shorter recordings.
+    """
+    outputs = fit.problem.outputs
+    known = np.array([stated.get(name) is not None for name in outputs])
+    duration = max(float(t.system.grid.time[-1]) for t in fit.trajectories)
+    times = min(7200.0, duration / 12), min(10800.0, duration / 8)
+    start = Noise(outputs, tuple(fit.noise.white), (), None, slow_time=times[0], heat_time=times[1])
+    best, lowest = np.array(fit.noise.white), np.inf
+    if not known.all():
+        seen, least = Whitened(fit, 1), np.array(resolution([s.grid.readings for s in fit.problem.systems]))
+        for slow in prior.slow:
+            for level in _TRIED:
+                white, cost = _white_with(seen, start, known, least, floor, prior, level, slow)
+                if cost < lowest:
+                    best, lowest = white, cost
+    return replace(start, white=tuple(float(w) for w in best))
+
+
+def _white_with(
+    seen: Whitened,
+    start: Noise,
+    known: NDArray[np.bool_],
+    least: Array,
+    floor: Mapping[str, float],
+    prior: Prior,
+    level: float,
+    slow: float,
+) -> tuple[Array, float]:
+    """White level (Y,) of unit innovations with given slow and process noise, and its -log likelihood."""
+    white, cost = np.array(start.white), np.inf
+    for _ in range(4):
+        noise = _noise(replace(start, white=tuple(white)), floor, prior, level, slow, 0.0)
+        squares, counts, cost = np.zeros(len(white)), np.zeros(len(white)), 0.0
+        for part, residual in zip(seen.filters, seen.residuals, strict=True):
+            z, log = part.whitened(noise, residual[:, :, None])
+            innovation = np.full(residual.shape, np.nan)
+            innovation[part.measured] = np.clip(z[:, 0], -_CLIPPED, _CLIPPED)
+            squares += np.nansum(innovation**2, axis=0)
+            counts += part.measured.sum(axis=0)
+            cost += float(np.sum(log)) + 0.5 * float(np.nansum(innovation**2))
+        factor = np.where(known, 1.0, np.sqrt(squares / np.maximum(counts, 1)))
+        white = np.where(known, white, np.maximum(white * np.maximum(factor, 0.2), least))
+        if np.all(np.abs(factor - 1) < 0.01):
+            break
+    return white, cost
+
+
+def noise_in_free_runs(trajectory: Trajectory, noise: Noise) -> float:
+    """rms that reading noise, slow noise and process noise leave in a free run, in reading noises."""
+    white = np.array(noise.white)
+    slow = np.array(noise.slow or np.zeros(len(white)))
+    variance = np.tile(1.0 + (slow / white) ** 2, (len(trajectory.system.grid.read), 1))
+    system, size = trajectory.system, flows(trajectory)
+    middle = 0.5 * (system.grid.time[1:] + system.grid.time[:-1])
+    edges = np.linspace(system.grid.time[0], system.grid.time[-1], _BLOCKS + 1)
+    block = np.clip(np.searchsorted(edges, middle, side="right") - 1, 0, _BLOCKS - 1)
+    lag = np.abs(np.subtract.outer(edges[:-1], edges[:-1]))
+    kernel = np.exp(-lag / noise.heat_time)
+    for state, floor in (noise.heat or {}).items():
+        if state not in system.states:
+            continue
+        sd = np.hypot(floor, noise.share * size[:, system.states.index(state)])
+        pieces = [Column(k, state, np.repeat(sd * (block == k), 2)) for k in range(_BLOCKS)]
+        blocks = sensitivities(trajectory, (), (), pieces, count=_BLOCKS) / white[None, :, None]
+        variance = variance + np.einsum("ryk,kl,ryl->ry", blocks, kernel, blocks, optimize=True)
+    return float(np.sqrt(np.mean(variance)))

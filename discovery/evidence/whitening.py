@@ -1,0 +1,254 @@
+"""A fit as the noise model sees it: whitened residual and sensitivities, kept as normal equations by block.
+
+Everything that is asked afterwards (evidence with all unknowns integrated out, what a refit would absorb of a
+signature, the posterior on resampled blocks) is algebra on these small matrices:
+
+    log p(y) = -log det L - 1/2 (r'r - b' H^-1 b) - 1/2 log det H + priors,   H = J'J + priors, b = J'r
+
+with r and J whitened by the Kalman filter of `fitting/kalman.py` (Laplace's approximation; MacKay, Neural
+Computation 4, 1992).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.fitting import Fit, Noise
+from discovery.fitting.kalman import Filter, make_filter
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+_AT_BOUND = 1e-6
+_UNSEEN = 1e-20  # of the largest entry of the normal equations
+
+
+@dataclass(frozen=True)
+class Grams:
+    """A fit under one noise setting. Columns are the residual, then the unknowns that do not press against a
+    bound: `blocks` (B, 1 + U, 1 + U) and `logdet` (B,) by block, `prior` (1 + U, 1 + U) of the priors,
+    `constant` what their densities add.
+    """
+
+    noise: Noise
+    blocks: Array
+    logdet: Array
+    prior: Array
+    constant: float
+
+    def level(self, weights: Array | None = None) -> float:
+        """Log-likelihood with all unknowns integrated out; `weights` (B,): how often each block counts."""
+        return self.solved(weights)[0]
+
+    def solved(self, weights: Array | None = None) -> tuple[float, Array, Array]:
+        """The level, the step (U,) from where the fit stands to its optimum under this noise, and the
+        covariance (U, U) there.
+        """
+        w = np.ones(len(self.logdet)) if weights is None else weights
+        total = np.tensordot(w, self.blocks, 1) + self.prior
+        hessian, slope = total[1:, 1:], total[1:, 0]
+        scale = _scale(np.diag(hessian))
+        size, axes = np.linalg.eigh(hessian / np.outer(scale, scale))
+        size = np.maximum(size, 1e-12)
+        inverse = (axes / size) @ axes.T / np.outer(scale, scale)
+        step = inverse @ slope
+        quadratic = float(total[0, 0]) - float(slope @ step)
+        volume = 0.5 * float(np.sum(np.log(size))) + float(np.sum(np.log(scale)))
+        level = -float(w @ self.logdet) - 0.5 * quadratic - volume + self.constant
+        return level, step, inverse
+
+    def without(self, extra: Array) -> Grams:
+        """The same without the last columns, whose coefficients have the spreads `extra` (E,)."""
+        kept = self.prior.shape[0] - len(extra)
+        constant = self.constant + float(np.sum(np.log(extra)))
+        return Grams(
+            self.noise,
+            self.blocks[:, :kept, :kept],
+            self.logdet,
+            self.prior[:kept, :kept],
+            constant,
+        )
+
+    def drawn(self, weights: Array, widths: Array) -> tuple[Array, Array, Array]:
+        """As `solved` for many draws at once: levels (D,), steps (D, U), variances (D, U).
+
+        Args:
+            weights: (D, B) how often each block counts.
+            widths: (D,) of the priors, relative to what they are.
+        """
+        size = self.prior.shape[0]
+        flat = self.blocks.reshape(len(self.logdet), -1)
+        total = (weights @ flat).reshape(-1, size, size) + self.prior / widths[:, None, None] ** 2
+        hessian, slope = total[:, 1:, 1:], total[:, 1:, 0]
+        scale = _scale(np.einsum("dii->di", hessian))
+        unit = hessian / (scale[:, :, None] * scale[:, None, :])
+        unit[:, np.arange(size - 1), np.arange(size - 1)] += 1e-10
+        chol = np.linalg.cholesky(unit)
+        inverse = np.linalg.inv(chol)
+        along = np.einsum("dij,dj->di", inverse, slope / scale)
+        step = np.einsum("dji,dj->di", inverse, along) / scale
+        variance = np.einsum("dji,dji->di", inverse, inverse) / scale**2
+        volume = np.log(np.einsum("dii->di", chol)).sum(axis=1) + np.log(scale).sum(axis=1)
+        quadratic = total[:, 0, 0] - np.sum(along**2, axis=1)
+        return -weights @ self.logdet - 0.5 * quadratic - volume + self.constant, step, variance
+
+
+@dataclass(frozen=True)
+class Whitened:
+    """A fit with its whitening filters."""
+
+    fit: Fit
+    blocks: int  # of time in each recording
+    extra: tuple[Array, ...] = ()  # by recording (R, Y, E): what may act with coefficients ...
+    spread: Array = field(default_factory=lambda: np.zeros(0))  # (E,) ... that are known to be about zero
+    form: int = 0  # of them, the first, that count with the form error of a noise
+    last: dict[str, tuple[Noise, Any]] = field(default_factory=dict, repr=False)
+
+    def absorbed(self, noise: Noise) -> Absorbed:
+        """What a refit absorbs under a noise; the last noise is kept."""
+        if "basis" not in self.last or self.last["basis"][0] != noise:
+            self.last["basis"] = (noise, absorbed(self.rows(noise)[0], self.prior[0]))
+        known: Absorbed = self.last["basis"][1]
+        return known
+
+    @cached_property
+    def filters(self) -> list[Filter]:
+        """Whitening filter of each recording."""
+        return [make_filter(t) for t in self.fit.trajectories]
+
+    @cached_property
+    def residuals(self) -> list[Array]:
+        """Readings minus model by recording, (R, Y)."""
+        return [self.fit.problem.residual(t) for t in self.fit.trajectories]
+
+    @cached_property
+    def jacobians(self) -> list[Array]:
+        """Sensitivities of the outputs by recording, (R, Y, U + E), of the unknowns that are free to move and
+        of the extra columns.
+        """
+        own = [self.fit.problem.jacobian(t)[:, :, self.moving] for t in self.fit.trajectories]
+        if not self.extra:
+            return own
+        return [np.concatenate([j, e], axis=2) for j, e in zip(own, self.extra, strict=True)]
+
+    @cached_property
+    def moving(self) -> Ints:
+        """Unknowns that do not press against a bound."""
+        low, high = self.fit.problem.bounds
+        theta = self.fit.theta
+        scale = _AT_BOUND * np.maximum(1.0, np.abs(theta))
+        return np.flatnonzero((theta > low + scale) & (theta < high - scale))
+
+    @cached_property
+    def block(self) -> Ints:
+        """Block (N,) of each whitened reading, counted through the recordings."""
+        found = []
+        for k, t in enumerate(self.fit.trajectories):
+            grid = t.system.grid
+            share = (grid.time[grid.read] - grid.time[0]) / max(float(grid.time[-1] - grid.time[0]), 1e-9)
+            number = np.minimum((share * self.blocks).astype(int), self.blocks - 1) + k * self.blocks
+            found.append(np.broadcast_to(number[:, None], grid.measured.shape)[grid.measured])
+        return np.concatenate(found)
+
+    def whiten(self, noise: Noise, columns: Sequence[Array]) -> tuple[Array, Array]:
+        """Columns (R, Y, M) by recording whitened and stacked (N, M), and the logarithms (N,) of the standard
+        deviations of the innovations.
+        """
+        parts = [p.whitened(noise, c) for p, c in zip(self.filters, columns, strict=True)]
+        return np.concatenate([z for z, _ in parts]), np.concatenate([log for _, log in parts])
+
+    def rows(self, noise: Noise) -> tuple[Array, Array]:
+        """Whitened residual and sensitivities (N, 1 + U), logarithms (N,) as in `whiten`. The last noise is
+        kept.
+        """
+        if "rows" not in self.last or self.last["rows"][0] != noise:
+            joined = [
+                np.concatenate([r[:, :, None], j], axis=2)
+                for r, j in zip(self.residuals, self.jacobians, strict=True)
+            ]
+            rows, log = self.whiten(noise, joined)
+            first = 1 + len(self.moving)
+            rows[:, first : first + self.form] *= noise.share
+            self.last["rows"] = (noise, (rows, log))
+        known: tuple[Array, Array] = self.last["rows"][1]
+        return known
+
+    @cached_property
+    def prior(self) -> tuple[Array, float]:
+        """What priors add to the normal equations (1 + U, 1 + U), and the logarithm of their densities."""
+        fit = self.fit
+        residual, slope = fit.problem.prior_rows(fit.theta, fit.together)
+        count = len(self.spread)
+        rows = np.zeros((len(residual) + count, 1 + len(self.moving) + count))
+        rows[: len(residual), 0] = -residual
+        rows[: len(residual), 1 : 1 + len(self.moving)] = slope[:, self.moving]
+        rows[len(residual) :, 1 + len(self.moving) :] = np.diag(1.0 / self.spread)
+        spreads = [
+            u.prior[1] / (np.sqrt(fit.together) if u.is_nuisance else 1.0)
+            for u in fit.problem.unknowns
+            if u.prior
+        ]
+        of_logs = [np.log(x) for x, u in zip(fit.theta, fit.problem.unknowns, strict=True) if u.is_log]
+        logs = np.concatenate([np.log(spreads), of_logs, np.log(self.spread)])
+        return rows.T @ rows, -float(np.sum(logs))
+
+    def grams(self, noise: Noise) -> Grams:
+        """The fit under one noise setting, as normal equations by block."""
+        rows, log = self.rows(noise)
+        count = self.blocks * len(self.fit.trajectories)
+        order = np.argsort(self.block, kind="stable")
+        edges = np.searchsorted(self.block[order], np.arange(count + 1))
+        rows, log = rows[order], log[order]
+        pieces = [rows[a:b].T @ rows[a:b] for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        logdet = np.array([float(np.sum(log[a:b])) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+        prior, constant = self.prior
+        return Grams(noise, np.array(pieces), logdet, prior, constant)
+
+
+@dataclass(frozen=True)
+class Absorbed:
+    """What a refit absorbs: `residual` (N,), a basis (N, U) whose square is what readings and priors together
+    let the unknowns move, how far the residual is along it (U,), and the log likelihood that is left, without
+    what does not depend on the columns.
+    """
+
+    residual: Array
+    basis: Array
+    slope: Array
+    level: float
+
+
+def absorbed(rows: Array, prior: Array) -> Absorbed:
+    """What the columns of `rows` (N, 1 + U), the residual first, absorb of anything.
+
+    Args:
+        prior: (1 + U, 1 + U) normal equations of what is known of the unknowns before.
+    """
+    hessian = rows[:, 1:].T @ rows[:, 1:] + prior[1:, 1:]
+    scale = _scale(np.diag(hessian))
+    size, axes = np.linalg.eigh(hessian / np.outer(scale, scale))
+    size = np.maximum(size, 1e-12)
+    root = axes / np.sqrt(size) / scale[:, None]
+    slope = root.T @ (rows[:, 1:].T @ rows[:, 0] + prior[1:, 0])
+    quadratic = float(rows[:, 0] @ rows[:, 0]) + float(prior[0, 0]) - float(slope @ slope)
+    volume = 0.5 * float(np.sum(np.log(size))) + float(np.sum(np.log(scale)))
+    return Absorbed(rows[:, 0], rows[:, 1:] @ root, slope, -0.5 * quadratic - volume)
+
+
+def _scale(diagonal: Array) -> Array:
+    """What makes the diagonal of normal equations one; what no reading sees is kept from dividing by zero."""
+    return np.asarray(np.sqrt(np.maximum(diagonal, _UNSEEN * diagonal.max(initial=1e-300))))
+
+
+def log_sum_exp(values: Array, axis: int = 0) -> Array:
+    """log of the sum of exp, safely."""
+    top = np.max(values, axis=axis, keepdims=True)
+    top = np.where(np.isfinite(top), top, 0.0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.squeeze(top, axis) + np.log(np.sum(np.exp(values - top), axis=axis)))

