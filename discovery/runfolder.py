@@ -78,8 +78,8 @@ def staged(folder: Path) -> Iterator[Path]:
 
 @contextmanager
 def beside(folder: Path) -> Iterator[Path]:
-    """A temporary folder beside `folder` that vanishes at the end, whatever happens. What a killed process left
-    of such a folder is cleared away first.
+    """A temporary folder beside `folder` that vanishes at the end, whatever happens. What a killed process
+    left of such a folder is cleared away first.
 
     Raises UserError: it cannot be written.
     """
@@ -100,7 +100,9 @@ def beside(folder: Path) -> Iterator[Path]:
 
 
 def _mark(place: Path) -> str:
-    """What the temporary folders of this computer beside a place begin with; the number of a process follows."""
+    """What the temporary folders of this computer beside a place begin with; the number of a process
+    follows.
+    """
     host = re.sub(r"[^\w-]", "_", platform.node())
     return f".{place.name}.{host}."
 

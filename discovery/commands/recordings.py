@@ -21,9 +21,10 @@ def check(
 ) -> None:
     """List what is wrong with the recordings of CAMPAIGN, worst first: where, and what to do about it.
 
-    Each channel is looked at by itself, beside its siblings, and beside the other recordings: units, signs, clocks,
-    swapped columns, dead or frozen sensors, copies. An `error` keeps the recording from being used (exit status 1);
-    a `warning` is worth a look.
+    Each channel is looked at by itself, beside its siblings, and beside the other recordings: units,
+    signs, clocks,
+    swapped columns, dead or frozen sensors, copies. An `error` keeps the recording from being used (exit
+    status 1); a `warning` is worth a look.
     """
     from discovery.recordings.check import check_campaign, summary
     from discovery.recordings.finding import folded
@@ -63,7 +64,7 @@ def new(
         typer.Option(
             "--is",
             metavar="NAME=ROLE,UNIT",
-            help="What a column is, e.g. --is 'CH1=error,um'; the unit of the clock: --is time=min. Repeatable.",
+            help="What a column is: --is 'CH1=error,um'; the unit of the clock: --is time=min. Repeatable.",
         ),
     ] = None,
     room: Annotated[

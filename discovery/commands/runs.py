@@ -19,10 +19,13 @@ def run(
         bool, typer.Option("--json", help="What was found as one JSON object on stdout, nothing else.")
     ] = False,
 ) -> None:
-    """Do the main job: look at the recordings, fit, discover, cross-validate, compare, diagnose, report, export.
+    """Do the main job: look at the recordings, fit, discover, cross-validate, compare, diagnose, report,
+    export.
 
-    Recordings that are wrong (`discovery check`) stop it, unless --force. The last five lines say which model wins,
-    how sure that is, what is missing, what is doubtful, what to do next. The results in the folder are replaced as a
+    Recordings that are wrong (`discovery check`) stop it, unless --force. The last five lines say which
+    model wins,
+    how sure that is, what is missing, what is doubtful, what to do next. The results in the folder are
+    replaced as a
     whole at the end: an interrupted run leaves nothing behind. Exports, figures and notes in it stay.
     """
     import json

@@ -1,4 +1,6 @@
-"""The end of a run in five lines: which model, how sure, what is missing, what is doubtful, what to do next."""
+"""The end of a run in five lines: which model, how sure, what is missing, what is doubtful, what to do
+next.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +28,8 @@ _MOVES = 0.05  # share of an effect from which a guess matters
 
 @dataclass(frozen=True)
 class Lead:
-    """`ratio`: rms of the winner over that of another model (or of none), with its 95 % interval; `sure`: share
-    of the draws in which the winner is better.
+    """`ratio`: rms of the winner over that of another model (or of none), with its 95 % interval; `sure`:
+    share of the draws in which the winner is better.
     """
 
     ratio: float
@@ -80,10 +82,14 @@ class Ending:
         if self.winner is None or none is None:
             share = f"{none.ratio:.0%}" if none else "more than all"
             return (
-                f"winner: no model; the best, {self.best}, leaves {share} of the rms without any model on {where}: "
+                f"winner: no model; the best, {self.best}, leaves {share} of the rms without any "
+                f"model on {where}: "
                 "do not use it"
             )
-        return f"winner: {self.winner} predicts best on {where}: rms {rms}, {1 - none.ratio:.0%} less than without a model"
+        return (
+            f"winner: {self.winner} predicts best on {where}: rms {rms}, {1 - none.ratio:.0%} less "
+            "than without a model"
+        )
 
     def _sure(self) -> str:
         lead, other = self.against_runner_up, self.runner_up
@@ -93,7 +99,8 @@ class Ending:
         low, high = sorted((1 - lead.low, 1 - lead.high))
         close = "" if lead.high < 1 else "; the two cannot be told apart"
         return (
-            f"how sure: it leaves {abs(1 - lead.ratio):.0%} {said} than {other} (95 %: {low:.0%} to {high:.0%}; "
+            f"how sure: it leaves {abs(1 - lead.ratio):.0%} {said} than {other} (95 %: {low:.0%} to "
+            f"{high:.0%}; "
             f"better in {lead.sure:.0%} of resampled recordings){close}"
         )
 
@@ -171,12 +178,13 @@ def _next(
         return str(diagnosis["next_experiment"]).rstrip(".")
     if not helps:
         return "record what drives the machine, each input moving on its own"
-    return f'`discovery export {run.folder} --model {best} --to json`, or diagnose it ([mismatch] model = "{best}")'
+    export = f"`discovery export {run.folder} --model {best} --to json`"
+    return f'{export}, or diagnose it ([mismatch] model = "{best}")'
 
 
 def hanging(run: Run, model: str, guesses: Mapping[str, str]) -> dict[str, float]:
-    """How much of what a model predicts each guessed channel carries: its share of the terms that hold it; 1 for
-    an output, which is all that is predicted.
+    """How much of what a model predicts each guessed channel carries: its share of the terms that hold it;
+    1 for an output, which is all that is predicted.
     """
     shares = run.results["models"][model].get("shares") or {}
     terms = run.models[model].terms if model in run.models else ()

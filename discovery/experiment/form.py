@@ -22,7 +22,7 @@ def _file_name(name: str) -> str:
     return name
 
 
-_BUILT = ["reduced", "superposition", "sindy"]  # kinds of models; one in a file needs no kind
+_BUILT = ["regression", "reduced", "superposition", "sindy"]  # kinds of models; one in a file needs no kind
 
 # What several kinds of models may say
 Inputs = Annotated[list[str] | None, Field(min_length=1, description="default by role, as in the paper")]
@@ -39,6 +39,15 @@ class FileEntry(Strict):
     outputs: Outputs = None
     also: Also = []
     loss: Pull = "linear"
+
+
+class RegressionEntry(Strict):
+    """Ridge regression on the inputs, without memory."""
+
+    kind: Literal["regression"]
+    inputs: Inputs = None
+    outputs: Outputs = None
+    also: Also = []
 
 
 class ReducedEntry(Strict):
@@ -80,9 +89,10 @@ def _kind(entry: Any) -> str:
     return str(entry.get("kind", "file") if isinstance(entry, Mapping) else getattr(entry, "kind", "file"))
 
 
-ModelEntry = FileEntry | ReducedEntry | SuperpositionEntry | SparseOptions
+ModelEntry = FileEntry | RegressionEntry | ReducedEntry | SuperpositionEntry | SparseOptions
 TaggedEntry = Annotated[
     Annotated[FileEntry, Tag("file")]
+    | Annotated[RegressionEntry, Tag("regression")]
     | Annotated[ReducedEntry, Tag("reduced")]
     | Annotated[SuperpositionEntry, Tag("superposition")]
     | Annotated[SparseOptions, Tag("sindy")],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,20 +17,23 @@ from discovery.experiment.form import (
     MismatchForm,
     ModelEntry,
     ReducedEntry,
+    RegressionEntry,
     SuperpositionEntry,
     separate,
 )
 from discovery.experiment.joining import check_joins, join
 from discovery.experiment.quality import quality, refuse
 from discovery.experiment.results import write_run
-from discovery.fitting import fit_model
+from discovery.fitting import Fit, fit_model
 from discovery.fitting.fit import written_with
+from discovery.fitting.ridge import fit_ridge
 from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.solve import Loss
 from discovery.fitting.starts import warm_start
 from discovery.models import Model
 from discovery.models.dimensions import with_coefficient_units
 from discovery.models.reduced import reduced
+from discovery.models.regression import regression
 from discovery.models.superposition import superposition
 from discovery.progress import Progress, Steps, silent
 from discovery.recordings.finding import folded
@@ -66,7 +69,8 @@ def run(
         The folder.
 
     Raises:
-        UserError: a mistake in a file, recordings that cannot be used, a model that cannot be fitted, or one that
+        UserError: a mistake in a file, recordings that cannot be used, a model that cannot be fitted, or
+            one that
             cannot be exported; then the run is kept.
     """
     began = clock.perf_counter()
@@ -169,37 +173,36 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
     began = clock.perf_counter()
     progress(f"fitting {name}")
     common, experiment = experiment.fit, experiment.seen_by(entry)
-    model, report = starting_model(experiment, name, entry, progress)
-    loss: Loss = getattr(entry, "loss", "linear")
-    fitted = fit_model_of(
-        experiment, name, entry.kind, model, report, experiment.outputs_of(entry), loss, progress
-    )
+    model, report, fit = fit_of(experiment, name, entry, progress)
+    seconds = clock.perf_counter() - began
+    fitted = judged(experiment, name, entry.kind, model, fit, report, seconds, progress)
     also = [recording for recording in experiment.fit if recording not in common]
     told = [f"is fitted to {', '.join(also)} besides"] if also else []
     return replace(fitted, notes=(*told, *fitted.notes), seconds=clock.perf_counter() - began)
 
 
-def fit_model_of(
+def fit_of(
     experiment: Experiment,
     name: str,
-    kind: str,
-    model: Model,
-    report: Mapping[str, Any] | None = None,
-    outputs: Sequence[str] | None = None,
-    loss: Loss = "linear",
+    entry: ModelEntry,
     progress: Progress = silent,
-) -> Fitted:
-    """A model with start values, wherever it comes from: fit, cross-validation, free runs."""
-    began = clock.perf_counter()
-    outputs = [y for y in outputs or experiment.outputs if y in model.outputs or y in model.states]
-    if not outputs:
+    max_rounds: int = 60,
+) -> tuple[Model, dict[str, Any], Fit]:
+    """A model as its fit starts, what a search reports, and the fit to the recordings of `fit`."""
+    campaign, recordings = experiment.fitting, experiment.fit
+    outputs = experiment.outputs_of(entry)
+    if isinstance(entry, RegressionEntry):  # its strength is found, not only its numbers
+        fit = fit_ridge(campaign, recordings, outputs, experiment.inputs(entry))
+        return replace(fit.problem.model, name=name), {}, fit
+    model, report = starting_model(experiment, name, entry, progress)
+    given = [y for y in outputs if y in model.outputs or y in model.states]
+    if not given:
         raise UserError(
-            f"{experiment.path}: model '{name}' gives none of the outputs {', '.join(experiment.outputs)}; "
+            f"{experiment.path}: model '{name}' gives none of the outputs {', '.join(outputs)}; "
             "write them under [outputs] of the model"
         )
-    fit = fit_model(model, experiment.fitting, experiment.fit, outputs, loss=loss)
-    seconds = clock.perf_counter() - began
-    return judged(experiment, name, kind, model, fit, report, seconds, progress)
+    loss: Loss = getattr(entry, "loss", "linear")
+    return model, report, fit_model(model, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
 
 
 def repaired_of(
@@ -223,6 +226,8 @@ def starting_model(
     match entry:
         case FileEntry():
             return experiment.model_file(name), report
+        case RegressionEntry():
+            model = regression(inputs, outputs, campaign.channels)
         case ReducedEntry():
             model = warm_start(reduced(inputs, outputs, campaign.channels), campaign, recordings, outputs)
         case SuperpositionEntry(separate=None):

@@ -37,8 +37,8 @@ def rewrite(folder: Path, made: Plan) -> list[str]:
     """Write models and experiment of a plan; lines about what was kept.
 
     A model that a person changed stays; the new one stands beside it. In an experiment that a person changed,
-    the models of the plan are renewed and names that are no outputs any more taken out; the rest, remarks too,
-    stays as it is.
+    the models of the plan are renewed and names that are no outputs any more taken out; the rest, remarks
+    too, stays as it is.
     """
     notes = []
     models = dict(made.models)

@@ -14,29 +14,106 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _NOTHING = frozenset(
-    "nan,-nan,inf,-inf,+inf,na,n/a,n.a.,null,none,nil,nat,<na>,-,--,---,----,?,*,**,***,****,.,ol,o.l,+ol,-ol,"
-    "over,+over,-over,+++++,-----,burnout,b.o,b/o,err,err.,error,fault,invalid,bad,missing,undefined,unknown,"
-    "unavailable,overflow,overload,underflow,underrange,overrange,no data,nodata,"
-    "#n/a,#nv,#n/v,#value!,#div/0!,#num!,#ref!,#wert!,#bezug!,#zahl!,#null!,"
-    "k.a.,n.v.,ungültig,ungueltig,fehlt,fehler,unbekannt,leer,欠測,無効,異常,断線,未測定,无效,缺失".split(",")
+    [
+        "nan",
+        "-nan",
+        "inf",
+        "-inf",
+        "+inf",
+        "na",
+        "n/a",
+        "n.a.",
+        "null",
+        "none",
+        "nil",
+        "nat",
+        "<na>",
+        "-",
+        "--",
+        "---",
+        "----",
+        "?",
+        "*",
+        "**",
+        "***",
+        "****",
+        ".",
+        "ol",
+        "o.l",
+        "+ol",
+        "-ol",
+        "over",
+        "+over",
+        "-over",
+        "+++++",
+        "-----",
+        "burnout",
+        "b.o",
+        "b/o",
+        "err",
+        "err.",
+        "error",
+        "fault",
+        "invalid",
+        "bad",
+        "missing",
+        "undefined",
+        "unknown",
+        "unavailable",
+        "overflow",
+        "overload",
+        "underflow",
+        "underrange",
+        "overrange",
+        "no data",
+        "nodata",
+        "#n/a",
+        "#nv",
+        "#n/v",
+        "#value!",
+        "#div/0!",
+        "#num!",
+        "#ref!",
+        "#wert!",
+        "#bezug!",
+        "#zahl!",
+        "#null!",
+        "k.a.",
+        "n.v.",
+        "ungültig",
+        "ungueltig",
+        "fehlt",
+        "fehler",
+        "unbekannt",
+        "leer",
+        "欠測",
+        "無効",
+        "異常",
+        "断線",
+        "未測定",
+        "无效",
+        "缺失",
+    ]
 )
 # on, off
 _SWITCHES = (
-    "true false,on off,yes no,enabled disabled,active inactive,running stopped,run stop,start stop,open closed,"
+    "true false,on off,yes no,enabled disabled,active inactive,running stopped,run stop,start "
+    "stop,open closed,"
     "opened closed,open shut,"
-    "wahr falsch,ein aus,an aus,ja nein,aktiv inaktiv,auf zu,offen geschlossen,läuft steht,betrieb stillstand,"
+    "wahr falsch,ein aus,an aus,ja nein,aktiv inaktiv,auf zu,offen geschlossen,läuft steht,betrieb "
+    "stillstand,"
     "vrai faux,marche arrêt,marche arret,oui non,ouvert fermé,activé désactivé,"
-    "vero falso,acceso spento,sì no,si no,aperto chiuso,verdadero falso,encendido apagado,sí no,abierto cerrado,"
-    "オン オフ,入 切,有 無,運転 停止,運転中 停止中,開 閉,真 偽,はい いいえ,開 关,开 关,是 否,真 假,启动 停止,运行 停止,"
+    "vero falso,acceso spento,sì no,si no,aperto chiuso,verdadero falso,encendido apagado,sí "
+    "no,abierto cerrado,"
+    "オン オフ,入 切,有 無,運転 停止,運転中 停止中,開 閉,真 偽,はい いいえ,開 关,开 关,是 否,真 假,启动 停止,"
+    "运行 停止,"
     "켜짐 꺼짐,вкл выкл,да нет,истина ложь"
 )
 SWITCHES = {
     word: on for pair in _SWITCHES.split(",") for word, on in zip(pair.split(), (1.0, 0.0), strict=True)
 }
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-_WITH_UNIT = re.compile(
-    r"([-+]?\s*[\d.,' ]*\d(?:[eE][-+]?\d+)?)\s*([^\W\d]\S{0,9}|[°%‰\"'][^\d\s]{0,8})"
-)
+_WITH_UNIT = re.compile(r"([-+]?\s*[\d.,' ]*\d(?:[eE][-+]?\d+)?)\s*([^\W\d]\S{0,9}|[°%‰\"'][^\d\s]{0,8})")
 _LIKE_NUMBER = re.compile(r"[-+]?\s*(\d[\d.,'’\u00a0\u202f ]*|[.,]\d+)([eE][-+]?\d+)?")
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}([,.]\d{3})+")
 _SPACED = re.compile(r"(?<=\d)['’\u00a0\u202f ](?=\d{3}(?!\d))")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,8 @@ from discovery.errors import UserError
 from discovery.evaluation.crossvalidation import Fold, folds, masked
 from discovery.experiment import Experiment
 from discovery.experiment.form import ModelEntry
-from discovery.experiment.pipeline import starting_model
-from discovery.fitting import fit_model, predict_recording
+from discovery.experiment.pipeline import fit_of
+from discovery.fitting import predict_recording
 from discovery.models import Model
 from discovery.progress import Progress, silent
 from discovery.recordings import Campaign, Recording
@@ -33,6 +34,7 @@ _LOST = 10.0  # times the error without a model: what is said of a model that ru
 
 # simplest first: name -> entry of an experiment file; INPUTS stands for the channels that drive the outputs
 CANDIDATES = {
+    "regression": '{ kind = "regression", inputs = [INPUTS] }',
     "reduced": '{ kind = "reduced", inputs = [INPUTS] }',
     "first_order": '{ file = "model.toml" }',
     "two_masses": '{ file = "two_masses.toml" }',
@@ -57,7 +59,8 @@ class Score:
 
 
 def choose(experiment: Experiment, progress: Progress = silent) -> list[Score]:
-    """The models of an experiment, which stand there simplest first, best first; one that runs away comes last.
+    """The models of an experiment, which stand there simplest first, best first; one that runs away comes
+    last.
 
     Each is found and fitted anew without each recording (or third of a single one) and predicts it freely.
     Only the recordings to fit are looked at.
@@ -97,8 +100,7 @@ def _left_out(experiment: Experiment, name: str, entry: ModelEntry, fold: Fold) 
     )
     reference = np.array([_spread(whole, r, outputs, fold) for r in fold.recordings or kept])
     try:
-        model, _ = starting_model(inner, name, entry)
-        fit = fit_model(model, inner.fitting, kept, outputs, max_rounds=_ROUNDS)
+        fit = fit_of(inner, name, entry, max_rounds=_ROUNDS)[2]
         left = np.array(
             [_residual(fit.model, whole, r, outputs, fit.noise.white, fold) for r in fold.recordings or kept]
         )
@@ -170,5 +172,5 @@ def _thin(recording: Recording, campaign: Campaign, points: int) -> Recording:
 
 
 def _pieces(series: Array, edges: NDArray[np.int_]) -> Iterator[Array]:
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         yield series[a:b]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from discovery.firsthour.measures import CLOCKS, TIME_UNITS, time_unit

@@ -1,15 +1,15 @@
 """What a column is, as log odds: its name, its unit and its values, added up in one table.
 
 A column has a quantity and a place (`vocabulary`); both together are a role. Each piece of evidence raises or
-lowers the odds of some of them, and none decides alone: a motor that stands between 17 and 42 and answers slowly
-is a temperature whatever it is called, and a column in degC is one whatever its values are.
+lowers the odds of some of them, and none decides alone: a motor that stands between 17 and 42 and answers
+slowly is a temperature whatever it is called, and a column in degC is one whatever its values are.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,10 +23,23 @@ from discovery.firsthour.vocabulary import PLACES, QUANTITIES, SET_POINT, Word, 
 Array = NDArray[np.float64]
 
 _PRIOR = {
-    "temperature": 0.5, "displacement": -0.5, "correction": -2.0, "nozzle height": -4.0, "nozzle side": -4.0,
-    "flow": -1.0, "speed": -0.5, "power": 0.0, "signal": -0.8, "current": -1.0, "voltage": -1.0, "torque": -1.0,
-    "position": -1.0, "other": 0.7, "state": -0.5, "fan": -3.0,
-}  # fmt: skip
+    "temperature": 0.5,
+    "displacement": -0.5,
+    "correction": -2.0,
+    "nozzle height": -4.0,
+    "nozzle side": -4.0,
+    "flow": -1.0,
+    "speed": -0.5,
+    "power": 0.0,
+    "signal": -0.8,
+    "current": -1.0,
+    "voltage": -1.0,
+    "torque": -1.0,
+    "position": -1.0,
+    "other": 0.7,
+    "state": -0.5,
+    "fan": -3.0,
+}
 _PLACE_PRIOR = {"body": 0.0, "air": -4.0, "fluid": -4.5, "coolant": -4.5}
 _HEAD = 1.25  # the last word of a name is what the others tell about: a coolant flow is a flow
 _ROLES = {
@@ -138,12 +151,35 @@ def value_odds(form: Shape, unit: str | None) -> list[tuple[str, Mapping[str, fl
     found: list[tuple[str, Mapping[str, float]]] = []
     span = f"{form.low:.4g} to {form.high:.4g}"
     if form.binary:
-        says = {"temperature": -8.0, "displacement": -6.0, "correction": -5.0, "speed": -4.0, "current": -2.0,
-                "voltage": -2.0, "flow": 1.0, "power": 0.5, "state": 1.5, "signal": -0.5}  # fmt: skip
+        says = {
+            "temperature": -8.0,
+            "displacement": -6.0,
+            "correction": -5.0,
+            "speed": -4.0,
+            "current": -2.0,
+            "voltage": -2.0,
+            "flow": 1.0,
+            "power": 0.5,
+            "state": 1.5,
+            "signal": -0.5,
+        }
         return [("it is 0 or 1", says)]
     if form.slow:
-        found.append(("it answers slowly", {"temperature": 1.5, "displacement": 1.0, "speed": -2.5, "power": -1.0,
-                                            "signal": -1.0, "flow": -1.0, "torque": -1.5, "voltage": -0.5}))  # fmt: skip
+        found.append(
+            (
+                "it answers slowly",
+                {
+                    "temperature": 1.5,
+                    "displacement": 1.0,
+                    "speed": -2.5,
+                    "power": -1.0,
+                    "signal": -1.0,
+                    "flow": -1.0,
+                    "torque": -1.5,
+                    "voltage": -0.5,
+                },
+            )
+        )
     elif form.jump > 0.4:
         says = {
             "temperature": -3.0,
@@ -157,8 +193,12 @@ def value_odds(form: Shape, unit: str | None) -> list[tuple[str, Mapping[str, fl
     if unit is not None:
         return found
     if form.low >= 5.0 and form.high <= 70.0 and form.slow:
-        found.append((f"{span}, as temperatures around a machine", {"temperature": 2.5, "displacement": -0.5,
-                                                                    "speed": -4.0, "voltage": -0.5}))  # fmt: skip
+        found.append(
+            (
+                f"{span}, as temperatures around a machine",
+                {"temperature": 2.5, "displacement": -0.5, "speed": -4.0, "voltage": -0.5},
+            )
+        )
     elif form.low < -60.0 or form.high > 400.0:
         found.append((f"{span}, no temperature", {"temperature": -6.0, "air": -5.0}))
     elif form.low < -30.0 or form.high > 200.0:
@@ -171,8 +211,20 @@ def value_odds(form: Shape, unit: str | None) -> list[tuple[str, Mapping[str, fl
     if form.span > 0 and abs(form.first) < 0.03 * form.span and form.slow and not form.whole:
         found.append(("it starts at zero and answers slowly", {"displacement": 1.5, "temperature": -1.0}))
     if form.low < -0.02 * max(abs(form.high), abs(form.low)):
-        found.append(("it goes below zero", {"displacement": 1.0, "correction": 0.5, "speed": -0.5, "flow": -3.0,
-                                             "power": -1.0, "signal": -5.0, "other": 0.3}))  # fmt: skip
+        found.append(
+            (
+                "it goes below zero",
+                {
+                    "displacement": 1.0,
+                    "correction": 0.5,
+                    "speed": -0.5,
+                    "flow": -3.0,
+                    "power": -1.0,
+                    "signal": -5.0,
+                    "other": 0.3,
+                },
+            )
+        )
     if form.high >= 200.0 and form.whole and form.jump > 0.05:
         found.append((f"whole numbers up to {form.high:.0f}", {"speed": 1.5, "power": 0.5}))
     if form.high > _STEPS:

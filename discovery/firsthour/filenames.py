@@ -88,7 +88,7 @@ def constants(stems: Sequence[str], present: Sequence[str]) -> dict[str, tuple[s
     for unit in dict.fromkeys(unit for one in said.values() for unit in one):
         quantity = likely(dimension_of(unit))[0]
         values = {stem: one[unit] for stem, one in said.items() if unit in one}
-        if quantity in ("speed", "flow", "power") and quantity not in present:
-            if len(values) == len(stems) and len(set(values.values())) > 1:
-                found[quantity] = (unit, values)
+        new = quantity in ("speed", "flow", "power") and quantity not in present
+        if new and len(values) == len(stems) and len(set(values.values())) > 1:
+            found[quantity] = (unit, values)
     return found

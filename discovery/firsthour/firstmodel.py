@@ -139,7 +139,9 @@ def _error(output: str, guesses: Mapping[str, Guess], inputs: Sequence[str], mas
 
 
 def usual_inputs(guesses: Mapping[str, Guess], room: str | None) -> list[str]:
-    """Channels that may drive an error: the air, fluids and temperatures, loads, else speeds, and switches."""
+    """Channels that may drive an error: the air, fluids and temperatures, loads, else speeds, and
+    switches.
+    """
     temperatures = [
         name
         for name, one in guesses.items()

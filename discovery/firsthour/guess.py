@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.firsthour.evidence import OTHER, Evidence, evidence
+from discovery.firsthour.evidence import OTHER, evidence
 from discovery.firsthour.measures import DEGREES, unit_of
 from discovery.firsthour.odds import likely, probabilities
 from discovery.firsthour.shapes import Shape, shape
@@ -94,7 +94,7 @@ def guess(column: Column, hints: Sequence[tuple[str, Mapping[str, float]]] = ())
         return replace(
             one, role=OTHER, chance=0.5, why=f"{why}; the header says {column.unit}, no known unit"
         )
-    return _by_values(one, column, found)
+    return _by_values(one, column)
 
 
 def drives(guesses: Mapping[str, Guess]) -> list[str]:
@@ -122,7 +122,7 @@ def _with_unit(one: Guess, unit: str, listed: bool, written: str) -> Guess:
     return replace(one, role=OTHER, unit="1", chance=0.5, why=f"{one.why}; the header says {written}")
 
 
-def _by_values(one: Guess, column: Column, found: Evidence) -> Guess:
+def _by_values(one: Guess, column: Column) -> Guess:
     """The unit of a column that names none."""
     form = shape(column.values)
     if form is None:
@@ -191,8 +191,8 @@ def _one_scale(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[
 
 
 def _one_unit(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
-    """Loads that differ in their number alone have one unit, guessed from all their values; so has one that is
-    never on that of its neighbour.
+    """Loads that differ in their number alone have one unit, guessed from all their values; so has one
+    that is never on that of its neighbour.
     """
     found = dict(guesses)
     bare = [column for column in columns if _is_load(guesses[column.name]) and not column.unit]
@@ -234,12 +234,8 @@ def _one_room(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[s
     clearest = min(air, key=lambda name: air[name])
     measured = any(one.role in ("temperature", "error") for one in guesses.values())
     why = f"{clearest} is the air around"
-    if (
-        not measured
-        and not clear
-        and len(set(air.values())) == 1
-        and len(air) > 1
-        or (not measured and not clear and len(air) == 1)
+    if (not measured and not clear and len(set(air.values())) == 1 and len(air) > 1) or (
+        not measured and not clear and len(air) == 1
     ):
         clearest, why = "", "nothing else is measured"
     for name, (_, more) in air.items():

@@ -37,7 +37,8 @@ _DATE = (
     r"(?P<a>\d{1,4}|[^\W\d]+)\.?\s*[-./年 ]\s*(?P<b>\d{1,2}|[^\W\d]+)\.?,?\s*[-./月 ]\s*(?P<c>\d{1,4})\s*日?"
 )
 _INSTANT = re.compile(
-    rf"(?:[^\W\d]{{2,10}}[.,]?\s+(?=\d|[^\W\d]))?{_DATE}(?:\s*(?:\([^\W\d]{{1,3}}\))?[ tT_,\-]*(?P<early>午前|午後|上午|下午)?\s*{_TIME})?",
+    rf"(?:[^\W\d]{{2,10}}[.,]?\s+(?=\d|[^\W\d]))?{_DATE}"
+    rf"(?:\s*(?:\([^\W\d]{{1,3}}\))?[ tT_,\-]*(?P<early>午前|午後|上午|下午)?\s*{_TIME})?",
     re.IGNORECASE,
 )
 _COMPACT = re.compile(r"(\d{4})(\d{2})(\d{2})[ T_-]?(\d{2})(\d{2})(\d{2}(?:[.,]\d+)?)?")
@@ -92,7 +93,8 @@ def read_instants(cells: Sequence[str]) -> Instants | None:
 
 
 def read_times_of_day(cells: Sequence[str]) -> Array | None:
-    """Hours and minutes (and seconds) without a date; past midnight the next day begins. None: a cell is none.
+    """Hours and minutes (and seconds) without a date; past midnight the next day begins. None: a cell is
+    none.
 
     >>> read_times_of_day(["23:59:30", "0:00:10"]).tolist()
     [0.0, 40.0]

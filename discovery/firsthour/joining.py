@@ -1,4 +1,5 @@
-"""Two loggers of one recording, each with its own clock and rate: one table, the shift between them estimated.
+"""Two loggers of one recording, each with its own clock and rate: one table, the shift between them
+estimated.
 
 What one logger reads drives what the other reads, so the right shift is the one at which the second can be
 predicted best from the past of the first. Too early a driver is no cause, too late a one misses the onset.
@@ -152,8 +153,7 @@ def _cost(
         known = np.isfinite(column.values)
         at = np.searchsorted(stamps[known], early - shift, side="right") - 1
         held = column.values[known][np.maximum(at, 0)]
-        for lag in _LAGS:
-            features.append(_filtered(held, step, lag * length)[-len(grid) :])
+        features += [_filtered(held, step, lag * length)[-len(grid) :] for lag in _LAGS]
     F = np.column_stack(features)
     F = F / (np.linalg.norm(F, axis=0) + 1e-30)
     gram = F.T @ F + _RIDGE * np.eye(F.shape[1])

@@ -76,11 +76,7 @@ def widen(
     stamp = np.cumsum(np.concatenate(([0], (np.diff(seconds) > 0).astype(np.intp))))
     who = list(dict.fromkeys(series.tolist()))
     unit_column = next((k for k, name in enumerate(names) if re.fullmatch(_UNITS, fold(name))), None)
-    said = (
-        {w: u for w, u in zip(long.series, sheet.cells(unit_column), strict=True)}
-        if unit_column is not None
-        else {}
-    )
+    said = dict(zip(long.series, sheet.cells(unit_column), strict=True)) if unit_column is not None else {}
     columns = []
     values_of = [
         k for k in range(len(names)) if k not in (long.names, *clock) and _moves(sheet.cells(k), long.series)

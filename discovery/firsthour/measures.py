@@ -16,7 +16,8 @@ _SPELLED = {
     "K": "k kelvin °k",
     "delta_degC": "deltak dk",
     "percent": "% pct percent prozent proz. パーセント %pwm %rh %r.h. %rf vh",
-    "rpm": "rpm 1/min u/min u/min. umin upm r/min rev/min min-1 min^-1 min⁻¹ /min tr/min giri/min ob/min 回転/分 r.p.m.",
+    "rpm": "rpm 1/min u/min u/min. umin upm r/min rev/min min-1 min^-1 min⁻¹ /min tr/min giri/min "
+    "ob/min 回転/分 r.p.m.",
     "1/s": "1/s s-1 s^-1 s⁻¹ rps rev/s",
     "W": "w watt watts ワット",
     "kW": "kw kilowatt",
@@ -63,7 +64,8 @@ _TIMES = {
     "ms": "ms msec msecs millis milliseconds millisecond millisekunden millisek ミリ秒 毫秒",
     "s": "s sec secs seconds second sek sekunde sekunden secondes secondi segundos 秒 秒数 秒間 초 сек sec.",
     "min": "min mins minute minutes minuten min. minuti minutos 分 分鐘 分钟 분 мин",
-    "h": "h hr hrs hour hours std std. stunde stunden heure heures ora ore hora horas 時間 小时 小時 시간 час часы",
+    "h": "h hr hrs hour hours std std. stunde stunden heure heures ora ore hora horas "
+    "時間 小时 小時 시간 час часы",
     "d": "d day days tag tage jour jours giorno giorni dia dias 日 天 일",
 }
 _TIME = {word: unit for unit, words in _TIMES.items() for word in words.split()}
@@ -101,7 +103,9 @@ def time_unit(written: str) -> str | None:
 
 
 def unit_of(written: str) -> tuple[str, str | None]:
-    """A unit as it is written, mended where loggers leave out a sign (W/m2), and as one of the list, or None."""
+    """A unit as it is written, mended where loggers leave out a sign (W/m2), and as one of the list, or
+    None.
+    """
     spelled = re.sub(
         r"(?<=[a-zA-Z])(?=[2-4](?!\w))", "**", written.strip().replace("º", "°").replace("˚", "°")
     )
@@ -109,7 +113,8 @@ def unit_of(written: str) -> tuple[str, str | None]:
 
 
 def unit_in(header: str) -> tuple[str, str] | None:
-    """Name and unit of a header such as ``Bed temp [°F]``, ``P_drive (kW)``, ``Zeit in s``, ``T1_degC``, or None.
+    """Name and unit of a header such as ``Bed temp [°F]``, ``P_drive (kW)``, ``Zeit in s``, ``T1_degC``,
+    or None.
 
     >>> unit_in("Bed temp [°F]"), unit_in("T1_degC"), unit_in("主軸温度（℃）"), unit_in("x [table]")
     (('Bed temp', '°F'), ('T1', 'degC'), ('主軸温度', '℃'), None)

@@ -56,7 +56,8 @@ def new(
     there = (folder / "campaign.toml").exists()
     if there and not again:
         raise UserError(
-            f"{folder}: campaign.toml is there already; say --again to make model and experiment anew (what you "
+            f"{folder}: campaign.toml is there already; say --again to make model and experiment anew "
+            "(what you "
             "wrote stays), or name another folder"
         )
     if not sources and not (there and again):

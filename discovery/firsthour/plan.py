@@ -1,4 +1,6 @@
-"""From a campaign to its first models and experiment: chosen by what each predicts that its fit did not see."""
+"""From a campaign to its first models and experiment: chosen by what each predicts that its fit did not
+see.
+"""
 
 from __future__ import annotations
 
@@ -40,11 +42,12 @@ class Plan:
 def plan(
     folder: Path, title: str, names: Sequence[str], progress: Progress = silent, *, quick: bool = False
 ) -> Plan:
-    """First models and the experiment of the campaign in a folder; the last of the named recordings is unseen.
+    """First models and the experiment of the campaign in a folder; the last of the named recordings is
+    unseen.
 
     Args:
-        folder: holds campaign.toml and the recordings; trial models are written into it. title: of the experiment.
-        names: recordings, the last one held out.
+        folder: holds campaign.toml and the recordings; trial models are written into it. title: of the
+        experiment. names: recordings, the last one held out.
         quick: models are not compared: a simple one and a discovered one are written.
 
     Raises:
@@ -71,7 +74,9 @@ def plan(
         for name, entry in CANDIDATES.items()
         if drivers or "INPUTS" not in entry
     }
-    trial = experiment_text(title, [*fit, ""], outputs, lines, None, ()).replace('held_out = [""]', "held_out = []")
+    trial = experiment_text(title, [*fit, ""], outputs, lines, None, ()).replace(
+        'held_out = [""]', "held_out = []"
+    )
     write_atomic(folder / "experiment.toml", trial)
     experiment = load_experiment(folder / "experiment.toml")  # whatever is wrong with it is said now
     scores = [] if quick else choose(experiment, progress)
@@ -130,7 +135,8 @@ def _decided(
     if helping:
         chosen = list(dict.fromkeys([helping[0], *([mismatch] if mismatch else []), *helping[:3]]))
         said = [
-            f"first model: {helping[0]}; it leaves {scores[0].ratio:.0%} of the error without a model on {how} "
+            f"first model: {helping[0]}; it leaves {scores[0].ratio:.0%} of the error without a model "
+            f"on {how} "
             f"that its fit did not see ({', '.join(told[1:])})"
         ]
     else:
@@ -151,7 +157,11 @@ def _decided(
 
 
 def _unchosen(
-    title: str, names: Sequence[str], outputs: Sequence[str], lines: Mapping[str, str], files: Mapping[str, str]
+    title: str,
+    names: Sequence[str],
+    outputs: Sequence[str],
+    lines: Mapping[str, str],
+    files: Mapping[str, str],
 ) -> Plan:
     """The simple model and a discovered one, not compared."""
     models = {name: lines[name].replace(", bootstraps = 0", "") for name in ("first_order", "discovered")}

@@ -107,7 +107,9 @@ def _renewed(
     hints: Mapping[str, Sequence[tuple[str, Mapping[str, float]]]],
     guesses: Mapping[str, Guess],
 ) -> dict[str, Guess]:
-    """Guesses once more beside the columns that were kept: a column that was left out says nothing of them."""
+    """Guesses once more beside the columns that were kept: a column that was left out says nothing of
+    them.
+    """
     again = guess_all(kept, hints)
     return {
         name: one if one.role == "other input" and one.why.endswith("controller") else again[name]
@@ -141,7 +143,9 @@ def _cut(table: OwnTable, rows: slice) -> OwnTable:
 
 
 def _same_units(recordings: dict[str, OwnTable]) -> dict[str, OwnTable]:
-    """Every column in the unit of the first recording, where another logger was set to Fahrenheit or inches."""
+    """Every column in the unit of the first recording, where another logger was set to Fahrenheit or
+    inches.
+    """
     first = {c.name: c.unit for c in next(iter(recordings.values())).columns}
     return {
         name: replace(run, columns=tuple(_in_unit(c, first.get(c.name, "")) for c in run.columns))
@@ -205,7 +209,8 @@ def _common(runs: Sequence[OwnTable]) -> tuple[set[str], list[str]]:
         if not first & here:
             raise UserError(
                 f"{table.path}: its columns differ from those of {runs[0].path} "
-                f"({', '.join(sorted(first ^ here))}); recordings of one campaign have the same columns. Is it "
+                f"({', '.join(sorted(first ^ here))}); recordings of one campaign have the same "
+                "columns. Is it "
                 "the other logger of the same hours? Then say --join instead of --from"
             )
     common = first.intersection(*({column.name for column in run.columns} for run in runs))
@@ -233,7 +238,9 @@ def _says_nothing(
             return "is a set point, no measurement: left out"
     if not np.isfinite(column.values).any():
         return "holds nothing in what is fitted: left out"
-    inputs = one.role == "other input" or (one.role not in TEMPERATURES and one.role != "error" and not one.sure)
+    inputs = one.role == "other input" or (
+        one.role not in TEMPERATURES and one.role != "error" and not one.sure
+    )
     return "never moves: left out" if inputs and never_moves(column) else ""
 
 

@@ -56,7 +56,8 @@ def unknown_room(
     room = Room(round(degrees, 1), round(spread, 1), why)
     return room, (
         f"no room temperature was recorded: {ROOM} is an unknown of each recording, believed to be "
-        f"{room.degrees:g} degC within {room.spread:g} K ({why}). A fit estimates it; better record it, or name "
+        f"{room.degrees:g} degC within {room.spread:g} K ({why}). A fit estimates it; better record "
+        "it, or name "
         "a stand-in with --room COLUMN"
     )
 

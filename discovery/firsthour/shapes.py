@@ -12,7 +12,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Shape:
-    """How values look: `jump`: the third largest step over the span; `slow`: they answer, they do not jump."""
+    """How values look: `jump`: the third largest step over the span; `slow`: they answer, they do not
+    jump.
+    """
 
     low: float
     high: float

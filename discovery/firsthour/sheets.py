@@ -270,7 +270,9 @@ def _explained(name: str, above: Sequence[Row]) -> str:
 def _body(
     path: Path, lines: _Lines, first: int, width: int, spare: int, header: list[str]
 ) -> tuple[tuple[pa.ChunkedArray, ...], Lines, tuple[str, ...]]:
-    """Columns of words, the line of each row, and what was left out: a header once more, what stands below."""
+    """Columns of words, the line of each row, and what was left out: a header once more, what stands
+    below.
+    """
     import pyarrow as pa
 
     chunks: list[list[pa.Array]] = [[] for _ in range(width)]

@@ -58,8 +58,8 @@ _UMLAUTS = str.maketrans(
 class Column:
     """`header`: as in the file. `name`: a word that expressions can use. `unit`: as the file names it, or "".
 
-    `values` (N,), NaN where the cell is empty. `about`: words of the file that explain the name. `words`: of a
-    switch that no list knows, the one that stands for 0 first.
+    `values` (N,), NaN where the cell is empty. `about`: words of the file that explain the name. `words`:
+    of a switch that no list knows, the one that stands for 0 first.
     """
 
     header: str

@@ -6,7 +6,6 @@ import io
 import re
 from collections.abc import Mapping, Sequence
 
-
 from discovery.files import format_toml
 from discovery.firsthour.asking import doubt
 from discovery.firsthour.guess import Guess
@@ -88,8 +87,10 @@ def campaign_text(
         if header and "role =" in line and header != line.split(" ")[0]:
             lines[index] = f"{line}  # {header}"
     head = [
-        "# Written by `discovery new`. Look at each role and unit (`discovery list roles` explains them); where it",
-        "# says guessed, delete those words once you have looked. Roles corrected: `discovery new DIR --again`.",
+        "# Written by `discovery new`. Look at each role and unit (`discovery list roles` explains "
+        "them); where it",
+        "# says guessed, delete those words once you have looked. Roles corrected: `discovery new "
+        "DIR --again`.",
         *(["# " + about_room.replace("\n", " ")] if about_room else []),
     ]
     return "\n".join([*head, *lines]) + "\n"

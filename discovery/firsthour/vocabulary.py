@@ -64,7 +64,8 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "growth",
         {"displacement": 5},
         "growth elongation expansion ~ausdehnung ~dehnung ~伸び ~伸长 ~热变形 ~熱変位 "
-        "~drift lvdt ~messtaster ~taster ~wegaufnehmer ~wegsensor gap rtest runout ~allongement ~dilatation ~nullpunkt",
+        "~drift lvdt ~messtaster ~taster ~wegaufnehmer ~wegsensor gap rtest runout ~allongement "
+        "~dilatation ~nullpunkt",
     ),
     ("probe", {"displacement": 3}, "probe shift eddy ~プローブ"),
     (
@@ -171,10 +172,15 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "ambient",
         {"air": 9, "temperature": 1.5},
         "amb ambient env environment ~umgebung ~umgebungs outside outdoor outdoors "
-        "ext external surrounding surroundings ~aussen ~外気 ~周囲 ~环境 ~環境 ~室外 ambiant ambiante ambiental ambiente ~주변 "
+        "ext external surrounding surroundings ~aussen ~外気 ~周囲 ~环境 ~環境 ~室外 ambiant ambiante "
+        "ambiental ambiente ~주변 "
         "exterieur esterno exterior ta taussen",
     ),
-    ("air", {"air": 7.5, "temperature": 1.5}, "air hall ~halle ~hallen ~luft shop workshop ~車間 ~车间 ~工場"),
+    (
+        "air",
+        {"air": 7.5, "temperature": 1.5},
+        "air hall ~halle ~hallen ~luft shop workshop ~車間 ~车间 ~工場",
+    ),
     (
         "room",
         {"air": 7, "temperature": 1.5},
@@ -198,8 +204,11 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "body",
         {"body": 2, "temperature": 1},
         "housing bearing plate body bed table column headstock tailstock ~lager "
-        "~gehaeuse ~bett ~tisch ~staender ~ベッド ~軸受 ~轴承 ~床身 ~コラム ~テーブル nut ~mutter ~ballscrew ~screw ~schlitten "
-        "saddle ram frame ~rahmen ~gestell palier tavola mesa bancada ~立柱 extruder nozzle nut guide ~fuehrung ~motor "
+        "~gehaeuse ~bett ~tisch ~staender ~ベッド ~軸受 ~轴承 ~床身 "
+        "~コラム ~テーブル nut ~mutter ~ballscrew ~screw "
+        "~schlitten "
+        "saddle ram frame ~rahmen ~gestell palier tavola mesa bancada ~立柱 extruder nozzle nut guide "
+        "~fuehrung ~motor "
         "~モータ ~电机 node wall wand",
     ),
 )

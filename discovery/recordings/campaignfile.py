@@ -64,7 +64,7 @@ class ChannelForm(Strict):
 
     guessed: str | None = Field(
         None,
-        description="what `discovery new` was not sure of; delete it once you have looked, `run` says what hangs on it",
+        description="what `discovery new` was not sure of; delete it once you have looked",
     )
 
     @model_validator(mode="after")

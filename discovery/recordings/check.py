@@ -26,8 +26,8 @@ from discovery.recordings.valuecheck import (
     few_findings,
     frozen_findings,
     load_findings,
-    small_findings,
     range_findings,
+    small_findings,
 )
 from discovery.schema import sentences, suggest
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-
 Severity = Literal["error", "warning"]
 _NAMED = 4  # files that a folded line names
 
@@ -60,8 +59,10 @@ def folded(findings: Sequence[Finding]) -> list[str]:
     """A line for each finding, worst first; of a kind that comes again and again one line for all.
 
     >>> from dataclasses import replace
-    >>> one = Finding("warning", Path("a.csv"), 1, "the column 'x' is not a channel", "declare it", "stray", "x")
-    >>> folded([one, replace(one, file=Path("b.csv")), replace(one, channel="y", what="the column 'y' is not")])
+    >>> one = Finding("warning", Path("a.csv"), 1, "the column 'x' is not a channel", "declare it",
+    "stray", "x")
+    >>> folded([one, replace(one, file=Path("b.csv")), replace(one, channel="y", what="the column 'y' is
+    not")])
     ["warning: a.csv, line 1: the column 'x' is not a channel; declare it (the same of y; also in b.csv)"]
     """
     groups: dict[tuple[object, ...], list[Finding]] = {}

@@ -1,4 +1,6 @@
-"""Values that no sensor means: a logger's words for "nothing", zeros for missing readings, lone readings, steps."""
+"""Values that no sensor means: a logger's words for "nothing", zeros for missing readings, lone readings,
+steps.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,32 @@ if TYPE_CHECKING:
 
 FEW = 20  # readings: fewer carry no model
 # what loggers write where they have nothing: limits of number formats, broken thermocouples, power-on values
-_WORDS = (-999.0, -9999.0, -99999.0, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, 999.99, 9999.99, -99.9, -127.0,
-          32767.0, -32768.0, 3276.7, -3276.8, 65535.0, 6553.5, 1e6, 999999.0, 2147483647.0, -2147483648.0, 4294967295.0)  # fmt: skip
+_WORDS = (
+    -999.0,
+    -9999.0,
+    -99999.0,
+    999.0,
+    9999.0,
+    99999.0,
+    999.9,
+    -999.9,
+    9999.9,
+    999.99,
+    9999.99,
+    -99.9,
+    -127.0,
+    32767.0,
+    -32768.0,
+    3276.7,
+    -3276.8,
+    65535.0,
+    6553.5,
+    1e6,
+    999999.0,
+    2147483647.0,
+    -2147483648.0,
+    4294967295.0,
+)
 _LARGEST = 1e15  # no quantity of a machine is so large in any unit
 _APART = 3.0  # times the span of the other readings
 _LONE = 20.0  # median steps: a single reading so far from both neighbours is wrong
@@ -45,13 +71,31 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
     if limits is not None:
         told = np.flatnonzero((read < limits.usual[0]) | (read > limits.usual[1]))
     words = np.setdiff1d(words, told)
-    yield from _told(file, lines[known], channel, read, words, "no reading but a logger's word for nothing",
-                     "empty these cells", "sentinel", weight=5.0)  # fmt: skip
+    yield from _told(
+        file,
+        lines[known],
+        channel,
+        read,
+        words,
+        "no reading but a logger's word for nothing",
+        "empty these cells",
+        "sentinel",
+        weight=5.0,
+    )
     if channel.role not in _SENSORS or known.size < FEW:
         return
     zeros = np.setdiff1d(_zeros(read), words)
-    yield from _told(file, lines[known], channel, read, zeros, "exactly zero between readings far from it",
-                     "empty the cells where nothing was measured", "zeros", weight=4.0)  # fmt: skip
+    yield from _told(
+        file,
+        lines[known],
+        channel,
+        read,
+        zeros,
+        "exactly zero between readings far from it",
+        "empty the cells where nothing was measured",
+        "zeros",
+        weight=4.0,
+    )
     lone = np.setdiff1d(lone_readings(read), [*words, *zeros, *told])
     left_out = np.intersect1d(lone, impossible_readings(channel, read)).size
     if left_out or lone.size >= max(_MANY, _MANY_SHARE * read.size):

@@ -2,8 +2,8 @@
 
     r' = (u - r)/tau
 
-The sum of such responses over a few time constants is a rough model of every measured channel that needs no fit
-but least squares. It serves to compare recordings with each other and to find what drives an output.
+The sum of such responses over a few time constants is a rough model of every measured channel that needs
+no fit but least squares. It serves to compare recordings with each other and to find what drives an output.
 """
 
 from collections.abc import Mapping, Sequence
@@ -68,6 +68,5 @@ def responses(
     columns = []
     for name, values in inputs.items():
         even = input_on_grid(time, values, grid, between[name])
-        for tau in taus:
-            columns.append(np.interp(at, grid, filtered(even, step, tau)))
+        columns += [np.interp(at, grid, filtered(even, step, tau)) for tau in taus]
     return np.column_stack(columns) if columns else np.zeros((len(at), 0))

@@ -44,7 +44,8 @@ def time_odds(values: Array, moving: Sequence[Array], interval: float | None = N
     """Log odds of the units in which a clock counts.
 
     Args:
-        values: (N,) of the clock. moving: each (N,), what was read. interval: of the logger [s], where the file states it.
+        values: (N,) of the clock. moving: each (N,), what was read. interval: of the logger [s], where the
+            file states it.
     """
     steps = np.diff(values)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0

@@ -12,7 +12,6 @@ from discovery.errors import UserError
 from discovery.firsthour.guess import Guess, drives, guess, guess_all
 from discovery.firsthour.table import Column, read_own
 
-
 CASES = [
     ("T_room", "", np.linspace(20, 23, 50), "ambient temperature", "degC"),
     ("Ambient", "", np.linspace(70, 74, 50), "ambient temperature", "degF"),

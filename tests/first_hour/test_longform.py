@@ -22,12 +22,15 @@ def _log(folder: Path, *lines: str) -> Path:
 def test_a_long_table_becomes_wide(tmp_path: Path, above: tuple[str, ...]) -> None:
     days = ["28.02", "01.03"]  # a month ends: as words, the stamps would be sorted wrongly
     rows = [
-        f"{1000 * k + n};{days[k // 6]}.2026 08:{k:02d}:00;{87 + n};{name};{20 * n + k % 4},5;{'C' if n < 2 else '-'}"
+        f"{1000 * k + n};{days[k // 6]}.2026 "
+        f"08:{k:02d}:00;{87 + n};{name};{20 * n + k % 4},5;{'C' if n < 2 else '-'}"
         for k in range(12)
         for n, name in enumerate(SENSORS)
     ]
     wide = read_own(_log(tmp_path, *above, "Milliseconds;Date;Parameter;Description;Value;Unit", *rows))
-    assert [(column.header, column.unit) for column in wide.columns] == list(zip(SENSORS, ("C", "C", "-"), strict=True))
+    assert [(column.header, column.unit) for column in wide.columns] == list(
+        zip(SENSORS, ("C", "C", "-"), strict=True)
+    )
     assert len(wide.time) == 12
     assert wide.columns[1].values.tolist() == [20.5 + k % 4 for k in range(12)]
     assert "the table is long: column 'Description' names 3 sensors" in wide.notes[-1]

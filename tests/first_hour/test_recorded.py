@@ -185,7 +185,12 @@ def test_nothing_stands_for_a_room_that_would_drive_errors(tmp_path: Path) -> No
 
 def test_a_column_may_stand_for_the_room(tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text(
-        "\n".join(["time,P [W],T1 [C],roof [C]", *(f"{k},{k % 3},{25 + k // 5},{12 + k / 30:.1f}" for k in range(60))])
+        "\n".join(
+            [
+                "time,P [W],T1 [C],roof [C]",
+                *(f"{k},{k % 3},{25 + k // 5},{12 + k / 30:.1f}" for k in range(60)),
+            ]
+        )
     )
     result = CliRunner().invoke(
         app, ["new", str(tmp_path / "rig"), "--quick", "--room", "roof", "--from", str(tmp_path / "run.csv")]

@@ -173,14 +173,16 @@ M, H = "machine", "heaters"
 
 def _damages() -> list[Damage]:
     r, h = "run1", "random_both_v2_02"
-    found = [
+    return [
         Damage("kW read as W", M, r, ("P_drive",), _set("P_drive", lambda v, _: v / 1e3)),
         Damage("kW read as W, cooling", M, r, ("P_cool",), _set("P_cool", lambda v, _: v / 1e3)),
         Damage("W read as kW", M, r, ("P_drive",), _set("P_drive", lambda v, _: v * 1e3)),
         Damage("1/s read as rpm", M, r, ("speed",), _set("speed", lambda v, _: v / 60)),
         Damage("speed ten times too large", M, r, ("speed",), _set("speed", lambda v, _: v * 10)),
-        *(Damage(f"Fahrenheit read as Celsius, {n}", M, r, (n,), _set(n, lambda v, _: 1.8 * v + 32))
-          for n in ("T_env", "T_fluid", "T_cool")),
+        *(
+            Damage(f"Fahrenheit read as Celsius, {n}", M, r, (n,), _set(n, lambda v, _: 1.8 * v + 32))
+            for n in ("T_env", "T_fluid", "T_cool")
+        ),
         Damage("kelvin read as Celsius", M, r, ("T_env",), _set("T_env", lambda v, _: v + 273.15)),
         Damage("Fahrenheit from half way on", M, r, ("T_fluid",), _set("T_fluid", _half(1.8, 32))),
         *(Damage(f"mm read as um, {n}", M, r, (n,), _set(n, lambda v, _: v / 1e3)) for n in ERRORS),
@@ -189,21 +191,41 @@ def _damages() -> list[Damage]:
         Damage("errors ten times too small", M, r, ("E_Y0C",), _set("E_Y0C", lambda v, _: v / 10)),
         *(Damage(f"mm from half way on, {n}", M, r, (n,), _set(n, _half(1e-3))) for n in ("E_Y0C", "E_R0T")),
         *(Damage(f"sign of an error, {n}", M, r, (n,), _set(n, lambda v, _: -v)) for n in ERRORS),
-        *(Damage(f"sign from half way on, {n}", M, r, (n,), _set(n, _half(-1.0))) for n in ("E_Y0C", "E_Z0T")),
+        *(
+            Damage(f"sign from half way on, {n}", M, r, (n,), _set(n, _half(-1.0)))
+            for n in ("E_Y0C", "E_Z0T")
+        ),
         Damage("sign of a power", M, r, ("P_drive",), _set("P_drive", lambda v, _: -v)),
         Damage("pump switch turned round", M, r, ("pump",), _set("pump", lambda v, _: 1 - v)),
-        *(Damage(f"swapped: {a}, {b}", M, r, (a, b), _swap(a, b))
-          for a, b in (("E_Y0C", "E_Z0T"), ("E_Z0T", "E_R0T"), ("E_R0T", "E_A0C"), ("T_env", "T_fluid"),
-                       ("T_fluid", "T_cool"), ("T_env", "T_cool"), ("speed", "P_drive"), ("P_drive", "P_cool"))),
+        *(
+            Damage(f"swapped: {a}, {b}", M, r, (a, b), _swap(a, b))
+            for a, b in (
+                ("E_Y0C", "E_Z0T"),
+                ("E_Z0T", "E_R0T"),
+                ("E_R0T", "E_A0C"),
+                ("T_env", "T_fluid"),
+                ("T_fluid", "T_cool"),
+                ("T_env", "T_cool"),
+                ("speed", "P_drive"),
+                ("P_drive", "P_cool"),
+            )
+        ),
         Damage("all readings 3 h late", M, r, ERRORS, _late(ERRORS, 10800.0)),
         Damage("all readings 1 h early", M, r, ERRORS, _late(ERRORS, -3600.0)),
         Damage("a power 3 h late", M, r, ("P_drive",), _late(("P_drive",), 10800.0)),
         Damage("a speed 3 h late", M, r, ("speed",), _late(("speed",), 10800.0)),
         Damage("an error 3 h late", M, r, ("E_Y0C",), _late(("E_Y0C",), 10800.0)),
-        Damage("a clock one hour off", M, r, ("pump", "speed", "P_drive", "P_cool"),
-               _late(("pump", "speed", "P_drive", "P_cool"), 3600.0)),
-        *(Damage(f"{word} read as seconds", M, r, (), lambda f, k=k: f | {"time": f["time"] / k})
-          for word, k in (("minutes", 60.0), ("hours", 3600.0), ("days", 86400.0), ("milliseconds", 1e-3))),
+        Damage(
+            "a clock one hour off",
+            M,
+            r,
+            ("pump", "speed", "P_drive", "P_cool"),
+            _late(("pump", "speed", "P_drive", "P_cool"), 3600.0),
+        ),
+        *(
+            Damage(f"{word} read as seconds", M, r, (), lambda f, k=k: f | {"time": f["time"] / k})
+            for word, k in (("minutes", 60.0), ("hours", 3600.0), ("days", 86400.0), ("milliseconds", 1e-3))
+        ),
         Damage("a clock that runs 20 % fast", M, r, (), lambda f: f | {"time": f["time"] * 1.2}),
         Damage("missing readings as 0", M, r, ("T_fluid",), _set("T_fluid", _rows(0.05, 0.0))),
         Damage("missing errors as 0", M, r, ("E_Y0C",), _set("E_Y0C", _rows(0.05, 0.0))),
@@ -218,28 +240,85 @@ def _damages() -> list[Damage]:
         Damage("20 times the noise, a temperature", M, r, ("T_fluid",), _set("T_fluid", _noisy(2.0))),
         Damage("a step of 25 um", M, r, ("E_Y0C",), _set("E_Y0C", _half(1.0, 25.0))),
         Damage("a step of 100 um", M, r, ("E_R0T",), _set("E_R0T", _half(1.0, 100.0))),
-        Damage("a drift of 60 um", M, r, ("E_Z0T",), _set("E_Z0T", lambda v, f: v + 60 * f["time"] / f["time"][-1])),
+        Damage(
+            "a drift of 60 um",
+            M,
+            r,
+            ("E_Z0T",),
+            _set("E_Z0T", lambda v, f: v + 60 * f["time"] / f["time"][-1]),
+        ),
         Damage("a sensor 10 K too warm", M, r, ("T_fluid",), _set("T_fluid", lambda v, _: v + 10)),
         Damage("frozen from half way on", M, r, ("E_Z0T",), _set("E_Z0T", _from(0.5, _frozen))),
         Damage("frozen temperature", M, r, ("T_fluid",), _set("T_fluid", _from(0.3, _frozen))),
         Damage("frozen power", M, r, ("P_drive",), _set("P_drive", _from(0.3, _frozen))),
-        Damage("dead from the start", M, r, ("E_R0T",), _set("E_R0T", lambda v, _: np.where(np.isfinite(v), 0.0, v))),
-        Damage("a power saturated at 40 %", M, r, ("P_drive",), _set("P_drive", lambda v, _: np.minimum(v, 0.4 * np.nanmax(v)))),
-        Damage("an error saturated", M, r, ("E_Y0C",), _set("E_Y0C", lambda v, _: np.clip(v, np.nanpercentile(v, 30), None))),
-        Damage("a temperature saturated", M, r, ("T_fluid",), _set("T_fluid", lambda v, _: np.minimum(v, np.nanpercentile(v, 40)))),
+        Damage(
+            "dead from the start",
+            M,
+            r,
+            ("E_R0T",),
+            _set("E_R0T", lambda v, _: np.where(np.isfinite(v), 0.0, v)),
+        ),
+        Damage(
+            "a power saturated at 40 %",
+            M,
+            r,
+            ("P_drive",),
+            _set("P_drive", lambda v, _: np.minimum(v, 0.4 * np.nanmax(v))),
+        ),
+        Damage(
+            "an error saturated",
+            M,
+            r,
+            ("E_Y0C",),
+            _set("E_Y0C", lambda v, _: np.clip(v, np.nanpercentile(v, 30), None)),
+        ),
+        Damage(
+            "a temperature saturated",
+            M,
+            r,
+            ("T_fluid",),
+            _set("T_fluid", lambda v, _: np.minimum(v, np.nanpercentile(v, 40))),
+        ),
         Damage("readings rounded to 10 um", M, r, ("E_Y0C",), _set("E_Y0C", lambda v, _: np.round(v, -1))),
         Damage("twice as large", M, r, ("E_Y0C",), _set("E_Y0C", lambda v, _: 2 * v)),
         Damage("a power half as large", M, r, ("P_drive",), _set("P_drive", lambda v, _: v / 2)),
-        Damage("an input that is the error", M, r, ("P_cool", "E_Y0C"), lambda f: f | {"P_cool": _held(f["E_Y0C"], 0.01)}),
-        Damage("no stamp order", M, r, (), lambda f: f | {"time": np.concatenate((f["time"][1:], f["time"][:1]))}),
-        Damage("a clock set back by an hour", M, r, (), lambda f: f | {"time": np.where(f["time"] > 9e4, f["time"] - 3600, f["time"])}),
-        Damage("a gap of ten hours", M, r, (), lambda f: {n: v[(f["time"] < 5e4) | (f["time"] > 8.6e4)] for n, v in f.items()}),
-        Damage("an input empty for ten hours", M, r, ("T_fluid",),
-               _set("T_fluid", lambda v, f: np.where((f["time"] > 5e4) & (f["time"] < 8.6e4), np.nan, v))),
+        Damage(
+            "an input that is the error",
+            M,
+            r,
+            ("P_cool", "E_Y0C"),
+            lambda f: f | {"P_cool": _held(f["E_Y0C"], 0.01)},
+        ),
+        Damage(
+            "no stamp order", M, r, (), lambda f: f | {"time": np.concatenate((f["time"][1:], f["time"][:1]))}
+        ),
+        Damage(
+            "a clock set back by an hour",
+            M,
+            r,
+            (),
+            lambda f: f | {"time": np.where(f["time"] > 9e4, f["time"] - 3600, f["time"])},
+        ),
+        Damage(
+            "a gap of ten hours",
+            M,
+            r,
+            (),
+            lambda f: {n: v[(f["time"] < 5e4) | (f["time"] > 8.6e4)] for n, v in f.items()},
+        ),
+        Damage(
+            "an input empty for ten hours",
+            M,
+            r,
+            ("T_fluid",),
+            _set("T_fluid", lambda v, f: np.where((f["time"] > 5e4) & (f["time"] < 8.6e4), np.nan, v)),
+        ),
         Damage("infinite readings", M, r, ("E_Y0C",), _set("E_Y0C", _rows(0.01, np.inf))),
         # two real heaters
         Damage("heaters: swapped temperatures", H, "random_h1_03", ("T1", "T2"), _swap("T1", "T2")),
-        Damage("heaters: swapped heaters", H, "random_h1_03", ("heater1", "heater2"), _swap("heater1", "heater2")),
+        Damage(
+            "heaters: swapped heaters", H, "random_h1_03", ("heater1", "heater2"), _swap("heater1", "heater2")
+        ),
         Damage("heaters: Fahrenheit", H, h, ("T1",), _set("T1", lambda v, _: 1.8 * v + 32)),
         Damage("heaters: minutes read as seconds", H, h, (), lambda f: f | {"time": f["time"] / 60}),
         Damage("heaters: hours read as seconds", H, h, (), lambda f: f | {"time": f["time"] / 3600}),
@@ -249,12 +328,16 @@ def _damages() -> list[Damage]:
         Damage("heaters: frozen sensor", H, h, ("T2",), _set("T2", _from(0.5, _frozen))),
         Damage("heaters: zeros", H, h, ("T1",), _set("T1", _rows(0.02, 0.0))),
         Damage("heaters: -127 of a digital sensor", H, h, ("T1",), _set("T1", _rows(0.02, -127.0))),
-        Damage("heaters: climbs 22 K in 6 min", H, h, ("T2",),
-               _set("T2", lambda v, f: v + 22 * np.clip((f["time"] - 4000) / 360, 0, 1))),
+        Damage(
+            "heaters: climbs 22 K in 6 min",
+            H,
+            h,
+            ("T2",),
+            _set("T2", lambda v, f: v + 22 * np.clip((f["time"] - 4000) / 360, 0, 1)),
+        ),
         Damage("heaters: starts at 48", H, "step_h1_up_080", ("T2",), _set("T2", lambda v, _: v + 25)),
         Damage("heaters: -180 throughout", H, h, ("T2",), _set("T2", lambda v, _: np.full(v.size, -180.0))),
-    ]  # fmt: skip
-    return found
+    ]
 
 
 def _held(values: Array, noise: float) -> Array:
@@ -307,7 +390,8 @@ def main(only: str = "") -> None:
         said = next((f for f in found if is_named(one, [f])), None) or (found[0] if found else None)
         what = said.what.replace("|", "/") if said else "-"
         print(
-            f"| {one.name} | {one.base} | {'yes' if named else 'NO'} | {what}{' +' + str(len(others(one, found))) + ' elsewhere' if others(one, found) else ''} |",
+            f"| {one.name} | {one.base} | {'yes' if named else 'NO'} | "
+            f"{what}{' +' + str(len(others(one, found))) + ' elsewhere' if others(one, found) else ''} |",
             flush=True,
         )
     print(f"\n{count} of {len(DAMAGES)} found and named.")

@@ -20,7 +20,9 @@ class Simulated:
 
 
 def simulated(seed: int) -> Simulated:
-    """A machine of two to five bodies, one to three loads, now and then a fluid; two to six recordings of it."""
+    """A machine of two to five bodies, one to three loads, now and then a fluid; two to six recordings of
+    it.
+    """
     rng = np.random.default_rng([seed, 7])
     bodies, loads = int(rng.integers(2, 6)), int(rng.integers(1, 4))
     has_fluid, has_room = rng.random() < 0.4, rng.random() < 0.8

@@ -91,7 +91,8 @@ def test_nothing_is_wrong(write: Write) -> None:
         ),
         (
             with_column(1, ["20", "20.1"] * 20 + ["-28"] + ["20.1", "20"] * 10),
-            "warning: fit.csv, line 42: 'T_env' is -28 degC in one reading between 20.1 and 20.1; it is left out",
+            "warning: fit.csv, line 42: 'T_env' is -28 degC in one reading between 20.1 and 20.1; it "
+            "is left out",
         ),
         (
             with_column(3, ["7", "", "8", ""] * 10 + ["900", ""] + ["7", "", "8", ""] * 5),

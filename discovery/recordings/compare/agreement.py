@@ -2,8 +2,8 @@
 
 Every measured channel is predicted in each recording by what the others say of it: a sum of first-order
 responses to the inputs, from the first reading on, with coefficients from the other recordings alone. Where a
-recording disagrees, each known damage is undone in turn (`repairs`); one that brings it back into agreement is
-named. The damage with the largest gain is undone first, and the rest is looked at anew.
+recording disagrees, each known damage is undone in turn (`repairs`); one that brings it back into
+agreement is named. The damage with the largest gain is undone first, and the rest is looked at anew.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _FEWEST = 20
 _RIDGE = 1e-3
 _ROOM = 22.0  # degC: responses to temperatures are counted from here
 _SUSPECT = 1.3  # times the usual misfit: a recording that may be damaged
-# log likelihood a reading, over the root of the outputs, that a repair has to gain: of 100 sound campaigns drawn at
-# random none gains so much by chance, of damaged ones nine in ten gain more
+# log likelihood a reading, over the root of the outputs, that a repair has to gain: of 100 sound campaigns
+# drawn at random none gains so much by chance, of damaged ones nine in ten gain more
 _GAIN, _TWO_GAIN = 1.3, 1.7  # among several recordings; of two that stand against each other
 _AGREES = 3.0  # times the usual misfit, at most, after a repair
 _TWO_AGREES = 0.4  # of the movement itself
@@ -150,7 +150,7 @@ class _Story:
         two = len(self.recordings) == 2
         theta = {y: t for y in self.outputs if (t := self._theta(y, {one.name})) is not None}
         features = self.features[one.name]
-        parts = {y: self._parts(features, y, theta[y]) for y in theta}
+        parts = {y: self._parts(features, theta[y]) for y in theta}
         misfit = {
             y: m
             for y in theta
@@ -181,7 +181,8 @@ class _Story:
                 float(np.sqrt(np.mean([of[y] ** 2 for y in touched]))) for of in (misfit, after, usual)
             )
             agrees = a < _TWO_AGREES if two else a < min(_AGREES * limit, 0.6)
-            # the log likelihood of each output's readings; a half of them by chance is as good as all by little
+            # the log likelihood of each output's readings; a half of them by chance is as good as all by
+            # little
             each = [np.log(max(misfit[y], _LEAST) / max(after[y], _LEAST)) for y in touched]
             gain = float(np.sum(each)) / len(touched) ** 0.5
             least = (_TWO_GAIN if two else _GAIN) + _DOUBT[repair.kind]
@@ -209,8 +210,8 @@ class _Story:
         parts: Mapping[str, Mapping[str, Array]],
         theta: Mapping[str, Array],
     ) -> float:
-        """By how many seconds a channel, or all readings, are late: the response to a late input is late by as
-        much, so that nothing has to be filtered anew.
+        """By how many seconds a channel, or all readings, are late: the response to a late input is late
+        by as much, so that nothing has to be filtered anew.
         """
         length = float(one.time[-1])
         shifts = np.concatenate([[0.0], -_LATE * length, _LATE * length])
@@ -259,7 +260,7 @@ class _Story:
             mine = (
                 parts[y]
                 if not changed
-                else {**parts[y], **self._parts(features, y, theta[y], self._with(changed))}
+                else {**parts[y], **self._parts(features, theta[y], self._with(changed))}
             )
             misfit = self._misfit(features, mine, theta[y], y, reading)
             if misfit is not None:
@@ -271,7 +272,7 @@ class _Story:
         return [name for name in self.names if changed & set(name.split("*"))]
 
     def _parts(
-        self, features: _Features, y: str, theta: Array, names: Sequence[str] | None = None
+        self, features: _Features, theta: Array, names: Sequence[str] | None = None
     ) -> dict[str, Array]:
         """What each input does to an output, on the grid (G,)."""
         width = len(self.taus)
@@ -300,7 +301,7 @@ class _Story:
             theta = self._theta(y, {without, name})
             reading = self.readings[name, y]
             if theta is not None:
-                parts = self._parts(self.features[name], y, theta)
+                parts = self._parts(self.features[name], theta)
                 found.append(self._misfit(self.features[name], parts, theta, y, reading) or 0.0)
         return max(float(np.median(found)) if found else 0.0, _LEAST)
 

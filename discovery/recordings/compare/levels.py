@@ -1,4 +1,6 @@
-"""A channel against its siblings and against itself in the other recordings: level, noise, resolution, speed."""
+"""A channel against its siblings and against itself in the other recordings: level, noise, resolution,
+speed.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,10 @@ def _noise(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
         if sizes[one.name] >= _FEWEST and usual > 0 and found[one.name] > _NOISIER * usual:
             times = found[one.name] / usual
             where = "than in the other recordings" if others else "than the campaign says"
-            what = f"'{channel.name}' is {times:.2g} times noisier {where} ({found[one.name]:.2g} {channel.unit})"
+            what = (
+                f"'{channel.name}' is {times:.2g} times noisier {where} ({found[one.name]:.2g} "
+                f"{channel.unit})"
+            )
             yield _finding(
                 one, channel, 0, what, "look at its cable, range and filter", "noise", np.log(times)
             )
@@ -71,7 +76,10 @@ def _resolution(recordings: Sequence[Seen], channel: Channel) -> Iterator[Findin
             continue
         usual, span = float(np.median(others)), float(np.ptp(read))
         if steps[one.name] > _COARSER * usual and steps[one.name] > 0.02 * span > 0:
-            what = f"'{channel.name}' is recorded in steps of {steps[one.name]:.2g} {channel.unit}, elsewhere of {usual:.2g}"
+            what = (
+                f"'{channel.name}' is recorded in steps of {steps[one.name]:.2g} {channel.unit}, "
+                f"elsewhere of {usual:.2g}"
+            )
             yield _finding(one, channel, 0, what, "record it with more digits", "resolution", 0.5)
 
 
@@ -106,7 +114,8 @@ def _full_range(recordings: Sequence[Seen], channel: Channel) -> Iterator[Findin
                 read = one.known(channel.name)[1]
                 row = int(np.argmax(sign * read))
                 what = (
-                    f"'{channel.name}' stays at its {'largest' if sign > 0 else 'smallest'} value {read[row]:.4g} in "
+                    f"'{channel.name}' stays at its {'largest' if sign > 0 else 'smallest'} value "
+                    f"{read[row]:.4g} in "
                     f"{flat[one.name, sign]:.0%} of its readings; elsewhere it goes "
                     f"{'higher' if sign > 0 else 'lower'} and never stays"
                 )
@@ -114,7 +123,9 @@ def _full_range(recordings: Sequence[Seen], channel: Channel) -> Iterator[Findin
 
 
 def _climbs(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
-    """A temperature that moves far faster than it does in any other recording, and not by a single reading."""
+    """A temperature that moves far faster than it does in any other recording, and not by a single
+    reading.
+    """
     fastest = {one.name: _fastest(*one.known(channel.name)) for one in recordings}
     for one in recordings:
         others = [v for name, (v, _) in fastest.items() if name != one.name]
@@ -124,7 +135,10 @@ def _climbs(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
         usual = max(others)
         if abs(change) > max(_CLIMB, _FASTER * usual):
             word = "climbs" if change > 0 else "falls"
-            what = f"'{channel.name}' {word} by {abs(change):.3g} K within {_MINUTES / 60:.0f} min, elsewhere by at most {usual:.2g} K"
+            what = (
+                f"'{channel.name}' {word} by {abs(change):.3g} K within {_MINUTES / 60:.0f} min, "
+                f"elsewhere by at most {usual:.2g} K"
+            )
             yield _finding(one, channel, row, what, "look at the sensor and its contact", "climbs", 2.0)
 
 
@@ -178,7 +192,8 @@ def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iter
                 read = one.known(c.name)[1]
                 side = "above" if here > 0 else "below"
                 what = (
-                    f"'{c.name}' starts at {np.median(read[:5]):.3g} degC, {abs(here):.2g} K {side} the other "
+                    f"'{c.name}' starts at {np.median(read[:5]):.3g} degC, {abs(here):.2g} K {side} "
+                    "the other "
                     f"temperatures, which agree"
                 )
                 yield _finding(one, c, 0, what, "look at the sensor, its unit and its contact", "start", 2.0)
@@ -207,7 +222,9 @@ def _exchanged(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterato
 
 
 def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Finding]:
-    """An input that keeps one value while another one, with which it moves elsewhere, goes on: frozen or full."""
+    """An input that keeps one value while another one, with which it moves elsewhere, goes on: frozen or
+    full.
+    """
     for b in inputs:
         for a in inputs:
             if a.name == b.name or (a.unit == "degC") != (b.unit == "degC"):
@@ -227,7 +244,8 @@ def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Fi
                 usual = max((_goes_on(o) for o in others), default=0.0)
                 if still.mean() > _STILL and goes_on > 0.4 and usual < 0.5 * goes_on:
                     what = (
-                        f"'{b.name}' stays at {value:.4g} in {still.mean():.0%} of the recording while '{a.name}', with "
+                        f"'{b.name}' stays at {value:.4g} in {still.mean():.0%} of the recording "
+                        f"while '{a.name}', with "
                         "which it moves elsewhere, goes on"
                     )
                     do = "frozen, or at the end of its range: look at the sensor"

@@ -1,7 +1,7 @@
 """Damages of recordings that are known from shop floors, each with what undoes it.
 
-A damage is named where undoing it makes a recording agree with the others (`agreement`). A new one is a further
-function that yields repairs.
+A damage is named where undoing it makes a recording agree with the others (`agreement`). A new one is a
+further function that yields repairs.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from discovery.recordings.compare.seen import Seen
 
 @dataclass(frozen=True)
 class Repair:
-    """`kind`: word of the damage. `channels`: whose readings change, () where the clock does. `what`, `do`: as in
-    a finding. `made`: the recording repaired.
+    """`kind`: word of the damage. `channels`: whose readings change, () where the clock does. `what`,
+    `do`: as in a finding. `made`: the recording repaired.
     """
 
     kind: str
@@ -33,13 +33,30 @@ _FACTORS: dict[str, tuple[tuple[float, str, str], ...]] = {
     "error": ((1e3, "mm", "um"), (1e-3, "nm", "um"), (25.4e3, "inches", "um")),
     "heat load": ((1e3, "kW", "W"), (1e-3, "mW", "W"), (745.7, "hp", "W")),
     "cooling power": ((1e3, "kW", "W"), (1e-3, "mW", "W")),
-    "rotation speed": ((60.0, "1/s", "rpm"), (1 / 60.0, "1/h", "rpm"), (9.549, "rad/s", "rpm"), (1e3, "1000 rpm", "rpm")),
-    "fluid flow": ((1 / 60.0, "l/h", "l/min"), (16.667, "m3/h", "l/min"), (60.0, "l/s", "l/min"), (100.0, "shares", "percent"),
-                   (0.01, "percent", "shares")),
-}  # fmt: skip
-_ANY_FACTORS = ((1e3, "1000 times too small"), (1e-3, "1000 times too large"), (10.0, "10 times too small"),
-                (0.1, "10 times too large"), (100.0, "100 times too small"), (0.01, "100 times too large"),
-                (2.0, "half as large"), (0.5, "twice as large"))  # fmt: skip
+    "rotation speed": (
+        (60.0, "1/s", "rpm"),
+        (1 / 60.0, "1/h", "rpm"),
+        (9.549, "rad/s", "rpm"),
+        (1e3, "1000 rpm", "rpm"),
+    ),
+    "fluid flow": (
+        (1 / 60.0, "l/h", "l/min"),
+        (16.667, "m3/h", "l/min"),
+        (60.0, "l/s", "l/min"),
+        (100.0, "shares", "percent"),
+        (0.01, "percent", "shares"),
+    ),
+}
+_ANY_FACTORS = (
+    (1e3, "1000 times too small"),
+    (1e-3, "1000 times too large"),
+    (10.0, "10 times too small"),
+    (0.1, "10 times too large"),
+    (100.0, "100 times too small"),
+    (0.01, "100 times too large"),
+    (2.0, "half as large"),
+    (0.5, "twice as large"),
+)
 _SCALES: tuple[tuple[str, float, float], ...] = (
     ("degF", 5 / 9, -160 / 9),
     ("K", 1.0, -273.15),
@@ -155,9 +172,13 @@ def halves(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequen
         if channel.unit == "degC":
             changes = [("is in Fahrenheit", 5 / 9, -160 / 9)]
         else:
-            changes = [("has the other sign", -1.0, 0.0), ("is 1000 times too small", 1e3, 0.0),
-                       ("is 1000 times too large", 1e-3, 0.0), ("is 10 times too small", 10.0, 0.0),
-                       ("is 10 times too large", 0.1, 0.0)]  # fmt: skip
+            changes = [
+                ("has the other sign", -1.0, 0.0),
+                ("is 1000 times too small", 1e3, 0.0),
+                ("is 1000 times too large", 1e-3, 0.0),
+                ("is 10 times too small", 10.0, 0.0),
+                ("is 10 times too large", 0.1, 0.0),
+            ]
         for share in _WHEN:
             after = one.time > share * length
             for words, factor, offset in changes:

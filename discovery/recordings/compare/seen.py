@@ -1,4 +1,6 @@
-"""A recording as the comparison sees it: canonical units, readings as they are, whatever is wrong with them."""
+"""A recording as the comparison sees it: canonical units, readings as they are, whatever is wrong with
+them.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ from discovery.recordings.columns import Array, Lines
 
 @dataclass(frozen=True)
 class Seen:
-    """`time` (T,) s since the first stamp; `values`: each (T,), NaN where not measured; `lines` (T,) of the file.
+    """`time` (T,) s since the first stamp; `values`: each (T,), NaN where not measured; `lines` (T,) of
+    the file.
 
     `constant`: channels that the campaign file sets.
     """
