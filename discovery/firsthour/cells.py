@@ -116,6 +116,7 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _WITH_UNIT = re.compile(r"([-+]?\s*[\d.,' ]*\d(?:[eE][-+]?\d+)?)\s*([^\W\d]\S{0,9}|[°%‰\"'][^\d\s]{0,8})")
 _LIKE_NUMBER = re.compile(r"[-+]?\s*(\d[\d.,'’\u00a0\u202f ]*|[.,]\d+)([eE][-+]?\d+)?")
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}([,.]\d{3})+")
+_DOTTED = re.compile(r"\d{1,4}\.\d{1,2}\.\d{1,4}")  # a date: groups of thousands have three digits
 _SPACED = re.compile(r"(?<=\d)['’\u00a0\u202f ](?=\d{3}(?!\d))")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d*([eE][-+]?\d+)?")
 
@@ -145,7 +146,13 @@ def is_switch(cell: str) -> bool:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell is a number, with a decimal point or comma, with or without its unit."""
+    """Whether a cell is a number, with a decimal point or comma, with or without its unit.
+
+    >>> is_number("1.234.567"), is_number("12,5 °C"), is_number("02.03.2026")
+    (True, True, False)
+    """
+    if _DOTTED.fullmatch(cell):
+        return False
     return bool(_LIKE_NUMBER.fullmatch(cell)) or bool(
         cell[:1] in "+-.,0123456789" and _WITH_UNIT.fullmatch(cell)
     )

@@ -7,6 +7,7 @@ predicted best from the past of the first. Too early a driver is no cause, too l
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -24,26 +25,67 @@ _MOST = 0.25  # of the shorter recording: shifts that are tried
 _SHIFTS = 121
 _RIDGE = 1e-6
 _GAIN = 12.0  # twice the gain in log likelihood from which a shift is believed
+_DIFFER = 4.0  # times its spread: a shift that is so far from the others is another one
 _APART = 30  # points of the grid that count as one: residuals hang together
 
 
 @dataclass(frozen=True)
 class Shift:
-    """`seconds` to add to the second clock, within `spread`; `seen`: the recordings show it."""
+    """`seconds` to add to the second clock, within `spread`; `seen`: the recordings show it; `shared`:
+    other pairs do.
+    """
 
     seconds: float
     spread: float
     seen: bool
+    shared: bool = False
+
+    @property
+    def known(self) -> bool:
+        """Whether the pair says anything of its shift, none included."""
+        return bool(np.isfinite(self.spread))
 
 
-def join(first: OwnTable, second: OwnTable) -> OwnTable:
-    """One table of both at the stamps of either; an empty cell where a logger has no reading.
+def join_all(firsts: Sequence[OwnTable], seconds: Sequence[OwnTable]) -> list[OwnTable]:
+    """Each table of the first logger with that of the second.
+
+    A pair that does not show how its clocks are shifted takes what the others show: the loggers are the same.
 
     Raises:
-        UserError: the two do not overlap.
+        UserError: two tables do not overlap, or one has no partner.
     """
-    offset, how = _offset(first, second)
-    shift = estimate_shift(first, replace(second, time=second.time + offset))
+    if len(firsts) != len(seconds):
+        raise UserError(
+            f"{len(firsts)} tables of one logger and {len(seconds)} of the other; name one --join for "
+            "each --from"
+        )
+    pairs = [(a, b, *_offset(a, b)) for a, b in zip(firsts, seconds, strict=True)]
+    shifts = [estimate_shift(a, replace(b, time=b.time + offset)) for a, b, offset, _ in pairs]
+    dated = all(a.first and b.first for a, b, *_ in pairs)  # else each pair began anew
+    common = _common(shifts) if dated else None
+    return [
+        _joined(a, b, offset, how, common if common and not shift.known else shift)
+        for (a, b, offset, how), shift in zip(pairs, shifts, strict=True)
+    ]
+
+
+def _common(shifts: Sequence[Shift]) -> Shift | None:
+    """The mean shift of the pairs that show one, weighed by how well each is known; None where they
+    differ.
+    """
+    known = [one for one in shifts if one.known]
+    if not known:
+        return None
+    weights = np.array([one.spread**-2 for one in known])
+    values = np.array([one.seconds for one in known])
+    mean, spread = float(weights @ values / weights.sum()), float(weights.sum() ** -0.5)
+    if (np.abs(values - mean) > _DIFFER * np.array([one.spread for one in known])).any():
+        return None
+    return Shift(mean, spread, any(one.seen for one in known), shared=True)
+
+
+def _joined(first: OwnTable, second: OwnTable, offset: float, how: str, shift: Shift) -> OwnTable:
+    """One table of both at the stamps of either; an empty cell where a logger has no reading."""
     moved = second.time + offset + (shift.seconds if shift.seen else 0.0)
     if moved[-1] < first.time[0] or moved[0] > first.time[-1]:
         raise UserError(
@@ -71,7 +113,10 @@ def _offset(first: OwnTable, second: OwnTable) -> tuple[float, str]:
 def _said(shift: Shift, second: OwnTable) -> str:
     size = f"{abs(shift.seconds):.3g} s (95 %: ±{1.96 * shift.spread:.2g} s)"
     if shift.seen:
-        return f"its clock was {'behind' if shift.seconds > 0 else 'ahead'} by {size} and was corrected"
+        where = ", as in the other pairs," if shift.shared else ""
+        return (
+            f"its clock was {'behind' if shift.seconds > 0 else 'ahead'} by {size}{where} and was corrected"
+        )
     if np.isfinite(shift.spread):
         return f"no shift between the clocks is seen (at most about {2 * shift.spread:.2g} s)"
     return f"whether the clock of {second.path.name} is shifted cannot be told (?)"

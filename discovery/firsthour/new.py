@@ -10,7 +10,7 @@ from discovery.files import read_toml, write_atomic
 from discovery.firsthour.again import rewrite, touched
 from discovery.firsthour.asking import Ask, answered, doubt, questions, read_statements, with_statements
 from discovery.firsthour.guess import Guess, drives
-from discovery.firsthour.joining import join
+from discovery.firsthour.joining import join_all
 from discovery.firsthour.measures import DEGREES
 from discovery.firsthour.plan import Plan, plan
 from discovery.firsthour.recorded import Recorded, never_moves, recorded
@@ -70,9 +70,9 @@ def new(
     progress("reading the files")
     tables = [table for source in sources for table in read_tables(Path(source))]
     if joins:
-        seconds = [read_tables(Path(source))[0] for source in joins]
+        seconds = [table for source in joins for table in read_tables(Path(source))]
         progress("finding the shift between the loggers")
-        tables = [join(a, b) for a, b in zip(tables, seconds, strict=True)]
+        tables = join_all(tables, seconds)
     found = recorded(tables, clock)
     guesses = with_statements(found.seen, found.guesses, said, room)
     if ask is not None:

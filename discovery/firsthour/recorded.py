@@ -184,7 +184,8 @@ def _counted(
         for unit, value in time_odds(
             run.time, [c.values for c in run.columns], stated_interval(run.above)
         ).items():
-            odds[unit] = odds.get(unit, 0.0) + value / len(seen) ** 0.5
+            # recordings of one logger say the same again: their mean counts, not their sum
+            odds[unit] = odds.get(unit, 0.0) + value / len(seen)
     shares = {said: 1.0} if said else probabilities(odds)
     unit, chance = next(iter(shares.items()))
     doubt = "" if chance >= 0.9 else f" (? {chance:.0%} likely; nothing names its unit)"

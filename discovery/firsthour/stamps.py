@@ -172,8 +172,8 @@ def _counted(at: int, cells: Sequence[str], values: Array, name: str, unit: str)
 def named_time_unit(name: str) -> str | None:
     """The unit of time that the name of a clock holds.
 
-    >>> named_time_unit("Minuten"), named_time_unit("経過分"), named_time_unit("Time"),
-    named_time_unit("t_min") ('min', 'min', None, 'min')
+    >>> [named_time_unit(name) for name in ("Minuten", "経過分", "Time", "t_min")]
+    ['min', 'min', None, 'min']
     """
     words = fold(name).split()
     found = [unit for word in words[::-1] if len(word) > 1 and (unit := time_unit(word))]

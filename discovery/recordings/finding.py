@@ -59,10 +59,9 @@ def folded(findings: Sequence[Finding]) -> list[str]:
     """A line for each finding, worst first; of a kind that comes again and again one line for all.
 
     >>> from dataclasses import replace
-    >>> one = Finding("warning", Path("a.csv"), 1, "the column 'x' is not a channel", "declare it",
-    "stray", "x")
-    >>> folded([one, replace(one, file=Path("b.csv")), replace(one, channel="y", what="the column 'y' is
-    not")])
+    >>> what = "the column 'x' is not a channel"
+    >>> one = Finding("warning", Path("a.csv"), 1, what, "declare it", "stray", "x")
+    >>> folded([one, replace(one, file=Path("b.csv")), replace(one, channel="y")])
     ["warning: a.csv, line 1: the column 'x' is not a channel; declare it (the same of y; also in b.csv)"]
     """
     groups: dict[tuple[object, ...], list[Finding]] = {}

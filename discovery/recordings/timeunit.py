@@ -10,6 +10,9 @@ from discovery.recordings.columns import Array
 
 SECONDS = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 _HOUR = 3600.0
+_TRIED = 200  # stamps that are looked at
+_ROUGH = 0.2  # of a part: a stamp that is rounded more roughly says nothing
+_MOST = 6.0  # log odds that digits are worth
 # log odds before anything is seen: who writes no unit mostly means seconds
 _PRIOR = {"s": 0.0, "min": -1.5, "h": -2.5, "ms": -3.5, "d": -5.0}
 _LENGTH = (np.log(5 * _HOUR), np.log(4.0))  # of a recording [s]: median and spread, both of the logarithm
@@ -65,17 +68,22 @@ def time_odds(values: Array, moving: Sequence[Array], interval: float | None = N
 
 
 def _sixtieths(values: Array, unit: str) -> float:
-    """Minutes read each second are 0.0167, 0.0333, ...: sixtieths, which nobody writes in seconds."""
+    """Minutes read each second are 0.0167, 0.0333, ...: sixtieths, which nobody writes in seconds.
+
+    Stamps of whole minutes say nothing. Of the others each that is a sixtieth counts as much as a number
+    of so many digits is seldom one by chance.
+    """
     parts = {"min": 60.0, "h": 3600.0}.get(unit)
     if parts is None:
         return 0.0
-    tried = values[:200] - values[0]
-    digits = 10.0 ** -max((len(f"{v:.9g}".partition(".")[2]) for v in tried), default=0)
-    broken = np.abs(tried - np.round(tried, 1)) > 0.45 * 0.1 * 1e-3
-    whole = np.abs(tried * parts - np.round(tried * parts)) < parts * digits + 1e-9
-    if broken.mean() < 0.3 or parts * digits > 0.2:
+    tried = values[:_TRIED]
+    tried = tried[np.abs(tried - np.round(tried, 1)) > 1e-6]
+    near = parts * np.array([10.0 ** -len(f"{v:.9g}".partition(".")[2]) for v in tried])  # by rounding
+    tried, near = tried[near < _ROUGH], near[near < _ROUGH]
+    whole = np.abs(tried * parts - np.round(tried * parts)) < near
+    if not tried.size or whole.mean() < 0.95:
         return 0.0
-    return 4.0 if whole.mean() > 0.95 else 0.0
+    return float(min(_MOST, -np.log(2 * near[whole]).sum()))
 
 
 def _answer(series: Array, clock: Array) -> float | None:
