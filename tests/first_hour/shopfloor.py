@@ -143,9 +143,10 @@ def two_loggers(folder: Path) -> Floor:
         slow.append(
             _write(folder / f"temperatures_{k + 1}.csv", "timestamp,T plate 1 [°C],T plate 2 [°C]", lines)
         )
+        ahead = begin + timedelta(seconds=95)
         lines = [
-            f"{begin + timedelta(seconds=95 + (row['time'] or 0.0)):%d.%m.%Y %H:%M:%S};{_comma(row['heater1'])};"
-            f"{_comma(row['heater2'])}"
+            f"{ahead + timedelta(seconds=row['time'] or 0.0):%d.%m.%Y %H:%M:%S};"
+            f"{_comma(row['heater1'])};{_comma(row['heater2'])}"
             for row in rows("tclab", name, 4)
         ]
         fast.append(_write(folder / f"drives_{k + 1}.csv", "Zeit;Heater 1 [%];Heater 2 [%]", lines))
