@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Array
-from discovery.recordings.compare.repairs import Repair, all_repairs, drifting, shiftable, shifted
+from discovery.recordings.compare.repairs import Repair, all_repairs, drifting, offset, shiftable, shifted
 from discovery.recordings.compare.seen import Seen, inputs_of, outputs_of
 from discovery.recordings.responses import even_grid, filtered, input_on_grid
 from discovery.threads import one_thread
@@ -32,6 +32,9 @@ _SUSPECT = 1.3  # times the usual misfit: a recording that may be damaged
 # log likelihood a reading, over the root of the outputs, that a repair has to gain: of 100 sound campaigns
 # drawn at random none gains so much by chance, of damaged ones nine in ten gain more
 _GAIN, _TWO_GAIN = 1.3, 1.7  # among several recordings; of two that stand against each other
+# a recording that is so many times as far off as the others, and as near as they are once the repair is made,
+# needs less of a gain
+_FAR, _BACK, _WHOLE = 3.0, 1.15, 0.75
 _AGREES = 3.0  # times the usual misfit, at most, after a repair
 _TWO_AGREES = 0.4  # of the movement itself
 _JUDGES = 8  # other recordings that say what misfit is usual
@@ -47,6 +50,7 @@ _DOUBT = {
     "halfway": 0.0,
     "factor": 0.2,
     "drift": 0.2,
+    "offset": 0.2,
 }
 _LATE = np.arange(0.002, 0.25, 0.001)  # of a recording: how late a channel may be
 _MOST = 6  # repairs of a campaign that are looked for
@@ -170,7 +174,13 @@ class _Story:
             drifting(one, y, self._drift(features, parts[y], theta[y], y, self.readings[one.name, y]))
             for y in misfit
         )
-        for repair in chain(all_repairs(one, self.channels, self.inputs, self.outputs), late, creeping):
+        higher = (
+            offset(one, y, *self._offset(features, parts[y], theta[y], y, reading), self.channels[y].unit)
+            for y in misfit
+            if (reading := self.readings[one.name, y]) is not None
+        )
+        known = all_repairs(one, self.channels, self.inputs, self.outputs)
+        for repair in chain(known, late, creeping, higher):
             touched = [y for y in misfit if y in repair.channels] or list(misfit)
             if not two and not set(touched) & wrong:
                 continue
@@ -186,7 +196,8 @@ class _Story:
             each = [np.log(max(misfit[y], _LEAST) / max(after[y], _LEAST)) for y in touched]
             gain = float(np.sum(each)) / len(touched) ** 0.5
             least = (_TWO_GAIN if two else _GAIN) + _DOUBT[repair.kind]
-            if agrees and gain > least:
+            whole = b > _FAR * limit and a < _BACK * limit and gain > _WHOLE and not two
+            if agrees and (gain > least or whole):
                 found.append(
                     (gain - 2 * _DOUBT[repair.kind], Disagreement(one.name, repair, b, a, limit, gain))
                 )
@@ -198,9 +209,28 @@ class _Story:
         """By how much an output creeps away from what the story says, per second."""
         if reading is None:
             return 0.0
+        return float(np.polyfit(reading.at, self._left(features, parts, theta, y, reading), 1)[0])
+
+    def _offset(
+        self, features: _Features, parts: Mapping[str, Array], theta: Array, y: str, reading: _Reading
+    ) -> tuple[float, float]:
+        """From when on [s], and by how much, an output is higher than the story says: the split that explains
+        most of what is left.
+        """
+        left = self._left(features, parts, theta, y, reading)
+        count = np.arange(1, left.size)
+        below, above = np.cumsum(left)[:-1] / count, (left.sum() - np.cumsum(left)[:-1]) / (left.size - count)
+        explained = count * (left.size - count) * (above - below) ** 2
+        explained[: _FEWEST - 1] = explained[1 - _FEWEST :] = 0.0
+        best = int(np.argmax(explained))
+        return float(reading.at[best]), float(above[best] - below[best])
+
+    def _left(
+        self, features: _Features, parts: Mapping[str, Array], theta: Array, y: str, reading: _Reading
+    ) -> Array:
+        """Readings minus story."""
         free = features.free @ theta[-features.free.shape[1] :] * self._start(y, reading)
-        left = reading.read - np.interp(reading.at, features.grid, sum(parts.values()) + free)
-        return float(np.polyfit(reading.at, left, 1)[0])
+        return np.asarray(reading.read - np.interp(reading.at, features.grid, sum(parts.values()) + free))
 
     def _lateness(
         self,

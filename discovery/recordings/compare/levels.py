@@ -15,6 +15,7 @@ from discovery.recordings.finding import Finding
 
 _FEWEST = 30  # readings
 _NOISIER = 8.0  # times the noise elsewhere
+_RESCALED, _PLACES = 50.0, 15  # times the noise before; places where a recording may change
 _COARSER = 20.0  # times the steps of readings elsewhere, and more than a hundredth of what the channel moves
 _START = 10.0  # K: the first reading against its siblings, beyond what it is elsewhere
 _AGREE = 6.0  # K: siblings that agree so well show the odd one out in a single recording
@@ -35,6 +36,7 @@ def level_findings(recordings: Sequence[Seen], channels: Mapping[str, Channel]) 
     for name, channel in channels.items():
         having = [one for one in recordings if name in one.values and name not in one.constant]
         yield from _noise(having, channel)
+        yield from _scale(having, channel)
         yield from _resolution(having, channel)
         yield from _full_range(having, channel)
         if channel.unit == "degC":
@@ -63,6 +65,27 @@ def _noise(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
             yield _finding(
                 one, channel, 0, what, "look at its cable, range and filter", "noise", np.log(times)
             )
+
+
+def _scale(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
+    """A noise that changes by orders of magnitude within a recording: another unit from there on."""
+    if not channel.measured and channel.between != "linear":
+        return
+    for one in recordings:
+        time, read = one.known(channel.name)
+        if read.size < 2 * _FEWEST:
+            continue
+        best, where = 1.0, 0
+        for row in np.linspace(_FEWEST, read.size - _FEWEST, _PLACES).astype(int):
+            before, after = noise_of(read[:row]), noise_of(read[row:])
+            if before > 0 and after > 0 and abs(np.log(after / before)) > abs(np.log(best)):
+                best, where = after / before, int(row)
+        if max(best, 1 / best) > _RESCALED:
+            change = f"{best:.2g} times as" if best > 1 else f"1/{1 / best:.2g} as"
+            at = (time[where] - time[0]) / 3600
+            what = f"'{channel.name}' is {change} noisy from about {at:.2g} h on"
+            do = "another unit or range from there on: split the recording, or mend it"
+            yield _finding(one, channel, where, what, do, "halfway", 6.0)
 
 
 def _resolution(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
@@ -168,7 +191,7 @@ def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iter
                 and (read := one.known(c.name)[1]).size >= 3
             ):
                 first[c.name] = float(np.median(read[:5]))
-        if len(first) < 3:
+        if len(first) < 2:
             continue
         for name, value in first.items():
             others = np.array([v for n, v in first.items() if n != name])
@@ -186,6 +209,7 @@ def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iter
                 spread = 1.4826 * float(np.median(np.abs(elsewhere - middle)))
                 odd = abs(here - middle) > max(_START, _SPREADS * spread, 1.5 * np.ptp(elsewhere))
                 odd = odd and agree[f"{one.name}|{c.name}"] < _START
+                odd = odd and (siblings > 1 or _stays_apart(one, c.name, recordings))
             else:
                 odd = siblings >= 5 and abs(here) > _ALONE and agree[f"{one.name}|{c.name}"] < _AGREE
             if odd:
@@ -197,6 +221,16 @@ def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iter
                     f"temperatures, which agree"
                 )
                 yield _finding(one, c, 0, what, "look at the sensor, its unit and its contact", "start", 2.0)
+
+
+def _stays_apart(one: Seen, name: str, recordings: Sequence[Seen]) -> bool:
+    """Of two temperatures that differ: whether it is this one that starts elsewhere than usual, and is no warm
+    start, which would cool down.
+    """
+    others = [r for r in recordings if r is not one and name in r.values]
+    starts = [float(np.median(r.known(name)[1][:5])) for r in others]
+    usual, read = float(np.median(starts)), one.known(name)[1]
+    return bool(np.percentile(read, 2) > usual + _START or np.median(read[:5]) < usual - _START)
 
 
 def _exchanged(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Finding]:

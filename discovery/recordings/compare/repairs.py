@@ -118,11 +118,13 @@ def signs(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
 
 def swaps(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]) -> Iterator[Repair]:
     """Two channels in each other's columns."""
-    for group in (_moving(one, inputs), _moving(one, outputs)):
-        for k, a in enumerate(group):
-            for b in group[k + 1 :]:
+    for group in (inputs, outputs):
+        # of the two one may stand still here: a heater that was off
+        names, moving = _recorded(one, group), set(_moving(one, group))
+        for k, a in enumerate(names):
+            for b in names[k + 1 :]:
                 kinds = {channels[a].unit == "degC", channels[b].unit == "degC"}
-                if len(kinds) == 2:
+                if len(kinds) == 2 or not {a, b} & moving:
                     continue
                 what, do = f"'{a}' and '{b}' are swapped", "change their columns"
                 yield Repair("swap", (a, b), what, do, one.having({a: one.values[b], b: one.values[a]}))
@@ -142,6 +144,16 @@ def drifting(one: Seen, name: str, per_second: float) -> Repair:
     made = one.values[name] - per_second * one.time
     what = f"'{name}' drifts by {whole:.3g} over the recording, which nothing that was recorded explains"
     return Repair("drift", (name,), what, "look at its zero and its holder", one.having({name: made}))
+
+
+def offset(one: Seen, name: str, since: float, size: float, unit: str) -> Repair:
+    """An output that is higher (lower where below zero) by so much from an instant [s] on."""
+    made = one.values[name] - size * (one.time > since)
+    side = "higher" if size > 0 else "lower"
+    at = _duration(since)
+    what = f"'{name}' is {abs(size):.3g} {unit} {side} from {at} on, which nothing recorded explains"
+    do = "look at the sensor and its holder; split the recording there"
+    return Repair("offset", (name,), what, do, one.having({name: made}))
 
 
 def shiftable(
@@ -193,8 +205,12 @@ def halves(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequen
                 )
 
 
+def _recorded(one: Seen, names: Sequence[str]) -> list[str]:
+    return [n for n in names if n in one.values and n not in one.constant]
+
+
 def _moving(one: Seen, names: Sequence[str]) -> list[str]:
-    return [n for n in names if n in one.values and n not in one.constant and _moves(one.values[n])]
+    return [n for n in _recorded(one, names) if _moves(one.values[n])]
 
 
 def _moves(values: Array) -> bool:
