@@ -1,10 +1,9 @@
-"""Files changed at random: every command says what is wrong with them, without a traceback, a hang or much memory.
+"""Files changed at random: what is wrong with them is said, without a traceback, a hang or much memory.
 
     python -m tests.fuzz --seconds 300 --seed 1
 
-prints how many inputs of each kind were tried, the longest time and the largest memory; every input that raised
-something else than UserError, took longer than a second or made the process grow beyond 500 MB is kept in
-build/fuzz. The last line is the count.
+prints how many inputs of each kind were tried, the longest time and the largest memory. An input that raised
+something else than UserError or took longer than a second is kept in build/fuzz.
 """
 
 from __future__ import annotations
@@ -200,7 +199,7 @@ def main() -> int:
     sound = {kind: KINDS[kind][1]() for kind in kinds}
     counts: Counter[str] = Counter()
     read: Counter[str] = Counter()
-    wrong, slowest = 0, {kind: 0.0 for kind in kinds}
+    wrong, slowest = 0, dict.fromkeys(kinds, 0.0)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for file, data in (("fit.csv", TABLE), ("campaign.toml", CAMPAIGN), ("model.toml", MODEL)):

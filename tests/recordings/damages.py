@@ -84,15 +84,22 @@ def _thin(columns: Mapping[str, Array], every: int) -> Frame:
 
 def write(folder: Path, base: str, frames: Mapping[str, Frame]) -> Path:
     """A campaign of such recordings."""
+    return write_campaign(folder, base, CHANNELS[base], frames)
+
+
+def write_campaign(
+    folder: Path, title: str, roles: Mapping[str, tuple[str, str]], frames: Mapping[str, Frame]
+) -> Path:
+    """Recordings as CSV with a campaign file."""
     folder.mkdir(parents=True, exist_ok=True)
-    channels = {name: {"role": role, "unit": unit} for name, (role, unit) in CHANNELS[base].items()}
+    channels = {name: {"role": role, "unit": unit} for name, (role, unit) in roles.items()}
     for name, frame in frames.items():
         header, rows = ",".join(frame), zip(*frame.values(), strict=True)
         lines = [",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in rows]
         (folder / f"{name}.csv").write_text("\n".join([header, *lines]) + "\n")
     recordings = {name: {"file": f"{name}.csv"} for name in frames}
     (folder / "campaign.toml").write_text(
-        format_toml({"name": base, "channels": channels, "recordings": recordings})
+        format_toml({"name": title, "channels": channels, "recordings": recordings})
     )
     return folder
 
