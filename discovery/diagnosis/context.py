@@ -27,17 +27,22 @@ from discovery.terms import evaluate
 
 Array = NDArray[np.float64]
 
-MOST_READINGS = 6000  # instants, over all recordings
+MOST_READINGS = 4000  # instants, over all recordings
 NODES = 1000  # of a recording, about, and its readings: inputs are their means in between
 
-PROCESS = Prior(
-    thresholds.FLOOR,
-    thresholds.SHARE,
-    thresholds.LEVELS,
-    thresholds.LEVEL_WEIGHTS,
-    thresholds.SLOW,
-    thresholds.SLOW_WEIGHTS,
-)
+
+def process_prior() -> Prior:
+    """What is believed of process noise before the recordings are read."""
+    return Prior(
+        thresholds.FLOOR,
+        thresholds.SHARE,
+        thresholds.LEVELS,
+        thresholds.LEVEL_WEIGHTS,
+        thresholds.SLOW,
+        thresholds.SLOW_WEIGHTS,
+        thresholds.FORMS,
+        thresholds.FORM_WEIGHTS,
+    )
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,16 @@ class Context:
     def white(self) -> Noise:
         """The reading noise."""
         return self.settings[0].noise
+
+    @property
+    def blocks(self) -> int:
+        """Blocks of time in each recording."""
+        return max(3, round(thresholds.BLOCKS / len(self.recordings)))
+
+    @property
+    def usual(self) -> Noise:
+        """The noise that is most likely before the recordings are read."""
+        return max(self.settings, key=lambda s: s.log_weight).noise
 
     @cached_property
     def candidates(self) -> list[Hypothesis]:
@@ -156,13 +171,13 @@ def make_context(
     if any(g.unsure for g in whole.values()):
         grids = thinned(whole)
         fit = fitted(grids, fit)
-    floor = floors(fit, PROCESS.floor)
-    white = reading_noise(fit, stated, floor, PROCESS)
+    floor = floors(fit, thresholds.FLOOR)
+    white = reading_noise(fit, stated, floor, process_prior())
     outliers = find_outliers(fit, whole, np.array(white.white))
     if outliers:
         grids = thinned(without(whole, outliers))
         fit = fitted(grids, fit)
-        white = reading_noise(fit, stated, floor, PROCESS)
+        white = reading_noise(fit, stated, floor, process_prior())
     own = {n: replace(s, start_sd=fit.model.states[n].start_sd) for n, s in model.states.items()}
     scene = Scene(
         campaign.channels,
@@ -185,20 +200,20 @@ def make_context(
         tuple(_within(e, spacing, duration) for e in effects),
         scene,
         fit,
-        settings(white, floor, PROCESS, any(g.unsure for g in grids.values())),
+        settings(white, floor, process_prior(), any(g.unsure for g in grids.values())),
         floor,
         belief,
         tuple(outliers),
-        tuple(model_form(fit.trajectories, np.array(white.white))),
+        tuple(model_form(fit, np.array(white.white))),
     )
 
 
 def with_noise_of(context: Context, fit: Fit) -> Context:
     """The context with the reading noise as it stands with a better fit, where the campaign does not state it."""
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
-    white = reading_noise(fit, stated, context.floor, PROCESS)
+    white = reading_noise(fit, stated, context.floor, process_prior())
     unsure = any(g.unsure for g in context.grids.values())
-    return replace(context, settings=settings(white, context.floor, PROCESS, unsure))
+    return replace(context, settings=settings(white, context.floor, process_prior(), unsure))
 
 
 def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:

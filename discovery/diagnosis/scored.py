@@ -28,6 +28,7 @@ from discovery.models import Model
 Array = NDArray[np.float64]
 
 ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
+KEPT = 4  # noise settings of a model, the most likely ones
 NEAR = 4.0  # log evidence below the best within which a noise setting leads to its neighbours
 
 
@@ -218,7 +219,7 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     extra = tuple(np.concatenate(parts, axis=2) for parts in zip(context.form, own, strict=True))
     model, effects = context.form[0].shape[2], own[0].shape[2]
     spread = np.concatenate([np.ones(model), np.full(effects, thresholds.FORM)])
-    seen = Whitened(fit, thresholds.BLOCKS, extra, spread, model)
+    seen = Whitened(fit, context.blocks, extra, spread, model)
     free = [h for h in chosen if h.effect.amplitude.fixed is None]
     place = {u.name: i for i, u in enumerate(fit.problem.unknowns) if not u.is_nuisance}
     index = np.array([place[name] for h in free for name in h.amplitudes], dtype=np.intp)
@@ -250,7 +251,7 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
         return float(known[k].levels[0])
 
     # a force on top of form error that is larger than usual would be the same noise once more
-    usual = [k for k, s in enumerate(context.settings) if not force or s.noise.share <= thresholds.SHARE]
+    usual = [k for k, s in enumerate(context.settings) if not force or _is_usual(s.noise)]
     start = min(usual, key=lambda k: _distance(context.settings[k].noise, bare.fit.noise))
     queue = [start]
     while queue:
@@ -263,7 +264,7 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
             if k not in known and k not in queue
             if context.settings[k].is_next_to(context.settings[here])
         ]
-    order = sorted(known)
+    order = sorted(known, key=lambda k: -level(k))[:KEPT]
     return replace(
         bare,
         settings=tuple(context.settings[k] for k in order),
@@ -274,7 +275,12 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
 def _distance(one: Noise, other: Noise) -> float:
     """How far two noises are apart in slow noise, form error and jitter."""
     slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
-    return slow + abs(one.share - other.share) + abs(one.jitter - other.jitter)
+    form = abs(one.share - other.share) + abs(one.form - other.form)
+    return slow + form + abs(one.jitter - other.jitter)
+
+
+def _is_usual(noise: Noise) -> bool:
+    return max(noise.share, noise.form) <= thresholds.SHARE
 
 
 def with_force(context: Context, one: Scored, state: str) -> Scored:
@@ -343,8 +349,7 @@ def _in_play(context: Context, current: Scored) -> list[Setting]:
     what is missing may have passed.
     """
     best = current.settings[current.best]
-    quiet = min(s.noise.share for s in context.settings)
-    other = next(s for s in context.settings if s.noise.share == quiet and s.place[:2] == best.place[:2])
+    other = next(s for s in context.settings if s.place == (*best.place[:2], 0, 0))
     return [best] if other.place == best.place else [best, other]
 
 

@@ -57,8 +57,12 @@ class Verdict:
     reasons: tuple[str, ...]
 
 
-def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
-    """What the recordings to fit say."""
+def decide(context: Context, found: Search, posterior: Posterior, gain: float) -> Verdict:
+    """What the recordings to fit say.
+
+    Args:
+        gain: what the best answer explains of the free runs of the fitted recordings, rms in reading noises.
+    """
     answer = found.best
     candidates = tuple(
         sorted(
@@ -68,9 +72,12 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     )
     if posterior.nothing > 1 - thresholds.DETECTED:
         return _nothing(context, answer, candidates)
+    if gain < thresholds.MATTERS:
+        return _nothing(context, answer, candidates)
     sure = [n for n in candidates if n.probability >= thresholds.NAMED]
-    named = tuple(n for n in sure if not vetoed(context, answer, n.hypothesis))
-    reasons = [text for n in sure if (text := vetoed(context, answer, n.hypothesis))]
+    refused = {n.hypothesis.key: text for n in sure if (text := _refused(context, answer, n.hypothesis))}
+    reasons = list(refused.values())
+    named = tuple(n for n in sure if n.hypothesis.key not in refused)
     short = _short(context, found, posterior, answer, [n.hypothesis for n in named])
     if short > max(thresholds.SHORT, thresholds.SMALL * found.gain):
         if unknown := posterior.best.forced:
@@ -79,20 +86,25 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
         named = ()
     if not named and not reasons:
         reasons.append(f"no effect reaches a probability of {thresholds.NAMED:g}")
-    for n in named:
-        outside = left_out(context, answer, n.hypothesis)
-        if outside and outside.contradicts:
-            named = ()
-            rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
-            reasons.append(
-                f"{n.hypothesis.effect.word} at {n.hypothesis.where} makes free runs worse on recordings that "
-                f"are left out of the fit (rms over the reading noise: {rms})"
-            )
     reasons += _apart(candidates, (*named, *sure))
     if not named:
         return Verdict(UNEXPLAINED, answer, (), candidates, tuple(reasons))
     kinds = {n.hypothesis.effect.is_physics for n in named}
     return Verdict(MISSING if True in kinds else FAULT, answer, named, (), tuple(reasons))
+
+
+def _refused(context: Context, answer: Scored, h: Hypothesis) -> str | None:
+    """Why an effect that is probable is not named; None where it may be."""
+    if veto := vetoed(context, answer, h):
+        return veto
+    outside = left_out(context, answer, h)
+    if outside is None or outside.explained >= thresholds.MATTERS:
+        return None
+    rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
+    return (
+        f"{h.effect.word} at {h.where} does not make free runs better by what would matter on recordings that "
+        f"are left out of the fit (rms over the reading noise: {rms})"
+    )
 
 
 def _short(

@@ -23,14 +23,7 @@ from discovery.fitting.noise import resolution
 Array = NDArray[np.float64]
 
 JITTER = 12**-0.5  # of a logging interval: a switch that comes anywhere in it
-_TRIED = (
-    0.0,
-    0.3,
-    1.0,
-    3.0,
-    10.0,
-    30.0,
-)  # levels beside which the reading noise is sought where none is stated
+_TRIED = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # levels with which the reading noise is sought where none is stated
 _BLOCKS = 72  # of a recording, in each of which process noise is one number
 _CLIPPED = 4.0  # standard deviations beyond which an innovation counts no more: single wrong readings
 
@@ -41,7 +34,7 @@ class Setting:
 
     noise: Noise
     log_weight: float
-    place: tuple[int, int, int]  # on the grid of jitters, slow noises and levels
+    place: tuple[int, int, int, int]  # on the grid of jitters, slow noises, levels and form errors
 
     def is_next_to(self, other: Setting) -> bool:
         """Whether the two are neighbours on the grid."""
@@ -58,6 +51,8 @@ class Prior:
     weights: tuple[float, ...]
     slow: tuple[float, ...]  # shares of the reading noise
     slow_weights: tuple[float, ...]
+    forms: tuple[float, ...]  # shares by which laws are off
+    form_weights: tuple[float, ...]
 
 
 def floors(fit: Fit, share: float) -> dict[str, float]:
@@ -93,17 +88,19 @@ def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: boo
         unsure: inputs may be logged late, each switch by another time, or all by the same.
     """
     jitters = (0.0, JITTER) if unsure else (0.0,)
-    total = float(sum(prior.weights)) * float(sum(prior.slow_weights)) * len(jitters)
-    return tuple(
-        Setting(
-            _noise(white, floor, prior, level, slow, jitter),
-            float(np.log(weight * prior.slow_weights[j] / total)),
-            (i, j, k),
-        )
-        for i, jitter in enumerate(jitters)
-        for j, slow in enumerate(prior.slow)
-        for k, (level, weight) in enumerate(zip(prior.levels, prior.weights, strict=True))
+    axes = (
+        [(jitter, 1.0) for jitter in jitters],
+        list(zip(prior.slow, prior.slow_weights, strict=True)),
+        list(zip(prior.levels, prior.weights, strict=True)),
+        list(zip(prior.forms, prior.form_weights, strict=True)),
     )
+    total = float(np.prod([sum(weight for _, weight in axis) for axis in axes]))
+    found = []
+    for place in np.ndindex(*(len(axis) for axis in axes)):
+        (jitter, a), (slow, b), (level, c), (form, d) = (axis[k] for axis, k in zip(axes, place, strict=True))
+        noise = replace(_noise(white, floor, prior, level, slow, jitter), form=form)
+        found.append(Setting(noise, float(np.log(a * b * c * d / total)), place))
+    return tuple(found)
 
 
 def _noise(
