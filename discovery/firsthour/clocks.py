@@ -73,6 +73,15 @@ def tells_time(name: str, unit: str, values: Array, seconds: Array, role: str) -
     return bool(unit or counts or role == "other input" or CLOCKS.search(fold(name)))
 
 
+def counts_up(name: str) -> bool:
+    """Whether a name is that of a counter: an integral of a current or power.
+
+    >>> counts_up("Amp-Hours"), counts_up("Amps")
+    (True, False)
+    """
+    return bool(_COUNTER.search(fold(name)))
+
+
 def _says_time(words: str) -> bool:
     """Whether a name is that of a clock; a t alone may be a temperature."""
     return bool(CLOCKS.search(re.sub(r"\bt\b", "", words)))

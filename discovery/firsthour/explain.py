@@ -10,6 +10,7 @@ from discovery.schema import suggest
 
 if TYPE_CHECKING:
     from discovery.effects.catalogue import Effect
+    from discovery.effects.form import Shape
 
 MODELS = {
     "file": 'a model of your own: { file = "model.toml" }, a sparse sum of terms with named parameters',
@@ -96,9 +97,7 @@ def _entry(effect: Effect) -> Iterator[str]:
         usual = f"{size.name}, about {size.plausible:g} {size.unit}"
         yield f"  size           {usual} on machines of this class{sign}"
     for shape in effect.shapes:
-        tried = _listed([f"{value:g}" for value in shape.grid])
-        limits = "" if shape.fixed else f", refined between {shape.low:g} and {shape.high:g}"
-        yield f"  shape          {shape.name} [{shape.unit}]: tried at {tried}{limits}"
+        yield f"  shape          {shape.name} [{shape.unit}]: {_prior(shape)}"
     yield f"  signature      {effect.signature}"
     if effect.confused_with:
         yield f"  confused with  {_listed(effect.confused_with)}"
@@ -106,6 +105,17 @@ def _entry(effect: Effect) -> Iterator[str]:
         values = ", ".join(f"{name} = {value:g}" for name, value in example.values.items())
         yield f"  example        {values}: {example.expected:g}"
     yield f"  source         {effect.source}"
+
+
+def _prior(shape: Shape) -> str:
+    """What is believed of a shape before anything is seen."""
+    if shape.instant:
+        return "an instant of the recording, which is searched for"
+    if shape.middle is None:
+        return "any time constant that the recordings can show"
+    if shape.factor:
+        return f"about {shape.middle:g}, two of three within a factor of {shape.factor:g}"
+    return f"about {shape.middle:g}, two of three within {shape.spread:g}"
 
 
 def _listed(words: Sequence[str]) -> str:

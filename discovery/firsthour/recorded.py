@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discovery.errors import UserError
-from discovery.firsthour.clocks import bookkeeping, tells_time
+from discovery.firsthour.clocks import bookkeeping, counts_up, tells_time
 from discovery.firsthour.evidence import is_set_point_word
 from discovery.firsthour.filenames import constants, file_hints
 from discovery.firsthour.guess import TEMPERATURES, Guess, guess, guess_all
@@ -226,7 +226,9 @@ def _says_nothing(
     role = _named(column)
     if all(tells_time(column.header, column.unit, values, time, role) for time, values in of_runs):
         return "is a clock, in exact proportion to the time: left out (if not, name its unit in the header)"
-    electric = any(word.gloss in _ELECTRIC for word in words_of(column.header))
+    electric = any(word.gloss in _ELECTRIC for word in words_of(column.header)) and not counts_up(
+        column.header
+    )
     unit = column.unit or ("V" if electric else "")  # a ramp of a voltage is no clock
     books = [bookkeeping(column.header, unit, values, time, role) for time, values in of_runs]
     if all(books):

@@ -70,3 +70,13 @@ def test_a_wide_table_is_not_long(tmp_path: Path, row: object) -> None:
     table = read_own(_log(tmp_path, "time,note,T1", *(row(k) for k in range(60))))
     assert not any("long" in note for note in table.notes)
     assert "T1" in [column.name for column in table.columns]
+
+
+def test_a_number_of_a_device_that_takes_turns_makes_series(tmp_path: Path) -> None:
+    from discovery.firsthour.table import read_tables
+
+    rows = [f"{k},{1 + k % 2},{20 + k % 2 * 5 + k / 9:.3f}" for k in range(60)]
+    [table] = read_tables(_log(tmp_path, "time,NodeID,T1", *rows))
+    first, second = table.columns
+    assert {first.name, second.name} == {"T1_1", "T1_2"}
+    assert float(np.nanmin(second.values)) - float(np.nanmin(first.values)) == pytest.approx(5.1, abs=0.2)

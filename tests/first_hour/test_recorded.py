@@ -80,7 +80,7 @@ def test_a_column_in_proportion_to_the_time_is_a_clock(tmp_path: Path, name: str
         ("Step time", lambda k: k % 20, "is a clock that starts anew"),
         ("ticks", lambda k: 3 * k + k % 2, "rises steadily with the time, as a second clock"),
         ("Entry ID", lambda k: 7 + k + k % 2, "numbers rows or devices"),
-        ("NodeID", lambda k: 1 + k * k % 4, "numbers rows or devices"),
+        ("NodeID", lambda k: 1 + k // 9 % 4 // 3, "numbers rows or devices"),
         ("Cycle Index", lambda k: k // 9, "numbers rows or devices"),
         ("Loop Counter #1", lambda k: k // 9, "numbers rows or devices"),
         ("Amp-Hours", lambda k: -(k // 9) / 7, "is a counter that only runs on"),
