@@ -7,6 +7,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -149,25 +150,24 @@ def _plain(cell: str) -> bool:
 
 def _split(line: str, mark: str) -> list[str]:
     if mark.strip() or mark == "\t":
-        if '"' not in line:
-            return [cell.strip() for cell in line.split(mark)]
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=mark), [])]
+        cells = line.split(mark)
+        if '"' in line:
+            with suppress(csv.Error):  # quotes that do not match are letters
+                cells = next(csv.reader([line], delimiter=mark), [])
+        return [cell.strip() for cell in cells]
     return re.split(r"\s{2,}|\t", line.strip()) if mark else line.split()
 
 
 def _sheet(
     path: Path, name: str, lines: _Lines, mark: str, remarks: tuple[str, ...], notes: tuple[str, ...]
 ) -> Sheet:
-    try:
-        head = list(lines.cut(0, _HEAD))
-        middle = list(lines.cut(len(lines) // 2, len(lines) // 2 + _HEAD))
-        width, spare = _width(head, middle)
-        first = next((k for k, (_, c) in enumerate(head) if len(c) in (width, spare) and _is_data(c)), None)
-        at, units, groups = _header(path, head, first, width)
-        body = first if first is not None else at + 1
-        columns, numbers, left = _body(path, lines, body, width, spare, head[at][1])
-    except csv.Error as error:
-        raise UserError(f"{path}: cannot be cut into cells ({error}); export the file again") from None
+    head = list(lines.cut(0, _HEAD))
+    middle = list(lines.cut(len(lines) // 2, len(lines) // 2 + _HEAD))
+    width, spare = _width(head, middle)
+    first = next((k for k, (_, c) in enumerate(head) if len(c) in (width, spare) and _is_data(c)), None)
+    at, units, groups = _header(path, head, first, width)
+    body = first if first is not None else at + 1
+    columns, numbers, left = _body(path, lines, body, width, spare, head[at][1])
     rows = len(numbers)
     if rows < FEWEST:
         raise UserError(

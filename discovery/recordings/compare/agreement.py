@@ -127,6 +127,7 @@ class _Story:
             list(outputs),
             list(taus),
         )
+        self.has_room = any(channels[name].role == "ambient temperature" for name in inputs)
         self.features = {one.name: (known or {}).get(one.name) or self._responses(one) for one in recordings}
         self.names = list(next(iter(self.features.values())).of_input)
         self.scale = {n: self._usual_size(n) for n in self.names}
@@ -173,6 +174,7 @@ class _Story:
         creeping = (
             drifting(one, y, self._drift(features, parts[y], theta[y], y, self.readings[one.name, y]))
             for y in misfit
+            if self.has_room  # else what creeps may be the air around, which nobody recorded
         )
         higher = (
             offset(one, y, *self._offset(features, parts[y], theta[y], y, reading), self.channels[y].unit)
