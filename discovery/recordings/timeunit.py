@@ -103,4 +103,4 @@ def _answer(series: Array, clock: Array) -> float | None:
 
 
 def _log_normal(value: float, about: tuple[float, float]) -> float:
-    return -0.5 * ((np.log(max(value, 1e-12)) - about[0]) / about[1]) ** 2
+    return float(-0.5 * ((np.log(max(value, 1e-12)) - about[0]) / about[1]) ** 2)

@@ -77,7 +77,7 @@ def simulated(seed: int) -> Simulated:
             rate = loss * (room[k] - x) + link @ x - link.sum(axis=1) * x + gain @ power[:, k]
             rate = rate + wet * flow[k] * (fluid[k] - x)
             x = x + rate * min(dt[k], 0.3 / loss.max())
-        frame: dict[str, Array] = {"time": t}
+        frame: dict[str, Array] = {"time": np.asarray(t, dtype=np.float64)}
         if has_room:
             frame["T_env"] = np.round(room + rng.normal(0, 0.05, n), 2)
         if has_fluid:

@@ -50,7 +50,7 @@ _DOUBT = {
     "halfway": 0.0,
     "factor": 0.2,
     "drift": 0.2,
-    "offset": 0.2,
+    "offset": 0.0,
 }
 _LATE = np.arange(0.002, 0.25, 0.001)  # of a recording: how late a channel may be
 _MOST = 6  # repairs of a campaign that are looked for
@@ -199,7 +199,8 @@ class _Story:
             gain = float(np.sum(each)) / len(touched) ** 0.5
             least = (_TWO_GAIN if two else _GAIN) + _DOUBT[repair.kind]
             whole = b > _FAR * limit and a < _BACK * limit and gain > _WHOLE and not two
-            if agrees and (gain > least or whole):
+            # an offset of free size and place fits a little of anything: it has to mend the whole
+            if agrees and (whole or (gain > least and repair.kind != "offset")):
                 found.append(
                     (gain - 2 * _DOUBT[repair.kind], Disagreement(one.name, repair, b, a, limit, gain))
                 )

@@ -224,8 +224,8 @@ def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iter
 
 
 def _stays_apart(one: Seen, name: str, recordings: Sequence[Seen]) -> bool:
-    """Whether, of two that differ, it is this one: it starts elsewhere than usual, and not from a machine that
-    is warm and would cool down.
+    """Whether, of two that differ, it is this one: it starts elsewhere than usual, and not from a warm
+    machine, which would cool down.
     """
     others = [r for r in recordings if r is not one and name in r.values]
     starts = [float(np.median(r.known(name)[1][:5])) for r in others]
