@@ -15,6 +15,7 @@ from discovery.recordings.finding import Finding
 
 _FEWEST = 30  # readings
 _NOISIER = 8.0  # times the noise elsewhere
+_ROUNDING = 1e-6  # of what a channel moves
 _RESCALED, _PLACES = 50.0, 15  # times the noise before; places where a recording may change
 _COARSER = 20.0  # times the steps of readings elsewhere, and more than a hundredth of what the channel moves
 _START = 10.0  # K: the first reading against its siblings, beyond what it is elsewhere
@@ -76,9 +77,10 @@ def _scale(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
         if read.size < 2 * _FEWEST:
             continue
         best, where = 1.0, 0
+        least = _ROUNDING * float(np.std(read))  # less is no noise: a straight line, or digits
         for row in np.linspace(_FEWEST, read.size - _FEWEST, _PLACES).astype(int):
             before, after = noise_of(read[:row]), noise_of(read[row:])
-            if before > 0 and after > 0 and abs(np.log(after / before)) > abs(np.log(best)):
+            if min(before, after) > least and abs(np.log(after / before)) > abs(np.log(best)):
                 best, where = after / before, int(row)
         if max(best, 1 / best) > _RESCALED:
             change = f"{best:.2g} times as" if best > 1 else f"1/{1 / best:.2g} as"
