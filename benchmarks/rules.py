@@ -21,7 +21,7 @@ TODAY_RULES, TODAY_CONSTANTS = 24, 36  # what a test holds: the aim is not reach
 RESOLUTION = {  # finer gives the same answer in more time
     "evidence/bayes.py": "_NARROW",
     "evidence/events.py": "COARSE FINE CLOSER",
-    "evidence/form_error.py": "RANK",
+    "evidence/form_error.py": "LAWS EDGES",
     "evidence/latent_force.py": "BLOCKS SIZES MEMORY_BLOCKS",
     "evidence/process_noise.py": "_TRIED _BLOCKS JITTER",
     "evidence/whitening.py": "_AT_BOUND _UNSEEN",

@@ -26,7 +26,7 @@ ORDER = (
     "diagnosis",
     "design report export",
     "experiment runtime",
-    "challenge firsthour",
+    "challenge firsthour estimator",
     "commands",
     "cli",
 )
