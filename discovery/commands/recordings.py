@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import click
 import typer
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ def _asked(question: "Question") -> int:
     typer.echo(question.text, err=True)
     for number, (words, _, _) in enumerate(question.answers, start=1):
         typer.echo(f"  {number}  {words}", err=True)
-    choice = typer.prompt("which?", type=typer.IntRange(1, len(question.answers)), default=1, err=True)
+    choice = typer.prompt("which?", type=click.IntRange(1, len(question.answers)), default=1, err=True)
     return int(choice) - 1
 
 

@@ -69,9 +69,9 @@ def _merged(before: str, now: str, models: dict[str, str], mismatch: str | None)
     old["outputs"] = new["outputs"]
     table = old["models"]
     for key, entry in models.items():
-        table[key] = tomlkit.parse(f"x = {entry}")["x"]  # type: ignore[index]
-    if "mismatch" in old and old["mismatch"]["model"] not in table and mismatch:  # type: ignore[index,operator]
-        old["mismatch"]["model"] = mismatch  # type: ignore[index]
+        table[key] = tomlkit.parse(f"x = {entry}")["x"]
+    if "mismatch" in old and old["mismatch"]["model"] not in table and mismatch:
+        old["mismatch"]["model"] = mismatch
     return tomlkit.dumps(old)
 
 

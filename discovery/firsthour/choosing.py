@@ -55,7 +55,7 @@ class Score:
     @property
     def helps(self) -> bool:
         """Whether the model is better than none, and not by one lucky part."""
-        return self.ratio < BETTER and np.mean([one < 1.0 for one in self.folds]) > 0.5
+        return self.ratio < BETTER and sum(one < 1.0 for one in self.folds) > 0.5 * len(self.folds)
 
 
 def choose(experiment: Experiment, progress: Progress = silent) -> list[Score]:
@@ -123,9 +123,10 @@ def _residual(
 
     grid = trajectory.system.grid
     rows = grid.readings - predict(trajectory)
-    return np.nansum(
+    squares: Array = np.nansum(
         np.where(_inside(grid.time[grid.read], fold, recording)[:, None], rows, np.nan) ** 2, axis=0
     )
+    return squares
 
 
 def _spread(campaign: Campaign, recording: str, outputs: Sequence[str], fold: Fold) -> Array:

@@ -128,7 +128,7 @@ def evidence(
             found.add(f"'{_spelled(word, name)}' in its name", says)
         seen.add(word.gloss)
     if unit is not None:
-        odds = dimension_of(unit)
+        odds = dict(dimension_of(unit))
         if odds and max(odds.values()) > 4:  # a quantity that cannot have the unit is out
             odds = {**dict.fromkeys((q for q in QUANTITIES if q not in odds), -12.0), **odds}
         found.add(f"its unit {unit}", odds)

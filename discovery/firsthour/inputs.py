@@ -91,5 +91,5 @@ def _unexplained(blocks: list[dict[str, Array]], targets: list[Array], names: Se
         F = np.column_stack([block[name] for name in names])
         gram = F.T @ F + _RIDGE * len(y) * np.eye(F.shape[1])
         left = y - F @ np.linalg.solve(gram, F.T @ y)
-        shares.append(float(np.mean(left**2) / max(np.mean(y**2), 1e-30)))
+        shares.append(float(np.mean(left**2)) / max(float(np.mean(y**2)), 1e-30))
     return float(np.mean(shares)) if shares else 1.0

@@ -127,7 +127,7 @@ class _Lines:
 
 def _mark(lines: Sequence[str]) -> str:
     """What separates the cells: with it most lines have as many cells, and most of these can be read."""
-    sample = lines[len(lines) // 2 :][:_TAIL] + lines[-_TAIL:]
+    sample = [*lines[len(lines) // 2 :][:_TAIL], *lines[-_TAIL:]]
 
     def score(mark: str) -> tuple[float, int]:
         rows = [_split(line, mark) for line in sample]

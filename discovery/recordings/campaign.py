@@ -174,10 +174,10 @@ def _load(
             do = f"{suggest(column, list(columns.header))}; or say set = {{ {channel} = ... }} in {path}"
             raise UserError(f"{file}, line 1: no column '{column}'; {do}")
     values = channel_values(columns, form, channels, conversions)
-    for channel, column in values.items():
+    for channel, series in values.items():
         made = make_channel(channel, channels[channel], conversions[channel])
-        known = np.flatnonzero(np.isfinite(column))
-        column[known[impossible_readings(made, column[known])]] = np.nan  # `check` says so
+        known = np.flatnonzero(np.isfinite(series))
+        series[known[impossible_readings(made, series[known])]] = np.nan  # `check` says so
     return Recording(
         name,
         columns.time - columns.time[0],

@@ -119,6 +119,11 @@ def _set(name: str, to: Callable[[Array, Frame], Array]) -> Callable[[Frame], Fr
     return lambda frame: frame | {name: np.asarray(to(frame[name].copy(), frame), dtype=float)}
 
 
+def _times(factor: float) -> Callable[[Frame], Frame]:
+    """A clock that counts so many of its units where one has passed."""
+    return lambda frame: frame | {"time": frame["time"] * factor}
+
+
 def _late(names: tuple[str, ...], seconds: float) -> Callable[[Frame], Frame]:
     def made(frame: Frame) -> Frame:
         found = dict(frame)
@@ -230,10 +235,10 @@ def _damages() -> list[Damage]:
             _late(("pump", "speed", "P_drive", "P_cool"), 3600.0),
         ),
         *(
-            Damage(f"{word} read as seconds", M, r, (), lambda f, k=k: f | {"time": f["time"] / k})
+            Damage(f"{word} read as seconds", M, r, (), _times(1 / k))
             for word, k in (("minutes", 60.0), ("hours", 3600.0), ("days", 86400.0), ("milliseconds", 1e-3))
         ),
-        Damage("a clock that runs 20 % fast", M, r, (), lambda f: f | {"time": f["time"] * 1.2}),
+        Damage("a clock that runs 20 % fast", M, r, (), _times(1.2)),
         Damage("missing readings as 0", M, r, ("T_fluid",), _set("T_fluid", _rows(0.05, 0.0))),
         Damage("missing errors as 0", M, r, ("E_Y0C",), _set("E_Y0C", _rows(0.05, 0.0))),
         Damage("missing readings as -999", M, r, ("T_env",), _set("T_env", _rows(0.03, -999.0))),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Literal
 
 from discovery.recordings.campaign import Channel
 from discovery.recordings.compare.agreement import Disagreement, disagreements
@@ -42,7 +43,7 @@ def compare(path: Path, recordings: Sequence[Seen], channels: Mapping[str, Chann
 
 def _disagreement(seen: Seen, one: Disagreement) -> Finding:
     repair = one.repair
-    severity = "error" if repair.kind in _ERRORS else "warning"
+    severity: Literal["error", "warning"] = "error" if repair.kind in _ERRORS else "warning"
     proof = f"undone, it agrees with the other recordings: misfit {one.before:.0%} -> {one.after:.0%}"
     channel = repair.channels[0] if repair.channels else ""
     weight = _WEIGHTS.get(repair.kind, 2.0)

@@ -343,7 +343,8 @@ class _Story:
         known = [gram for (name, of), gram in self.grams.items() if of == y and name not in without]
         if not known:
             return None
-        gram, target = sum(g for g, _, _ in known), sum(b for _, b, _ in known)
+        gram = np.sum([g for g, _, _ in known], axis=0)
+        target = np.sum([b for _, b, _ in known], axis=0)
         count = sum(n for _, _, n in known)
         found: Array = np.linalg.solve(gram + _RIDGE * count * np.eye(len(target)), target)
         return found

@@ -297,7 +297,7 @@ def _goes_on(pair: Array) -> float:
 
 def _related(others: Sequence[Array]) -> bool:
     """Whether one channel is nearly a straight line of the other in every recording."""
-    return all(abs(float(np.corrcoef(o)[0, 1])) > _LINE for o in others)
+    return all(abs(float(np.atleast_2d(np.corrcoef(o))[0, 1])) > _LINE for o in others)
 
 
 def _together(one: Seen, a: str, b: str) -> Array | None:
