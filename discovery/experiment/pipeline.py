@@ -18,19 +18,21 @@ from discovery.experiment.form import (
     ModelEntry,
     ReducedEntry,
     SuperpositionEntry,
+    ThermobalanceEntry,
     separate,
 )
 from discovery.experiment.joining import check_joins, join
-from discovery.experiment.results import write_run
+from discovery.experiment.results import results_document, write_run
 from discovery.fitting import fit_model
 from discovery.fitting.fit import written_with
 from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.solve import Loss
 from discovery.fitting.starts import warm_start
-from discovery.models import Model
+from discovery.models import Model, check_model
 from discovery.models.dimensions import with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
+from discovery.models.thermobalance import thermobalance
 from discovery.progress import Progress, silent
 from discovery.report import write_report
 from discovery.runfolder import default_folder, staged
@@ -66,20 +68,50 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
         check_targets(experiment.form.export.to)
     with staged(folder) as temporary:
         fitted: dict[str, Fitted] = {}
+        roles = roles_of(experiment, progress)
         for name, entry in experiment.form.models.items():
             fitted[name] = fit_entry(experiment, name, entry, progress)
         found = diagnosis(experiment, progress, fitted)
         if found is not None and found.repaired is not None:
             name = _free_name("repaired", fitted)
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
-        seconds = clock.perf_counter() - began
         progress("writing the report")
-        write_run(temporary, "run", experiment, fitted, _written(found), seconds)
+        further: dict[str, Any] = {"roles": roles} if roles else {}
+        if experiment.form.paper:
+            further |= paper_page(temporary, experiment, fitted, further, progress)
+        seconds = clock.perf_counter() - began
+        write_run(temporary, "run", experiment, fitted, _written(found), seconds, further)
         write_report(temporary)
     if experiment.form.export:
         progress(f"exporting {experiment.form.export.model}")
         export_of(folder, experiment.form.export)
     return folder
+
+
+def roles_of(experiment: Experiment, progress: Progress = silent) -> dict[str, Any] | None:
+    """Every model without each role in turn, where the experiment names roles."""
+    if experiment.form.roles is None:
+        return None
+    from discovery.experiment.roles import leave_roles_out
+
+    progress("leaving out one role after the other")
+    return leave_roles_out(experiment, progress)
+
+
+def paper_page(
+    folder: Path,
+    experiment: Experiment,
+    fitted: Mapping[str, Fitted],
+    further: Mapping[str, Any],
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Write paper.html; what results.json holds of it."""
+    from discovery.paper.page import chapters, write_page
+
+    results = {**results_document("run", experiment, fitted, 0.0), **further}
+    made = chapters(experiment, fitted, results, progress)
+    write_page(folder, experiment.name, made, results["command"])
+    return {"paper": {one.key: one.document() for one in made}}
 
 
 def export_of(folder: Path, wanted: ExportForm) -> None:
@@ -203,6 +235,9 @@ def starting_model(
         case SuperpositionEntry():
             alone = only(experiment.campaign, {one for names in separate(entry).values() for one in names})
             model = fit_one_at_a_time(alone, separate(entry), outputs)
+        case ThermobalanceEntry():
+            model = thermobalance(fluid=entry.fluid, variant=entry.speeding, jet=entry.jet)
+            check_model(model, {n: c.unit for n, c in experiment.campaign.channels.items()}, experiment.path)
         case SparseOptions():
             model, report = discovered(experiment, entry, progress)
     return replace(model, name=name), report
@@ -240,7 +275,7 @@ def diagnosis(experiment: Experiment, progress: Progress, fitted: Mapping[str, F
         experiment.held_out,
         experiment.outputs_of(entry),
         [form.effect() for form in wanted.effects],
-        physical=entry.kind == "file",
+        physical=entry.kind in ("file", "thermobalance"),
         fitted=fitted[name].fit,
         tell=progress,
     )

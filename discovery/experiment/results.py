@@ -9,6 +9,7 @@ import math
 import shlex
 import sys
 from collections.abc import Mapping
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,9 +40,16 @@ def write_run(
     fitted: Mapping[str, Fitted],
     diagnosis: Mapping[str, Any] | None,
     seconds: float,
+    further: Mapping[str, Any] | None = None,
 ) -> None:
-    """Everything that a run leaves behind but the report. `verb`: of the command that made it."""
-    write_json(folder / RESULTS, results_document(verb, experiment, fitted, seconds))
+    """Everything that a run leaves behind but the report.
+
+    Args:
+        verb: of the command that made it.
+        further: what results.json holds beside the models: "roles", "paper".
+    """
+    results = results_document(verb, experiment, fitted, seconds)
+    write_json(folder / RESULTS, results | dict(further or {}))
     if diagnosis is not None:
         write_json(folder / DIAGNOSIS, diagnosis)
     for name, one in fitted.items():
@@ -98,7 +106,15 @@ def model_entry(one: Fitted) -> dict[str, Any]:
         "values": parameter_values(model),
         "noise": dict(zip(one.fit.noise.outputs, one.fit.noise.white, strict=True)),
         "notes": list(one.notes),
+        **({"budgets": budgets} if (budgets := budgets_of(one)) else {}),
         **({"search": one.report} if one.report else {}),
+    }
+
+
+def budgets_of(one: Fitted) -> dict[str, dict[str, Any]]:
+    """Energy and fluid budget [MJ] by recording; empty for a model without heat capacities."""
+    return {
+        name: {**asdict(p.budget), "gap": p.budget.gap} for name, p in one.predictions.items() if p.budget
     }
 
 
