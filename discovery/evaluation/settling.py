@@ -56,7 +56,8 @@ def settling(time_s: Array, error: Array, smooth: int = 5) -> Settling | None:
     scatter = float(np.sqrt(2 * found.cost / max(len(y) - 3, 1)))
     if abs(end - y0) < 3 * scatter / np.sqrt(len(y)):
         return None
-    covariance = np.linalg.pinv(found.jac.T @ found.jac) * scatter**2
+    jacobian = np.asarray(found.jac, dtype=np.float64)
+    covariance = np.linalg.pinv(jacobian.T @ jacobian) * scatter**2
     tau = float(np.exp(log_tau))
     half = smooth // 2
     calm = np.array([np.median(y[max(0, k - half) : k + half + 1]) for k in range(len(y))])

@@ -139,6 +139,7 @@ class PaperForm(Strict):
     compensated: list[str] = Field([], description="recordings gone through with active compensation")
     speeding: list[str] = Field([], description="models that differ in eq. (6) alone")
     dry_load: str | None = Field(None, description="eq. (8) with the load from a dry machine")
+    cooling: str | None = Field(None, description="eq. (8) with the axis cooling power as u_2")
     nozzle: str | None = Field(None, description="recording in which height and flow of the jet matter")
     flooded: str | None = Field(None, description="recording in which they do not")
     symmetric: str | None = Field(None, description="error that symmetry keeps small, E_X0C")
@@ -152,7 +153,7 @@ class PaperForm(Strict):
 
     def models(self) -> list[tuple[str, str]]:
         """What it says of models: key and model."""
-        keys = ("thermobalance", "superposition", "reduced", "dry_load")
+        keys = ("thermobalance", "superposition", "reduced", "dry_load", "cooling")
         alone = [(key, getattr(self, key)) for key in keys]
         return [(key, name) for key, name in alone if name] + [("speeding", name) for name in self.speeding]
 

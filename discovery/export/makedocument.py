@@ -59,7 +59,7 @@ def exportable(model: Model, campaign: Campaign) -> Model:
                 "controller does not have, and no channel is an ambient temperature; give it a start value"
             )
         if start is not None and read:
-            spread = max(state.start_sd, START_SD)
+            spread = max(state.start_sd or 0.0, START_SD)
             state = replace(state, start=substitute(start, unread), start_sd=spread)
         states[name] = state
     return replace(model, outputs=outputs, states=states)

@@ -99,13 +99,14 @@ def _validity() -> Table:
         h = [film_coefficient(n, 0.05, 1000) for n in (100.0, 1200.0)]
     pr = prandtl_number(_NU, _LAMBDA_F)
     bi = [biot_number(one, TABLE_THICKNESS, _LAMBDA_S) for one in h]
-    rows: list[tuple[str | float | None, ...]] = []
-    for name, low, high, (least, most) in (
+    here: tuple[tuple[str, float, float, tuple[float, float]], ...] = (
         ("Ekman number, 1200 to 100 rpm", fast, slow, EKMAN),
-        ("Reynolds number, 2 to 14 l/min", *reynolds, REYNOLDS),
+        ("Reynolds number, 2 to 14 l/min", reynolds[0], reynolds[1], REYNOLDS),
         ("Prandtl number", pr, pr, PRANDTL),
-        ("Biot number, 100 to 1200 rpm", *bi, BIOT),
-    ):
+        ("Biot number, 100 to 1200 rpm", bi[0], bi[1], BIOT),
+    )
+    rows: list[tuple[str | float | None, ...]] = []
+    for name, low, high, (least, most) in here:
         holds = "inside" if least <= low and high <= most else "outside"
         rows.append((name, holds, low, high, least, most))
     header = ("Quantity", "", "here from", "to", "paper from", "paper to")

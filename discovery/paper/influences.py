@@ -32,9 +32,13 @@ def equation_8(m: Material) -> Chapter:
         f"{together:.0f} h "
         "(paper: about 10 days against 72 h)."
     ]
+    cooling = m.form.cooling
+    if cooling:
+        compared, _ = _compared(m, name, cooling, "The load as drive power and as axis cooling power")
+        tables.append(compared)
     dry = m.form.dry_load
     if dry:
-        compared, worst = _compared(m, name, dry)
+        compared, worst = _compared(m, name, dry, "Load identified on a wet and on a dry machine")
         tables.append(compared)
         if worst:
             error, ours, theirs = worst
@@ -64,7 +68,7 @@ def _hours(m: Material, recordings: Any) -> float:
     return sum(float(np.ptp(m.experiment.campaign.recordings[r].time)) for r in recordings) / 3600.0
 
 
-def _compared(m: Material, wet: str, dry: str) -> tuple[Table, tuple[str, float, float] | None]:
+def _compared(m: Material, wet: str, dry: str, title: str) -> tuple[Table, tuple[str, float, float] | None]:
     """rms of both on the unseen recordings, and the error with the largest ratio, pooled over these."""
     rows: list[tuple[str | float | None, ...]] = []
     pooled: dict[str, dict[str, list[float]]] = {}
@@ -80,7 +84,7 @@ def _compared(m: Material, wet: str, dry: str) -> tuple[Table, tuple[str, float,
         for e, one in pooled.items()
         if wet in one and dry in one
     }
-    table = Table("Load identified on a wet and on a dry machine", header, tuple(rows))
+    table = Table(title, header, tuple(rows))
     if not mean:
         return table, None
     error = max(mean, key=lambda e: mean[e][1] / mean[e][0])

@@ -9,7 +9,7 @@ from discovery.evaluation.symmetry import symmetry
 from discovery.evaluation.tables import Table
 from discovery.fitting import predict_recording
 from discovery.paper.active import AXIS_UM
-from discovery.paper.chapter import Array, Chapter, Material
+from discovery.paper.chapter import Chapter, Material
 from discovery.report.chart import Chart, Panel, Series
 
 WARM_UP_H = 15.0  # figure 3: then the table stands still
@@ -133,7 +133,7 @@ def symmetric(m: Material) -> Chapter | None:
     for recording, data in m.experiment.campaign.recordings.items():
         if error not in data.values:
             continue
-        others = {name: _values(data.values, name) for name in m.errors if name in data.values}
+        others = {name: data.values[name] for name in m.errors if name in data.values}
         one = symmetry(data.values[error], others)
         if one is None:
             continue
@@ -173,7 +173,3 @@ def symmetric(m: Material) -> Chapter | None:
         shows=(says,),
         not_shown=("Which side is heated: the sign of the slow part says so only for a known mounting.",),
     )
-
-
-def _values(values: object, name: str) -> Array:
-    return np.asarray(values[name], dtype=float)  # type: ignore[index]
