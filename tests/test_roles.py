@@ -1,4 +1,4 @@
-"""Cross-validation over roles: a fold sees its own recordings only; the matrix is what a run of its own finds."""
+"""Cross-validation over roles: a fold sees its own recordings only; the matrix is that of a run."""
 
 from __future__ import annotations
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
 from discovery.models.convection import HEAT_OF_FLUID
-from discovery.recordings import Channel
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.recordings.correction import at_every_row
 from discovery.terms import evaluate, names
 
 Array = NDArray[np.float64]
@@ -44,12 +45,12 @@ class Budget:
         return sum(self.entering.values()) - sum(self.stored.values())
 
 
-def budget(trajectory: Trajectory, channels: Mapping[str, Channel]) -> Budget | None:
+def budget(trajectory: Trajectory, campaign: Campaign) -> Budget | None:
     """The budget of a free run; None for a model without heat capacities.
 
     Args:
         trajectory: of a model whose terms are heat flows in W.
-        channels: of the campaign, to know the fluid by its role.
+        campaign: holds the recording; channels are known by their roles.
     """
     system = trajectory.system
     bodies = {name: state.capacity for name, state in system.model.states.items() if state.capacity}
@@ -59,7 +60,7 @@ def budget(trajectory: Trajectory, channels: Mapping[str, Channel]) -> Budget | 
     entering: dict[str, float] = {}
     moved: dict[str, float] = {}
     wet = 0.0
-    fluids = {name for name, c in channels.items() if c.role == "fluid temperature"}
+    fluids = {name for name, c in campaign.channels.items() if c.role == "fluid temperature"}
     for term in system.model.terms:
         if term.into not in bodies and term.source not in bodies:
             continue
@@ -78,10 +79,11 @@ def budget(trajectory: Trajectory, channels: Mapping[str, Channel]) -> Budget | 
         for k, name in enumerate(system.states)
         if (capacity := bodies.get(name))
     }
-    return Budget(entering, moved, stored, fluid_budget(trajectory, channels, wet))
+    recording = campaign.recordings[system.grid.recording]
+    return Budget(entering, moved, stored, fluid_budget(recording, campaign.channels, wet))
 
 
-def fluid_budget(trajectory: Trajectory, channels: Mapping[str, Channel], heat_MJ: float) -> dict[str, float]:
+def fluid_budget(recording: Recording, channels: Mapping[str, Channel], heat_MJ: float) -> dict[str, float]:
     """What the cutting fluid did: hours pumped, volume, temperature over the room, heat given to the machine,
     and the temperature drop of the fluid that this heat makes (only where a flow in l/min is recorded).
 
@@ -90,28 +92,31 @@ def fluid_budget(trajectory: Trajectory, channels: Mapping[str, Channel], heat_M
     Args:
         heat_MJ: given to the machine by terms that contain the fluid temperature.
     """
-    grid = trajectory.system.grid
-    by_role = {
-        role: [n for n, c in channels.items() if c.role == role and n in grid.samples]
-        for role in ("fluid temperature", "fluid flow", "ambient temperature")
-    }
-    if not by_role["fluid temperature"] or not by_role["fluid flow"]:
+    by_role: dict[str, list[str]] = {}
+    for name, channel in channels.items():
+        values = recording.values.get(name)
+        if values is not None and np.isfinite(values).any():
+            by_role.setdefault(channel.role, []).append(name)
+    flows = by_role.get("fluid flow", [])
+    if not flows or "fluid temperature" not in by_role:
         return {}
+    steps = np.diff(recording.time)
 
-    def mean(name: str, weight: Array) -> float:
-        ends = grid.ends[name]
-        middle = 0.5 * (ends[0::2] + ends[1::2])
-        return float(np.sum(middle * weight) / np.sum(weight)) if np.sum(weight) > 0 else 0.0
+    def over(name: str) -> Array:
+        """A channel in each interval between rows; 0 before it is known."""
+        rows = at_every_row(recording.time, recording.values[name], channels[name].between)
+        middle = 0.5 * (rows[:-1] + rows[1:]) if channels[name].between == "linear" else rows[:-1]
+        return np.nan_to_num(middle)
 
-    flow = by_role["fluid flow"][-1]
-    litres = [n for n in by_role["fluid flow"] if channels[n].unit == "l/min"]
-    on = (grid.ends[flow][0::2] > 0) * grid.step
+    on = (over(flows[0]) > 0) * steps
     found = {"hours pumped": float(np.sum(on)) / 3600.0, "heat to the machine [MJ]": heat_MJ}
-    if by_role["ambient temperature"] and np.sum(on) > 0:
-        fluid, room = by_role["fluid temperature"][0], by_role["ambient temperature"][0]
-        found["over the room [K]"] = mean(fluid, on) - mean(room, on)
-    if litres and np.sum(on) > 0:
-        volume = mean(litres[0], grid.step) * float(np.sum(grid.step)) / 60.0  # l
-        found["volume [m3]"] = volume * LITRE
-        found["drop of the fluid [K]"] = heat_MJ * MJ / (HEAT_OF_FLUID * volume * LITRE)
+    if not np.sum(on) > 0:
+        return found
+    if rooms := by_role.get("ambient temperature"):
+        above = over(by_role["fluid temperature"][0]) - over(rooms[0])
+        found["over the room [K]"] = float(np.sum(above * on) / np.sum(on))
+    if litres := [n for n in flows if channels[n].unit == "l/min"]:
+        volume = float(np.sum(over(litres[0]) * steps)) / 60.0 * LITRE
+        found["volume [m3]"] = volume
+        found["drop of the fluid [K]"] = heat_MJ * MJ / (HEAT_OF_FLUID * volume)
     return found

@@ -3,7 +3,7 @@
     y(t) = y_end - (y_end - y_0) exp(-t/tau)
 
 One time constant is a summary, not a law: a table of several bodies has several. So the time after which the
-readings stay within a tenth of the whole change stands beside it, which assumes nothing.
+readings stay within a tenth of the whole change of its end stands beside it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 class Settling:
     """Of one error over one phase. `change`: y_end - y_0 of the exponential, in the unit of the error;
     `tau_h` with its standard error `tau_sd`; `settled_h`: from here on readings stay within a tenth of the
-    change, NaN if they do not before the phase ends; `largest`: magnitude read in the phase.
+    change of where the exponential ends, NaN if they do not before the phase ends; `largest`: magnitude read.
     """
 
     change: float
@@ -61,7 +61,7 @@ def settling(time_s: Array, error: Array, smooth: int = 5) -> Settling | None:
     tau = float(np.exp(log_tau))
     half = smooth // 2
     calm = np.array([np.median(y[max(0, k - half) : k + half + 1]) for k in range(len(y))])
-    outside = np.flatnonzero(np.abs(calm - np.median(y[-smooth:])) > 0.1 * abs(end - y0))
+    outside = np.flatnonzero(np.abs(calm - end) > 0.1 * abs(end - y0))
     settled = float(t[outside[-1] + 1]) if len(outside) and outside[-1] + 1 < len(t) - smooth else np.nan
     if not len(outside):
         settled = 0.0

@@ -217,6 +217,7 @@ def _check_roles(path: Path, form: ExperimentForm, campaign: Campaign, outputs: 
                 what = f"'{name}' plays '{taken[name]}' too; a recording has one role"
                 raise _mistake(path, ("roles", role), what)
             taken[name] = role
+    for role, recordings in roles.items():
         others = [name for other, names in roles.items() if other != role for name in names]
         for one, other in twins(campaign, recordings, others):
             what = f"'{one}' holds the same readings as '{other}' of another role; leave one out"

@@ -164,5 +164,5 @@ def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
         if experiment.campaign.channels[name].role == "temperature" and len(taken):
             reference[y] = taken[0]
     predicted = model_outputs(trajectory)
-    heat = budget(trajectory, experiment.campaign.channels)
+    heat = budget(trajectory, experiment.campaign)
     return Prediction(outputs, grid.time[grid.read], grid.readings, predicted, reference, heat)

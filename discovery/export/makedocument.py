@@ -21,6 +21,7 @@ from discovery.recordings import Campaign
 from discovery.terms import Expression, Name, Number, Term, names, substitute, text
 
 START_SD = 2.0  # um or K: of a start value that was a reading and is a guess now
+BODY_SD = 0.5  # K: of a start that a fit was free to find in each recording
 
 
 def exportable(model: Model, campaign: Campaign) -> Model:
@@ -58,10 +59,10 @@ def exportable(model: Model, campaign: Campaign) -> Model:
                 f"model '{model.name}': state '{name}' starts at the reading of {read[0]}, which a "
                 "controller does not have, and no channel is an ambient temperature; give it a start value"
             )
+        spread = BODY_SD if state.start_sd is None else state.start_sd
         if start is not None and read:
-            spread = max(state.start_sd or 0.0, START_SD)
-            state = replace(state, start=substitute(start, unread), start_sd=spread)
-        states[name] = state
+            start, spread = substitute(start, unread), max(spread, START_SD)
+        states[name] = replace(state, start=start, start_sd=spread)
     return replace(model, outputs=outputs, states=states)
 
 

@@ -63,7 +63,7 @@ SPEED_NEW = {  # eq. (6), in rpm
 
 
 FALL = "(h_nozzle/d_n)"  # beta, eq. (4)
-JET = "(1000*4*max(flow, 0.1)/60/3.14159265/d_n/nu/1e6)"  # Re = V_j d_n/nu, V_j = 4 Q/(pi d_n^2); Q in l/min
+JET = "(4*max(flow, 0.1)/60/3.14159265/d_n/nu)"  # Re = V_j d_n/nu, V_j = 4 Q/(pi d_n^2); Q in l/min
 
 
 def film(variant: Speeding = "none", *, jet: bool = False) -> str:

@@ -21,7 +21,7 @@ from discovery.recordings import Campaign
 from discovery.recordings.campaignfile import ChannelForm
 from discovery.recordings.correction import uncompensated
 from discovery.recordings.roles import CORRECTION
-from discovery.runtime.compensator import Compensator
+from discovery.runtime.compensator import Compensator, Settings, State
 from discovery.runtime.guards import Reading
 
 Array = NDArray[np.float64]
@@ -36,13 +36,22 @@ class Active:
 
     `measured[error]` (N,): on the compensated machine, NaN where not read. `applied[error]` (N,): correction
     that the controller took off. `reconstructed[error]` (N,): the uncompensated error, from these two alone.
+    `ready` (N,): the runtime was in state ACTIVE; before, it was just switched on and its start still counts.
     """
 
     time: Array
     measured: Mapping[str, Array]
     applied: Mapping[str, Array]
     reconstructed: Mapping[str, Array]
-    states: Mapping[str, int]  # ticks in each state of the runtime
+    ready: NDArray[np.bool_]
+
+    def compensated(self, error: str) -> Array:
+        """What was measured while the runtime was ready, NaN elsewhere."""
+        return np.where(self.ready, self.measured[error], np.nan)
+
+    def uncompensated(self, error: str) -> Array:
+        """What would have been measured meanwhile."""
+        return np.where(self.ready, self.reconstructed[error], np.nan)
 
 
 def exported_of(
@@ -79,13 +88,15 @@ def in_steps(offset: float, step: float) -> float:
 def compensate(exported: Exported, campaign: Campaign, recording: str) -> Active:
     """Go through a recording tick by tick with a model that knows no more than a controller would."""
     data = campaign.recordings[recording]
-    compensator = Compensator(exported)
     names = [one.name for one in exported.inputs]
+    logged = np.any([np.isfinite(data.values[name]) for name in names], axis=0)
+    compensator = Compensator(exported, Settings(tick_s=float(np.median(np.diff(data.time[logged])))))
     errors = [name for name in compensator.names if name in data.values]
     step = {name: resolution(campaign.channels[name].unit) for name in errors}
     applied = {name: np.zeros(len(data.time)) for name in errors}
     readings: dict[str, Reading] = {}
-    states: dict[str, int] = {}
+    ready = np.zeros(len(data.time), dtype=bool)
+    active = False
     offsets = dict.fromkeys(errors, 0.0)
     columns = {name: data.values[name] for name in names}
     for k, now in enumerate(data.time.tolist()):
@@ -93,18 +104,14 @@ def compensate(exported: Exported, campaign: Campaign, recording: str) -> Active
         if fresh:
             readings |= fresh
             tick = compensator.tick(readings, now)
-            states[tick.state.name] = states.get(tick.state.name, 0) + 1
+            active = tick.state is State.ACTIVE
             offsets = {name: in_steps(tick.offsets[name], step[name]) for name in errors}
+        ready[k] = active
         for name in errors:
             applied[name][k] = -offsets[name]
     measured = {name: np.asarray(data.values[name] - applied[name]) for name in errors}
-    return Active(
-        data.time,
-        measured,
-        applied,
-        _reconstructed(campaign, recording, data.time, measured, applied),
-        states,
-    )
+    found = _reconstructed(campaign, recording, data.time, measured, applied)
+    return Active(data.time, measured, applied, found, ready)
 
 
 def _reconstructed(

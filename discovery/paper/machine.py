@@ -39,8 +39,8 @@ def figure_2(m: Material) -> Chapter | None:
     rows.sort(key=lambda row: str(row[0]))
     both = {name: one for name, one in last.items() if len(one) == 2}
     warmer = [name for name, one in both.items() if one["wet"] > one["dry"]]
-    shows = f"At 240 min {len(warmer)} of {len(both)} bodies are warmer wet than dry: "
-    f"{', '.join(warmer) or 'none'}."
+    named = ", ".join(warmer) or "none"
+    shows = f"At 240 min {len(warmer)} of {len(both)} bodies are warmer wet than dry: {named}."
     header = ("Body [°C]", "", *(f"{t:.0f} min" for t in _INSTANTS_MIN))
     return Chapter(
         "figure-2",

@@ -40,7 +40,7 @@ def test_heat_that_enters_is_stored_or_leaves() -> None:
     """0.36 MJ of loss into x; joint of 20 W/K to z; all of it stays: 0.36 MJ / (2 x 50 kJ/K) = 3.6 K."""
     campaign, model = run((Term("loss", "x", parse("P")), Term("joint", "z", parse("20*(x - z)"), "x")))
     trajectory = predict_recording(model, campaign, "r", ["E"])
-    found = budget(trajectory, CHANNELS)
+    found = budget(trajectory, campaign)
     assert found is not None
     assert found.entering == pytest.approx({"loss": 0.36})
     assert sum(found.stored.values()) == pytest.approx(0.36, rel=1e-9)
@@ -51,11 +51,11 @@ def test_heat_that_enters_is_stored_or_leaves() -> None:
 
 
 def test_the_fluid_cools_by_what_it_gives() -> None:
-    """A body that its size holds at 20 degC takes 40 W/K x 10 K for an hour: 1.44 MJ from 0.72 m3. It cools by
-    1.44 MJ/(4.15 MJ/m3K x 0.72 m3) = 0.482 K.
+    """A body that its size holds at 20 degC takes 40 W/K x 10 K for an hour: 1.44 MJ from 0.72 m3,
+    which cools by 1.44 MJ/(4.15 MJ/m3K x 0.72 m3) = 0.482 K.
     """
     campaign, model = run((Term("fluid", "x", parse("40*(flow/12)*(T_fluid - x)")),), capacity=1e9)
-    found = budget(predict_recording(model, campaign, "r", ["E"]), CHANNELS)
+    found = budget(predict_recording(model, campaign, "r", ["E"]), campaign)
     assert found is not None
     assert found.fluid["heat to the machine [MJ]"] == pytest.approx(1.44, rel=1e-3)
     assert found.fluid["volume [m3]"] == pytest.approx(0.72, rel=1e-6)
@@ -66,4 +66,4 @@ def test_the_fluid_cools_by_what_it_gives() -> None:
 
 def test_a_model_without_heat_capacities_has_no_budget() -> None:
     campaign, model = run((Term("itself", "x", parse("20 - x")),), capacity=None)
-    assert budget(predict_recording(model, campaign, "r", ["E"]), CHANNELS) is None
+    assert budget(predict_recording(model, campaign, "r", ["E"]), campaign) is None
