@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,6 +41,7 @@ from discovery.targets import check_targets
 
 if TYPE_CHECKING:
     from discovery.diagnosis import Diagnosis
+    from discovery.experiment.roles import Fold
 
 
 def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
@@ -68,7 +69,7 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
         check_targets(experiment.form.export.to)
     with staged(folder) as temporary:
         fitted: dict[str, Fitted] = {}
-        roles = roles_of(experiment, progress)
+        begun = begin_roles(experiment)
         for name, entry in experiment.form.models.items():
             fitted[name] = fit_entry(experiment, name, entry, progress)
         found = diagnosis(experiment, progress, fitted)
@@ -76,7 +77,7 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
             name = _free_name("repaired", fitted)
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
         progress("writing the report")
-        further: dict[str, Any] = {"roles": roles} if roles else {}
+        further = roles_of(experiment, begun, progress)
         if experiment.form.paper:
             further |= paper_page(temporary, experiment, fitted, further, progress)
         seconds = clock.perf_counter() - began
@@ -88,14 +89,23 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
     return folder
 
 
-def roles_of(experiment: Experiment, progress: Progress = silent) -> dict[str, Any] | None:
-    """Every model without each role in turn, where the experiment names roles."""
+def begin_roles(experiment: Experiment) -> Iterator[Fold] | None:
+    """Folds of the cross-validation over roles, under way beside the fits of the experiment itself."""
     if experiment.form.roles is None:
         return None
+    from discovery.experiment.roles import begin_folds
+
+    return begin_folds(experiment)
+
+
+def roles_of(experiment: Experiment, begun: Iterator[Fold] | None, progress: Progress) -> dict[str, Any]:
+    """What results.json holds of the roles; nothing where the experiment names none."""
+    if begun is None:
+        return {}
     from discovery.experiment.roles import leave_roles_out
 
     progress("leaving out one role after the other")
-    return leave_roles_out(experiment, progress)
+    return {"roles": leave_roles_out(experiment, begun, progress)}
 
 
 def paper_page(

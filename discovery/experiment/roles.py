@@ -41,28 +41,46 @@ class Fold:
     lost: tuple[str, ...] = ()
 
 
-def leave_roles_out(experiment: Experiment, progress: Progress = silent) -> dict[str, Any]:
-    """Every model of the experiment without each role in turn, two folds at a time where there are two cores.
+def begin_folds(experiment: Experiment) -> Iterator[Fold]:
+    """Begin to find every model without each role, on as many cores as there are, in the background.
+
+    The folds come in the order in which they are done.
+    """
+    from joblib import Parallel, delayed
+
+    models = experiment.form.models
+    # the longest first, so that no core waits at the end
+    tasks = sorted(
+        ((m, r) for r in experiment.form.roles or {} for m in models),
+        key=lambda t: models[t[0]].kind != "sindy",
+    )
+    jobs = max(1, min(len(os.sched_getaffinity(0)), len(tasks)))
+    work = Parallel(n_jobs=jobs, return_as="generator_unordered")
+    found: Iterator[Fold] = work(delayed(fold_of)(experiment, name, role) for name, role in tasks)
+    return found
+
+
+def leave_roles_out(
+    experiment: Experiment, begun: Iterator[Fold] | None = None, progress: Progress = silent
+) -> dict[str, Any]:
+    """Every model of the experiment without each role in turn.
+
+    Args:
+        begun: folds under way, see `begin_folds`.
 
     Returns:
         What `results.json` holds under "roles": recordings of each role, and for each model the matrix
         rms[error][found without][judged on], the terms with the share of folds that hold them, and the spread
         of each parameter over the folds.
     """
-    from joblib import Parallel, delayed
-
     roles: Roles = experiment.form.roles or {}
     models = experiment.form.models
-    # the longest first, so that no core waits at the end
-    tasks = sorted(((m, r) for r in roles for m in models), key=lambda task: models[task[0]].kind != "sindy")
-    jobs = max(1, min(len(os.sched_getaffinity(0)), len(tasks)))
-    work = Parallel(n_jobs=jobs, return_as="generator_unordered")(
-        delayed(fold_of)(experiment, name, role) for name, role in tasks
-    )
     folds: list[Fold] = []
-    for fold in work:
+    for fold in begun if begun is not None else begin_folds(experiment):
         folds.append(fold)
-        progress(f"{fold.model} found without {fold.without}: {len(folds)} of {len(tasks)} folds")
+        progress(
+            f"{fold.model} found without {fold.without}: {len(folds)} of {len(roles) * len(models)} folds"
+        )
     order = list(roles)
     return {
         "recordings": {role: list(recordings) for role, recordings in roles.items()},
