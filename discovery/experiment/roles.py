@@ -9,7 +9,6 @@ diagonal stands what nobody has seen.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -46,7 +45,7 @@ def begin_folds(experiment: Experiment) -> Iterator[Fold]:
 
     The folds come in the order in which they are done.
     """
-    from joblib import Parallel, delayed
+    from joblib import Parallel, cpu_count, delayed
 
     models = experiment.form.models
     # the longest first, so that no core waits at the end
@@ -54,7 +53,7 @@ def begin_folds(experiment: Experiment) -> Iterator[Fold]:
         ((m, r) for r in experiment.form.roles or {} for m in models),
         key=lambda t: models[t[0]].kind != "sindy",
     )
-    jobs = max(1, min(len(os.sched_getaffinity(0)), len(tasks)))
+    jobs = max(1, min(cpu_count(), len(tasks)))
     work = Parallel(n_jobs=jobs, return_as="generator_unordered")
     found: Iterator[Fold] = work(delayed(fold_of)(experiment, name, role) for name, role in tasks)
     return found

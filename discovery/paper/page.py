@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from discovery.errors import RunsAwayError, UserError
 from discovery.evaluation.paper import SOURCE
 from discovery.evaluation.rolematrix import left_out, matrix, steadiness
 from discovery.experiment.experiment import Experiment
@@ -57,7 +58,10 @@ def chapters(
     made = []
     for name, make in _IN_ORDER:
         progress(f"the paper: {name}")
-        chapter = make(material)
+        try:
+            chapter = make(material)
+        except (RunsAwayError, UserError) as error:  # one figure less, not a run less
+            chapter = Chapter(name.replace(" ", "-"), f"{name}: not made", "", not_shown=(str(error),))
         if chapter is not None:
             made.append(chapter)
     if "roles" in results:

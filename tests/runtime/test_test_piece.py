@@ -1,4 +1,4 @@
-"""A test piece as sparse readings: a few features cut in a day and measured later are enough for an update."""
+"""A test piece as sparse readings: a few features cut in a day and measured later suffice for an update."""
 
 from __future__ import annotations
 
