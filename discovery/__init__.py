@@ -1,10 +1,11 @@
 """Discovery workbench: models of thermal errors from recordings, and what physics they miss.
 
-    recordings -> terms -> models -> dynamics -> fitting -> sparse, mismatch -> evaluation -> report, export
-        -> experiment, runtime
+    terms -> recordings -> models -> dynamics -> fitting, effects -> evidence, evaluation, sparse
+        -> diagnosis -> design, report, export -> experiment, runtime
 
-A folder each; an import goes only to the left. `virtual` makes recordings, `challenge` puts the diagnosis to
-the proof, `firsthour` helps a user begin, `commands` holds the verbs of `cli`.
+A folder each; an import goes only to the left (`tests/test_imports.py`). `virtual` makes recordings,
+`challenge` puts the diagnosis to the proof, `firsthour` helps a user begin, `commands` holds the verbs of
+`cli`.
 
 Nothing heavy is imported here: ``import discovery`` takes a few milliseconds; each name below loads what
 it needs.
@@ -18,6 +19,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from discovery.diagnosis import diagnose
     from discovery.errors import UserError
+    from discovery.estimator import SparseDiscovery, discover
     from discovery.experiment import run
     from discovery.fitting import fit_model
     from discovery.frames import campaign_from_frames, prediction_frame, recording_frame
@@ -26,9 +28,11 @@ if TYPE_CHECKING:
     from discovery.report import write_report
 
 _HOME = {
+    "SparseDiscovery": "estimator",
     "UserError": "errors",
     "campaign_from_frames": "frames",
     "diagnose": "diagnosis",
+    "discover": "estimator",
     "fit_model": "fitting",
     "load_campaign": "recordings",
     "prediction_frame": "frames",
@@ -40,9 +44,11 @@ _HOME = {
 }
 
 __all__ = [
+    "SparseDiscovery",
     "UserError",
     "campaign_from_frames",
     "diagnose",
+    "discover",
     "fit_model",
     "load_campaign",
     "prediction_frame",

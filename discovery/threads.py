@@ -1,21 +1,46 @@
-"""One thread for the linear algebra of a process: problems are small, and processes share the cores.
+"""How the cores are used: independent fits run side by side, each with one thread for its linear algebra.
 
-The command says so before numpy is loaded. A script has loaded it by then, so whatever computes for long pins
-the libraries itself while it runs. What the user has set stays.
+Problems are small: threads inside a matrix product would only get in each other's way. The command says so
+before numpy is loaded. A script has loaded it by then, so whatever computes for long pins the libraries itself
+while it runs. What the user has set stays. The kernels release the lock of the interpreter, so that threads
+share everything and nothing is copied.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
+T = TypeVar("T")
 
 _LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "VECLIB")
 NAMES = tuple(f"{library}_NUM_THREADS" for library in _LIBRARIES)
+
+
+JOBS = "DISCOVERY_JOBS"  # environment variable: fits at a time
+
+
+def jobs() -> int:
+    """Fits at a time: what the user has set, else the cores that this process may use."""
+    said = os.environ.get(JOBS, "")
+    if said.isdigit() and int(said) > 0:
+        return int(said)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """`work` on each item, in their order; the same results with any number of jobs."""
+    count = min(jobs(), len(items))
+    if count < 2:
+        return [work(item) for item in items]
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(count) as pool:
+        return list(pool.map(work, items))
 
 
 def say_one_thread() -> None:

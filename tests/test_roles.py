@@ -106,7 +106,7 @@ def test_terms_and_parameters_over_the_folds() -> None:
 def test_a_run_writes_the_matrix_into_results_and_report(path: Path) -> None:
     out = run(path, path.parent / "out")
     results = load_run(out).results
-    assert set(results["roles"]["models"]) == {"reduced", "one_body", "apart"}
+    assert set(results["role_matrix"]["models"]) == {"reduced", "one_body", "apart"}
     page = (out / "report.html").read_text()
     assert "Each role left out in turn" in page
     assert "Heat and fluid of each recording" in page

@@ -1,4 +1,4 @@
-"""What a diagnosis works on: recordings that it may see, noise to reckon with, and how large effects can be."""
+"""What a diagnosis works on: recordings it may see, noise to reckon with, and how large effects can be."""
 
 from __future__ import annotations
 
@@ -27,17 +27,22 @@ from discovery.terms import evaluate
 
 Array = NDArray[np.float64]
 
-MOST_READINGS = 6000  # instants, over all recordings
+MOST_READINGS = 4000  # instants, over all recordings
 NODES = 1000  # of a recording, about, and its readings: inputs are their means in between
 
-PROCESS = Prior(
-    thresholds.FLOOR,
-    thresholds.SHARE,
-    thresholds.LEVELS,
-    thresholds.LEVEL_WEIGHTS,
-    thresholds.SLOW,
-    thresholds.SLOW_WEIGHTS,
-)
+
+def process_prior() -> Prior:
+    """What is believed of process noise before the recordings are read."""
+    return Prior(
+        thresholds.FLOOR,
+        thresholds.SHARE,
+        thresholds.LEVELS,
+        thresholds.LEVEL_WEIGHTS,
+        thresholds.SLOW,
+        thresholds.SLOW_WEIGHTS,
+        thresholds.FORMS,
+        thresholds.FORM_WEIGHTS,
+    )
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,7 @@ class Context:
     belief: float | None
     outliers: tuple[Outlier, ...]  # set aside
     form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
+    laws: int  # of these, the first, that are of laws and not of edges
     known: dict[tuple[str, ...], list[tuple[float, float, float]]] = field(default_factory=dict, repr=False)
 
     @property
@@ -64,14 +70,24 @@ class Context:
         """The reading noise."""
         return self.settings[0].noise
 
+    @property
+    def blocks(self) -> int:
+        """Blocks of time in each recording."""
+        return max(3, round(thresholds.BLOCKS / len(self.recordings)))
+
+    @property
+    def usual(self) -> Noise:
+        """The noise that is most likely before the recordings are read."""
+        return max(self.settings, key=lambda s: s.log_weight).noise
+
     @cached_property
     def candidates(self) -> list[Hypothesis]:
         """Every effect at every place where it could act in the model."""
         return candidates(self.model, self.effects, self.scene)
 
     def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:
-        """Prior of the size of each amplitude: usual on machines of the catalogue, but no more than a share of
-        what flows in the model; of what an output shows more, some reading noises.
+        """Prior of the size of each amplitude: usual on machines of the catalogue, but no more than a share
+        of what flows in the model; of what an output shows more, some reading noises.
         """
         for h in hypotheses:
             if h.amplitudes not in self.known:
@@ -104,7 +120,7 @@ class Context:
         """For each amplitude: rms of what one of it shows, and the reading noise there."""
         white = dict(zip(self.outputs, self.white.white, strict=True))
         several = len(h.amplitudes) > 1
-        names = list(h.shown) if several else [list(h.shown)[0]]
+        names = list(h.shown) if several else [next(iter(h.shown))]
         size = np.zeros(len(names))
         for run in self.baseline.trajectories:
             for k, name in enumerate(names):
@@ -156,13 +172,14 @@ def make_context(
     if any(g.unsure for g in whole.values()):
         grids = thinned(whole)
         fit = fitted(grids, fit)
-    floor = floors(fit, PROCESS.floor)
-    white = reading_noise(fit, stated, floor, PROCESS)
+    floor = floors(fit, thresholds.FLOOR)
+    white = reading_noise(fit, stated, floor, process_prior())
     outliers = find_outliers(fit, whole, np.array(white.white))
     if outliers:
         grids = thinned(without(whole, outliers))
         fit = fitted(grids, fit)
-        white = reading_noise(fit, stated, floor, PROCESS)
+        white = reading_noise(fit, stated, floor, process_prior())
+    form, laws = model_form(fit, np.array(white.white))
     own = {n: replace(s, start_sd=fit.model.states[n].start_sd) for n, s in model.states.items()}
     scene = Scene(
         campaign.channels,
@@ -185,20 +202,21 @@ def make_context(
         tuple(_within(e, spacing, duration) for e in effects),
         scene,
         fit,
-        settings(white, floor, PROCESS, any(g.unsure for g in grids.values())),
+        settings(white, floor, process_prior(), any(g.unsure for g in grids.values())),
         floor,
         belief,
         tuple(outliers),
-        tuple(model_form(fit.trajectories, np.array(white.white))),
+        tuple(form),
+        laws,
     )
 
 
 def with_noise_of(context: Context, fit: Fit) -> Context:
-    """The context with the reading noise as it stands with a better fit, where the campaign does not state it."""
+    """The context with the reading noise that a better fit leaves, where the campaign states none."""
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
-    white = reading_noise(fit, stated, context.floor, PROCESS)
+    white = reading_noise(fit, stated, context.floor, process_prior())
     unsure = any(g.unsure for g in context.grids.values())
-    return replace(context, settings=settings(white, context.floor, PROCESS, unsure))
+    return replace(context, settings=settings(white, context.floor, process_prior(), unsure))
 
 
 def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:

@@ -1,21 +1,21 @@
-"""The diagnosis from start to end: fit, noise, search, posterior, verdict, proof, location, next experiment."""
+"""The diagnosis from start to end: fit, noise, search, posterior, verdict, proof, location, what to do."""
 
 from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from discovery.design.question import ask
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
 from discovery.diagnosis.posterior import Posterior, posterior
-from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement
+from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, size_of
 from discovery.diagnosis.repair import written
 from discovery.diagnosis.scored import Scored, with_effects, with_force
 from discovery.diagnosis.selection import Search
@@ -24,7 +24,7 @@ from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis
 from discovery.effects.not_offered import not_offered
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError, UserError
 from discovery.evidence.late import told
 from discovery.evidence.latent_force import Force, latent_forces
 from discovery.fitting import Fit, fit_model
@@ -70,8 +70,8 @@ class Diagnosis:
         return explained(self.held_out)
 
     def interval(self, h: Hypothesis, name: str) -> tuple[float | None, float | None]:
-        """95 % interval of a parameter of what was named: of the diagnosis and of the fit that goes out, which
-        need not agree, each wider by what a law slightly off in form leaves open.
+        """95 % interval of a parameter of what was named: of the diagnosis and of the fit that goes out,
+        which need not agree, each wider by what a law slightly off in form leaves open.
         """
         assert self.after is not None
         p = self.after.model.parameters[name]
@@ -117,6 +117,8 @@ def diagnose(
     Raises:
         UserError: a model that does not run, or recordings without readings.
     """
+    from discovery.design.question import ask  # it asks about what is found here
+
     began = clock.perf_counter()
     shared = [n for n in {**model.outputs, **model.states} if n in campaign.channels]
     outputs = tuple(dict.fromkeys(outputs or shared))
@@ -139,16 +141,19 @@ def diagnose(
         context, found = other, found.again(other)
     tell("weighing the answers")
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
-    verdict = decide(context, found, chances)
     tell("proving in free runs")
     before = fitted or fit_model(model, seen, fit, outputs)
-    after = _repaired(context, verdict, model, seen, before) if verdict.named else None
+    verdict = decide(context, found, chances, _gain(context, found.best, model, seen, before))
+    after = None
+    if named := [n.hypothesis for n in verdict.named]:
+        after = _repaired(context, verdict.answer, named, model, seen, before)
     noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     runs = free_runs(campaign, [*fit, *read], before, after or before, noise)
     fitting = improvement([runs[r] for r in fit if r in runs], outputs)
     proof = {r: improvement([runs[r]], outputs) for r in read if r in runs}
-    verdict = refuted(idle(verdict, fitting), proof)
+    everywhere = improvement(list(runs.values()), outputs)
+    verdict = refuted(idle(verdict, everywhere, size_of(campaign, noise)), proof)
     if not verdict.named and after is not None:
         after = None
     verdict = replace(verdict, reasons=(*verdict.reasons, *_reasons(context, verdict, read, proof, effects)))
@@ -191,12 +196,27 @@ def _unknown(context: Context, found: Search) -> list[Scored]:
     return [with_force(context, one, state) for one in models for state in context.floor]
 
 
-def _repaired(context: Context, verdict: Verdict, model: Model, seen: Campaign, before: Fit) -> Fit:
-    """The model with what was named, fitted as the baseline of the proof is."""
-    grown = with_effects(model, [n.hypothesis for n in verdict.named])
-    values = verdict.answer.fit.model.parameters
+def _repaired(
+    context: Context, answer: Scored, chosen: Sequence[Hypothesis], model: Model, seen: Campaign, before: Fit
+) -> Fit:
+    """The model with effects of an answer, fitted as the baseline of the proof is."""
+    grown = with_effects(model, chosen)
+    values = answer.fit.model.parameters
     start = {n: values[n].value for n in grown.free if n in values}
     return fit_model(grown, seen, context.recordings, context.outputs, guess=start, begin=before)
+
+
+def _gain(context: Context, answer: Scored, model: Model, seen: Campaign, before: Fit) -> float:
+    """What an answer explains of the free runs of the fitted recordings, rms in reading noises."""
+    if not answer.hypotheses:
+        return inf  # what is left has no name, if anything is
+    try:
+        after = _repaired(context, answer, answer.hypotheses, model, seen, before)
+    except RunsAwayError:
+        return inf  # it cannot run from the starts of a free run: nothing is known
+    runs = free_runs(seen, context.recordings, before, after, answer.noise)
+    found = improvement(list(runs.values()), context.outputs)
+    return found.explained / size_of(seen, answer.noise)
 
 
 def _reasons(

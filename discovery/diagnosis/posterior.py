@@ -1,9 +1,9 @@
 """How sure an answer is: the posterior over everything that was tried, bagged.
 
-A posterior of approximate models is too sure of itself: a little more data, other priors or one recording less
-and another model wins. So it is averaged over resampled blocks of time and over wider and narrower priors
-(Huggins & Miller, Bayesian Analysis 18, 2023). The models stay where they were fitted; everything else is
-algebra on their normal equations.
+A posterior of approximate models is too sure of itself: a little more data, other priors or one recording
+less and another model wins. So it is averaged over resampled blocks of time and over wider and narrower
+priors (Huggins & Miller, Bayesian Analysis 18, 2023). The models stay where they were fitted; everything else
+is algebra on their normal equations.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from discovery.evidence.whitening import log_sum_exp
 Array = NDArray[np.float64]
 
 WIDTHS = (1 / 3, 1.0, 3.0)  # of the priors, relative to what they are
-FAR = 40.0  # log evidence below the best from which a model takes no part
-MOST = 40  # models that take part
+FAR = 25.0  # log evidence below the best from which a model takes no part
+MOST = 25  # models that take part
 IN_PLAY = 8.0  # log evidence below the best of a model within which a noise setting counts
 SETTINGS = 3  # of these, at most
 
@@ -48,7 +48,7 @@ class Posterior:
     @property
     def shares(self) -> Array:
         """(M,) share of each model among those that were tried."""
-        return np.exp(self.evidence - log_sum_exp(self.evidence)[None, :]).mean(axis=1)
+        return np.asarray(np.exp(self.evidence - log_sum_exp(self.evidence)[None, :]).mean(axis=1))
 
     def of(self, holds: Callable[[Scored], bool]) -> float:
         """Probability of a statement about the machine."""
@@ -73,14 +73,14 @@ def posterior(context: Context, models: Collection[Scored], seed: int = 0) -> Po
     """The posterior of models over bootstrap draws of blocks and over prior widths."""
     best = max(m.evidence for m in models)
     taking = sorted((m for m in models if m.evidence > best - FAR), key=lambda m: -m.evidence)[:MOST]
-    draws, widths = _draws(len(context.recordings), seed)
+    draws, widths = _draws(len(context.recordings), context.blocks, seed)
     return Posterior(tuple(taking), np.array([_evidence(m, draws, widths) for m in taking]))
 
 
-def _draws(recordings: int, seed: int) -> tuple[Array, Array]:
+def _draws(recordings: int, blocks: int, seed: int) -> tuple[Array, Array]:
     """How often each block counts (D, B), the number in each recording kept; the width of priors (D,)."""
     rng = np.random.default_rng(seed)
-    blocks, count = thresholds.BLOCKS, thresholds.DRAWS
+    count = thresholds.DRAWS
     one = [rng.multinomial(blocks, np.full(blocks, 1 / blocks), count) for _ in range(recordings)]
     return np.concatenate(one, axis=1).astype(float), rng.choice(WIDTHS, count)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import copysign, inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,12 @@ class Improvement:
     low: float
     high: float
     outputs: Mapping[str, tuple[float, float]]
+
+    @property
+    def explained(self) -> float:
+        """What the repair explains of what was left before, rms; below zero where it leaves more."""
+        square = self.before**2 - self.after**2
+        return copysign(sqrt(abs(square)), square) if isfinite(square) else -inf
 
     @property
     def contradicts(self) -> bool:

@@ -28,6 +28,7 @@ from discovery.models import Model
 Array = NDArray[np.float64]
 
 ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
+KEPT = 4  # noise settings of a model, the most likely ones
 NEAR = 4.0  # log evidence below the best within which a noise setting leads to its neighbours
 
 
@@ -93,13 +94,13 @@ class Scored:
         return float(log_sum_exp(np.array([self._level(g, k) for g in self._forms(k)])))
 
     def _forms(self, k: int) -> tuple[Grams, ...]:
-        """The laws of the effects as they are, and each off by a share that depends on the operating point."""
-        spread = self.seen.spread[self.seen.form :]
+        """The laws of the effects as they are, and each off by a share that the operating point sets."""
+        spread = self.seen.spread[sum(self.seen.form) :]
         return (self.grams[k].without(spread), self.grams[k]) if len(spread) else (self.grams[k],)
 
     @property
     def _count(self) -> int:
-        return 2 if len(self.seen.spread) > self.seen.form else 1
+        return 2 if len(self.seen.spread) > sum(self.seen.form) else 1
 
     def _level(self, gram: Grams, k: int) -> float:
         level, step, covariance = gram.solved()
@@ -218,7 +219,7 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     extra = tuple(np.concatenate(parts, axis=2) for parts in zip(context.form, own, strict=True))
     model, effects = context.form[0].shape[2], own[0].shape[2]
     spread = np.concatenate([np.ones(model), np.full(effects, thresholds.FORM)])
-    seen = Whitened(fit, thresholds.BLOCKS, extra, spread, model)
+    seen = Whitened(fit, context.blocks, extra, spread, (context.laws, model - context.laws))
     free = [h for h in chosen if h.effect.amplitude.fixed is None]
     place = {u.name: i for i, u in enumerate(fit.problem.unknowns) if not u.is_nuisance}
     index = np.array([place[name] for h in free for name in h.amplitudes], dtype=np.intp)
@@ -250,7 +251,7 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
         return float(known[k].levels[0])
 
     # a force on top of form error that is larger than usual would be the same noise once more
-    usual = [k for k, s in enumerate(context.settings) if not force or s.noise.share <= thresholds.SHARE]
+    usual = [k for k, s in enumerate(context.settings) if not force or _is_usual(s.noise)]
     start = min(usual, key=lambda k: _distance(context.settings[k].noise, bare.fit.noise))
     queue = [start]
     while queue:
@@ -263,7 +264,7 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
             if k not in known and k not in queue
             if context.settings[k].is_next_to(context.settings[here])
         ]
-    order = sorted(known)
+    order = sorted(known, key=lambda k: -level(k))[:KEPT]
     return replace(
         bare,
         settings=tuple(context.settings[k] for k in order),
@@ -274,7 +275,12 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
 def _distance(one: Noise, other: Noise) -> float:
     """How far two noises are apart in slow noise, form error and jitter."""
     slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
-    return slow + abs(one.share - other.share) + abs(one.jitter - other.jitter)
+    form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
+    return slow + form + abs(one.jitter - other.jitter)
+
+
+def _is_usual(noise: Noise) -> bool:
+    return max(noise.share, noise.form) <= thresholds.SHARE
 
 
 def with_force(context: Context, one: Scored, state: str) -> Scored:
@@ -291,7 +297,7 @@ def light(one: Scored) -> Scored:
 
 @dataclass(frozen=True)
 class Scan:
-    """Claims on what a model leaves, the best odds first, and on what it leaves without one of its effects."""
+    """Claims on what a model leaves, the best odds first; and on what it leaves without one effect."""
 
     claims: tuple[Score, ...]
     without: Mapping[Key, tuple[Score, ...]]
@@ -343,8 +349,7 @@ def _in_play(context: Context, current: Scored) -> list[Setting]:
     what is missing may have passed.
     """
     best = current.settings[current.best]
-    quiet = min(s.noise.share for s in context.settings)
-    other = next(s for s in context.settings if s.noise.share == quiet and s.place[:2] == best.place[:2])
+    other = next(s for s in context.settings if s.place == (*best.place[:2], 0, 0))
     return [best] if other.place == best.place else [best, other]
 
 
@@ -357,6 +362,6 @@ def attempt(
     h = claim.hypothesis
     sizes: dict[str, float] = {}
     if h.effect.amplitude.fixed is None:
-        low = np.where(h.effect.amplitude.sign > 0, 0.0, -h.effect.amplitude.most)
-        sizes = {n: float(max(s, low)) for n, s in zip(h.amplitudes, claim.size, strict=True)}
+        low = 0.0 if h.effect.amplitude.sign > 0 else -h.effect.amplitude.most
+        sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
     return score(context, (*others, h), current.noise, current.fit, sizes)

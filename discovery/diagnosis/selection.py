@@ -1,24 +1,27 @@
 """The search for the set of effects that makes the readings most likely, one refit at a time.
 
-Effects are added while they add to the posterior; then each one is questioned: is it needed, and would another
-one stand better in its place? Everything that is refitted on the way is kept: these models share the posterior.
+Effects are added while they add to the posterior; then each one is questioned: is it needed, and would
+another one stand better in its place? Everything that is refitted on the way is kept: these models share the
+posterior.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import inf
 
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.scored import Scan, Scored, attempt, light, scan_model, score, scored
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score
+from discovery.threads import side_by_side
 
 MOST = 6  # effects at once
 REFITS = 5  # claims that are refitted at each step
 RIVALS = 3  # ... in the place of another one
 HOPE = 4.0  # log odds below those of the model without it from which a claim is not refitted
-HALF = 0.6  # of the log odds of an effect: claims in its place that reach it are refitted
+HALF = 0.6  # of the best log odds: claims that reach it are refitted
 FAR = 40.0  # log evidence below the best from which a model is not scored again
 
 Keys = frozenset[Key]
@@ -61,8 +64,7 @@ class Search:
     def run(self) -> Search:
         """Search from the most likely model that was tried, or from the baseline."""
         if not self.tried:
-            settings = self.context.settings
-            rough = score(self.context, (), settings[len(settings) // 2].noise)
+            rough = score(self.context, (), self.context.usual)
             assert rough is not None  # the context has fitted it
             self.keep(score(self.context, (), rough.noise, rough.fit) or rough)
         current = self.best
@@ -96,8 +98,7 @@ class Search:
     def _grown(self, current: Scored) -> Scored:
         """Add the claim that adds most, while one does."""
         while len(current.hypotheses) < MOST:
-            pool = [c for c in self.scanned(current).claims[:REFITS] if c.odds > -HOPE]
-            best = self._refitted(current, current.hypotheses, pool)
+            best = self._refitted(current, current.hypotheses, _hopeful(self.scanned(current).claims, REFITS))
             if best.evidence <= current.evidence:
                 break
             current = best
@@ -115,20 +116,33 @@ class Search:
             if scan is None or without is None:
                 continue
             own = current.evidence - self.keep(without).evidence
-            least = max(-HOPE, HALF * own - HOPE)  # the scan sees but the first order of a large effect
-            pool = [c for c in scan.without[h.key] if c.odds > least]
+            pool = _hopeful(scan.without[h.key], RIVALS, own)
             same = [c for c in scan.without[h.key] if c.hypothesis.effect.word == h.effect.word][:1]
-            best = self._refitted(without, others, [*pool[:RIVALS], *(c for c in same if c.odds > 0)])
+            best = self._refitted(without, others, [*pool, *(c for c in same if c.odds > 0)])
             if max(best.evidence, without.evidence) > current.evidence:
                 return self._questioned(max(best, without, key=lambda a: a.evidence))
         return current
 
     def _refitted(self, start: Scored, others: Sequence[Hypothesis], pool: Sequence[Score]) -> Scored:
         """The best refit with one of some claims added to others; `start` where none is better."""
+        own = [o.key for o in others]
+        keys = [frozenset((*own, claim.hypothesis.key)) for claim in pool]
+        fresh = {k: claim for k, claim in zip(keys, pool, strict=True) if k not in self.tried}
+
+        def tried(claim: Score) -> Scored | None:
+            one = attempt(self.context, start, others, claim)
+            return one if one is not None and one.evidence > -inf else None  # the evidence is found here
+
+        found = dict(zip(fresh, side_by_side(tried, list(fresh.values())), strict=True))
         best = start
-        for claim in pool:
-            keys = frozenset((*(o.key for o in others), claim.hypothesis.key))
-            one = self.tried.get(keys) or attempt(self.context, start, others, claim)
+        for key in dict.fromkeys(keys):
+            one = found[key] if key in found else self.tried[key]
             if one is not None and self.keep(one).evidence > best.evidence:
                 best = one
         return best
+
+
+def _hopeful(claims: Sequence[Score], most: int, reached: float = -inf) -> list[Score]:
+    """The claims that are worth a refit: the scan sees but the first order of a large effect."""
+    best = max([reached, *(c.odds for c in claims[:1])])
+    return [c for c in claims[:most] if c.odds > max(-HOPE, HALF * best - HOPE)]

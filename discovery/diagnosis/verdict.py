@@ -1,7 +1,7 @@
 """The verdict: what is named, how sure it is, what else it could be, and when to say that nothing is known.
 
-An effect is named where its probability says so, where it also predicts recordings that a fit has not seen, and
-where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
+An effect is named where its probability says so, where it also predicts recordings that a fit has not seen,
+and where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
 """
 
 from __future__ import annotations
@@ -57,8 +57,12 @@ class Verdict:
     reasons: tuple[str, ...]
 
 
-def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
-    """What the recordings to fit say."""
+def decide(context: Context, found: Search, posterior: Posterior, gain: float) -> Verdict:
+    """What the recordings to fit say.
+
+    Args:
+        gain: what the best answer explains of the free runs of the fitted recordings, rms in reading noises.
+    """
     answer = found.best
     candidates = tuple(
         sorted(
@@ -66,11 +70,13 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
             key=lambda n: -_added(found, answer, n.hypothesis),
         )
     )
-    if posterior.nothing > 1 - thresholds.DETECTED:
+    more = posterior.best.evidence - found.baseline.evidence
+    if posterior.nothing > 1 - thresholds.DETECTED or more < thresholds.SHORT or gain < thresholds.MATTERS:
         return _nothing(context, answer, candidates)
     sure = [n for n in candidates if n.probability >= thresholds.NAMED]
-    named = tuple(n for n in sure if not vetoed(context, answer, n.hypothesis))
-    reasons = [text for n in sure if (text := vetoed(context, answer, n.hypothesis))]
+    refused = {n.hypothesis.key: text for n in sure if (text := _refused(context, answer, n.hypothesis))}
+    reasons = list(refused.values())
+    named = tuple(n for n in sure if n.hypothesis.key not in refused)
     short = _short(context, found, posterior, answer, [n.hypothesis for n in named])
     if short > max(thresholds.SHORT, thresholds.SMALL * found.gain):
         if unknown := posterior.best.forced:
@@ -79,20 +85,25 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
         named = ()
     if not named and not reasons:
         reasons.append(f"no effect reaches a probability of {thresholds.NAMED:g}")
-    for n in named:
-        outside = left_out(context, answer, n.hypothesis)
-        if outside and outside.contradicts:
-            named = ()
-            rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
-            reasons.append(
-                f"{n.hypothesis.effect.word} at {n.hypothesis.where} makes free runs worse on recordings that "
-                f"are left out of the fit (rms over the reading noise: {rms})"
-            )
     reasons += _apart(candidates, (*named, *sure))
     if not named:
         return Verdict(UNEXPLAINED, answer, (), candidates, tuple(reasons))
     kinds = {n.hypothesis.effect.is_physics for n in named}
     return Verdict(MISSING if True in kinds else FAULT, answer, named, (), tuple(reasons))
+
+
+def _refused(context: Context, answer: Scored, h: Hypothesis) -> str | None:
+    """Why an effect that is probable is not named; None where it may be."""
+    if veto := vetoed(context, answer, h):
+        return veto
+    outside = left_out(context, answer, h)
+    if outside is None or outside.explained >= thresholds.MATTERS:
+        return None
+    rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
+    return (
+        f"{h.effect.word} at {h.where} does not make free runs better by what would matter on recordings that "
+        f"are left out of the fit (rms over the reading noise: {rms})"
+    )
 
 
 def _short(
@@ -104,16 +115,19 @@ def _short(
     return posterior.best.evidence - alone.evidence if alone is not None else inf
 
 
-def idle(verdict: Verdict, fit: Improvement) -> Verdict:
-    """The verdict with its names withdrawn where they do nothing for free runs, even of the recordings that
-    were fitted.
+def idle(verdict: Verdict, everywhere: Improvement, noise: float) -> Verdict:
+    """No mismatch where what was named does too little for free runs of all recordings, fitted and unseen.
+
+    Args:
+        noise: one reading noise in the unit of the proof.
     """
-    if not verdict.named or fit.low > 0:
+    if not verdict.named or everywhere.explained >= thresholds.MATTERS * noise:
         return verdict
-    reason = "with what was named, free runs of the fitted recordings are no better than without it"
-    return replace(
-        verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
+    reason = (
+        "what could be named changes free runs of all recordings too little to matter (rms "
+        f"{printed(everywhere.before)} without it, {printed(everywhere.after)} with it)"
     )
+    return replace(verdict, word=NO_MISMATCH, named=(), candidates=(), reasons=(reason, *verdict.reasons))
 
 
 def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:

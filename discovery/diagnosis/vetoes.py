@@ -37,7 +37,7 @@ def every_clock(context: Context, answer: Scored, h: Hypothesis) -> str | None:
 
 def far_from_the_machine(_: Context, answer: Scored, h: Hypothesis) -> str | None:
     """What happens in one recording, or in the measuring chain, is told from a model that is nearly right."""
-    share = answer.noise.share
+    share = max(answer.noise.share, answer.noise.form)
     if share <= thresholds.SHARE or (h.effect.is_physics and not h.effect.is_event):
         return None
     return (

@@ -26,7 +26,7 @@ _TAYLOR = np.array([1.0 / factorial(i + 2) for i in range(13)])
 _LOOKBACK = 12  # recent transitions looked through before a new one is computed
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _matmul(a, b, out):  # type: ignore[no-untyped-def]
     n, m = a.shape[0], b.shape[1]
     for i in range(n):
@@ -37,7 +37,7 @@ def _matmul(a, b, out):  # type: ignore[no-untyped-def]
             out[i, j] = total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _exponential(a, h, e, w0, w1):  # type: ignore[no-untyped-def]
     n = a.shape[0]
     norm = 0.0
@@ -94,7 +94,7 @@ def _exponential(a, h, e, w0, w1):  # type: ignore[no-untyped-def]
     w0[:] = h * (phi1 - phi2)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _equal(a, j, k):  # type: ignore[no-untyped-def]
     """Whether the matrices at two places of a (K, n, n) are the same, number by number."""
     for p in range(a.shape[1]):
@@ -104,7 +104,7 @@ def _equal(a, j, k):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def transitions(a, h):  # type: ignore[no-untyped-def]
     """Transition matrices of all intervals, each distinct one computed once.
 
@@ -138,7 +138,7 @@ def transitions(a, h):  # type: ignore[no-untyped-def]
     return which, e[:used].copy(), w0[:used].copy(), w1[:used].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def trajectory(which, e, w0, w1, g0, g1, start):  # type: ignore[no-untyped-def]
     """States (K + 1, n) from the start and the forcing at both ends of each interval, g0 and g1 (K, n)."""
     count, n = g0.shape
@@ -154,7 +154,7 @@ def trajectory(which, e, w0, w1, g0, g1, start):  # type: ignore[no-untyped-def]
     return x
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_scale, left, right, read):  # type: ignore[no-untyped-def]
     """Sensitivities of the states at the reading instants.
 
@@ -213,7 +213,7 @@ def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_sca
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def between(which, e, read):  # type: ignore[no-untyped-def]
     """Transition from each reading instant to the next, (R - 1, n, n)."""
     n = e.shape[1]
@@ -228,7 +228,7 @@ def between(which, e, read):  # type: ignore[no-untyped-def]
     return f
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def driven(which, e, w0, w1, read, gain):  # type: ignore[no-untyped-def]
     """Response (R - 1, n, n) of the states, from each reading instant to the next, to a force at each state
     whose size in interval k is gain[k] (K, n) times a number that is held in between.

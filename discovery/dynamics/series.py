@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def moved(values, base, far):  # type: ignore[no-untyped-def]
     """Which instants (T,) are kept: those of `base` (T,), and those at which any of the values (T, C) is
     farther than `far` from what it was at the last one kept.
@@ -22,7 +22,7 @@ def moved(values, base, far):  # type: ignore[no-untyped-def]
     return kept
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def play(series, width):  # type: ignore[no-untyped-def]
     """Play operator y = max(x - w, min(x + w, y_before)), starting at rest in the middle.
 
@@ -50,7 +50,7 @@ def play(series, width):  # type: ignore[no-untyped-def]
     return y, follows, contact
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def lag_ends(series, step, tau):  # type: ignore[no-untyped-def]
     """First-order lag of a series on interval ends (2K,) that runs straight within each interval; starts
     settled.

@@ -13,7 +13,7 @@ def matrix(roles: Mapping[str, Any], error: str, unit: str = "") -> Table:
     """rms of one error for every model: a row for each role left out, a column for each role judged on.
 
     Args:
-        roles: "roles" of results.json.
+        roles: "role_matrix" of results.json.
 
     The figure in brackets was judged on what no part of the fit or the search has seen.
     """

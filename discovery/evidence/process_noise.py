@@ -23,14 +23,7 @@ from discovery.fitting.noise import resolution
 Array = NDArray[np.float64]
 
 JITTER = 12**-0.5  # of a logging interval: a switch that comes anywhere in it
-_TRIED = (
-    0.0,
-    0.3,
-    1.0,
-    3.0,
-    10.0,
-    30.0,
-)  # levels beside which the reading noise is sought where none is stated
+_TRIED = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # levels with which the reading noise is sought where none is stated
 _BLOCKS = 72  # of a recording, in each of which process noise is one number
 _CLIPPED = 4.0  # standard deviations beyond which an innovation counts no more: single wrong readings
 
@@ -41,7 +34,7 @@ class Setting:
 
     noise: Noise
     log_weight: float
-    place: tuple[int, int, int]  # on the grid of jitters, slow noises and levels
+    place: tuple[int, int, int, int]  # on the grid of jitters, slow noises, levels and form errors
 
     def is_next_to(self, other: Setting) -> bool:
         """Whether the two are neighbours on the grid."""
@@ -58,6 +51,8 @@ class Prior:
     weights: tuple[float, ...]
     slow: tuple[float, ...]  # shares of the reading noise
     slow_weights: tuple[float, ...]
+    forms: tuple[tuple[float, float], ...]  # shares by which laws are off, and flows beyond the edge of a body
+    form_weights: tuple[float, ...]
 
 
 def floors(fit: Fit, share: float) -> dict[str, float]:
@@ -93,17 +88,21 @@ def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: boo
         unsure: inputs may be logged late, each switch by another time, or all by the same.
     """
     jitters = (0.0, JITTER) if unsure else (0.0,)
-    total = float(sum(prior.weights)) * float(sum(prior.slow_weights)) * len(jitters)
-    return tuple(
-        Setting(
-            _noise(white, floor, prior, level, slow, jitter),
-            float(np.log(weight * prior.slow_weights[j] / total)),
-            (i, j, k),
-        )
-        for i, jitter in enumerate(jitters)
-        for j, slow in enumerate(prior.slow)
-        for k, (level, weight) in enumerate(zip(prior.levels, prior.weights, strict=True))
+    axes = (
+        [(jitter, 1.0) for jitter in jitters],
+        list(zip(prior.slow, prior.slow_weights, strict=True)),
+        list(zip(prior.levels, prior.weights, strict=True)),
+        [(float(k), weight) for k, weight in enumerate(prior.form_weights)],
     )
+    total = float(np.prod([sum(weight for _, weight in axis) for axis in axes]))
+    found = []
+    for place in np.ndindex(*(len(axis) for axis in axes)):
+        jitter, slow, level, _ = (axis[k][0] for axis, k in zip(axes, place, strict=True))
+        form, edge = prior.forms[place[3]]
+        weight = np.prod([axis[k][1] for axis, k in zip(axes, place, strict=True)])
+        noise = replace(_noise(white, floor, prior, level, slow, jitter), form=form, edge=edge)
+        found.append(Setting(noise, float(np.log(weight / total)), place))
+    return tuple(found)
 
 
 def _noise(
@@ -121,8 +120,8 @@ def _noise(
 def reading_noise(
     fit: Fit, stated: Mapping[str, float | None], floor: Mapping[str, float], prior: Prior
 ) -> Noise:
-    """White reading noise: what is stated, else the most likely level with slow noise and process noise of any
-    size.
+    """White reading noise: what is stated, else the most likely level with slow noise and process noise of
+    any size.
 
     Process noise far above the usual is offered, so that a mismatch passes for that and not for reading
     noise. Time constants are 2 h of slow noise and 3 h of process noise, or a share of shorter recordings.

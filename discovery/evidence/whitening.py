@@ -12,8 +12,9 @@ Computation 4, 1992).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,8 @@ _UNSEEN = 1e-20  # of the largest entry of the normal equations
 class Grams:
     """A fit under one noise setting. Columns are the residual, then the unknowns that do not press against a
     bound: `blocks` (B, 1 + U, 1 + U) and `logdet` (B,) by block, `prior` (1 + U, 1 + U) of the priors,
-    `constant` what their densities add.
+    `constant` what their densities add. `scale` (1 + U,) multiplies the columns: form errors of any share are
+    the same blocks.
     """
 
     noise: Noise
@@ -41,6 +43,7 @@ class Grams:
     logdet: Array
     prior: Array
     constant: float
+    scale: Array
 
     def level(self, weights: Array | None = None) -> float:
         """Log-likelihood with all unknowns integrated out; `weights` (B,): how often each block counts."""
@@ -51,7 +54,7 @@ class Grams:
         covariance (U, U) there.
         """
         w = np.ones(len(self.logdet)) if weights is None else weights
-        total = np.tensordot(w, self.blocks, 1) + self.prior
+        total = np.tensordot(w, self.blocks, 1) * np.outer(self.scale, self.scale) + self.prior
         hessian, slope = total[1:, 1:], total[1:, 0]
         scale = _scale(np.diag(hessian))
         size, axes = np.linalg.eigh(hessian / np.outer(scale, scale))
@@ -73,6 +76,7 @@ class Grams:
             self.logdet,
             self.prior[:kept, :kept],
             constant,
+            self.scale[:kept],
         )
 
     def drawn(self, weights: Array, widths: Array) -> tuple[Array, Array, Array]:
@@ -84,7 +88,8 @@ class Grams:
         """
         size = self.prior.shape[0]
         flat = self.blocks.reshape(len(self.logdet), -1)
-        total = (weights @ flat).reshape(-1, size, size) + self.prior / widths[:, None, None] ** 2
+        blocks = (weights @ flat).reshape(-1, size, size) * np.outer(self.scale, self.scale)
+        total = blocks + self.prior / widths[:, None, None] ** 2
         hessian, slope = total[:, 1:, 1:], total[:, 1:, 0]
         scale = _scale(np.einsum("dii->di", hessian))
         unit = hessian / (scale[:, :, None] * scale[:, None, :])
@@ -107,8 +112,8 @@ class Whitened:
     blocks: int  # of time in each recording
     extra: tuple[Array, ...] = ()  # by recording (R, Y, E): what may act with coefficients ...
     spread: Array = field(default_factory=lambda: np.zeros(0))  # (E,) ... that are known to be about zero
-    form: int = 0  # of them, the first, that count with the form error of a noise
-    last: dict[str, tuple[Noise, Any]] = field(default_factory=dict, repr=False)
+    form: tuple[int, int] = (0, 0)  # of them, the first: form errors of laws, then of edges, of a model
+    last: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def absorbed(self, noise: Noise) -> Absorbed:
         """What a refit absorbs under a noise; the last noise is kept."""
@@ -164,20 +169,29 @@ class Whitened:
         return np.concatenate([z for z, _ in parts]), np.concatenate([log for _, log in parts])
 
     def rows(self, noise: Noise) -> tuple[Array, Array]:
-        """Whitened residual and sensitivities (N, 1 + U), logarithms (N,) as in `whiten`. The last noise is
-        kept.
-        """
-        if "rows" not in self.last or self.last["rows"][0] != noise:
+        """Whitened residual and sensitivities (N, 1 + U), logarithms (N,) as in `whiten`."""
+        rows, log = self._rows(replace(noise, form=1.0, edge=1.0))
+        return rows * self._scale(noise), log
+
+    def _rows(self, unit: Noise) -> tuple[Array, Array]:
+        """The rows with a form error of one; those of the last noise are kept."""
+        if "rows" not in self.last or self.last["rows"][0] != unit:
             joined = [
                 np.concatenate([r[:, :, None], j], axis=2)
                 for r, j in zip(self.residuals, self.jacobians, strict=True)
             ]
-            rows, log = self.whiten(noise, joined)
-            first = 1 + len(self.moving)
-            rows[:, first : first + self.form] *= noise.share
-            self.last["rows"] = (noise, (rows, log))
+            self.last["rows"] = (unit, self.whiten(unit, joined))
         known: tuple[Array, Array] = self.last["rows"][1]
         return known
+
+    def _scale(self, noise: Noise) -> Array:
+        """What multiplies the columns (1 + U,) under the form error of a noise."""
+        scale = np.ones(1 + len(self.moving) + len(self.spread))
+        first = 1 + len(self.moving)
+        laws, edges = self.form
+        scale[first : first + laws] = noise.form
+        scale[first + laws : first + laws + edges] = noise.edge
+        return scale
 
     @cached_property
     def prior(self) -> tuple[Array, float]:
@@ -200,15 +214,25 @@ class Whitened:
 
     def grams(self, noise: Noise) -> Grams:
         """The fit under one noise setting, as normal equations by block."""
-        rows, log = self.rows(noise)
+        unit = replace(noise, form=1.0, edge=1.0)
+        known = self.last.setdefault("grams", [])
+        same = next((pieces for other, pieces in known if other == unit), None)
+        if same is None:
+            same = self._blocks(unit)
+            known.append((unit, same))
+        prior, constant = self.prior
+        return Grams(noise, *same, prior, constant, self._scale(noise))
+
+    def _blocks(self, unit: Noise) -> tuple[Array, Array]:
+        """Normal equations (B, 1 + U, 1 + U) and log determinants (B,) by block of time."""
+        rows, log = self._rows(unit)
         count = self.blocks * len(self.fit.trajectories)
         order = np.argsort(self.block, kind="stable")
         edges = np.searchsorted(self.block[order], np.arange(count + 1))
         rows, log = rows[order], log[order]
-        pieces = [rows[a:b].T @ rows[a:b] for a, b in zip(edges[:-1], edges[1:], strict=True)]
-        logdet = np.array([float(np.sum(log[a:b])) for a, b in zip(edges[:-1], edges[1:], strict=True)])
-        prior, constant = self.prior
-        return Grams(noise, np.array(pieces), logdet, prior, constant)
+        parts = list(pairwise(edges.tolist()))
+        pieces = [rows[a:b].T @ rows[a:b] for a, b in parts]
+        return np.array(pieces), np.array([float(np.sum(log[a:b])) for a, b in parts])
 
 
 @dataclass(frozen=True)

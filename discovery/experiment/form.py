@@ -28,6 +28,8 @@ _BUILT = [
     "superposition",
     "thermobalance",
     "sindy",
+    "pysindy",
+    "regression",
 ]  # kinds of models; one in a file needs no kind
 
 # What several kinds of models may say
@@ -83,6 +85,27 @@ class ThermobalanceEntry(Strict):
     loss: Pull = "linear"
 
 
+class PysindyEntry(Strict):
+    """PySINDy as its users take it, threshold by cross-validation."""
+
+    kind: Literal["pysindy"]
+    inputs: Inputs = None
+    outputs: Outputs = None
+    form: Literal["auto", "plain", "weak"] = Field(
+        "auto", description='derivatives of readings, or integrals; "auto": what predicts left-out parts best'
+    )
+    also: Also = []
+
+
+class RegressionEntry(Strict):
+    """Ridge regression on the inputs as they are."""
+
+    kind: Literal["regression"]
+    inputs: Inputs = None
+    outputs: Outputs = None
+    also: Also = []
+
+
 def _said(entry: Any) -> Any:
     """What a model is: a file of its own, or a kind that is built."""
     if not isinstance(entry, Mapping):
@@ -98,13 +121,23 @@ def _kind(entry: Any) -> str:
     return str(entry.get("kind", "file") if isinstance(entry, Mapping) else getattr(entry, "kind", "file"))
 
 
-ModelEntry = FileEntry | ReducedEntry | SuperpositionEntry | ThermobalanceEntry | SparseOptions
+ModelEntry = (
+    FileEntry
+    | ReducedEntry
+    | SuperpositionEntry
+    | ThermobalanceEntry
+    | SparseOptions
+    | PysindyEntry
+    | RegressionEntry
+)
 TaggedEntry = Annotated[
     Annotated[FileEntry, Tag("file")]
     | Annotated[ReducedEntry, Tag("reduced")]
     | Annotated[SuperpositionEntry, Tag("superposition")]
     | Annotated[ThermobalanceEntry, Tag("thermobalance")]
-    | Annotated[SparseOptions, Tag("sindy")],
+    | Annotated[SparseOptions, Tag("sindy")]
+    | Annotated[PysindyEntry, Tag("pysindy")]
+    | Annotated[RegressionEntry, Tag("regression")],
     Discriminator(_kind),
     BeforeValidator(_said),
 ]

@@ -16,15 +16,18 @@ from discovery.experiment.form import (
     FileEntry,
     MismatchForm,
     ModelEntry,
+    PysindyEntry,
     ReducedEntry,
+    RegressionEntry,
     SuperpositionEntry,
     ThermobalanceEntry,
     separate,
 )
 from discovery.experiment.joining import check_joins, join
 from discovery.experiment.results import results_document, write_run
-from discovery.fitting import fit_model
+from discovery.fitting import Fit, fit_model
 from discovery.fitting.fit import written_with
+from discovery.fitting.ridge import fit_ridge
 from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.solve import Loss
 from discovery.fitting.starts import warm_start
@@ -34,6 +37,7 @@ from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
 from discovery.models.thermobalance import thermobalance
 from discovery.progress import Progress, silent
+from discovery.recordings import Campaign
 from discovery.report import write_report
 from discovery.runfolder import default_folder, staged
 from discovery.sparse.options import SparseOptions
@@ -105,7 +109,7 @@ def roles_of(experiment: Experiment, begun: Iterator[Fold] | None, progress: Pro
     from discovery.experiment.roles import leave_roles_out
 
     progress("leaving out one role after the other")
-    return {"roles": leave_roles_out(experiment, begun, progress)}
+    return {"role_matrix": leave_roles_out(experiment, begun, progress)}
 
 
 def paper_page(
@@ -118,7 +122,7 @@ def paper_page(
     """Write paper.html; what results.json holds of it."""
     from discovery.paper.page import chapters, write_page
 
-    results = {**results_document("run", experiment, fitted, 0.0), **further}
+    results = results_document("run", experiment, fitted, 0.0, further).model_dump(exclude_unset=True)
     made = chapters(experiment, fitted, results, progress)
     write_page(folder, experiment.name, made, results["command"])
     return {"paper": {one.key: one.document() for one in made}}
@@ -182,11 +186,14 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
     began = clock.perf_counter()
     progress(f"fitting {name}")
     common, experiment = experiment.fit, experiment.seen_by(entry)
-    model, report = starting_model(experiment, name, entry, progress)
-    loss: Loss = getattr(entry, "loss", "linear")
-    fitted = fit_model_of(
-        experiment, name, entry.kind, model, report, experiment.outputs_of(entry), loss, progress
-    )
+    if isinstance(entry, PysindyEntry | RegressionEntry):
+        fitted = compared(experiment, name, entry, progress)
+    else:
+        model, report = starting_model(experiment, name, entry, progress)
+        loss: Loss = getattr(entry, "loss", "linear")
+        fitted = fit_model_of(
+            experiment, name, entry.kind, model, report, experiment.outputs_of(entry), loss, progress
+        )
     also = [recording for recording in experiment.fit if recording not in common]
     told = [f"is fitted to {', '.join(also)} besides"] if also else []
     return replace(fitted, notes=(*told, *fitted.notes), seconds=clock.perf_counter() - began)
@@ -213,6 +220,34 @@ def fit_model_of(
     fit = fit_model(model, experiment.fitting, experiment.fit, outputs, loss=loss)
     seconds = clock.perf_counter() - began
     return judged(experiment, name, kind, model, fit, report, seconds, progress)
+
+
+def compared(
+    experiment: Experiment, name: str, entry: PysindyEntry | RegressionEntry, progress: Progress = silent
+) -> Fitted:
+    """A model to compare with, with the numbers of its own method; cross-validated by that method, too."""
+    began = clock.perf_counter()
+    inputs, outputs = experiment.inputs(entry), experiment.outputs_of(entry)
+
+    report: dict[str, Any] = {}
+    seen, recordings = experiment.fitting, experiment.fit
+    if isinstance(entry, RegressionEntry):
+
+        def refit(campaign: Campaign, recordings: Sequence[str]) -> Fit:
+            return fit_ridge(campaign, recordings, outputs, inputs)
+
+        fit = refit(seen, recordings)
+    else:
+        from discovery.sparse.plain import fit_plain, settings
+
+        fit, best, report = fit_plain(seen, recordings, outputs, inputs, settings(entry.form))
+
+        def refit(campaign: Campaign, recordings: Sequence[str]) -> Fit:
+            return fit_plain(campaign, recordings, outputs, inputs, [best])[0]
+
+    model = replace(fit.model, name=name)
+    seconds = clock.perf_counter() - began
+    return judged(experiment, name, entry.kind, model, fit, report, seconds, progress, refit)
 
 
 def repaired_of(

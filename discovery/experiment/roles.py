@@ -68,7 +68,7 @@ def leave_roles_out(
         begun: folds under way, see `begin_folds`.
 
     Returns:
-        What `results.json` holds under "roles": recordings of each role, and for each model the matrix
+        What `results.json` holds under "role_matrix": recordings of each role, and for each model the matrix
         rms[error][found without][judged on], the terms with the share of folds that hold them, and the spread
         of each parameter over the folds.
     """

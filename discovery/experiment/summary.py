@@ -23,7 +23,7 @@ def summary(folder: Path) -> Iterator[str]:
     for recording in (*results["fit"], *results["held_out"]):
         yield as_text(rms_table({"": results}, recording))
         yield ""
-    if roles := results.get("roles"):
+    if roles := results.get("role_matrix"):
         for error in results["outputs"]:
             yield as_text(matrix(roles, error, differences(results["units"].get(error, ""))))
             yield ""

@@ -21,7 +21,6 @@ from discovery.recordings import Campaign
 from discovery.terms import Expression, Name, Number, Term, names, substitute, text
 
 START_SD = 2.0  # um or K: of a start value that was a reading and is a guess now
-BODY_SD = 0.5  # K: of a start that a fit was free to find in each recording
 
 
 def exportable(model: Model, campaign: Campaign) -> Model:
@@ -59,10 +58,10 @@ def exportable(model: Model, campaign: Campaign) -> Model:
                 f"model '{model.name}': state '{name}' starts at the reading of {read[0]}, which a "
                 "controller does not have, and no channel is an ambient temperature; give it a start value"
             )
-        spread = BODY_SD if state.start_sd is None else state.start_sd
+        spread = START_SD if state.start_sd is None else state.start_sd
         if start is not None and read:
-            start, spread = substitute(start, unread), max(spread, START_SD)
-        states[name] = replace(state, start=start, start_sd=spread)
+            state, spread = replace(state, start=substitute(start, unread)), max(spread, START_SD)
+        states[name] = replace(state, start_sd=spread)
     return replace(model, outputs=outputs, states=states)
 
 

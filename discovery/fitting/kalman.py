@@ -30,7 +30,7 @@ from discovery.fitting.noise import Noise
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _propagate(f, b, heat_decay, slow_decay, x, top):  # type: ignore[no-untyped-def]
     """Rows of x (states, heats, slow noises) one reading on, in place; `top` is room for the states' rows."""
     n, nh = b.shape
@@ -49,7 +49,7 @@ def _propagate(f, b, heat_decay, slow_decay, x, top):  # type: ignore[no-untyped
     x[n + nh :] *= slow_decay
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, jumps):  # type: ignore[no-untyped-def]
     """Kalman gains (R, Y, size) and standard deviations (R, Y) of the innovations.
 
@@ -98,7 +98,7 @@ def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, jumps):
     return gains, roots
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _whitened(f, b, h, measured, gains, roots, nv, slow_decay, heat_decay, data):  # type: ignore[no-untyped-def]
     """Whitened data (R * Y rows in reading order, unmeasured rows zero) by gains from `_gains`.
 

@@ -51,7 +51,7 @@ def chapters(
     """The chapters of the page, in the order of the paper.
 
     Args:
-        results: content of results.json, with "roles" where the experiment names roles.
+        results: content of results.json, with "role_matrix" where the experiment names roles.
     """
     assert experiment.form.paper is not None
     material = Material(experiment, fitted, results, experiment.form.paper)
@@ -64,14 +64,14 @@ def chapters(
             chapter = Chapter(name.replace(" ", "-"), f"{name}: not made", "", not_shown=(str(error),))
         if chapter is not None:
             made.append(chapter)
-    if "roles" in results:
+    if results.get("role_matrix"):
         made.append(role_chapter(results))
     return made
 
 
 def role_chapter(results: Mapping[str, Any]) -> Chapter:
     """Cross-validation over roles: what the paper's validation cycle and nozzle tests ask, for every role."""
-    roles, units = results["roles"], results["units"]
+    roles, units = results["role_matrix"], results["units"]
     errors = list(dict.fromkeys(e for model in roles["models"].values() for e in model["rms"]))
     lost = [f"{name} {line}" for name, model in roles["models"].items() for line in model["lost"]]
     return Chapter(
