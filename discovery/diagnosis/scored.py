@@ -167,12 +167,6 @@ def refit(
     Raises:
         RunsAwayError: the model does not stay finite with them.
     """
-    priors = {
-        name: _prior(shape)
-        for h in chosen
-        for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
-        if not shape.instant
-    }
     return fit_model(
         with_effects(context.model, chosen),
         context.campaign,
@@ -180,13 +174,23 @@ def refit(
         context.outputs,
         noise=noise,
         grids=context.grids,
-        priors=priors,
+        priors=shape_priors(chosen),
         belief=context.belief,
         guess=sizes,
         begin=start or context.baseline,
         max_rounds=25,
         tolerance=ENOUGH,
     )
+
+
+def shape_priors(chosen: Sequence[Hypothesis]) -> dict[str, Prior]:
+    """Priors of the shape parameters of effects, by name."""
+    return {
+        name: _prior(shape)
+        for h in chosen
+        for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
+        if not shape.instant
+    }
 
 
 def _prior(shape: Shape) -> Prior:
