@@ -64,6 +64,23 @@ def table_3(results: Mapping[str, Any], recording: str, models: Sequence[str] | 
     return Table(f"Recording '{recording}' (Table 3)", header, tuple(rows))
 
 
+def budget_tables(found: Mapping[str, Any]) -> tuple[Table, ...]:
+    """Heat by term and fluid by recording, a column for each recording."""
+    recordings = list(found)
+    terms = list(dict.fromkeys(t for one in found.values() for t in one["entering"]))
+    rows: list[tuple[str | float | None, ...]] = [
+        (t, *(found[r]["entering"].get(t) for r in recordings)) for t in terms
+    ]
+    rows.append(("stored in the bodies", *(sum(found[r]["stored"].values()) for r in recordings)))
+    rows.append(("entered, not stored", *(found[r]["gap"] for r in recordings)))
+    fluid = list(dict.fromkeys(k for one in found.values() for k in one["fluid"]))
+    tables = [Table("Heat into the bodies [MJ]", ("Term", *recordings), tuple(rows))]
+    if fluid:
+        lines = tuple((k, *(found[r]["fluid"].get(k) for r in recordings)) for k in fluid)
+        tables.append(Table("Cutting fluid", ("Quantity", *recordings), lines))
+    return tuple(tables)
+
+
 def _row(
     error: str, label: str, ours: Mapping[str, float], paper: str | None
 ) -> tuple[str | float | None, ...]:

@@ -40,6 +40,65 @@ class Estimate(Strict):
     intervals: dict[str, list[Number]] | None = Field(None, description="its 95 % interval in each")
 
 
+class Budgets(Strict):
+    """Energy and fluid budget of a model on a recording, MJ."""
+
+    entering: dict[str, Number] = Field(description="heat into the bodies from outside, by term")
+    moved: dict[str, Number] = Field(description="heat from body to body, by term")
+    stored: dict[str, Number] = Field(description="by body")
+    fluid: dict[str, Number] = Field(description="what the cutting fluid did")
+    gap: Number = Field(description="entered and not stored: 0 but for the integration")
+
+
+class Spread(Strict):
+    """A parameter over the folds that hold its term."""
+
+    mean: Number
+    sd: Number
+    without: dict[str, Number] = Field(description="its value, by the role that was left out")
+
+
+class Steadiness(Strict):
+    """A term over the folds."""
+
+    share: Number = Field(description="of the folds that hold it")
+    parameters: dict[str, Spread]
+
+
+class ModelFolds(Strict):
+    """One model, found anew without each role."""
+
+    rms: dict[str, dict[str, dict[str, Number]]] = Field(
+        description="by error, role left out, role judged on"
+    )
+    terms: dict[str, Steadiness]
+    lost: list[str] = Field(description="what went wrong")
+
+
+class RoleMatrix(Strict):
+    """Cross-validation over roles."""
+
+    recordings: dict[str, list[str]] = Field(description="of each role")
+    models: dict[str, ModelFolds]
+
+
+class PaperTable(Strict):
+    """A table of the page on the paper."""
+
+    title: str
+    header: list[str]
+    rows: list[list[str | Number]]
+
+
+class PaperChapter(Strict):
+    """A figure, table or equation of the paper."""
+
+    title: str
+    shows: list[str]
+    does_not_show: list[str]
+    tables: list[PaperTable]
+
+
 class ModelResults(Strict):
     """One model."""
 
@@ -54,7 +113,19 @@ class ModelResults(Strict):
     values: dict[str, Estimate]
     noise: dict[str, Number] = Field(description="reading noise of each output that the fit reckoned with")
     notes: list[str]
+    budgets: dict[str, Budgets] | None = Field(
+        None, description="by recording, of a model with heat capacities"
+    )
     search: dict[str, Any] | None = Field(None, description="what a search for terms reports")
+
+
+class Recommended(Strict):
+    """The model that is best for an output on the held-out recordings."""
+
+    model: str
+    rms: Number
+    ties: list[str] = Field(description="models that the readings do not tell from it")
+    against: dict[str, dict[str, Any]] = Field(description="by model, how far behind it is")
 
 
 class ResultsDocument(Strict):
@@ -76,9 +147,9 @@ class ResultsDocument(Strict):
     findings: list[str] = Field(description="what is wrong with the recordings")
     guessed: dict[str, str] | None = Field(None, description="of channels, what nobody has confirmed")
     models: dict[str, ModelResults]
-    recommended: dict[str, dict[str, Any]] | None = Field(
-        None, description="by output: the model that is best on held-out recordings, and how far others are"
-    )
+    recommended: dict[str, Recommended] | None = Field(None, description="by output")
+    role_matrix: RoleMatrix | None = Field(None, description="each role left out of fit and search in turn")
+    paper: dict[str, PaperChapter] | None = Field(None, description="what paper.html shows, by chapter")
     seconds: float
     versions: dict[str, str]
     inputs: dict[str, str] = Field(description="SHA-256 of each file that was read")

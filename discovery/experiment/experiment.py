@@ -150,6 +150,10 @@ def _recordings(path: Path, form: ExperimentForm) -> list[str]:
     named |= dict.fromkeys(form.held_out, ("held_out",))
     for model, entry in form.models.items():
         named |= {name: ("models", model) for _, name in own_recordings(entry) if name not in named}
+    for role, recordings in (form.roles or {}).items():
+        named |= {name: ("roles", role) for name in recordings if name not in named}
+    if form.paper:
+        named |= {name: ("paper", key) for key, name in form.paper.recordings() if name not in named}
     for name, key in named.items():
         if name not in known:
             raise _mistake(path, key, f"no recording '{name}'; {suggest(name, known)}")
@@ -193,6 +197,10 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
     for one, other in twins(campaign, form.held_out, [*form.fit, *alone]):
         what = f"'{one}' holds the same readings as '{other}', which is fitted; hold out another recording"
         raise _mistake(path, ("held_out",), what)
+    _check_roles(path, form, campaign, outputs)
+    for word, name in form.paper.models() if form.paper else []:
+        if name not in form.models:
+            raise _mistake(path, ("paper", word), f"no model '{name}'; {suggest(name, list(form.models))}")
     for section in ("mismatch", "export"):
         chosen = getattr(form, section)
         if chosen and chosen.model not in form.models:
@@ -201,6 +209,27 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
                 (section, "model"),
                 f"no model '{chosen.model}'; {suggest(chosen.model, list(form.models))}",
             )
+
+
+def _check_roles(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collection[str]) -> None:
+    """One role for each recording, and no copy of a recording in another role: a fold would have seen what it
+    is judged on. Raises UserError.
+    """
+    roles = form.roles or {}
+    taken: dict[str, str] = {}
+    for role, recordings in roles.items():
+        for name in recordings:
+            if name in taken:
+                what = f"'{name}' plays '{taken[name]}' too; a recording has one role"
+                raise _mistake(path, ("roles", role), what)
+            taken[name] = role
+    for role, recordings in roles.items():
+        others = [name for other, names in roles.items() if other != role for name in names]
+        for one, other in twins(campaign, recordings, others):
+            what = f"'{one}' holds the same readings as '{other}' of another role; leave one out"
+            raise _mistake(path, ("roles", role), what)
+        if what := campaign.unread(others, outputs):
+            raise _mistake(path, ("roles", role), f"without this role, {what}")
 
 
 def _mistake(path: Path, key: tuple[str | int, ...], what: str) -> UserError:

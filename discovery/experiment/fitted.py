@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from discovery.dynamics.system import predict as model_outputs
 from discovery.errors import RunsAwayError
 from discovery.evaluation import evaluate
+from discovery.evaluation.budget import Budget, budget
 from discovery.evaluation.crossvalidation import Refit, cross_validate
 from discovery.experiment.experiment import Experiment
 from discovery.fitting import Fit, predict_recording
@@ -38,6 +39,7 @@ class Prediction:
     readings: Array
     predicted: Array
     reference: Array  # (Y,) what would be assumed without a model: no error, or the first temperature
+    budget: Budget | None = None  # of heat and fluid; None for a model without heat capacities
 
     def scores(self) -> dict[str, dict[str, Any]]:
         """Criteria by output."""
@@ -180,4 +182,5 @@ def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
         if experiment.campaign.channels[name].role != "error" and len(taken):
             reference[y] = taken[0]
     predicted = model_outputs(trajectory)
-    return Prediction(outputs, grid.time[grid.read], grid.readings, predicted, reference)
+    heat = budget(trajectory, experiment.campaign)
+    return Prediction(outputs, grid.time[grid.read], grid.readings, predicted, reference, heat)

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from discovery.effects.own import EffectForm
 from discovery.fitting.solve import Loss
+from discovery.models.convection import Speeding
 from discovery.schema import Strict, suggest
 from discovery.sparse.options import SparseOptions
 from discovery.targets import Target
@@ -25,6 +26,7 @@ def _file_name(name: str) -> str:
 _BUILT = [
     "reduced",
     "superposition",
+    "thermobalance",
     "sindy",
     "pysindy",
     "regression",
@@ -71,6 +73,18 @@ class SuperpositionEntry(Strict):
     loss: Pull = "linear"
 
 
+class ThermobalanceEntry(Strict):
+    """The five bodies of the rotary table, section 3, with the film coefficient of eqs. (1) to (6)."""
+
+    kind: Literal["thermobalance"]
+    fluid: bool = Field(True, description="whether cutting fluid wets Table and C-Body 1")
+    speeding: Speeding = Field("none", description="eq. (6) off, as printed, or with the exponent 1.5")
+    jet: bool = Field(False, description="find the exponents of nozzle height and fluid velocity in eq. (1)")
+    outputs: Outputs = None
+    also: Also = []
+    loss: Pull = "linear"
+
+
 class PysindyEntry(Strict):
     """PySINDy as its users take it, threshold by cross-validation."""
 
@@ -107,11 +121,20 @@ def _kind(entry: Any) -> str:
     return str(entry.get("kind", "file") if isinstance(entry, Mapping) else getattr(entry, "kind", "file"))
 
 
-ModelEntry = FileEntry | ReducedEntry | SuperpositionEntry | SparseOptions | PysindyEntry | RegressionEntry
+ModelEntry = (
+    FileEntry
+    | ReducedEntry
+    | SuperpositionEntry
+    | ThermobalanceEntry
+    | SparseOptions
+    | PysindyEntry
+    | RegressionEntry
+)
 TaggedEntry = Annotated[
     Annotated[FileEntry, Tag("file")]
     | Annotated[ReducedEntry, Tag("reduced")]
     | Annotated[SuperpositionEntry, Tag("superposition")]
+    | Annotated[ThermobalanceEntry, Tag("thermobalance")]
     | Annotated[SparseOptions, Tag("sindy")]
     | Annotated[PysindyEntry, Tag("pysindy")]
     | Annotated[RegressionEntry, Tag("regression")],
@@ -134,6 +157,40 @@ class ExportForm(Strict):
     to: list[Target] = Field(["json"], min_length=1)
 
 
+class PaperForm(Strict):
+    """[paper]: which models and recordings play the parts of the paper; writes `paper.html`.
+
+    What is not given is not shown. Recordings that only the page looks at need not stand in `fit` or
+    `held_out`.
+    """
+
+    thermobalance: str = Field(description="model of section 3: table 1, figures 6 and 7, budgets")
+    superposition: str = Field(description="model of eq. (8): table 3, figure 8")
+    reduced: str = Field(description="model of eq. (9): table 3, figure 9")
+    wet: str | None = Field(None, description="warm-up under cutting fluid, figure 3")
+    dry: str | None = Field(None, description="the same warm-up without fluid, figure 3")
+    compensated: list[str] = Field([], description="recordings gone through with active compensation")
+    speeding: list[str] = Field([], description="models that differ in eq. (6) alone")
+    dry_load: str | None = Field(None, description="eq. (8) with the load from a dry machine")
+    cooling: str | None = Field(None, description="eq. (8) with the axis cooling power as u_2")
+    nozzle: str | None = Field(None, description="recording in which height and flow of the jet matter")
+    flooded: str | None = Field(None, description="recording in which they do not")
+    symmetric: str | None = Field(None, description="error that symmetry keeps small, E_X0C")
+
+    def recordings(self) -> list[tuple[str, str]]:
+        """What it says of recordings: key and recording."""
+        alone = [(key, getattr(self, key)) for key in ("wet", "dry", "nozzle", "flooded")]
+        return [(key, name) for key, name in alone if name] + [
+            ("compensated", name) for name in self.compensated
+        ]
+
+    def models(self) -> list[tuple[str, str]]:
+        """What it says of models: key and model."""
+        keys = ("thermobalance", "superposition", "reduced", "dry_load", "cooling")
+        alone = [(key, getattr(self, key)) for key in keys]
+        return [(key, name) for key, name in alone if name] + [("speeding", name) for name in self.speeding]
+
+
 class ExperimentForm(Strict):
     """The whole file."""
 
@@ -149,9 +206,15 @@ class ExperimentForm(Strict):
     cross_validate: bool = Field(
         True, description="leave recordings and blocks out of the fit, one after the other"
     )
+    roles: dict[str, Annotated[list[str], Field(min_length=1)]] | None = Field(
+        None,
+        min_length=2,
+        description="part that recordings play -> recordings; each is left out in turn, models found anew",
+    )
     models: dict[Annotated[str, AfterValidator(_file_name)], TaggedEntry] = Field(min_length=1)
     mismatch: MismatchForm | None = None
     export: ExportForm | None = None
+    paper: PaperForm | None = None
 
 
 def own_recordings(entry: ModelEntry) -> list[tuple[str, str]]:

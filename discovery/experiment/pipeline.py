@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,25 +20,27 @@ from discovery.experiment.form import (
     ReducedEntry,
     RegressionEntry,
     SuperpositionEntry,
+    ThermobalanceEntry,
     separate,
 )
 from discovery.experiment.joining import check_joins, join
 from discovery.experiment.quality import quality, refuse
-from discovery.experiment.results import write_run
+from discovery.experiment.results import results_document, write_run
 from discovery.fitting import Fit, fit_model
 from discovery.fitting.fit import written_with
 from discovery.fitting.ridge import fit_ridge
 from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.solve import Loss
 from discovery.fitting.starts import warm_start
-from discovery.models import Model
+from discovery.models import Model, check_model
 from discovery.models.dimensions import with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.regression import regression
 from discovery.models.superposition import superposition
+from discovery.models.thermobalance import thermobalance
 from discovery.progress import Progress, Steps, silent
 from discovery.recordings import Campaign
-from discovery.recordings.finding import folded
+from discovery.recordings.finding import Finding, folded
 from discovery.report import write_report
 from discovery.runfolder import default_folder, staged
 from discovery.sparse.options import SparseOptions
@@ -46,6 +48,7 @@ from discovery.targets import check_targets
 
 if TYPE_CHECKING:
     from discovery.diagnosis import Diagnosis
+    from discovery.experiment.roles import Fold
 
 
 def run(
@@ -91,6 +94,7 @@ def run(
         check_targets(experiment.form.export.to)
     with staged(folder) as temporary:
         fitted: dict[str, Fitted] = {}
+        begun = begin_roles(experiment)
         for name, entry in experiment.form.models.items():
             steps.begin()
             fitted[name] = fit_entry(experiment, name, entry, progress)
@@ -99,9 +103,12 @@ def run(
         if found is not None and found.repaired is not None:
             name = _free_name("repaired", fitted)
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
-        seconds = clock.perf_counter() - began
         progress("writing the report")
-        write_run(temporary, "run", experiment, fitted, _written(found), seconds, findings)
+        further = roles_of(experiment, begun, progress)
+        if experiment.form.paper:
+            further |= paper_page(temporary, experiment, fitted, further, findings, progress)
+        seconds = clock.perf_counter() - began
+        write_run(temporary, "run", experiment, fitted, _written(found), seconds, findings, further)
         write_report(temporary)
     if experiment.form.export:
         progress(f"exporting {experiment.form.export.model}")
@@ -115,6 +122,43 @@ _DIAGNOSIS = (4.0,)  # how long it takes beside a model that is only fitted
 def _weight(entry: ModelEntry) -> float:
     """How long a model takes beside one that is only fitted."""
     return 3.0 if isinstance(entry, SparseOptions) else 1.0
+
+
+def begin_roles(experiment: Experiment) -> Iterator[Fold] | None:
+    """Folds of the cross-validation over roles, under way beside the fits of the experiment itself."""
+    if experiment.form.roles is None:
+        return None
+    from discovery.experiment.roles import begin_folds
+
+    return begin_folds(experiment)
+
+
+def roles_of(experiment: Experiment, begun: Iterator[Fold] | None, progress: Progress) -> dict[str, Any]:
+    """What results.json holds of the roles; nothing where the experiment names none."""
+    if begun is None:
+        return {}
+    from discovery.experiment.roles import leave_roles_out
+
+    progress("leaving out one role after the other")
+    return {"role_matrix": leave_roles_out(experiment, begun, progress)}
+
+
+def paper_page(
+    folder: Path,
+    experiment: Experiment,
+    fitted: Mapping[str, Fitted],
+    further: Mapping[str, Any],
+    findings: Sequence[Finding],
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Write paper.html; what results.json holds of it."""
+    from discovery.paper.page import chapters, write_page
+
+    document = results_document("run", experiment, fitted, 0.0, findings, further)
+    results = document.model_dump(exclude_unset=True)
+    made = chapters(experiment, fitted, results, progress)
+    write_page(folder, experiment.name, made, results["command"])
+    return {"paper": {one.key: one.document() for one in made}}
 
 
 def export_of(folder: Path, wanted: ExportForm) -> None:
@@ -270,6 +314,9 @@ def starting_model(
         case SuperpositionEntry():
             alone = only(experiment.campaign, {one for names in separate(entry).values() for one in names})
             model = fit_one_at_a_time(alone, separate(entry), outputs)
+        case ThermobalanceEntry():
+            model = thermobalance(fluid=entry.fluid, variant=entry.speeding, jet=entry.jet)
+            check_model(model, {n: c.unit for n, c in experiment.campaign.channels.items()}, experiment.path)
         case SparseOptions():
             model, report = discovered(experiment, entry, progress)
     return replace(model, name=name), report
@@ -307,7 +354,7 @@ def diagnosis(experiment: Experiment, progress: Progress, fitted: Mapping[str, F
         experiment.held_out,
         experiment.outputs_of(entry),
         [form.effect() for form in wanted.effects],
-        physical=entry.kind == "file",
+        physical=entry.kind in ("file", "thermobalance"),
         fitted=fitted[name].fit,
         tell=progress,
     )

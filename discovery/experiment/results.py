@@ -47,15 +47,17 @@ def write_run(
     diagnosis: Mapping[str, Any] | None,
     seconds: float,
     findings: Sequence[Finding] | None = None,
+    further: Mapping[str, Any] | None = None,
 ) -> None:
     """Everything that a run leaves behind but the report.
 
     Args:
         verb: of the command that made it.
         findings: of the recordings, where they were looked at before.
+        further: what results.json holds beside the models: "role_matrix", "paper".
     """
     found = quality(experiment) if findings is None else findings
-    document = results_document(verb, experiment, fitted, seconds, found)
+    document = results_document(verb, experiment, fitted, seconds, found, further)
     write_json(folder / RESULTS, document.model_dump(exclude_unset=True))
     if diagnosis is not None:
         write_json(folder / DIAGNOSIS, diagnosis)
@@ -72,6 +74,7 @@ def results_document(
     fitted: Mapping[str, Fitted],
     seconds: float,
     findings: Sequence[Finding],
+    further: Mapping[str, Any] | None = None,
 ) -> ResultsDocument:
     """The content of results.json."""
     channels = experiment.campaign.channels
@@ -96,6 +99,7 @@ def results_document(
         "seconds": seconds,
         "versions": versions(),
         "inputs": hashes(input_files(experiment)),
+        **(further or {}),
     }
     return ResultsDocument.model_validate(_plain(content))
 
@@ -138,7 +142,15 @@ def model_entry(one: Fitted) -> dict[str, Any]:
         "values": parameter_values(model),
         "noise": dict(zip(one.fit.noise.outputs, one.fit.noise.white, strict=True)),
         "notes": list(one.notes),
+        **({"budgets": budgets} if (budgets := budgets_of(one)) else {}),
         **({"search": one.report} if one.report else {}),
+    }
+
+
+def budgets_of(one: Fitted) -> dict[str, dict[str, Any]]:
+    """Energy and fluid budget [MJ] by recording; empty for a model without heat capacities."""
+    return {
+        name: {**asdict(p.budget), "gap": p.budget.gap} for name, p in one.predictions.items() if p.budget
     }
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from discovery.errors import UsageError
+from discovery.evaluation.rolematrix import matrix
 from discovery.evaluation.tables import Table, as_text
 from discovery.models.units import differences
 from discovery.runfolder import read_results
@@ -22,18 +23,27 @@ def summary(folder: Path) -> Iterator[str]:
     for recording in (*results["fit"], *results["held_out"]):
         yield as_text(rms_table({"": results}, recording))
         yield ""
+    if roles := results.get("role_matrix"):
+        for error in results["outputs"]:
+            yield as_text(matrix(roles, error, differences(results["units"].get(error, ""))))
+            yield ""
     yield from remarks(folder)
+    if "paper" in results:
+        yield f"the paper, figure by figure: {folder / 'paper.html'}"
     yield f"{results['seconds']:.0f} s; the report: {folder / 'report.html'}"
 
 
 def remarks(folder: Path) -> Iterator[str]:
     """The notes of each model, and that something is wrong with the recordings."""
     results = read_results(folder)
+    said: dict[str, list[str]] = {}
     for name, model in results["models"].items():
         notes = model["notes"]
-        yield from (f"note, {name}: {note}" for note in notes[:MOST_NOTES])
+        for note in notes[:MOST_NOTES]:
+            said.setdefault(note, []).append(name)
         if len(notes) > MOST_NOTES:
-            yield f"note, {name}: {len(notes) - MOST_NOTES} more in results.json"
+            said[f"{len(notes) - MOST_NOTES} more notes on {name} in results.json"] = [name]
+    yield from (f"note, {', '.join(models)}: {note}" for note, models in said.items())
     if findings := results["findings"]:
         worst = min(findings, key=lambda one: not one.startswith("error"))
         many = f"{len(findings)} findings in the recordings, the first: " if findings[1:] else ""

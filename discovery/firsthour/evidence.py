@@ -134,10 +134,10 @@ def evidence(
         found.add(f"its unit {unit}", odds)
     form = shape(values)
     if form is not None:
-        for why, says in value_odds(form, unit):
-            found.add(why, says)
-    for why, says in hints:
-        found.add(why, says)
+        for why, more in value_odds(form, unit):
+            found.add(why, more)
+    for why, more in hints:
+        found.add(why, more)
     return found
 
 

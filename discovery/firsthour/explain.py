@@ -16,6 +16,7 @@ MODELS = {
     "regression": "ridge regression on the inputs, without memory: the least that a model has to beat",
     "reduced": "equation (9): each error first order, driven by all inputs together, fitted from one cycle",
     "superposition": "equation (8): each error a sum of parts, each first order and driven by one input",
+    "thermobalance": "section 3: five bodies of a rotary table, cutting fluid by equations (1) to (6)",
     "sindy": "discovered: the fewest terms of a large library that predict parts of the data left out",
     "pysindy": "PySINDy as its users take it, threshold by cross-validation: to compare with",
 }

@@ -56,7 +56,7 @@ def warm_start(model: Model, campaign: Campaign, recordings: Sequence[str], outp
         ]
         if mine:
             found |= _best(model, mine, banks, y, taus)
-    model = _poles_that_can_be_told(model, parts, float(taus[-1]))
+    model = _poles_that_can_be_told(model, parts, float(taus[-1]), float(taus[0]))
     inside = {
         name: min(max(value, model.parameters[name].min), model.parameters[name].max)
         for name, value in found.items()
@@ -64,13 +64,19 @@ def warm_start(model: Model, campaign: Campaign, recordings: Sequence[str], outp
     return model.with_values(inside)
 
 
-def _poles_that_can_be_told(model: Model, parts: Mapping[str, _Part], slowest: float) -> Model:
-    """The model with no time constant beyond `slowest` [s]: there an influence only adds up its input, fits
-    every trend of these recordings and runs away in others.
+def _poles_that_can_be_told(
+    model: Model, parts: Mapping[str, _Part], slowest: float, fastest: float
+) -> Model:
+    """The model with no time constant beyond `slowest` or below `fastest` [s]. Beyond, an influence only adds
+    up its input, fits every trend of these recordings and runs away in others; below, it follows its input
+    within the distance of readings, however fast, and no controller can integrate it.
     """
-    limit = -TIME_UNITS[model.time_unit] / slowest
+    unit = TIME_UNITS[model.time_unit]
     poles = {part.pole: model.parameters[part.pole] for part in parts.values()}
-    bounded = {name: replace(p, max=min(p.max, limit)) for name, p in poles.items()}
+    bounded = {
+        name: replace(p, max=min(p.max, -unit / slowest), min=max(p.min, -unit / fastest))
+        for name, p in poles.items()
+    }
     return replace(model, parameters={**model.parameters, **bounded})
 
 

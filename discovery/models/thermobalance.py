@@ -57,22 +57,31 @@ LEVERS = {
 }
 SPEED_NEW = {  # eq. (6), in rpm
     "none": "max(speed, n_min)",
-    "printed": "where(speed > 750, 4*(max(speed, 750) - 750)**5 + 750, max(speed, n_min))",
-    "1.5": "where(speed > 750, 4*(max(speed, 750) - 750)**1.5 + 750, max(speed, n_min))",
+    "printed": "where(speed > n_limit, 4*(max(speed, n_limit) - n_limit)**5 + n_limit, max(speed, n_min))",
+    "1.5": "where(speed > n_limit, 4*(max(speed, n_limit) - n_limit)**1.5 + n_limit, max(speed, n_min))",
 }
 
 
-def film(variant: Speeding = "none") -> str:
+FALL = "(h_nozzle/d_n)"  # beta, eq. (4)
+JET = "(4*max(flow, 0.1)/60/3.14159265/d_n/nu)"  # Re = V_j d_n/nu, V_j = 4 Q/(pi d_n^2); Q in l/min
+
+
+def film(variant: Speeding = "none", *, jet: bool = False) -> str:
     """Expression of eqs. (1) to (6) in W/m2K: h_nozzle and d_n in mm, speed in rpm (0.10472 rad/s each),
     h_still at rest.
+
+    With `jet` the exponents of nozzle height and fluid velocity are parameters, b and m, and the velocity
+    comes from the flow; they hold at rest as well, where h_still is for 50 mm and 10 l/min.
     """
     ekman = f"(nu/(4*0.10472*{SPEED_NEW[variant]}*r_d**2))"
-    nusselt = f"(h_nozzle/d_n)**0.0909*Re**0.75*{ekman}**(-0.1111)*(lambda_s/lambda_f)**(-0.9)"
+    reynolds, b, m = (JET, "b", "m") if jet else ("Re", "0.0909", "0.75")
+    nusselt = f"{FALL}**{b}*{reynolds}**{m}*{ekman}**(-0.1111)*(lambda_s/lambda_f)**(-0.9)"
     moving = f"1.97619*1000*lambda_f/d_n*{nusselt}"
-    return f"where(speed > n_min, {moving}, h_still)"
+    still = "h_still*(h_nozzle/50)**b*(max(flow, 0.1)/10)**m" if jet else "h_still"
+    return f"where(speed > n_min, {moving}, {still})"
 
 
-def thermobalance(*, fluid: bool = True, variant: Speeding = "none") -> Model:
+def thermobalance(*, fluid: bool = True, variant: Speeding = "none", jet: bool = False) -> Model:
     """The five bodies, and the bed that follows the room.
 
     Inputs: T_env, T_cool, P_drive, and with `fluid` T_fluid, pump, speed, h_nozzle.
@@ -80,6 +89,8 @@ def thermobalance(*, fluid: bool = True, variant: Speeding = "none") -> Model:
     Args:
         fluid: whether cutting fluid wets Table and C-Body 1.
         variant: of eq. (6); doubtful as printed, and hardly seen in the errors.
+        jet: find the exponents of nozzle height (b) and fluid velocity (m) in eq. (1); `flow` [l/min] is an
+            input then, and Re no parameter.
     """
     parameters = {f"G_{_short(a)}_{_short(b)}": _positive(G, "W/K") for (a, b), G in LINKS.items()}
     parameters["G_b2_bed"] = _positive(8.0, "W/K")
@@ -105,10 +116,10 @@ def thermobalance(*, fluid: bool = True, variant: Speeding = "none") -> Model:
     for name, body in BODIES.items():
         if fluid and body.wet is not None:
             parameters[f"hF_{_short(name)}"] = _positive(body.wet, "m**2")
-            flow = f"hF_{_short(name)}*pump*{film(variant)}*(T_fluid - {name})"
+            flow = f"hF_{_short(name)}*pump*{film(variant, jet=jet)}*(T_fluid - {name})"
             terms.append(Term(f"cutting fluid on {name}", name, parse(flow)))
     if fluid:
-        parameters |= _fluid_parameters()
+        parameters |= _fluid_parameters(variant, jet=jet)
     parameters["T_ref"] = Parameter(22.0, "degC", fixed=True)
     states = {
         name: State(name, "degC", body.capacity, parse("T_env"), scale=1.0 / body.capacity)
@@ -120,15 +131,19 @@ def thermobalance(*, fluid: bool = True, variant: Speeding = "none") -> Model:
     return Model(title, parameters, states, tuple(terms), outputs)
 
 
-def _fluid_parameters() -> dict[str, Parameter]:
+def _fluid_parameters(variant: Speeding, *, jet: bool) -> dict[str, Parameter]:
     def given(value: float, unit: str) -> Parameter:
         return Parameter(value, unit, fixed=True)
 
+    found = {"b": Parameter(0.0909, "1", -1.0, 2.0), "m": Parameter(0.75, "1", 0.0, 2.0)} if jet else {}
+    speeding = {} if variant == "none" else {"n_limit": given(750.0, "rpm")}
     return {
+        **found,
+        **speeding,
         "h_still": Parameter(400.0, "W/m**2/K", 0.0, 3000.0),
         "d_n": given(10.0, "mm"),
         "r_d": given(0.25, "m"),
-        "Re": given(1000.0, "1"),
+        **({} if jet else {"Re": given(1000.0, "1")}),
         "nu": given(1.2e-6, "m**2/s"),
         "lambda_f": given(0.58, "W/m/K"),
         "lambda_s": given(45.0, "W/m/K"),

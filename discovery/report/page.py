@@ -78,10 +78,12 @@ def render(run: Run) -> str:
         "models": [sections.model(run, name) for name in sections.detailed(run)],
         "discovery": found,
         "residual": residual,
+        "roles": sections.roles(run),
+        "budgets": sections.budgets(run),
         "quality": sections.quality(run),
         "reproduce": sections.reproduce(run),
     }
-    return fill("page.html.j2", view, charts)
+    return fill("page.html.j2", view, charts, _contents(view))
 
 
 def charts_of(run: Run) -> list[Chart]:
@@ -93,8 +95,10 @@ def charts_of(run: Run) -> list[Chart]:
     return charts
 
 
-def fill(template: str, view: Mapping[str, Any], charts: Sequence[Chart]) -> str:
-    """A template with its view, style, script and the data of its charts."""
+def fill(
+    template: str, view: Mapping[str, Any], charts: Sequence[Chart], contents: Sequence[tuple[str, str]]
+) -> str:
+    """A template with its view, style, script and the data of its charts. `contents`: anchor and name."""
     from markupsafe import Markup
 
     curves = sum(len(panel.series) for chart in charts for panel in chart.panels)
@@ -107,7 +111,7 @@ def fill(template: str, view: Mapping[str, Any], charts: Sequence[Chart]) -> str
         .get_template(template)
         .render(
             **view,
-            contents=_contents(view),
+            contents=contents,
             version=__version__,
             css=style(),
             script=Markup((_HERE / "charts.js").read_text("utf-8")),
@@ -135,11 +139,13 @@ def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
     parts = [
         ("predictions", "Measured, predicted"),
         ("summary", "Models compared"),
+        ("roles", "Each role left out"),
         ("diagnosis", "What was left out"),
         ("network", "Thermal network"),
         ("models", ""),
         ("discovery", "How it was found"),
         ("residual", "What is left"),
+        ("budgets", "Heat and fluid"),
         ("quality", "The recordings"),
         ("reproduce", "Reproduce"),
     ]

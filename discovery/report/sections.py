@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from discovery import __version__
+from discovery.evaluation import rolematrix
+from discovery.evaluation.tables import budget_tables
 from discovery.report import equations, heat, series
 from discovery.report.chart import Chart, Panel, Series
-from discovery.report.printed import Line, Printed
+from discovery.report.printed import Line, Printed, printed
 from discovery.report.ranking import is_discovered, ranked
 from discovery.report.run import Run
 from discovery.report.text import counted, number, percent
@@ -156,6 +158,38 @@ def residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
         "would not be alike and bars would stay inside the band.",
         "table": Printed(f"Left over on {recording}", header, lines),
         "charts": series.residual_charts(run, model, recording),
+    }
+
+
+def roles(run: Run) -> dict[str, Any] | None:
+    """Cross-validation over roles; None where the experiment names none."""
+    found = run.results.get("role_matrix")
+    if not found:
+        return None
+    units = {error: run.unit(error) for error in run.outputs}
+    return {
+        "about": "Each role was left out of fit and search in turn, and every model found anew from the "
+        "others. "
+        "The columns judge a role when it was left out; the last one is the mean over what the fits had "
+        "seen.",
+        "summary": printed(rolematrix.left_out(found, units), left=[1]),
+        "matrices": [printed(rolematrix.matrix(found, e, units[e]), left=[1]) for e in run.outputs],
+        "steadiness": [printed(rolematrix.steadiness(found, m), left=[1, 2]) for m in found["models"]],
+        "lost": [f"{name} {line}" for name, one in found["models"].items() for line in one["lost"]],
+    }
+
+
+def budgets(run: Run) -> dict[str, Any] | None:
+    """Energy and fluid budgets by the best model that has heat capacities; None where there is none."""
+    models = run.results.get("models", {})
+    order = [name for name in ranked(run) if models[name].get("budgets")]
+    if not order:
+        return None
+    found = models[order[0]]["budgets"]
+    return {
+        "about": f"Heat as the fitted model “{order[0]}” has it, integrated over each recording. Heat that "
+        "enters and is not stored would be an error of the integration.",
+        "tables": [printed(table) for table in budget_tables(found)],
     }
 
 

@@ -8,9 +8,12 @@ import pytest
 
 from discovery.models.convection import (
     OutsideValidity,
+    biot_number,
     ekman,
     film_coefficient,
+    jet_velocity,
     nusselt,
+    prandtl_number,
     rad_per_s,
     speed_new,
     validity,
@@ -101,11 +104,63 @@ def test_the_law_in_the_model_is_the_law_of_the_functions() -> None:
     from discovery.models.thermobalance import film, thermobalance
     from discovery.terms import evaluate, parse
 
-    values = {name: p.value for name, p in thermobalance().parameters.items()} | {"h_nozzle": 100.0}
     for variant in ("none", "printed", "1.5"):
+        model = thermobalance(variant=variant)  # type: ignore[arg-type]
+        values = {name: p.value for name, p in model.parameters.items()} | {"h_nozzle": 100.0}
         for speed in (0.0, 100.0, 600.0, 751.0, 1200.0):
             found = evaluate(parse(film(variant)), values | {"speed": speed}).value
             expected = quiet(
                 speed, 0.10, 1000, variant=variant, floor=values["h_still"] if speed == 0 else 0.0
             )
             assert float(np.asarray(found)) == pytest.approx(expected, rel=1e-5)
+
+
+def test_jet_prandtl_and_biot_by_hand() -> None:
+    """10 l/min through 10 mm: 1.667e-4 m3/s / 7.854e-5 m2 = 2.122 m/s, Re = 2.122 x 0.01/1.2e-6 = 17684.
+    Pr = 1.2e-6 x 4.15e6/0.58 = 8.586. Bi = 3000 x 0.06/45 = 4.
+    """
+    assert jet_velocity(10.0, 0.010) == pytest.approx(2.1221, rel=1e-4)
+    assert jet_velocity(10.0, 0.010) * 0.010 / 1.2e-6 == pytest.approx(17684, rel=1e-4)
+    assert prandtl_number(1.2e-6, 0.58) == pytest.approx(8.586, rel=1e-3)
+    assert biot_number(3000.0, 0.06, 45.0) == pytest.approx(4.0)
+
+
+def test_the_jet_in_the_model_by_hand() -> None:
+    """With b = 0.0909, m = 0.75 the free exponents are eq. (1) at the Reynolds number of the flow. At rest
+    h_still (100/50)^b (5/10)^m: 400 x 1.0650 x 0.5946 = 253.3.
+    """
+    from discovery.models.thermobalance import film, thermobalance
+    from discovery.terms import evaluate, parse
+
+    values = {name: p.value for name, p in thermobalance(jet=True).parameters.items()}
+    here = values | {"h_nozzle": 100.0, "flow": 5.0}
+    law = parse(film(jet=True))
+    reynolds = jet_velocity(5.0, 0.010) * 0.010 / 1.2e-6
+    for speed in (100.0, 600.0):
+        found = float(np.asarray(evaluate(law, here | {"speed": speed}).value))
+        assert found == pytest.approx(quiet(speed, 0.10, reynolds), rel=1e-5)
+    still = float(np.asarray(evaluate(law, here | {"speed": 0.0}).value))
+    assert still == pytest.approx(253.3, rel=1e-3)
+
+
+def test_a_model_outside_the_ranges_says_so_once() -> None:
+    from discovery.models.convection import validity_of_model
+    from discovery.models.thermobalance import thermobalance
+    from discovery.recordings import Campaign, Channel, Recording
+
+    time = np.array([0.0, 60.0])
+    channels = {
+        "speed": Channel("speed", "rotation speed", "rpm", None, "held"),
+        "h_nozzle": Channel("h_nozzle", "nozzle height", "mm", None, "held"),
+        "pump": Channel("pump", "fluid flow", "1", None, "held"),
+    }
+    values = {"speed": np.array([100.0, 900.0]), "h_nozzle": np.full(2, 50.0), "pump": np.ones(2)}
+    campaign = Campaign("c", channels, {"r": Recording("r", time, values)})
+    (note,) = validity_of_model(thermobalance(), campaign, ["r"])
+    for what in ("Ekman", "Biot", "speed in rpm 900"):
+        assert what in note
+    assert "Prandtl" not in note  # 8.6 is inside
+    assert "Reynolds" not in note  # 1000 is inside
+    (with_6,) = validity_of_model(thermobalance(variant="printed"), campaign, ["r"])
+    assert "speed in rpm" not in with_6  # eq. (6) reaches 1200 rpm
+    assert validity_of_model(thermobalance(fluid=False), campaign, ["r"]) == []
