@@ -230,18 +230,27 @@ def _factors(
     on = np.flatnonzero(fixed)
     out[on] = fixed[on] * part.dot[first[on]] - 0.5 * fixed[on] ** 2 * part.gram[first[on]]
     for i in np.flatnonzero(~single):
-        mine = np.flatnonzero(owners == i)
-        matrix = part.block(mine) + 1e-9 * np.diag(part.length[mine] ** 2 + 1e-30)
-        inverse = np.linalg.inv(matrix)
-        at = inverse @ part.dot[mine]
-        out[i] = (
-            0.5 * float(part.dot[mine] @ at)
-            + float(np.sum(slab.take(mine).average(at, np.diag(inverse))))
-            + 0.5 * len(mine) * float(np.log(2 * np.pi))
-            - 0.5 * float(np.linalg.slogdet(matrix)[1])
-        )
+        out[i] = _jointly(part, slab, np.flatnonzero(owners == i))
     nothing = part.length[first] <= 0
     return np.where(nothing, -np.inf, out)
+
+
+def _jointly(part: Projected, slab: Slab, mine: NDArray[np.intp]) -> float:
+    """Log Bayes factor of an effect with several amplitudes. One that the first order gives the wrong sign
+    does not count: a refit says what it is once the others act.
+    """
+    matrix = part.block(mine) + 1e-9 * np.diag(part.length[mine] ** 2 + 1e-30)
+    inverse = np.linalg.inv(matrix)
+    at = inverse @ part.dot[mine]
+    wrong = (at * slab.sign[mine] < 0) & (np.abs(at) > np.sqrt(np.diag(inverse)))
+    if wrong.any() and not wrong.all():
+        return _jointly(part, slab, mine[~wrong])
+    return (
+        0.5 * float(part.dot[mine] @ at)
+        + float(np.sum(slab.take(mine).average(at, np.diag(inverse))))
+        + 0.5 * len(mine) * float(np.log(2 * np.pi))
+        - 0.5 * float(np.linalg.slogdet(matrix)[1])
+    )
 
 
 def _score(h: Hypothesis, gain: float, part: Projected, mine: NDArray[np.intp], noise: int) -> Score:

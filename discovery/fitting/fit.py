@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
+from discovery.errors import RunsAwayError
 from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.kalman import innovations
 from discovery.fitting.noise import Noise, readings_as_one, resolution, white_noise
@@ -123,6 +124,8 @@ def fit_model(
         most = max_rounds if k in (0, rounds - 1) else _ROUGH
         solution = solve(problem, theta, current, loss, most, tolerance, together)
         theta = solution.theta
+        if not np.isfinite(solution.jacobian).all():
+            raise RunsAwayError(f"model '{model.name}' answers its parameters with numbers without bound")
         if k == rounds - 1:
             break
         left = [problem.residual(t) for t in solution.trajectories]
