@@ -152,8 +152,8 @@ def diagnose(
     runs = free_runs(campaign, [*fit, *read], before, after or before, noise)
     fitting = improvement([runs[r] for r in fit if r in runs], outputs)
     proof = {r: improvement([runs[r]], outputs) for r in read if r in runs}
-    everywhere = improvement(list(runs.values()), outputs)
-    verdict = refuted(idle(verdict, everywhere, size_of(campaign, noise)), proof)
+    each = [improvement([one], outputs) for one in runs.values()]
+    verdict = refuted(idle(verdict, each), proof)
     if not verdict.named and after is not None:
         after = None
     verdict = replace(verdict, reasons=(*verdict.reasons, *_reasons(context, verdict, read, proof, effects)))

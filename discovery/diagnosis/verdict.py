@@ -6,7 +6,7 @@ and where no veto of physics stands against it. Unseen recordings may withdraw a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, log
 
@@ -72,7 +72,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     )
     more = posterior.best.evidence - found.baseline.evidence
     if posterior.nothing > 1 - thresholds.DETECTED or more < thresholds.SHORT or gain < thresholds.MATTERS:
-        return _nothing(context, answer, candidates)
+        return _nothing(context, found.baseline, answer, candidates)
     sure = [n for n in candidates if n.probability >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in sure if (text := _refused(context, answer, n.hypothesis))}
     reasons = list(refused.values())
@@ -115,19 +115,23 @@ def _short(
     return posterior.best.evidence - alone.evidence if alone is not None else inf
 
 
-def idle(verdict: Verdict, everywhere: Improvement, noise: float) -> Verdict:
-    """No mismatch where what was named does too little for free runs of all recordings, fitted and unseen.
-
-    Args:
-        noise: one reading noise in the unit of the proof.
+def idle(verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:
+    """No mismatch where what was named does too little for free runs, on average over all recordings, fitted
+    and unseen. Logarithms of the rms are averaged: one recording of another machine does not drown the rest.
     """
-    if not verdict.named or everywhere.explained >= thresholds.MATTERS * noise:
+    if not verdict.named or _lower(runs) >= 0.5 * thresholds.MATTERS**2:
         return verdict
     reason = (
-        "what could be named changes free runs of all recordings too little to matter (rms "
-        f"{printed(everywhere.before)} without it, {printed(everywhere.after)} with it)"
+        "what could be named changes free runs too little to matter (rms lower by "
+        f"{printed(100 * _lower(runs))} % on average over the recordings)"
     )
     return replace(verdict, word=NO_MISMATCH, named=(), candidates=(), reasons=(reason, *verdict.reasons))
+
+
+def _lower(runs: Iterable[Improvement]) -> float:
+    """Mean over recordings of the logarithm by which the rms of free runs is lower."""
+    logs = [log(max(i.before, 1e-12) / max(i.after, 1e-12)) if isfinite(i.after) else -inf for i in runs]
+    return sum(logs) / max(len(logs), 1)
 
 
 def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
@@ -139,7 +143,7 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     if not lasting or not worse:
         return verdict
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in lasting)
-    if sum(log(max(i.after, 1e-12) / max(i.before, 1e-12)) for i in proof.values()) <= 0:
+    if _lower(proof.values()) >= 0:
         reason = (
             f"{names} holds on the other unseen recordings but not on {', '.join(worse)}: check whether the "
             "machine was the same there"
@@ -151,7 +155,15 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     )
 
 
-def _nothing(context: Context, answer: Scored, candidates: tuple[Named, ...]) -> Verdict:
+def _nothing(context: Context, baseline: Scored, answer: Scored, candidates: tuple[Named, ...]) -> Verdict:
+    """Nothing is missing, unless the model is so coarse that process noise explains whatever there is."""
+    share = max(baseline.noise.share, baseline.noise.form)
+    if share > thresholds.SHARE:
+        reason = (
+            f"the flows of the model are off by about {100 * share:.0f} %, more than is usual for a lumped "
+            "model, and no effect explains that"
+        )
+        return Verdict(UNEXPLAINED, answer, (), candidates, (reason,))
     if context.outliers:
         reason = f"{len(context.outliers)} single wrong readings, nothing else"
         return Verdict(FAULT, answer, (), (), (reason,))

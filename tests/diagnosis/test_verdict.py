@@ -259,12 +259,12 @@ def improved(before: float, after: float, low: float, high: float) -> Improvemen
 
 def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
     named = said(WET, {"fluid_convection": 0.9})
-    assert idle(named, improved(2.0, 1.0, 0.1, 1.5), 1.0) is named
-    withdrawn = idle(named, improved(2.0, 1.995, -0.1, 0.3), 1.0)
+    large, small = improved(2.0, 1.0, 0.1, 1.5), improved(2.0, 1.995, -0.1, 0.3)
+    another_machine = improved(200.0, 260.0, -70.0, -50.0)
+    assert idle(named, [large]) is named
+    withdrawn = idle(named, [small, small])
     assert (withdrawn.word, withdrawn.named) == ("no mismatch", ())
-    assert (
-        idle(named, improved(2.0, 1.995, -0.1, 0.3), 0.5) is named
-    )  # 0.14 of noise 0.5 are more than 0.15 of it
+    assert idle(named, [large, large, another_machine]) is named
 
 
 def test_unseen_recordings_withdraw_a_name_and_never_add_one() -> None:
