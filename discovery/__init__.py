@@ -18,6 +18,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from discovery.diagnosis import diagnose
     from discovery.errors import UserError
+    from discovery.estimator import SparseDiscovery, discover
     from discovery.experiment import run
     from discovery.fitting import fit_model
     from discovery.frames import campaign_from_frames, prediction_frame, recording_frame
@@ -26,9 +27,11 @@ if TYPE_CHECKING:
     from discovery.report import write_report
 
 _HOME = {
+    "SparseDiscovery": "estimator",
     "UserError": "errors",
     "campaign_from_frames": "frames",
     "diagnose": "diagnosis",
+    "discover": "estimator",
     "fit_model": "fitting",
     "load_campaign": "recordings",
     "prediction_frame": "frames",
@@ -40,9 +43,11 @@ _HOME = {
 }
 
 __all__ = [
+    "SparseDiscovery",
     "UserError",
     "campaign_from_frames",
     "diagnose",
+    "discover",
     "fit_model",
     "load_campaign",
     "prediction_frame",

@@ -280,7 +280,7 @@ def simulate(
                 f"model '{system.model.name}' runs away on recording '{system.grid.recording}'; "
                 "check signs, bounds and start values of its parameters"
             )
-        change = np.max(np.abs(new - x) / (1.0 + np.abs(new)))
+        change = np.max(np.abs(new - x) / (1.0 + np.abs(new)), initial=0.0)
         x = new
         # Newton's steps shrink at least as fast as this one did, a first one to less than its square
         if change * min(1.0, change / before) < _TOLERANCE:

@@ -6,19 +6,20 @@ the figures of the fit can be trusted before anything unseen is looked at.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.evaluation.criteria import criteria
-from discovery.fitting import Noise, fit_model, predict_recording
+from discovery.fitting import Fit, Noise, fit_model, predict_recording
 from discovery.models import Model
 from discovery.recordings import Campaign, Recording
 
 Array = NDArray[np.float64]
 Window = tuple[float, float]  # s, from and up to
+Refit = Callable[[Campaign, Sequence[str]], Fit]
 
 ROUNDS = 6  # of Levenberg-Marquardt: the start is the fit to everything
 MOST_FOLDS = 4  # recordings are left out in groups when there are more
@@ -54,6 +55,7 @@ def cross_validate(
     recordings: Sequence[str],
     outputs: Sequence[str],
     noise: Noise | None = None,
+    refit: Refit | None = None,
 ) -> dict[str, dict[str, float]]:
     """rms of each output on what was left out, pooled over the folds: {"recordings": {...}, "blocks": {...}}.
 
@@ -61,10 +63,16 @@ def cross_validate(
 
     Args:
         noise: of the fit to everything, so that no fold has to find it again.
+        refit: how the model is fitted to what stays; default by output error.
     """
+
+    def by_output_error(seen: Campaign, kept: Sequence[str]) -> Fit:
+        return fit_model(model, seen, kept, outputs, noise=noise, max_rounds=ROUNDS)
+
+    refit = refit or by_output_error
     left: dict[str, list[Array]] = {}
     for fold in folds(campaign, recordings):
-        for rows in _left_over(model, campaign, recordings, outputs, fold, noise):
+        for rows in _left_over(refit, campaign, recordings, outputs, fold):
             left.setdefault("blocks" if fold.windows else "recordings", []).append(rows)
     return {
         kind: {name: criteria(np.concatenate([r[:, y] for r in rows])).rms for y, name in enumerate(outputs)}
@@ -73,26 +81,23 @@ def cross_validate(
 
 
 def _left_over(
-    model: Model,
+    refit: Refit,
     campaign: Campaign,
     recordings: Sequence[str],
     outputs: Sequence[str],
     fold: Fold,
-    noise: Noise | None,
 ) -> Iterator[Array]:
     """Readings minus model (R, Y) where the fit did not see them, NaN elsewhere."""
     if fold.windows is None:
         kept = [name for name in recordings if name not in fold.recordings]
         seen = replace(campaign, recordings={name: campaign.recordings[name] for name in kept})
-        fit = fit_model(model, seen, kept, outputs, noise=noise, max_rounds=ROUNDS)
+        fit = refit(seen, kept)
         for name in fold.recordings:
             trajectory = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)
             yield fit.problem.residual(trajectory)
         return
     masked = {name: _mask(campaign.recordings[name], outputs, fold.windows[name]) for name in recordings}
-    fit = fit_model(
-        model, replace(campaign, recordings=masked), recordings, outputs, noise=noise, max_rounds=ROUNDS
-    )
+    fit = refit(replace(campaign, recordings=masked), recordings)
     for trajectory in fit.trajectories:
         name = trajectory.system.grid.recording
         whole = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)

@@ -26,6 +26,11 @@ _INPUT_ROLES = (
     "heat load",
     "fluid temperature",
 )  # of eqs. (8) and (9), in the paper's order
+OUTPUTS = (
+    "error",
+    "temperature",
+    "other output",
+)  # roles, of which the first one recorded is modelled by default
 _ELSE = ("rotation speed", "other input")
 
 
@@ -126,11 +131,12 @@ def load_experiment(path: str | os.PathLike[str]) -> Experiment:
     path = Path(path)
     form = read_toml(path, ExperimentForm)
     campaign = load_campaign(path.parent / form.campaign, only=_recordings(path, form))
-    outputs = form.outputs or _of_role(campaign, "error") or _of_role(campaign, "temperature")
+    outputs = form.outputs or next((found for role in OUTPUTS if (found := _of_role(campaign, role))), [])
     if not outputs:
         measured = ", ".join(c.name for c in campaign.channels.values() if c.measured)
+        roles = " or ".join(f'"{role}"' for role in OUTPUTS)
         raise UserError(
-            f'{path}: no channel of {campaign.path} has the role "error" or "temperature"; '
+            f"{path}: no channel of {campaign.path} has the role {roles}; "
             f"say outputs = [...] with some of {measured}"
         )
     _check(path, form, campaign, outputs)

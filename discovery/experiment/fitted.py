@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from discovery.dynamics.system import predict as model_outputs
 from discovery.errors import RunsAwayError
 from discovery.evaluation import evaluate
-from discovery.evaluation.crossvalidation import cross_validate
+from discovery.evaluation.crossvalidation import Refit, cross_validate
 from discovery.experiment.experiment import Experiment
 from discovery.fitting import Fit, predict_recording
 from discovery.models import Model
@@ -25,6 +25,7 @@ from discovery.progress import Progress, silent
 from discovery.recordings import Channel
 
 Array = NDArray[np.float64]
+_AT_BOUND = 1e-4  # share of a bound that counts as at it
 _NEGLIGIBLE = 0.01  # of the spread of an input: an offset so small is none
 
 
@@ -73,6 +74,7 @@ def judged(
     report: Mapping[str, Any] | None = None,
     seconds: float = 0.0,
     progress: Progress = silent,
+    refit: Refit | None = None,
 ) -> Fitted:
     """A model and its fit: cross-validation on the fit recordings alone, free runs on all, notes."""
     began = clock.perf_counter() - seconds
@@ -82,7 +84,8 @@ def judged(
     if experiment.form.cross_validate:
         progress(f"cross-validating {name}")
         try:
-            validation = cross_validate(fit.model, experiment.fitting, experiment.fit, outputs, fit.noise)
+            seen, names = experiment.fitting, experiment.fit
+            validation = cross_validate(fit.model, seen, names, outputs, fit.noise, refit)
         except RunsAwayError:  # a finding about the model, no mistake of the user's
             lost.append(f"with a part of the readings left out the fit of {name} runs away: do not trust it")
     seconds = clock.perf_counter() - began
@@ -99,6 +102,7 @@ def judged(
         *fit.unidentified,
         *check_dimensions(model, experiment.campaign.channels),
     ]
+    notes += bound_notes(fit.model)
     notes += offset_notes(fit, experiment.campaign.channels)
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
     return Fitted(name, kind, model, fit, predictions, validation, report or {}, tuple(notes), seconds)
@@ -134,6 +138,20 @@ def coarse_notes(fit: Fit) -> list[str]:
     ]
 
 
+def bound_notes(model: Model) -> list[str]:
+    """A sentence for each number that stands at a bound other than zero: the readings ask for more."""
+    notes = []
+    for name, p in model.parameters.items():
+        for bound, which in ((p.min, "least"), (p.max, "greatest")):
+            near = _AT_BOUND * max(abs(bound), 1e-12) if np.isfinite(bound) else 0.0
+            if near and bound != 0 and not p.fixed and abs(p.value - bound) <= near:
+                notes.append(
+                    f"{name} stands at its {which} allowed value, {bound:.4g} {p.unit}: the readings ask for "
+                    "more; allow it, or ask what the model lacks"
+                )
+    return notes
+
+
 def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
     """One sentence for each input known only within a spread: what the fit makes of it, if anything."""
     notes = []
@@ -159,7 +177,7 @@ def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
     reference = np.zeros(len(outputs))
     for y, name in enumerate(outputs):
         taken = grid.readings[grid.measured[:, y], y]
-        if experiment.campaign.channels[name].role == "temperature" and len(taken):
+        if experiment.campaign.channels[name].role != "error" and len(taken):
             reference[y] = taken[0]
     predicted = model_outputs(trajectory)
     return Prediction(outputs, grid.time[grid.read], grid.readings, predicted, reference)

@@ -22,7 +22,13 @@ def _file_name(name: str) -> str:
     return name
 
 
-_BUILT = ["reduced", "superposition", "sindy"]  # kinds of models; one in a file needs no kind
+_BUILT = [
+    "reduced",
+    "superposition",
+    "sindy",
+    "pysindy",
+    "regression",
+]  # kinds of models; one in a file needs no kind
 
 # What several kinds of models may say
 Inputs = Annotated[list[str] | None, Field(min_length=1, description="default by role, as in the paper")]
@@ -65,6 +71,27 @@ class SuperpositionEntry(Strict):
     loss: Pull = "linear"
 
 
+class PysindyEntry(Strict):
+    """PySINDy as its users take it, threshold by cross-validation."""
+
+    kind: Literal["pysindy"]
+    inputs: Inputs = None
+    outputs: Outputs = None
+    form: Literal["auto", "plain", "weak"] = Field(
+        "auto", description='derivatives of readings, or integrals; "auto": what predicts left-out parts best'
+    )
+    also: Also = []
+
+
+class RegressionEntry(Strict):
+    """Ridge regression on the inputs as they are."""
+
+    kind: Literal["regression"]
+    inputs: Inputs = None
+    outputs: Outputs = None
+    also: Also = []
+
+
 def _said(entry: Any) -> Any:
     """What a model is: a file of its own, or a kind that is built."""
     if not isinstance(entry, Mapping):
@@ -80,12 +107,14 @@ def _kind(entry: Any) -> str:
     return str(entry.get("kind", "file") if isinstance(entry, Mapping) else getattr(entry, "kind", "file"))
 
 
-ModelEntry = FileEntry | ReducedEntry | SuperpositionEntry | SparseOptions
+ModelEntry = FileEntry | ReducedEntry | SuperpositionEntry | SparseOptions | PysindyEntry | RegressionEntry
 TaggedEntry = Annotated[
     Annotated[FileEntry, Tag("file")]
     | Annotated[ReducedEntry, Tag("reduced")]
     | Annotated[SuperpositionEntry, Tag("superposition")]
-    | Annotated[SparseOptions, Tag("sindy")],
+    | Annotated[SparseOptions, Tag("sindy")]
+    | Annotated[PysindyEntry, Tag("pysindy")]
+    | Annotated[RegressionEntry, Tag("regression")],
     Discriminator(_kind),
     BeforeValidator(_said),
 ]

@@ -16,14 +16,17 @@ from discovery.experiment.form import (
     FileEntry,
     MismatchForm,
     ModelEntry,
+    PysindyEntry,
     ReducedEntry,
+    RegressionEntry,
     SuperpositionEntry,
     separate,
 )
 from discovery.experiment.joining import check_joins, join
 from discovery.experiment.results import write_run
-from discovery.fitting import fit_model
+from discovery.fitting import Fit, fit_model
 from discovery.fitting.fit import written_with
+from discovery.fitting.ridge import fit_ridge
 from discovery.fitting.sequential import fit_one_at_a_time
 from discovery.fitting.solve import Loss
 from discovery.fitting.starts import warm_start
@@ -32,6 +35,7 @@ from discovery.models.dimensions import with_coefficient_units
 from discovery.models.reduced import reduced
 from discovery.models.superposition import superposition
 from discovery.progress import Progress, silent
+from discovery.recordings import Campaign
 from discovery.report import write_report
 from discovery.runfolder import default_folder, staged
 from discovery.sparse.options import SparseOptions
@@ -140,11 +144,14 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
     began = clock.perf_counter()
     progress(f"fitting {name}")
     common, experiment = experiment.fit, experiment.seen_by(entry)
-    model, report = starting_model(experiment, name, entry, progress)
-    loss: Loss = getattr(entry, "loss", "linear")
-    fitted = fit_model_of(
-        experiment, name, entry.kind, model, report, experiment.outputs_of(entry), loss, progress
-    )
+    if isinstance(entry, PysindyEntry | RegressionEntry):
+        fitted = compared(experiment, name, entry, progress)
+    else:
+        model, report = starting_model(experiment, name, entry, progress)
+        loss: Loss = getattr(entry, "loss", "linear")
+        fitted = fit_model_of(
+            experiment, name, entry.kind, model, report, experiment.outputs_of(entry), loss, progress
+        )
     also = [recording for recording in experiment.fit if recording not in common]
     told = [f"is fitted to {', '.join(also)} besides"] if also else []
     return replace(fitted, notes=(*told, *fitted.notes), seconds=clock.perf_counter() - began)
@@ -171,6 +178,34 @@ def fit_model_of(
     fit = fit_model(model, experiment.fitting, experiment.fit, outputs, loss=loss)
     seconds = clock.perf_counter() - began
     return judged(experiment, name, kind, model, fit, report, seconds, progress)
+
+
+def compared(
+    experiment: Experiment, name: str, entry: PysindyEntry | RegressionEntry, progress: Progress = silent
+) -> Fitted:
+    """A model to compare with, with the numbers of its own method; cross-validated by that method, too."""
+    began = clock.perf_counter()
+    inputs, outputs = experiment.inputs(entry), experiment.outputs_of(entry)
+
+    report: dict[str, Any] = {}
+    seen, recordings = experiment.fitting, experiment.fit
+    if isinstance(entry, RegressionEntry):
+
+        def refit(campaign: Campaign, recordings: Sequence[str]) -> Fit:
+            return fit_ridge(campaign, recordings, outputs, inputs)
+
+        fit = refit(seen, recordings)
+    else:
+        from discovery.sparse.plain import fit_plain, settings
+
+        fit, best, report = fit_plain(seen, recordings, outputs, inputs, settings(entry.form))
+
+        def refit(campaign: Campaign, recordings: Sequence[str]) -> Fit:
+            return fit_plain(campaign, recordings, outputs, inputs, [best])[0]
+
+    model = replace(fit.model, name=name)
+    seconds = clock.perf_counter() - began
+    return judged(experiment, name, entry.kind, model, fit, report, seconds, progress, refit)
 
 
 def repaired_of(

@@ -9,14 +9,17 @@ import math
 import shlex
 import sys
 from collections.abc import Mapping
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import discovery
 from discovery.evaluation.paper import parts_of_the_paper
+from discovery.evaluation.recommendation import recommend
 from discovery.evaluation.shares import term_shares
 from discovery.experiment.experiment import Experiment
 from discovery.experiment.inputfiles import hashes, input_files
@@ -28,6 +31,8 @@ from discovery.runfolder import DIAGNOSIS, RESULTS
 
 if TYPE_CHECKING:
     from discovery.experiment.fitted import Fitted
+
+Array = NDArray[np.float64]
 
 _PACKAGES = ("numpy", "scipy", "numba", "pandas", "scikit-learn", "pysindy", "pint")
 
@@ -64,6 +69,7 @@ def results_document(
         "fit": list(experiment.fit),
         "held_out": list(experiment.held_out),
         "outputs": list(experiment.outputs),
+        "roles": {name: channels[name].role for name in experiment.outputs},
         "units": {name: channels[name].unit for name in experiment.outputs},
         "input_units": {name: c.unit for name, c in channels.items() if name not in experiment.outputs},
         "noise": {name: channels[name].noise for name in experiment.outputs},
@@ -71,10 +77,34 @@ def results_document(
         "notes": {name: r.note for name, r in experiment.campaign.recordings.items() if r.note},
         "findings": findings(experiment),
         "models": {name: model_entry(one) for name, one in fitted.items()},
+        "recommended": recommended(experiment, fitted),
         "seconds": seconds,
         "versions": versions(),
         "inputs": hashes(input_files(experiment)),
     }
+
+
+def recommended(experiment: Experiment, fitted: Mapping[str, Fitted]) -> dict[str, dict[str, Any]]:
+    """By output: the model that is best on the held-out recordings, and how far behind the others are [%]."""
+    found = {}
+    for output in experiment.outputs:
+        left: dict[str, list[Array]] = {}
+        for name, one in fitted.items():
+            runs = [one.predictions[r] for r in experiment.held_out if r in one.predictions]
+            left[name] = [
+                run.readings[:, y] - run.predicted[:, y]
+                for run in runs
+                for y in [k for k, given in enumerate(run.outputs) if given == output]
+            ]
+        best = recommend(output, left)
+        if best is not None:
+            found[output] = {
+                "model": best.best,
+                "rms": best.rms,
+                "ties": list(best.ties),
+                "against": {one.model: asdict(one) for one in best.others},
+            }
+    return found
 
 
 def findings(experiment: Experiment) -> list[str]:

@@ -75,6 +75,8 @@ held_out = [{listed(names[-1:])}]
 [models]
 first_order = {{ file = "model.toml" }}
 discovered  = {{ kind = "sindy" }}
+pysindy     = {{ kind = "pysindy" }}       # PySINDy as its users take it
+regression  = {{ kind = "regression" }}    # ridge on the inputs as they are
 
 [mismatch]
 model = "first_order"

@@ -56,7 +56,16 @@ def rate_unit(of: str, per: str = "1", power: int = 1) -> str:
     >>> rate_unit("um", "degC"), rate_unit("um/m", "W"), rate_unit("um")
     ('um/K/h', 'um/m/W/h', 'um/h')
     """
+    return f"{per_unit(of, '1' if power == 0 else per)}/{TIME_UNIT}"
+
+
+def per_unit(of: str, per: str) -> str:
+    """Unit of a gain: `of` per unit of an input.
+
+    >>> per_unit("um", "degC"), per_unit("um", "1"), per_unit("V", "m/s")
+    ('um/K', 'um', 'V/(m/s)')
+    """
     names = {"degC": "K", "degF": "delta_degF"}
     per = names.get(per, per)
-    divided = "" if per == "1" or power == 0 else f"/({per})" if set("/* ") & set(per) else f"/{per}"
-    return f"{names.get(of, of)}{divided}/{TIME_UNIT}"
+    divided = "" if per == "1" else f"/({per})" if set("/* ") & set(per) else f"/{per}"
+    return f"{names.get(of, of)}{divided}"

@@ -18,6 +18,7 @@ Role = Literal[
     "error",
     "applied correction",
     "other input",
+    "other output",
 ]
 CORRECTION: Role = "applied correction"
 
@@ -39,6 +40,7 @@ class RoleFacts:
     ranges: dict[str, Range] = field(default_factory=dict)
     measured: bool = False  # an output: read now and then, never interpolated
     plain: bool = False  # a dimensionless value is kept as given (a heater in percent)
+    open: bool = False  # a value of another dimension is kept as given (an error in V)
 
     @property
     def said(self) -> str:
@@ -67,9 +69,10 @@ ROLES: dict[str, RoleFacts] = {
     "cooling power": RoleFacts(("W",), ranges=_POWER, plain=True),
     "nozzle height": RoleFacts(("mm",), ranges={"mm": Range((0.0, 2000.0))}),
     "nozzle side": RoleFacts(("1",), ranges={"1": Range((-2.0, 2.0))}),
-    "error": RoleFacts(("um", "um/m"), ranges=_DEVIATION, measured=True),
+    "error": RoleFacts(("um", "um/m"), ranges=_DEVIATION, measured=True, open=True),
     CORRECTION: RoleFacts(("um", "um/m"), ranges=_DEVIATION),
     "other input": RoleFacts(()),
+    "other output": RoleFacts((), between="linear", measured=True),
 }
 
 

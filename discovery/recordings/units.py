@@ -65,6 +65,8 @@ def conversion(unit: str, role: str) -> Conversion:
         canonical = next(name for name in facts.units if given.is_compatible_with(_pint(name)))
         return _affine(given, canonical)
     except Exception:  # no canonical unit of this dimension, or a difference of temperatures
+        if facts.open:
+            return Conversion(unit)
         problem = f"the unit '{unit}' cannot be that of a channel of role '{role}'"
         raise UnitError(f"{problem}; {_allowed(unit, role)}") from None
 

@@ -20,6 +20,7 @@ from discovery.report.ranking import (
     ratio,
     rms_by_unit,
 )
+from discovery.report.recommended import recommended
 from discovery.report.run import Run, pretty_unit
 from discovery.report.text import counted, listed, number, percent, words
 
@@ -64,8 +65,11 @@ def _models(run: Run) -> tuple[str, list[str], list[tuple[str, str]]]:
         for model in order[1:]
         if math.isfinite(ratio(run, best, model)) and astray(run, model) == astray(run, best)
     ]
-    headline = f"The {origin(run, best)} model{named} predicts best {where}{_nearly(run, best, rivals)}."
+    overall = f"The {origin(run, best)} model{named} predicts best {where}{_nearly(run, best, rivals)}."
+    headline = recommended(run, where) or overall
     points, figures = _removed(run, best) if is_error(run) else _left(run, best)
+    if headline != overall:
+        points = [overall, *points]
     compared = [f"{_less(ratio(run, best, model))} {_name(run, model)}" for model in rivals]
     if compared:
         points.append(f"It leaves {listed(compared)}.")

@@ -25,9 +25,13 @@ def is_discovered(run: Run, model: str) -> bool:
 
 
 def origin(run: Run, model: str) -> str:
-    """Where a model comes from: "discovered", "hand-built", or "repaired" after a diagnosis."""
-    if kind(run, model) == "repaired":
-        return "repaired"
+    """Where a model comes from: "discovered", "hand-built", "repaired" after a diagnosis, or a method
+    to compare with: "PySINDy", "regression".
+    """
+    if kind(run, model) in ("repaired", "regression"):
+        return kind(run, model)
+    if kind(run, model) == "pysindy":
+        return "PySINDy"
     return "discovered" if is_discovered(run, model) else "hand-built"
 
 
@@ -98,7 +102,9 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 
 def is_error(run: Run) -> bool:
-    """Whether the outputs are errors, which are zero where nothing is wrong; temperatures are not."""
+    """Whether the outputs are errors, which are zero where nothing is wrong."""
+    if roles := run.results.get("roles"):
+        return all(roles[output] == "error" for output in run.outputs if output in roles)
     return not any(run.unit(output) in ("°C", "K", "°F") for output in run.outputs)
 
 

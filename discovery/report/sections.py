@@ -70,6 +70,10 @@ def discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
     for name in names:
         entry = run.results["models"][name]["search"]
         charts += _pareto(name, entry.get("path") or [])
+        costs = [pair for group in entry.get("groups") or [] for pair in _costs(group)]
+        if costs:
+            head = f"{name}: what each term is worth, by data left out"
+            tables.append(Printed(head, ("Term", "rms without it"), tuple(Line(pair) for pair in costs)))
         if entry.get("stability"):
             shares = sorted(entry["stability"].items(), key=lambda pair: -pair[1])
             rare = [share for _, share in shares if share < _OFTEN]
@@ -88,6 +92,14 @@ def discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
         "Terms that are chosen again and again do not depend on which hours were recorded."
     )
     return {"about": about, "charts": charts, "tables": tables}
+
+
+def _costs(group: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Each term of a group of outputs and by how much the rms on what was left out grows without it."""
+    where = ", ".join(group.get("outputs") or [])
+    known = {term: cost for term, cost in (group.get("costs") or {}).items() if cost is not None}
+    costs = sorted(known.items(), key=lambda pair: -pair[1])
+    return [(f"{where}: {term}", f"+{100 * cost:.1f} %".replace("+-", "−")) for term, cost in costs]
 
 
 def _pareto(name: str, path: Sequence[Mapping[str, Any]]) -> list[Chart]:

@@ -1,183 +1,161 @@
-"""Discovery of one error as a sum of hidden thermal masses."""
+"""Discovery of one output as a sum of filtered inputs, through `pysindy.SINDy`."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Grid
-from discovery.fitting import fit_model
+from discovery.fitting import Fit, fit_model
+from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.sparse.discovery import Discovery, PathPoint
-from discovery.sparse.folds import PREDICT, Blocks, Ints, bootstraps, choose, make_folds
-from discovery.sparse.gram import Gram, solve
-from discovery.sparse.masses import MassLibrary, Response, block_grams, free_run, mass_model, pooled
-from discovery.sparse.optimisers import pysindy_path
+from discovery.sparse.borrowed import borrowed
+from discovery.sparse.choice import Choice, chosen
+from discovery.sparse.constraints import matched
+from discovery.sparse.discovery import Discovery, PathPoint, path_points
+from discovery.sparse.drives import Drives
+from discovery.sparse.folds import PREDICT
+from discovery.sparse.library import Feature, FilteredInputs
+from discovery.sparse.masses import Response, Rules, mass_model, responses_of, with_spreads, within
+from discovery.sparse.optimiser import SparseSearch, features_of, rough_noise
 from discovery.sparse.options import SparseOptions
-from discovery.sparse.path import Support, forward
-from discovery.terms import text
 
 Array = NDArray[np.float64]
 
-OFFSET = (0,)  # column that is always in: the zero of the error
-START_SHARE = 0.05  # spread of a start value, as a share of the rms of the readings
+CLEAR = 1.96  # standard errors that a gain must be from zero
 
 
 @dataclass(frozen=True)
 class MassData:
-    """The library on the recordings to fit, shared by all errors."""
+    """What all outputs share: drives, and the grid of each recording to fit."""
 
-    library: MassLibrary
+    drives: Drives
     grids: Mapping[str, Grid]
-    responses: tuple[Response, ...]
-    blocks: Blocks
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """One error, everything over its noise."""
-
-    data: MassData
-    readings: tuple[Array, ...]  # (R,) each
-    grams: tuple[dict[int, Gram], ...]
-    start_sd: float
-    low: Array
-    high: Array
-
-    def gram(self, weights: Array) -> Gram:
-        return pooled(self.grams, self.data.responses[0].columns.shape[1], self.start_sd, weights)
-
-
-def discover_error(
+def discover_masses(
     data: MassData,
     campaign: Campaign,
     recordings: Sequence[str],
     output: str,
     options: SparseOptions,
 ) -> Discovery:
-    """Choose the masses and drives of one error and fit their numbers."""
-    column = data.grids[recordings[0]].outputs.index(output)
-    readings = [data.grids[r].readings[:, column] for r in recordings]
-    size = float(np.sqrt(np.nanmean(np.concatenate(readings) ** 2)))
-    noise = campaign.channels[output].noise or 0.02 * size
-    start_sd = max(noise, START_SHARE * size)
-    problem = _pose(data, readings, noise, start_sd / noise, options)
+    """Choose the inputs and time constants of one output and fit their numbers."""
+    import pysindy
 
-    everything = np.ones(data.blocks.count)
-    errors = _left_out(problem, options)
-    whole = problem.gram(everything)
-    path = _path(whole, problem, options)
-    rows = min(len(path), len(errors))
-    row = choose(errors[:rows], PREDICT if options.tolerance is None else options.tolerance)
-    chosen = path[row]
-    theta = solve(whole, chosen, problem.low, problem.high)
-    labels = data.library.labels
-    points = tuple(
-        PathPoint(
-            (output,),
-            len(path[k]),
-            noise * float(np.sqrt(errors[k].mean())),
-            noise
-            * float(
-                np.sqrt(max(whole.cost(solve(whole, path[k], problem.low, problem.high)), 0) / whole.count)
-            ),
-            k == row,
-            tuple(labels[j] for j in path[k]),
-        )
-        for k in range(rows)
+    options = matched(options, data.drives.expressions, campaign.path)
+    column = data.grids[recordings[0]].outputs.index(output)
+    grids = {
+        r: replace(data.grids[r], outputs=(output,), readings=data.grids[r].readings[:, [column]])
+        for r in recordings
+    }
+    readings = [grids[r].readings[:, 0] for r in recordings]
+    noise = campaign.channels[output].noise or rough_noise(readings)
+    library = FilteredInputs(
+        ["time", *data.drives.inputs, "read"],
+        [d for d in data.drives.expressions if d not in options.forbid],
+        options.time_constants,
+        data.drives.linear,
+        data.drives.settled,
+        integrals=[d for d in data.drives.integrals if d not in options.forbid],
     )
-    model = mass_model(data.library, output, campaign.channels[output].unit, chosen, theta * noise, start_sd)
-    if options.refine:
-        grids = {
-            r: replace(data.grids[r], outputs=(output,), readings=data.grids[r].readings[:, [column]])
-            for r in recordings
-        }
-        model = fit_model(model, campaign, recordings, [output], grids=grids).model
-    terms, drives = _stability(problem, chosen, options)
+    search = SparseSearch(
+        library,
+        options.max_terms,
+        options.bounds,
+        options.keep,
+        [noise],
+        PREDICT if options.tolerance is None else options.tolerance,
+        options.blocks,
+        options.bootstraps,
+        options.seed,
+        chosen if options.optimiser == "search" else borrowed(options.optimiser, options.optimiser_arguments),
+    )
+    sindy = pysindy.SINDy(optimizer=search, feature_library=library)
+    tables = [_table(grids[r], data.drives.inputs) for r in recordings]
+    sindy.fit(tables, t=1.0, x_dot=[grids[r].readings for r in recordings])
+    choice = search.choices_[0]
+    features = features_of(library, choice.terms)
+    rules = Rules(
+        output,
+        {name: c.unit for name, c in campaign.channels.items()},
+        data.drives.settled,
+        options.bounds,
+        (float(library.taus_[0]), float(library.taus_[-1])),
+        choice.start_sd,
+    )
+    model, left = _clear(rules, features, choice, campaign, recordings, grids, options)
+    return Discovery(model, *_evidence(output, features, left, over(choice, noise), library))
+
+
+def over(choice: Choice, noise: float) -> Choice:
+    """The choice with what it misses counted in reading noises."""
+    left_out, fit = (tuple(rms / noise for rms in some) for some in (choice.left_out, choice.fit))
+    return replace(choice, left_out=left_out, fit=fit)
+
+
+def _table(grid: Grid, inputs: Sequence[str]) -> Array:
+    """Rows of a recording as the library wants them: time, inputs, whether there is a reading."""
+    read = np.zeros(len(grid.time))
+    read[grid.read] = 1.0
+    return np.column_stack([grid.time, *(grid.nodes[name] for name in inputs), read])
+
+
+def _clear(
+    rules: Rules,
+    features: Sequence[Feature],
+    choice: Choice,
+    campaign: Campaign,
+    recordings: Sequence[str],
+    grids: Mapping[str, Grid],
+    options: SparseOptions,
+) -> tuple[Model, list[Feature]]:
+    """The model of the chosen features, fitted by output error, without those whose interval holds zero;
+    and these.
+    """
+    found = zip(features, choice.terms.theta, choice.terms.pole, strict=True)
+    responses = [Response(f, float(gain), int(pole), f) for f, gain, pole in found]
+    if not options.refine:
+        return mass_model(rules, responses), list(features)
+
+    def fitted(model: Model) -> Fit:
+        return fit_model(model, campaign, recordings, [rules.output], grids=grids)
+
+    while True:
+        fit = fitted(mass_model(rules, responses))
+        responses, strength = responses_of(fit, responses)
+        inside = within(rules, responses)
+        if inside != responses:
+            responses = inside
+            continue
+        free = [i for i, r in enumerate(responses) if r.feature.drive not in options.keep]
+        weakest = min(free, key=lambda i: strength[i], default=None)
+        if weakest is None or strength[weakest] >= CLEAR:
+            return fitted(with_spreads(fit)).model, [r.chosen for r in responses]
+        responses = [r for i, r in enumerate(responses) if i != weakest]
+
+
+def _evidence(
+    output: str, features: Sequence[Feature], left: Sequence[Feature], choice: Choice, library: FilteredInputs
+) -> tuple[tuple[PathPoint, ...], dict[str, float], dict[str, Any]]:
+    """Path, stability and report."""
+    points = path_points([output], choice, library.drive_of_family_)
+    stability = {f"{output}: {f}": s for f, s in zip(features, choice.stability, strict=True) if f in left}
     report = {
         "outputs": [output],
         "form": "masses",
-        "terms": len(chosen),
-        "masses": len({int(data.library.mass[k]) for k in chosen} - {-1}),
-        "left_out_rms": round(points[row].left_out_rms, 4),
-        "library": len(labels),
-        "drive_stability": {name: round(share, 3) for name, share in drives.items()},
+        "terms": len(left),
+        "left_out_rms": round(choice.left_out[choice.row], 4),
+        "library": library.families_.columns,
+        "kept": [str(f) for f in left],
+        "costs": {
+            str(f): round(cost, 4)
+            for f, cost in zip(features, choice.costs, strict=True)
+            if f in left and np.isfinite(cost)
+        },
     }
-    stability = {f"{output}: {labels[k]}": share for k, share in terms.items()}
-    return Discovery(model, points, stability, report)
-
-
-def _pose(
-    data: MassData,
-    readings: Sequence[Array],
-    noise: float,
-    start_sd: float,
-    options: SparseOptions,
-) -> _Problem:
-    scaled = tuple(series / noise for series in readings)
-    grams = tuple(
-        block_grams(response, series, block)
-        for response, series, block in zip(data.responses, scaled, data.blocks.of, strict=True)
-    )
-    count = data.responses[0].columns.shape[1]
-    low, high = np.full(count, -np.inf), np.full(count, np.inf)
-    for k, drive in enumerate(data.library.drive):
-        if drive >= 0 and (bound := options.bounds.get(text(data.library.drives[drive]))):
-            low[k], high[k] = bound[0] / noise, bound[1] / noise
-    return _Problem(data, scaled, grams, start_sd, low, high)
-
-
-def _path(g: Gram, problem: _Problem, options: SparseOptions, size: int | None = None) -> list[Support]:
-    if options.optimiser != "elimination":
-        return [s for s in pysindy_path(g, options.optimiser, OFFSET) if len(s) <= options.max_terms]
-    groups = problem.data.library.mass
-    return forward(
-        g, size or options.max_terms, OFFSET, groups, options.max_masses, problem.low, problem.high
-    )
-
-
-def _left_out(problem: _Problem, options: SparseOptions) -> Array:
-    """Mean squared error (sizes, B) of the free run on each block, by models that have not seen its fold."""
-    data = problem.data
-    found = []
-    for fold in make_folds(data.blocks):
-        weights = np.ones(data.blocks.count)
-        weights[fold] = 0.0
-        g = problem.gram(weights)
-        thetas = [solve(g, support, problem.low, problem.high) for support in _path(g, problem, options)]
-        found.append(np.array([_missed(problem, theta, fold) for theta in thetas]))
-    rows = min(len(errors) for errors in found)
-    return np.asarray(np.nansum([errors[:rows] for errors in found], axis=0))
-
-
-def _missed(problem: _Problem, theta: Array, fold: Ints) -> Array:
-    """Mean squared error (B,) of the free run on the blocks of a fold, NaN elsewhere."""
-    blocks = problem.data.blocks
-    row = np.full(blocks.count, np.nan)
-    for i in dict.fromkeys(blocks.recording[fold].tolist()):
-        response, readings = problem.data.responses[i], problem.readings[i]
-        run = free_run(problem.data.library, response, theta, readings, problem.start_sd)
-        for b in fold[blocks.recording[fold] == i]:
-            row[b] = np.nanmean((readings - run)[blocks.of[i] == b] ** 2)
-    return row
-
-
-def _stability(
-    problem: _Problem, chosen: Support, options: SparseOptions
-) -> tuple[dict[int, float], dict[str, float]]:
-    """Share of block bootstraps that keep each chosen column, and each drive through whatever mass."""
-    library = problem.data.library
-    kept: Counter[int] = Counter()
-    drives: Counter[str] = Counter()
-    for weights in bootstraps(problem.data.blocks.count, options.bootstraps, options.seed):
-        path = _path(problem.gram(weights), problem, options, len(chosen))
-        support = min(path, key=lambda s: abs(len(s) - len(chosen)), default=())
-        kept.update(support)
-        drives.update({text(library.drives[library.drive[k]]) for k in support if k})
-    runs = max(options.bootstraps, 1)
-    names = sorted(drives, key=lambda name: -drives[name])
-    return {k: kept[k] / runs for k in chosen}, {name: drives[name] / runs for name in names}
+    return points, stability, report

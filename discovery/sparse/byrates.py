@@ -4,32 +4,31 @@ file.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Grid
-from discovery.dynamics.system import predict
 from discovery.errors import RunsAwayError
-from discovery.fitting import Fit, Noise, predict_recording
+from discovery.fitting import Fit, Noise
 from discovery.fitting.noise import white_noise
 from discovery.models import Model
-from discovery.sparse.discovery import Discovery, PathPoint
-from discovery.sparse.folds import CLAIM, NAME, bootstraps, choose, make_folds
-from discovery.sparse.gram import Gram, solve
-from discovery.sparse.growth import Growth, grown
-from discovery.sparse.optimisers import pysindy_path
+from discovery.sparse.borrowed import borrowed
+from discovery.sparse.choice import Choice, stability
+from discovery.sparse.discovery import Discovery, path_points
+from discovery.sparse.folds import NAME, choose, make_folds
+from discovery.sparse.freeruns import RAN_AWAY, left_out
 from discovery.sparse.options import SparseOptions
-from discovery.sparse.path import Support, best_of_each_size
-from discovery.sparse.ratedata import RateData, has_reading, rough_noise, stated_noise
-from discovery.sparse.rates import Evidence, evidence, extended_bic, masked, refit, without
+from discovery.sparse.problem import Problem
+from discovery.sparse.ratedata import RateData, rough_noise, stated_noise
+from discovery.sparse.rates import extended_bic, linearised, refit, regress, without
+from discovery.sparse.search import Search, Terms
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 3  # of a fit in a fold: it starts where the normal equations of the fold have their minimum
+_ROUNDS = 4  # of a fit in a fold: it starts at the fit to everything
 _SIZES = 5  # that are refitted and run freely, down from the one that the criterion names
 
 
@@ -39,7 +38,8 @@ def discover_rates(
     labels: Mapping[str, str],
     always: Sequence[str],
     options: SparseOptions,
-    growth: Growth | None = None,
+    grown: bool = False,
+    tolerance: float = NAME,
     plain: Sequence[str] = (),
     easy: Sequence[str] = (),
 ) -> Discovery:
@@ -49,150 +49,189 @@ def discover_rates(
         model: baseline and all candidates, coefficients at good start values.
         labels: coefficients that may leave, by name; what reports call their terms.
         always: parameters that cannot leave (shapes, baseline terms that are kept).
-        growth: terms first enter one by one by their score, then those that entered may leave; else all are
-            fitted at once and leave one by one.
+        grown: the candidates entered one by one, each fitted: together they compete in any case.
+        tolerance: default of the standard errors by which a sparser set may be worse on what was left out.
         plain: coefficients of a model that competes at any rate: where little is recorded the way down from
             all candidates may miss it.
         easy: coefficients of terms of the first order: where the readings hardly tell, one of them stands for
             a term of a higher order.
     """
-    if growth is not None:
-        model, labels = grown(data, model, labels, growth)
     full = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, rough_noise(data))
     noise = white_noise(data.outputs, stated_noise(data), list(full.residuals().values()))
-    full = replace(full, noise=noise)
-    seen = evidence(full, data.blocks)
-    kept = [i for i, name in enumerate(seen.names) if name in always or name not in labels]
-    g = seen.pooled()
-    most = len(kept) + options.max_terms * len(data.outputs)
-    path = _path(g, seen, kept, options, most)
-    costs = [g.cost(solve(g, s, seen.low, seen.high)) for s in path]
-    dispersion = max(min(costs) / max(g.count - len(path[-1]), 1), 1.0)
-    criterion = extended_bic(g, [len(s) for s in path], [c / dispersion for c in costs], max(len(labels), 1))
-    last = int(np.argmin(criterion))
-    simple = tuple(sorted({*kept, *(i for i, name in enumerate(seen.names) if name in plain)}))
-    window = {*path[max(0, last - _SIZES + 1) : last + 1], *([simple] if plain else [])}
-    supports = sorted(window, key=len)
-
-    errors = np.array([_left_out(data, model, seen, one, noise, growth is None) for one in supports])
-    usual = NAME if growth is None else CLAIM
-    row = choose(errors, usual if options.tolerance is None else options.tolerance)
-    worth = dispersion * (np.log(max(g.count, 2)) + 2 * np.log(max(len(labels), 1)))  # of one more term
-    supports[row] = chosen = _plainer(g, seen, supports[row], kept, easy, labels, float(worth))
-    fit = _refit(data, model, seen, g, chosen, data.grids, None, 25)
-    points = tuple(
-        PathPoint(
-            data.outputs,
-            len(one),
-            float(np.sqrt(errors[i].mean())),
-            float(np.sqrt(max(g.cost(solve(g, one, seen.low, seen.high)), 0.0) / g.count)),
-            i == row,
-            tuple(labels.get(seen.names[j], seen.names[j]) for j in one),
-        )
-        for i, one in enumerate(supports)
+    seen = linearised(replace(full, noise=noise))
+    kept = [name for name in seen.names if name in always or name not in labels]
+    judge = Judge(
+        data,
+        model,
+        labels,
+        seen.names,
+        noise,
+        not grown,
+        tolerance if options.tolerance is None else options.tolerance,
+        plain,
+        easy,
+        grown,
     )
-    stability = _stability(seen, kept, chosen, options)
+    select = judge if options.optimiser == "search" else judge.on(options)
+    choice = regress(seen, kept, options, select, options.max_terms * len(data.outputs))
+    fit = judge.refit(choice.terms, data.grids, None, 25)
+    names = [labels.get(name, name) for name in seen.names]
+    kept_labels = [names[j] for j in choice.terms.members if seen.names[j] in labels]
     report = {
         "outputs": list(data.outputs),
         "form": "rates",
-        "terms": len(chosen),
-        "left_out_rms": round(points[row].left_out_rms, 4),
+        "terms": len(choice.terms),
+        "left_out_rms": round(choice.left_out[choice.row], 4),
         "library": len(labels),
-        "kept": [labels[seen.names[j]] for j in chosen if seen.names[j] in labels],
+        "kept": kept_labels,
+        "costs": {
+            names[f]: round(cost, 4)
+            for f, cost in zip(choice.terms.family, choice.costs, strict=True)
+            if np.isfinite(cost)
+        },
     }
-    named = {labels[seen.names[j]]: share for j, share in stability.items() if seen.names[j] in labels}
-    return Discovery(fit.model, points, named, report)
+    shares = zip(choice.terms.family, choice.stability, strict=True)
+    named = {names[f]: share for f, share in shares if seen.names[f] in labels}
+    return Discovery(fit.model, path_points(data.outputs, choice, names), named, report)
 
 
-def _path(g: Gram, seen: Evidence, kept: Sequence[int], options: SparseOptions, most: int) -> list[Support]:
-    if options.optimiser != "elimination":
-        return [s for s in pysindy_path(g, options.optimiser, kept) if len(s) <= most]
-    return best_of_each_size(g, most, kept, seen.low, seen.high)
+@dataclass(frozen=True)
+class Judge:
+    """Makes the choice of a linearised fit: each size refitted, and run freely on what was left out."""
+
+    data: RateData
+    model: Model
+    labels: Mapping[str, str]
+    names: Sequence[str]  # of the columns
+    noise: Noise
+    whole: bool  # leave whole recordings out, where there are several
+    tolerance: float
+    plain: Sequence[str]
+    easy: Sequence[str]
+    grown: bool
+
+    def __call__(self, problem: Problem) -> Choice:
+        """The sparsest set within the tolerance of the best on what was left out."""
+        search = problem.search()
+        g, count = search.g, max(len(self.labels), 1)
+        path = search.path(problem.max_terms)
+        dispersion = max(min(g.square - one.gain for one in path) / max(g.count - len(path[-1]), 1), 1.0)
+        costs = [(g.square - one.gain) / dispersion for one in path]
+        last = int(np.argmin(extended_bic(g, [len(one) for one in path], costs, count)))
+        window = path[max(0, last - _SIZES + 1) : last + 1]
+        if self.plain:
+            simple = [
+                i for i, name in enumerate(self.names) if name in self.plain and i not in problem.always
+            ]
+            competitor = search.of(np.concatenate([problem.always, np.array(simple, int)]))
+            window += [competitor] * (competitor.members not in [one.members for one in window])
+        if self.grown:
+            everything = search.of(np.union1d(problem.always, np.arange(len(self.names))))
+            window += [everything] * (everything.members not in [one.members for one in window])
+        sets = sorted(window, key=len)
+        errors = np.array([self.left_out(one) for one in sets])
+        row = choose(errors, self.tolerance)
+        worth = dispersion * (np.log(max(g.count, 2)) + 2 * np.log(count))  # of one more term
+        sets[row] = plainer(search, sets[row], self.names, self.easy, self.labels, float(worth))
+        return self.evidence(problem, sets, errors, row)
+
+    def on(self, options: SparseOptions) -> Callable[[Problem], Choice]:
+        """The choice of an optimiser of PySINDy, with the evidence for it."""
+        theirs = borrowed(options.optimiser, options.optimiser_arguments)
+
+        def select(problem: Problem) -> Choice:
+            terms = theirs(problem).terms
+            return self.evidence(problem, [terms], np.array([self.left_out(terms)]), 0)
+
+        return select
+
+    def evidence(self, problem: Problem, sets: Sequence[Terms], errors: Array, row: int) -> Choice:
+        """The choice of one of some sets, by their mean squared errors (sizes, B) on what was left out."""
+        g = problem.pooled()
+        return Choice(
+            sets[row],
+            tuple(sets),
+            tuple(np.sqrt(errors.mean(axis=1)).tolist()),
+            tuple(np.sqrt([max(g.square - one.gain, 0.0) / g.count for one in sets]).tolist()),
+            row,
+            costs=self.costs(problem, sets[row]),
+            stability=stability(problem, sets[row]),
+        )
+
+    def refit(self, terms: Terms, grids: Mapping[str, Grid], noise: Noise | None, rounds: int) -> Fit:
+        """The model with the terms of a set alone, fitted by output error from where it stands and from their
+        coefficients.
+        """
+        found = {self.names[f]: float(v) for f, v in zip(terms.family, terms.theta, strict=True)}
+        small = without(self.model, [name for name in self.names if name not in found])
+        recordings = [r for r in self.data.recordings if r in grids]
+        fits = []
+        for start in ({}, found):
+            try:
+                fits.append(
+                    refit(
+                        small, self.data.campaign, recordings, self.data.outputs, start, grids, noise, rounds
+                    )
+                )
+            except RunsAwayError:
+                continue
+        if not fits:
+            raise RunsAwayError(f"no fit of {', '.join(found)} stays finite")
+        return min(fits, key=lambda one: one.cost)
+
+    def left_out(self, terms: Terms) -> Array:
+        """Mean squared error (B,) of the free run on each block, by fits that have not seen its fold.
+
+        They begin at the fit to everything: the linearised one may be far where terms are not linear.
+        """
+        try:
+            whole = self.refit(terms, self.data.grids, self.noise, 25).model
+        except RunsAwayError:
+            return np.full(self.data.blocks.count, RAN_AWAY)
+
+        def fit_of(weights: Array, train: Mapping[str, Grid]) -> Fit:  # noqa: ARG001
+            recordings = [r for r in self.data.recordings if r in train]
+            outputs, campaign = self.data.outputs, self.data.campaign
+            return refit(whole, campaign, recordings, outputs, {}, train, self.noise, _ROUNDS)
+
+        return left_out(self.data, fit_of, self.whole)
+
+    def costs(self, problem: Problem, terms: Terms) -> tuple[float, ...]:
+        """Share by which what the linearised fit leaves on left-out blocks grows without each term."""
+        free = list(range(len(problem.always), len(terms)))
+        left = np.zeros(len(free) + 1)
+        for fold in make_folds(problem.blocks, False):
+            inside, outside = np.ones(problem.blocks.count), np.zeros(problem.blocks.count)
+            inside[fold], outside[fold] = 0.0, 1.0
+            search, g = problem.search(inside), problem.pooled(outside)
+            whole = search.of(terms.family)
+            for row, k in enumerate([None, *free]):
+                one = whole if k is None else search.without(whole, k)
+                theta = np.zeros(len(g.vector))
+                theta[one.family] = one.theta
+                left[row] += max(g.cost(theta), 0.0)
+        rms = np.sqrt(left)
+        return (float("nan"),) * len(problem.always) + tuple((rms[1:] / max(rms[0], 1e-300) - 1).tolist())
 
 
-def _plainer(
-    g: Gram,
-    seen: Evidence,
-    support: Support,
-    kept: Sequence[int],
+def plainer(
+    search: Search,
+    terms: Terms,
+    names: Sequence[str],
     easy: Sequence[str],
     labels: Mapping[str, str],
     worth: float,
-) -> Support:
-    """The support with terms of the first order in place of others into the same state, where the cost rises
-    by less than a further term would have to bring.
+) -> Terms:
+    """The set with terms of the first order in place of others into the same state, where the cost rises by
+    less than a further term would have to bring.
     """
-    first = [i for i, name in enumerate(seen.names) if name in easy]
-    bound = g.cost(solve(g, support, seen.low, seen.high)) + worth
-    for term in [i for i in support if i not in kept and i not in first]:
-        into = labels[seen.names[term]].split(": ")[0]
-        swaps = [
-            tuple(sorted({*support, i} - {term}))
-            for i in first
-            if i not in support and labels[seen.names[i]].split(": ")[0] == into
-        ]
-        costs = [g.cost(solve(g, one, seen.low, seen.high)) for one in swaps]
-        if costs and min(costs) < bound:
-            support = swaps[int(np.argmin(costs))]
-    return support
-
-
-def _refit(
-    data: RateData,
-    model: Model,
-    seen: Evidence,
-    g: Gram,
-    support: Support,
-    grids: Mapping[str, Grid],
-    noise: Noise | None,
-    rounds: int,
-) -> Fit:
-    theta = solve(g, support, seen.low, seen.high)
-    gone = [name for i, name in enumerate(seen.names) if i not in support]
-    start = {name: float(theta[i]) for i, name in enumerate(seen.names) if i in support}
-    recordings = [r for r in data.recordings if r in grids]
-    return refit(without(model, gone), data.campaign, recordings, data.outputs, start, grids, noise, rounds)
-
-
-def _left_out(
-    data: RateData, model: Model, seen: Evidence, support: Support, noise: Noise, whole: bool
-) -> Array:
-    """Mean squared error (B,) of the free run on each block, by fits that have not seen its fold."""
-    blocks = data.blocks
-    errors = np.full(blocks.count, np.nan)
-    for fold in make_folds(blocks, whole):
-        keep = {r: ~np.isin(block, fold) for r, block in zip(data.recordings, blocks.of, strict=True)}
-        train = {r: masked(data.grids[r], keep[r]) for r in data.recordings if keep[r].any()}
-        try:
-            weights = np.ones(blocks.count)
-            weights[fold] = 0.0
-            fit = _refit(data, model, seen, seen.pooled(weights), support, train, noise, _ROUNDS)
-            trajectories = {t.system.grid.recording: t for t in fit.trajectories}
-            for i, r in enumerate(data.recordings):
-                mine = [b for b in fold if blocks.recording[b] == i]
-                if not mine:
-                    continue
-                trajectory = trajectories.get(r) or predict_recording(
-                    fit.model, data.campaign, r, data.outputs, fit.noise.white, data.grids[r]
-                )
-                left = data.grids[r].readings - predict(trajectory)
-                for b in mine:
-                    here = left[blocks.of[i] == b] ** 2
-                    errors[b] = np.nanmean(here) if np.isfinite(here).any() else np.nan
-        except RunsAwayError:  # a sparse model that runs away is a bad model
-            errors[fold] = np.inf
-    # a block without a reading says nothing: it must not tell the sizes apart
-    silent = np.array([not has_reading(data, b) for b in range(blocks.count)])
-    return np.where(np.isfinite(errors), errors, np.where(silent, 1.0, 1e12))
-
-
-def _stability(
-    seen: Evidence, kept: Sequence[int], chosen: Support, options: SparseOptions
-) -> dict[int, float]:
-    """Share of block bootstraps that keep each chosen column."""
-    found: Counter[int] = Counter()
-    for weights in bootstraps(len(seen.blocks), options.bootstraps, options.seed):
-        path = _path(seen.pooled(weights), seen, kept, options, len(chosen))
-        nearest: Support = min(path, key=lambda s: abs(len(s) - len(chosen)), default=())
-        found.update(nearest)
-    return {j: found[j] / max(options.bootstraps, 1) for j in chosen}
+    first = [i for i, name in enumerate(names) if name in easy]
+    bound = terms.gain - worth
+    for term in [f for f in terms.family[len(search.always) :] if f not in first]:
+        into = labels[names[term]].split(": ")[0]
+        others = [i for i in first if i not in terms.family and labels[names[i]].split(": ")[0] == into]
+        swaps = [search.of(np.where(terms.family == term, i, terms.family)) for i in others]
+        best = max(swaps, key=lambda one: one.gain, default=None)
+        if best is not None and best.gain > bound:
+            terms = best
+    return terms

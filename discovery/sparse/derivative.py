@@ -10,11 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.sparse.borrowed import fit_quietly
 from discovery.sparse.gram import Gram, factor, gram, solve, total
-from discovery.sparse.optimisers import fit_quietly
-from discovery.sparse.path import Support
 
 Array = NDArray[np.float64]
+Support = tuple[int, ...]
 
 _WINDOW = 11  # readings that the smoother sees
 _RIDGE = 0.05  # PySINDy's own default

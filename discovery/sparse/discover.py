@@ -6,32 +6,32 @@ import time as clock
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from discovery.dynamics import make_grid
 from discovery.errors import UserError
 from discovery.fitting import fit_model
-from discovery.models import Model, State
 from discovery.models.check import check_model
 from discovery.models.modelfile import read_model
 from discovery.progress import Progress, silent
 from discovery.recordings import Campaign
-from discovery.sparse.bymasses import MassData, discover_error
+from discovery.sparse.bymasses import MassData, discover_masses
 from discovery.sparse.byrates import discover_rates
+from discovery.sparse.bystates import discover_states, left_out_of
+from discovery.sparse.constraints import UnknownTermError, kept
 from discovery.sparse.discovery import Discovery, joined
-from discovery.sparse.drives import AMBIENT, Inputs, make_inputs
+from discovery.sparse.drives import Inputs, make_drives, make_inputs
 from discovery.sparse.families import candidates
-from discovery.sparse.folds import make_blocks
-from discovery.sparse.growth import Growth
-from discovery.sparse.masses import make_mass_library, respond
-from discovery.sparse.options import SparseOptions
+from discovery.sparse.folds import CLAIM, PREDICT, choose
+from discovery.sparse.growth import Growth, grown
+from discovery.sparse.options import HIDDEN, SparseOptions
 from discovery.sparse.ratedata import make_rate_data
 from discovery.sparse.rates import with_candidates
-from discovery.sparse.starts import started
 from discovery.sparse.temperatures import discover_temperatures
 from discovery.terms import names
 from discovery.threads import one_thread
 
 FILE_FAMILIES = ("wet", "rotation", "coupling")
-QUICK = (60.0, 240.0)  # s
 
 
 @one_thread
@@ -45,14 +45,14 @@ def discover(
 ) -> Discovery:
     """Discover a sparse model of `outputs` from `recordings`; no other recording is looked at.
 
-    Errors become sums of hidden thermal masses; measured temperatures, user-given expressions and baseline
-    files get terms in the rates of their states. Sizes are chosen by free runs on what was left out, one
-    recording at a time (or by blocks of a single one); numbers are fitted by output error and carry 95 %
-    intervals.
+    Errors become sums of filtered inputs; measured temperatures, systems that a library of states is asked
+    of, and baseline files get terms in the rates of their states; for other outputs both are tried. Sizes
+    are chosen by free runs on what was left out (recordings, or parts of a few); numbers are fitted by
+    output error and carry 95 % intervals.
 
     Args:
         recordings: names of the recordings to fit.
-        outputs: channels of role error or temperature.
+        outputs: measured channels.
         progress: told in a few words what is being done.
         folder: where a relative baseline file is looked for; default the campaign's folder.
 
@@ -61,60 +61,72 @@ def discover(
     """
     began = clock.perf_counter()
     inputs = make_inputs(campaign, recordings, options.inputs)
+    roles = {campaign.channels[name].role for name in outputs}
     if options.built_on_file:
         progress("terms on the baseline")
         parts = [_on_file(campaign, recordings, outputs, inputs, options, folder or campaign.path.parent)]
-    elif all(campaign.channels[name].role == "temperature" for name in outputs):
+    elif roles == {"temperature"} and options.form == "auto":
         progress("terms of " + ", ".join(outputs))
         parts = [discover_temperatures(campaign, recordings, outputs, inputs, options)]
-    elif options.form == "rates" or (options.form == "auto" and options.library):
-        parts = []
-        for name in outputs:
-            progress(f"terms of {name}")
-            parts.append(_error_rates(campaign, recordings, name, inputs, options))
     else:
-        progress("filtered inputs")
-        data = _mass_data(campaign, recordings, outputs, inputs, options)
-        parts = []
-        for name in outputs:
-            progress(f"masses of {name}")
-            parts.append(discover_error(data, campaign, recordings, name, options))
+        forms = _forms(roles, options)
+        groups = [list(outputs)] if _coupled(outputs, options) else [[name] for name in outputs]
+        parts = [_best(campaign, recordings, group, inputs, forms, options, progress) for group in groups]
     return joined("discovered", parts, clock.perf_counter() - began)
 
 
-def _mass_data(
+def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:
+    """Forms to try, the plainer one first: "masses", and what may stand behind an output in rates."""
+    states = HIDDEN if options.hidden == "auto" else (options.hidden,)
+    if options.form == "masses":
+        return ("masses",)
+    if options.form == "rates":
+        return ("own",) if options.hidden == "auto" and roles == {"error"} else states
+    if options.hidden != "auto":
+        return states
+    return ("masses",) if roles <= {"error", "temperature"} else ("masses", *states)
+
+
+def _coupled(outputs: Sequence[str], options: SparseOptions) -> bool:
+    """Whether the rate of an output may hold another output."""
+    return len(outputs) > 1 and options.form != "masses" and "coupling" in (options.library or ())
+
+
+def _best(
     campaign: Campaign,
     recordings: Sequence[str],
     outputs: Sequence[str],
     inputs: Inputs,
+    forms: Sequence[str],
     options: SparseOptions,
-) -> MassData:
-    quick = QUICK if inputs.bodies else ()  # an error follows the temperature of its own body at once
-    constants = sorted({*quick, *options.time_constants})
-    library = make_mass_library(inputs, constants, options.pump_ratios, options.library or ())
-    grids = {r: make_grid(campaign, r, inputs.names, outputs) for r in recordings}
-    blocks = make_blocks([grids[r].time[grids[r].read] for r in recordings], options.blocks)
-    return MassData(library, grids, tuple(respond(library, grids[r]) for r in recordings), blocks)
-
-
-def _error_rates(
-    campaign: Campaign, recordings: Sequence[str], output: str, inputs: Inputs, options: SparseOptions
+    progress: Progress,
 ) -> Discovery:
-    """Terms in the rate of one error: eq. (9) and what the library adds, started from the weak form."""
-    unit = campaign.channels[output].unit
-    state = State(output, unit, None, None, max(1.0, campaign.channels[output].noise or 0.0), 1 / 3600)
-    empty = Model(output, {}, {output: state}, (), {}, "h")
-    baseline = ["y", "1", *inputs.of(AMBIENT, "heat load", "fluid temperature")]
-    words = list(dict.fromkeys([*baseline, *(options.library or ("linear", "wet", "rotation"))]))
-    found = candidates([output], empty, campaign, inputs, words, options)
-    data = make_rate_data(campaign, recordings, [output], inputs.names, options.blocks)
-    model, labels = with_candidates(empty, started(found, data, {output: output}))
-    always = [
-        name
-        for name, label in labels.items()
-        if options.keep_baseline and label.split(": ", 1)[1] in (output, *baseline)
-    ]
-    return discover_rates(data, model, labels, always, options)
+    """The plainest form whose free runs on what was left out are within the tolerance of the best."""
+    found: list[Discovery] = []
+    if "masses" in forms:
+        progress(f"filtered inputs of {', '.join(outputs)}")
+        grids = {r: make_grid(campaign, r, inputs.names, outputs) for r in recordings}
+        data = MassData(make_drives(inputs, campaign, options.library), grids)
+        try:
+            found += [discover_masses(data, campaign, recordings, name, options) for name in outputs]
+        except UnknownTermError:
+            if len(forms) == 1:
+                raise
+    states = [form for form in forms if form != "masses"]
+    if not states:
+        return found[0]
+    rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
+    found += discover_states(rates, options, states, progress)
+    if not found:
+        raise UserError(
+            f"{campaign.path}: no model of {', '.join(outputs)} in the form asked for stays finite on "
+            "its own readings and has the terms under keep and bounds; offer other terms under library, or "
+            "leave out form and hidden"
+        )
+    if len(found) == 1:
+        return found[0]
+    errors = np.array([left_out_of(rates, one.model) for one in found])
+    return found[choose(errors, PREDICT if options.tolerance is None else options.tolerance)]
 
 
 def _on_file(
@@ -133,7 +145,7 @@ def _on_file(
         if name not in baseline.states:
             raise UserError(
                 f"{path}: the discovery adds terms into '{name}', which is no state of this model "
-                f"({', '.join(baseline.states)}); mend the name under into"
+                f"({', '.join(baseline.states)}); correct the name under into"
             )
     bodies = [name for name, state in baseline.states.items() if state.capacity] or list(baseline.states)
     found = candidates(
@@ -150,7 +162,8 @@ def _on_file(
             for n in baseline.free
             if baseline.parameters[n].min <= 0 <= baseline.parameters[n].max and n not in used
         }
-    growth = Growth(most=options.max_terms, restart=baseline.values())
-    return discover_rates(
-        data, model, labels, (), options, None if options.keep_baseline is False else growth
-    )
+        return discover_rates(data, model, labels, kept(labels, options, campaign.path), options)
+    always = kept(labels, options, campaign.path)
+    growth = Growth(tuple(always), tuple(always), options.max_terms, restart=baseline.values())
+    model, labels = grown(data, model, labels, growth, options)
+    return discover_rates(data, model, labels, always, options, grown=True, tolerance=CLAIM)

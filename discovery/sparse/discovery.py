@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from discovery.models import Model
+from discovery.sparse.choice import Choice
 
 
 @dataclass(frozen=True)
 class PathPoint:
-    """One size on the way from sparse to rich: error on what was left out, in the unit of the outputs."""
+    """One size on the way from sparse to rich: errors on what was left out and fitted, over the noise."""
 
     outputs: tuple[str, ...]
     terms: int
@@ -29,6 +30,21 @@ class Discovery:
     path: tuple[PathPoint, ...]
     stability: Mapping[str, float]  # "E_Y0C: P_cool through 3600 s" -> share of block bootstraps that keep it
     report: dict[str, Any]
+
+
+def path_points(outputs: Sequence[str], choice: Choice, names: Sequence[str]) -> tuple[PathPoint, ...]:
+    """The sets of a choice as points of its path; `names` (F,) of the families."""
+    return tuple(
+        PathPoint(
+            tuple(outputs),
+            len(one),
+            choice.left_out[k],
+            choice.fit[k],
+            k == choice.row,
+            tuple(names[f] for f in one.members),
+        )
+        for k, one in enumerate(choice.path)
+    )
 
 
 def merged(name: str, parts: Sequence[Model]) -> Model:

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.recordings import Campaign
+from discovery.sparse.laws import laws, products
+from discovery.sparse.options import FAMILIES
+from discovery.terms import names, parse, text
 
 AMBIENT = "ambient temperature"
 FLOW = "fluid flow"
@@ -79,20 +82,66 @@ def _known(campaign: Campaign, recording: str, name: str) -> NDArray[np.float64]
     return np.empty(0) if series is None else series[np.isfinite(series)]
 
 
-def mass_drives(inputs: Inputs) -> list[str]:
-    """Expressions that may drive a hidden mass: zero at the reference, heat also gated by the pump."""
-    reference = f"{inputs.reference:g}"
-    found = [f"{name} - {reference}" for name in (*inputs.of(*TEMPERATURES), *inputs.bodies)]
+@dataclass(frozen=True)
+class Drives:
+    """What may drive a hidden mass."""
+
+    inputs: tuple[str, ...]
+    expressions: tuple[str, ...]
+    linear: tuple[str, ...]  # inputs that run straight between their stamps
+    settled: tuple[str, ...]  # expressions whose mass begins in balance with them: air, measured bodies
+    integrals: tuple[str, ...] = ()  # expressions that may add up without bound
+
+
+def make_drives(inputs: Inputs, campaign: Campaign, library: Sequence[str] | None = None) -> Drives:
+    """Drives of hidden masses: inputs by the words of a library, and expressions of the user.
+
+    Raises:
+        UserError: an expression of a name that is no input.
+    """
+    words = library or ("linear", "wet")
+    expressions = mass_drives(inputs, words)
+    for word in words:
+        if word in FAMILIES and word not in inputs.names:
+            continue
+        expression = parse(word, "library of the discovery")
+        for name in sorted(names(expression) - {*inputs.names, "time"}):
+            raise UserError(
+                f"{campaign.path}: the library of the discovery names '{name}' in '{word}', which is neither "
+                f"a family ({', '.join(FAMILIES)}) nor made of inputs ({', '.join(inputs.names)}); terms of "
+                'states need form = "rates"'
+            )
+        expressions.append(text(expression))
+    air = frozenset((*inputs.of(*TEMPERATURES), *inputs.bodies))
+    gate = names(parse(inputs.gate)) if inputs.gate else frozenset()
+    settled = [e for e in expressions if names(parse(e)) & air and not names(parse(e)) & gate]
+    linear = [name for name in inputs.names if campaign.channels[name].between == "linear"]
+    charges = [name for name in inputs.of("other input") if name not in inputs.bodies]
+    return Drives(
+        inputs.names, tuple(dict.fromkeys(expressions)), tuple(linear), tuple(settled), tuple(charges)
+    )
+
+
+def mass_drives(inputs: Inputs, words: Sequence[str] = ("linear", "wet")) -> list[str]:
+    """Expressions of the inputs: temperatures from the reference, the others as they are; heat gated by the
+    pump.
+    """
+    warm = [f"{name} - {inputs.reference:g}" for name in (*inputs.of(*TEMPERATURES), *inputs.bodies)]
     others = [
         name
-        for role, names in inputs.by_role.items()
+        for role, named in inputs.by_role.items()
         if role not in (*TEMPERATURES, FLOW)
-        for name in names
+        for name in named
         if name not in inputs.bodies
     ]
-    found += others
-    if inputs.gate:
-        found += [f"{inputs.gate}*({name} - {reference})" for name in inputs.of(*TEMPERATURES)]
+    found = [
+        text(parse(law))
+        for one in (*warm, *others)
+        for law in laws(words, one if one in others else f"({one})")
+    ]
+    found += products(words, others)
+    if inputs.gate and "wet" in words:
+        found += [f"{inputs.gate}*({name} - {inputs.reference:g})" for name in inputs.of(*TEMPERATURES)]
         found += [f"{inputs.gate}*{name}" for name in inputs.of("heat load")]
         found.append(inputs.gate)
-    return found
+    return list(dict.fromkeys(found))

@@ -57,7 +57,7 @@ def candidates(
             f"{campaign.path}: the discovery bounds '{sorted(unused)[0]}', which is no term of its library; "
             f"write it as it stands there: {', '.join(sorted({c.label for c in found}))}"
         )
-    return _unique(found)
+    return [c for c in _unique(found) if c.label not in options.forbid]
 
 
 def _bounded(candidate: Candidate, options: SparseOptions, word: str | None = None) -> Candidate:

@@ -77,16 +77,22 @@ def bootstraps(blocks: int, count: int, seed: int) -> Iterator[Array]:
 def choose(errors: Array, tolerance: float) -> int:
     """The sparsest row whose error on what was left out is within `tolerance` standard errors of the best.
 
-    The standard error is that of the paired difference of logarithms over blocks: it holds where residuals
-    are coloured and where recordings of different violence stand side by side.
+    The standard error is that of the paired difference over blocks, of the logarithms and of the squares
+    alike: logarithms hold where recordings of different violence stand side by side, squares where what
+    tells happens in few blocks.
 
     Args:
         errors: (sizes, B) mean squared error of each left-out block, sparsest model first.
     """
     best = int(np.argmin(errors.mean(axis=1)))
+    scales = (np.log(errors), errors)
     for row in range(best):
-        difference = np.log(errors[row]) - np.log(errors[best])
-        spread = difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
-        if difference.mean() <= tolerance * spread:
+        if all(_within(scale[row] - scale[best], tolerance) for scale in scales):
             return row
     return best
+
+
+def _within(difference: Array, tolerance: float) -> bool:
+    """Whether the mean of a difference (B,) is within so many of its standard errors of zero, or below it."""
+    spread = difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
+    return bool(difference.mean() <= tolerance * spread)

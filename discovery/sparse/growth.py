@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
-from discovery.fitting import Noise
+from discovery.fitting import Fit, Noise
 from discovery.models import Model
-from discovery.sparse.gram import solve
-from discovery.sparse.path import best_of_each_size, forward
+from discovery.sparse.choice import Choice
+from discovery.sparse.gram import Gram
+from discovery.sparse.options import SparseOptions
+from discovery.sparse.problem import Problem
 from discovery.sparse.ratedata import RateData, rough_noise
-from discovery.sparse.rates import Evidence, evidence, extended_bic, refit, without
+from discovery.sparse.rates import extended_bic, linearised, refit, regress, without
+from discovery.sparse.search import Terms
 
 
 @dataclass(frozen=True)
@@ -25,12 +29,13 @@ class Growth:
     """
 
     entered: tuple[str, ...] = ()
+    always: tuple[str, ...] = ()  # of these, those that stay
     most: int = 15
     restart: Mapping[str, float] = field(default_factory=dict)
 
 
 def grown(
-    data: RateData, model: Model, labels: Mapping[str, str], growth: Growth
+    data: RateData, model: Model, labels: Mapping[str, str], growth: Growth, options: SparseOptions
 ) -> tuple[Model, dict[str, str]]:
     """The baseline with the candidates that its residual asks for, one at a time, each time fitted anew.
 
@@ -42,19 +47,13 @@ def grown(
     noise = rough_noise(data)
     for _ in range(growth.most + 1):
         model, _ = _fitted_with(data, model, labels, entered, growth, noise)
-        seen = _seen_from(data, model, noise)
-        kept = [i for i, name in enumerate(seen.names) if name in entered or name not in labels]
-        g = seen.pooled()
-        better = forward(g, len(kept) + 1, kept, low=seen.low, high=seen.high)
-        if not better:
+        seen = linearised(_as_it_stands(data, model, noise))
+        kept = [name for name in seen.names if name in entered or name not in labels]
+        best = regress(seen, kept, options, partial(_next, library=len(labels)), 1).terms
+        if len(best) == len(kept):
             break
-        costs = [g.cost(solve(g, s)) for s in (kept, better[0])]
-        dispersion = max(costs[1] / g.count, 1.0)
-        before, after = extended_bic(g, [0, 1], [c / dispersion for c in costs], len(labels))
-        if after >= before:
-            break
-        entered.append(next(seen.names[i] for i in better[0] if i not in kept))
-    model, entered = _exchanged(data, model, labels, entered, growth, noise)
+        entered.append(seen.names[best.family[-1]])
+    model, entered = _exchanged(data, model, labels, entered, growth, noise, options)
     whole = without(model, [name for name in labels if name not in entered])
     return whole, {name: labels[name] for name in entered}
 
@@ -66,6 +65,7 @@ def _exchanged(
     entered: Sequence[str],
     growth: Growth,
     noise: Noise,
+    options: SparseOptions,
 ) -> tuple[Model, list[str]]:
     """The terms that entered, or others in their place that do better together.
 
@@ -75,19 +75,18 @@ def _exchanged(
     entered = list(entered)
     model, cost = _fitted_with(data, model, labels, entered, growth, noise)
     for _ in range(growth.most):
-        seen = _seen_from(data, model, noise)
-        kept = [i for i, name in enumerate(seen.names) if name not in labels]
-        g = seen.pooled()
-        path = best_of_each_size(g, len(kept) + len(entered), kept, seen.low, seen.high)
-        costs = [g.cost(solve(g, s, seen.low, seen.high)) for s in path]
-        dispersion = max(min(costs) / g.count, 1.0)
-        ranked = extended_bic(g, [len(s) for s in path], [c / dispersion for c in costs], len(labels))
-        other = [seen.names[i] for i in path[int(np.argmin(ranked))] if i not in kept]
+        seen = linearised(_as_it_stands(data, model, noise))
+        kept = [name for name in seen.names if name not in labels or name in growth.always]
+        choice = regress(
+            seen, kept, options, partial(_best_set, library=len(labels)), len(entered) - len(growth.always)
+        )
+        other = [seen.names[f] for f in choice.terms.members if seen.names[f] in labels]
         if set(other) == set(entered):
             break
         tried, its = _fitted_with(data, model, labels, other, growth, noise)
-        sizes, both = [len(entered), len(other)], [2 * cost / dispersion, 2 * its / dispersion]
-        before, after = extended_bic(g, sizes, both, len(labels))
+        dispersion = max(2 * min(cost, its) / seen.count, 1.0)
+        price = np.log(max(seen.count, 2)) + 2 * np.log(len(labels))
+        before, after = (2 * c / dispersion + len(k) * price for c, k in ((cost, entered), (its, other)))
         if after >= before:
             break
         entered, model, cost = other, tried, its
@@ -118,7 +117,29 @@ def _fitted_with(
     return model.with_values(out | {name: fit.model.parameters[name].value for name in small.free}), fit.cost
 
 
-def _seen_from(data: RateData, model: Model, noise: Noise) -> Evidence:
-    """The normal equations around a model as it stands."""
-    here = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, noise, 1)
-    return evidence(here, data.blocks)
+def _as_it_stands(data: RateData, model: Model, noise: Noise) -> Fit:
+    """The fit of a model around where it stands."""
+    return refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, noise, 1)
+
+
+def _next(problem: Problem, library: int) -> Choice:
+    """What stays and the one term that the extended criterion pays for, if any."""
+    search = problem.search()
+    path = search.path(len(problem.always) + 1)
+    return Choice(path[_least(search.g, path, library)])
+
+
+def _best_set(problem: Problem, library: int) -> Choice:
+    """The set of the least extended criterion."""
+    search = problem.search()
+    path = search.path(problem.max_terms)
+    return Choice(path[_least(search.g, path, library)])
+
+
+def _least(g: Gram, path: Sequence[Terms], library: int) -> int:
+    """The set of a path with the least extended criterion."""
+    costs = [g.square - one.gain for one in path]
+    dispersion = max(min(costs) / g.count, 1.0)
+    return int(
+        np.argmin(extended_bic(g, [len(one) for one in path], [c / dispersion for c in costs], library))
+    )

@@ -1,222 +1,149 @@
-"""Hidden thermal masses: each error is a sum of a few of them, each driven by a sparse sum of inputs.
+"""Hidden masses: an output is a sum of first-order responses to inputs, each with a gain and a time constant.
 
-    ds_j/dt = sum_k g_jk phi_k(u) - (a_j + b_j pump) s_j          E = sum_j s_j + offset
+    tau_j ds_j/dt = sum_k g_jk phi_k(u) - s_j          y = sum_j s_j + sum_k g_k phi_k(u) + offset
 
-Eq. (8) generalised: there every input has one mass of its own, in eq. (9) all inputs share one. `b_j` lets a
-mass answer quicker while cutting fluid runs over it, which no constant time constant can. On a grid of (dry,
-wet) time constants the model is linear in its gains, so the filtered inputs are the columns of a regression
-in the *outputs*: readings are used where they were taken and nothing is differentiated.
+Eq. (8) generalised: there every input has one mass of its own, in eq. (9) all inputs share one. An input
+may act without a mass, or be added up without bound, as charge is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from discovery.dynamics import Column, Grid, make_system, sensitivities, simulate
+from discovery.fitting import Fit
 from discovery.models import Model, Parameter, State
-from discovery.sparse.drives import AMBIENT, Inputs, mass_drives
-from discovery.sparse.gram import Gram, gram, project_out, total
-from discovery.terms import Expression, Number, Term, evaluate, names, parse, text
+from discovery.models.dimensions import unit_of
+from discovery.sparse.library import Feature
+from discovery.terms import Number, Term, parse, text
 
-Array = NDArray[np.float64]
-
-HOUR = 3600.0
-_CHUNK = 8  # masses simulated at once: bounds the memory of fine grids
-_QUICKEST = 200.0  # s
-
-
-@dataclass(frozen=True)
-class Mass:
-    """A point of the grid: time constants [s] without and with cutting fluid."""
-
-    dry: float
-    wet: float
-
-    @property
-    def rates(self) -> tuple[float, float]:
-        """a and b in 1/h."""
-        return HOUR / self.dry, HOUR / self.wet - HOUR / self.dry
-
-
-@dataclass(frozen=True)
-class MassLibrary:
-    """Every drive into every mass: column k is `drive[k]` into `mass[k]`, column 0 the offset."""
-
-    masses: tuple[Mass, ...]
-    drives: tuple[Expression, ...]
-    gate: Expression
-    soaked: tuple[bool, ...]  # drives whose mass begins in balance with them: air, measured bodies
-
-    @property
-    def drive(self) -> NDArray[np.intp]:
-        """(M,) drive of each column, -1 for the offset."""
-        return np.concatenate([[-1], np.repeat(np.arange(len(self.drives)), len(self.masses))])
-
-    @property
-    def mass(self) -> NDArray[np.intp]:
-        """(M,) mass of each column, -1 for the offset."""
-        return np.concatenate([[-1], np.tile(np.arange(len(self.masses)), len(self.drives))])
-
-    @property
-    def labels(self) -> list[str]:
-        """What reports call the columns."""
-        out = ["1"]
-        for drive, mass in zip(self.drive[1:], self.mass[1:], strict=True):
-            m = self.masses[mass]
-            wet = f"/{m.wet:g}" if m.wet != m.dry else ""
-            out.append(f"{text(self.drives[drive])} through {m.dry:g}{wet} s")
-        return out
-
-
-def make_mass_library(
-    inputs: Inputs, time_constants: Sequence[float], ratios: Sequence[float], extra: Sequence[str] = ()
-) -> MassLibrary:
-    """Library over a grid; without a switching pump every ratio is 1."""
-    masses = [
-        Mass(tau, tau / ratio)
-        for tau in time_constants
-        for ratio in (ratios if inputs.gate else (1.0,))
-        if ratio == 1.0 or tau / ratio >= _QUICKEST
-    ]
-    drives = tuple(parse(drive) for drive in [*mass_drives(inputs), *extra])
-    air = frozenset((*inputs.of(AMBIENT), *inputs.bodies))
-    gate_names = names(parse(inputs.gate)) if inputs.gate else frozenset()
-    soaked = tuple(bool(names(drive) & air) and not names(drive) & gate_names for drive in drives)
-    return MassLibrary(tuple(masses), drives, parse(inputs.gate or 0.0), soaked)
+_AT = 1e-3  # share of a bound that counts as at it
+QUICKER = 10.0  # times below the grid that the time constant of a fit may go
 
 
 @dataclass(frozen=True)
 class Response:
-    """Filtered library of a recording at its readings: columns (R, M) and start-value decays (R, masses)."""
+    """A feature with its coefficient; responses of one pole share a hidden mass."""
 
-    columns: Array
-    decays: Array
+    feature: Feature
+    gain: float
+    pole: int
+    chosen: Feature  # as the search chose it; the fit moves its time constant
 
-
-def respond(library: MassLibrary, grid: Grid) -> Response:
-    """Filter every drive through every mass."""
-    grid = replace(grid, outputs=("y",), readings=grid.readings[:, :1])
-    series = [np.broadcast_to(evaluate(d, grid.ends).value, (2 * len(grid.step),)) for d in library.drives]
-    gate = float(np.ravel(evaluate(library.gate, {n: s[0] for n, s in grid.nodes.items()}).value)[0])
-    count, rows = len(library.masses), len(grid.read)
-    filtered = np.empty((rows, len(series), count))
-    decays = np.empty((rows, count))
-    for first in range(0, count, _CHUNK):
-        masses = library.masses[first : first + _CHUNK]
-        model = _carriers(masses, library.gate)
-        pieces = [
-            Column(k * len(masses) + i, f"s{i}", s) for k, s in enumerate(series) for i in range(len(masses))
-        ]
-        trajectory = simulate(make_system(model, grid), {})
-        found = sensitivities(trajectory, (), tuple(model.states), pieces)[:, 0]
-        decays[:, first : first + len(masses)] = found[:, : len(masses)]
-        filtered[:, :, first : first + len(masses)] = found[:, len(masses) :].reshape(rows, len(series), -1)
-    for k, soaked in enumerate(library.soaked):
-        if soaked:
-            a, b = np.array([m.rates for m in library.masses]).T
-            filtered[:, k] += decays * series[k][0] / (a + b * gate)
-    return Response(np.column_stack([np.ones(rows), filtered.reshape(rows, -1)]), decays)
+    @property
+    def lagged(self) -> bool:
+        """Whether it has a time constant."""
+        return 0 < self.feature.tau < np.inf
 
 
-def _carriers(masses: Sequence[Mass], gate: Expression) -> Model:
-    states, terms = {}, []
-    for i, mass in enumerate(masses):
-        a, b = mass.rates
-        states[f"s{i}"] = State(f"s{i}", "um", None, Number(0.0), 1.0, 1 / HOUR)
-        rate = f"{a!r} + {b!r}*({text(gate)})" if b else f"{a!r}"
-        terms.append(Term("decay", f"s{i}", parse(f"-({rate})*s{i}")))
-    return Model("masses", {}, states, tuple(terms), {"y": parse(" + ".join(states))}, "h")
+@dataclass(frozen=True)
+class Rules:
+    """What the model of an output is written with."""
+
+    output: str
+    units: Mapping[str, str]  # of channels
+    settled: Collection[str]  # drives whose mass begins in balance with them
+    bounds: Mapping[str, tuple[float, float]]
+    time_constants: tuple[float, float]  # s
+    start_sd: float
 
 
-def block_grams(response: Response, target: Array, block: NDArray[np.intp]) -> dict[int, Gram]:
-    """Normal equations by block of a recording, in columns [library, start values]; readings that are NaN
-    count nowhere.
-
-    Args:
-        target: (R,) readings over their noise.
-        block: (R,) block of each reading.
-    """
-    columns = np.column_stack([response.columns, response.decays])
-    known = np.isfinite(target)
-    return {
-        int(b): gram(columns[known & (block == b)], target[known & (block == b)]) for b in np.unique(block)
-    }
-
-
-def pooled(grams: Sequence[dict[int, Gram]], library_size: int, start_sd: float, weights: Array) -> Gram:
-    """Normal equations of the library over recordings with the start values taken out of each.
-
-    Args:
-        grams: by recording, by block.
-        start_sd: spread of a start value, over the noise.
-        weights: (B,) how often each block counts.
-    """
-    parts = []
-    for recording in grams:
-        used = [b for b in recording if weights[b] > 0]
-        if used:
-            whole = total([recording[b] for b in used], [weights[b] for b in used])
-            starts = np.arange(library_size, len(whole.vector))
-            parts.append(project_out(whole, starts, np.full(len(starts), start_sd**-2.0)))
-    return total(parts)
-
-
-def free_run(
-    library: MassLibrary, response: Response, theta: Array, readings: Array, start_sd: float
-) -> Array:
-    """Prediction (R,) of a recording that was left out, zeroed on its first reading alone.
-
-    The same Bayesian step as `fitting.predict_recording`: the masses in use share what the first reading
-    says.
-    """
-    predicted = response.columns @ theta
-    used = sorted(set(library.mass[np.flatnonzero(theta)]) - {-1})
-    first = np.flatnonzero(np.isfinite(readings))
-    if used and len(first):
-        decay = response.decays[first[0], used]
-        gain = decay / (decay @ decay + start_sd**-2.0)
-        predicted = predicted + response.decays[:, used] @ gain * (readings[first[0]] - predicted[first[0]])
-    return np.asarray(predicted)
-
-
-def mass_model(
-    library: MassLibrary, output: str, unit: str, support: Sequence[int], theta: Array, start_sd: float
-) -> Model:
-    """The chosen columns written as a model: one hidden state for each mass in use.
-
-    Args:
-        theta: (M,) gains.
-        start_sd: spread of the start values, in the unit of the output.
-    """
+def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
+    """The responses written as a model: a hidden state for each time constant; the drive 1 is the offset."""
+    y, unit = rules.output, rules.units[rules.output]
+    parameters: dict[str, Parameter] = {}
     states: dict[str, State] = {}
     terms: list[Term] = []
-    offset = f"{output}_0"
-    parameters = {offset: Parameter(float(theta[0]), unit)}
-    chosen = [k for k in support if k > 0]
-    gated = text(library.gate)
-    for number, mass in enumerate(sorted({int(library.mass[k]) for k in chosen}), start=1):
-        state = f"{output}_{number}"
-        a, b = library.masses[mass].rates
-        rate = f"{state}_a"
-        parameters[rate] = Parameter(a, "1/h", a / 3, a * 3)
-        if b:
-            parameters[f"{state}_b"] = Parameter(b, "1/h", 0.0, 4 * b)
-            rate = f"({rate} + {state}_b*{gated})"
-        terms.append(Term(f"{state} settles", state, parse(f"-{rate}*{state}")))
-        start = []
-        for k in (k for k in chosen if library.mass[k] == mass):
-            drive = int(library.drive[k])
-            name = f"{state}_g{drive + 1}"
-            parameters[name] = Parameter(float(theta[k]), f"{unit}/h")
-            driven = text(library.drives[drive])
-            terms.append(Term(f"{driven} drives {state}", state, parse(f"{name}*({driven})")))
-            if library.soaked[drive]:
-                start.append(f"{name}*({driven})")
-        begin = parse(f"({' + '.join(start)})/{rate}") if start else Number(0.0)
-        states[state] = State(state, unit, None, begin, start_sd, 1 / HOUR)
-    expression = parse(" + ".join([*states, offset]))
-    return Model(output, parameters, states, tuple(terms), {output: expression}, "h")
+    direct: list[str] = []
+    number = _numbers(responses)
+    for k, r in enumerate(responses):
+        drive, gain = r.feature.drive, _gain(y, k, r)
+        of = unit_of(parse(drive), rules.units)
+        low, high = rules.bounds.get(drive, (-np.inf, np.inf))
+        per = unit if of == "1" else f"{unit}/({of})" if set("*/") & set(of) else f"{unit}/{of}"
+        driven = gain if drive == "1" else text(parse(f"{gain}*({drive})"))
+        if r.feature.tau == 0.0:
+            direct.append(driven)
+        elif not r.lagged:
+            per, state = f"{per}/s", f"{y}_sum{k}"
+            states[state] = State(state, unit, None, Number(0.0), rules.start_sd, 1.0)
+            terms.append(Term(f"{drive} adds up in {state}", state, parse(driven)))
+        else:
+            state, tau = f"{y}_{number[r.pole]}", f"{y}_tau{number[r.pole]}"
+            if state not in states:
+                least, most = rules.time_constants
+                parameters[tau] = Parameter(r.feature.tau, "s", least / QUICKER, most)
+                states[state] = State(state, unit, None, Number(0.0), rules.start_sd, 1.0)
+                terms.append(Term(f"{state} settles", state, parse(f"-{state}/{tau}")))
+            if drive in rules.settled:
+                start = states[state].start
+                begun = driven if start in (None, Number(0.0)) else f"{text(start)} + {driven}"
+                states[state] = replace(states[state], start=parse(begun))
+            terms.append(Term(f"{drive} through {state}", state, parse(f"{driven}/{tau}")))
+        parameters[gain] = Parameter(r.gain, per, low, high)
+    output = parse(" + ".join([*states, *direct]) or "0")
+    return Model(y, parameters, states, tuple(terms), {y: output}, "s")
+
+
+def _gain(output: str, k: int, response: Response) -> str:
+    return f"{output}_0" if response.feature.drive == "1" else f"{output}_gain{k}"
+
+
+def _numbers(responses: Sequence[Response]) -> dict[int, int]:
+    """Number of the hidden mass of each pole."""
+    return {pole: k for k, pole in enumerate(dict.fromkeys(r.pole for r in responses if r.lagged), start=1)}
+
+
+def responses_of(fit: Fit, responses: Sequence[Response]) -> tuple[list[Response], list[float]]:
+    """Responses with the fitted gains and time constants, and by how many standard errors each gain is not
+    0.
+    """
+    y, values = fit.problem.outputs[0], fit.model.parameters
+    unknowns = zip(fit.problem.unknowns, fit.standard_errors, strict=True)
+    errors = {u.name: e for u, e in unknowns if not u.is_nuisance}
+    number = _numbers(responses)
+    found, strength = [], []
+    for k, r in enumerate(responses):
+        gain = _gain(y, k, r)
+        tau = values[f"{y}_tau{number[r.pole]}"].value if r.lagged else r.feature.tau
+        found.append(replace(r, feature=replace(r.feature, tau=tau), gain=values[gain].value))
+        strength.append(abs(values[gain].value) / max(errors[gain], 1e-300))
+    return found, strength
+
+
+def within(rules: Rules, responses: Sequence[Response]) -> list[Response]:
+    """The responses with none at an end of the time constants: what settles at once has no mass, and what
+    never settles in these recordings leaves.
+    """
+    least, most = rules.time_constants
+    found = []
+    for r in responses:
+        if not r.lagged or least / QUICKER * (1 + _AT) < r.feature.tau < most * (1 - _AT):
+            found.append(r)
+        elif r.feature.tau < most * (1 - _AT):
+            direct = replace(r.feature, tau=0.0)
+            if all(direct != other.feature for other in responses):
+                found.append(replace(r, feature=direct))
+    return found
+
+
+def with_spreads(fit: Fit) -> Model:
+    """The fitted model with the spread of the start of each mass in a recording to come.
+
+    The mean square of the starts that were found, and of one more: a recording may be cut out of what goes
+    on, and then the mass stands anywhere in its own range. Few cold starts do not say that all are cold.
+    """
+    found: dict[str, list[float]] = {}
+    for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
+        if u.is_start:
+            found.setdefault(u.name, []).append(float(value) ** 2 + float(error) ** 2)
+    order = list(fit.problem.model.states)
+    runs = np.concatenate([one.x for one in fit.trajectories])
+    states = {
+        name: replace(s, start_sd=float(np.sqrt(np.mean([*found.get(name, []), moved**2]))))
+        for name, s in fit.model.states.items()
+        for moved in [float(np.std(runs[:, order.index(name)]))]
+    }
+    return replace(fit.model, states=states)

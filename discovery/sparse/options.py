@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from discovery.schema import Strict
+from discovery.sparse.laws import LAWS
 
-FAMILIES = ("linear", "wet", "rotation", "coupling", "radiation", "natural", "load", "second mass")
+THERMAL = ("wet", "rotation", "coupling", "radiation", "natural", "load", "second mass")
+FAMILIES = (*LAWS, "threshold", "product", *THERMAL)
+HIDDEN = ("own", "rate", "upstream")
 
 FROM_LIST = Field(strict=False)  # a file has lists where options have tuples
 Words = Annotated[tuple[str, ...], FROM_LIST]
@@ -45,23 +48,33 @@ class SparseOptions(Strict):
         None, description="states of a baseline file that candidates may enter; default all"
     )
     max_terms: int = Field(15, ge=1, le=60, description="most terms of one output")
-    max_masses: int = Field(4, ge=1, le=12, description="most hidden masses of one error")
-    time_constants: Numbers = Field(
-        (900.0, 1800.0, 3600.0, 7200.0, 14400.0, 28800.0, 57600.0),
-        description="grid of time constants of the hidden masses [s]",
-        min_length=1,
+    time_constants: Annotated[tuple[float, float], FROM_LIST] | None = Field(
+        None,
+        description="least and greatest time constant of the hidden masses [s]; default by the sampling",
     )
-    pump_ratios: Numbers = Field(
-        (1.0, 2.0, 4.0, 8.0),
-        description="how many times quicker a hidden mass may answer while the pump runs",
-        min_length=1,
+    hidden: Literal["auto", "own", "rate", "upstream"] = Field(
+        "auto",
+        description='what stands behind an output in rates: "own": nothing; "rate": its rate is a hidden '
+        'state (a mass on a spring); "upstream": a hidden body empties into it (a tank above a tank); '
+        '"auto": what predicts best',
     )
+    stable: bool = Field(
+        True, description="no pole in the right half plane: states are drawn back, not driven away"
+    )
+    keep: Words = Field((), description="terms that stay")
+    forbid: Words = Field((), description="terms that are not offered")
     bounds: dict[str, Annotated[tuple[Bound, Bound], FROM_LIST]] = Field(
         default_factory=dict,
-        description="smallest and largest coefficient of a term, by its expression; [0, inf] is a sign",
+        description="smallest and largest coefficient of a term, by its expression; [0, inf] is a sign; in "
+        "the units of the equations, for rates of errors and temperatures per hour",
     )
-    optimiser: Literal["elimination", "stlsq", "ssr", "sr3"] = Field(
-        "elimination", description="our own search, or an optimiser of PySINDy"
+    optimiser: str = Field(
+        "search",
+        pattern=r"^(search|pysindy:\w+)$",
+        description='"search": our own; "pysindy:SR3": an optimiser of PySINDy by its name',
+    )
+    optimiser_arguments: dict[str, Any] = Field(
+        default_factory=dict, description="of the optimiser of PySINDy, as { threshold = 0.1 }"
     )
     tolerance: float | None = Field(
         None,
@@ -77,13 +90,6 @@ class SparseOptions(Strict):
     seed: int = Field(0, ge=0, description="of the bootstraps")
     also: Words = Field((), description="recordings that this model is fitted to besides `fit`")
 
-    @field_validator("time_constants", "pump_ratios")
-    @classmethod
-    def _positive(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        if any(not 0 < value < 1e9 for value in values):
-            raise ValueError("every entry must be a positive number")
-        return tuple(sorted(set(values)))
-
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for name, (low, high) in self.bounds.items():
@@ -91,6 +97,8 @@ class SparseOptions(Strict):
                 raise ValueError(
                     f"the bounds of '{name}' are {low:g} and {high:g}: the smaller one comes first"
                 )
+        if self.time_constants and not 0 < self.time_constants[0] < self.time_constants[1]:
+            raise ValueError("time_constants are two positive times in s, the shorter one first")
         if self.form == "masses" and self.baseline != "eq9":
             raise ValueError('a baseline file is built upon by rates; leave out form = "masses"')
         return self

@@ -15,7 +15,10 @@ from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.sparse.folds import Blocks, make_blocks
 
-_READINGS = 250  # of one output in one recording: more say nothing new about hours or minutes
+_READINGS = 250  # of one output in one recording: more say little that is new about what moves slowly
+_IN_TIME_SCALE = 5  # readings in the time in which the readings forget half of what they were
+_MOST = 4000  # readings of one output in one recording
+_RASTER = 4096  # points on which this time is looked for
 _FAR = 3.0  # times the rms: start values that are no use
 
 
@@ -28,22 +31,55 @@ class RateData:
     outputs: tuple[str, ...]
     grids: Mapping[str, Grid]
     blocks: Blocks
+    scale: float  # s, in which the readings forget half of what they were
+
+    @property
+    def size(self) -> tuple[float, ...]:
+        """What errors of each output are weighed with: its stated noise, else a share of the readings'
+        spread.
+        """
+        return rough_noise(self).white
 
 
 def make_rate_data(
     campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str], blocks: int
 ) -> RateData:
     """Grids of the recordings with all inputs that any candidate may use, dense readings thinned."""
-    campaign = thinned(campaign, recordings, outputs, inputs)
-    grids = {r: make_grid(campaign, r, inputs, outputs, coarse=8 * _READINGS) for r in recordings}
+    scale = min(time_scale(campaign, recordings, [y]) for y in outputs)
+    longest = max(float(campaign.recordings[r].time[-1]) for r in recordings)
+    most = int(np.clip(_IN_TIME_SCALE * longest / scale, _READINGS, _MOST))
+    campaign = thinned(campaign, recordings, outputs, inputs, most)
+    grids = {r: make_grid(campaign, r, inputs, outputs, coarse=8 * most) for r in recordings}
     times = [grids[r].time[grids[r].read] for r in recordings]
-    return RateData(campaign, tuple(recordings), tuple(outputs), grids, make_blocks(times, blocks))
+    return RateData(campaign, tuple(recordings), tuple(outputs), grids, make_blocks(times, blocks), scale)
+
+
+def time_scale(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> float:
+    """Time [s] in which readings forget half of what they were: the lag at which their autocorrelation is
+    one half.
+
+    The correlation at the smallest lag counts as one, which leaves white noise out.
+    """
+    found = []
+    for name, output in ((r, y) for r in recordings for y in outputs):
+        recording = campaign.recordings[name]
+        known = np.isfinite(recording.values[output])
+        time, series = recording.time[known], recording.values[output][known]
+        if len(time) < 8 or np.ptp(series) == 0:
+            continue
+        raster = np.linspace(time[0], time[-1], min(_RASTER, 2 * len(time)))
+        x = np.interp(raster, time, series)
+        power = np.abs(np.fft.rfft(x - x.mean(), 2 * len(x))) ** 2
+        rho = np.fft.irfft(power)[: len(x)]
+        below = np.flatnonzero(rho[1:] < 0.5 * rho[1])
+        found.append((below[0] + 1 if len(below) else len(x)) * (raster[1] - raster[0]))
+    return float(np.median(found)) if found else 1.0
 
 
 def thinned(
-    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str]
+    campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str], most: int
 ) -> Campaign:
-    """The campaign with at most about `_READINGS` evenly chosen readings of each output in a recording.
+    """The campaign with at most about `most` evenly chosen readings of each output in a recording.
 
     Held inputs keep the stamps at which they change alone, which says the same; both spare nodes of the grid.
     """
@@ -53,9 +89,9 @@ def thinned(
         values = dict(recording.values)
         for output in outputs:
             known = np.flatnonzero(np.isfinite(values[output]))
-            if len(known) >= 2 * _READINGS:
+            if (every := len(known) // most) >= 2:
                 few = np.full(len(recording.time), np.nan)
-                few[known[:: len(known) // _READINGS]] = values[output][known[:: len(known) // _READINGS]]
+                few[known[::every]] = values[output][known[::every]]
                 values[output] = few
         for channel in set(inputs) & set(values):
             known = np.flatnonzero(np.isfinite(values[channel]))

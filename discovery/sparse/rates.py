@@ -8,7 +8,7 @@ S_candidates theta` needs no derivative of a reading and works with states that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid
 from discovery.errors import UserError
-from discovery.fitting import Fit, Noise, fit_model
+from discovery.fitting import Fit, Noise, Unknown, fit_model
 from discovery.models import Model, Parameter
 from discovery.recordings import Campaign
-from discovery.sparse.folds import Blocks
-from discovery.sparse.gram import Gram, gram, project_out, total
+from discovery.sparse.choice import Choice
+from discovery.sparse.gram import Gram
+from discovery.sparse.options import SparseOptions
+from discovery.sparse.problem import Problem
 from discovery.terms import Apply, Expression, Name, Number, Term, names, parse, text
 
 Array = NDArray[np.float64]
@@ -135,57 +137,99 @@ def _vanishes(expression: Expression, zero: set[str] | frozenset[str]) -> bool:
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """Normal equations of all common parameters around a fit, by block; starts and per-recording values ride
-    along.
+class Linearised:
+    """A fit as a linear regression, everything over the noise: target = columns theta + nuisance delta.
+
+    theta are all common parameters, delta start values and what belongs to one recording, with normal priors.
     """
 
-    names: tuple[str, ...]  # (M,) common parameters
-    blocks: tuple[Gram, ...]  # (B,) columns [parameters, nuisance]
-    precision: Array  # of the nuisance priors
-    low: Array
+    names: tuple[str, ...]  # (M,)
+    columns: tuple[Array, ...]  # (R Y, M) by recording, a row for each output of each reading
+    target: tuple[Array, ...]  # (R Y,), NaN where nothing was read
+    nuisance: tuple[Array, ...]
+    precision: tuple[Array, ...]
+    times: tuple[Array, ...]  # (R Y,) s
+    low: Array  # (M,)
     high: Array
 
-    def pooled(self, weights: Array | None = None) -> Gram:
-        """Sum over blocks with the nuisance taken out."""
-        whole = total(self.blocks, None if weights is None else weights.tolist())
-        return project_out(whole, np.arange(len(self.names), len(whole.vector)), self.precision)
+    @property
+    def count(self) -> int:
+        """Number of readings."""
+        return sum(int(np.isfinite(one).sum()) for one in self.target)
 
 
-def evidence(fit: Fit, blocks: Blocks) -> Evidence:
-    """Linearise a fit: rows J theta + residual against J, over the noise."""
-    problem = fit.problem
-    order = [i for i, u in enumerate(problem.unknowns) if not u.is_start and u.recording is None]
-    common = len(order)
-    order += [i for i in range(len(problem.unknowns)) if i not in order]
-    centre = np.array(
-        [u.prior[0] if u.prior and i not in order[:common] else 0.0 for i, u in enumerate(problem.unknowns)]
+def linearised(fit: Fit) -> Linearised:
+    """Linearise a fit: rows J theta + residual against J."""
+    problem, sd = fit.problem, np.array(fit.noise.white)
+    common = [i for i, u in enumerate(problem.unknowns) if not u.is_start and u.recording is None]
+    means = np.array(
+        [u.prior[0] if u.prior and i not in common else 0.0 for i, u in enumerate(problem.unknowns)]
     )
-    theta = (fit.theta - centre)[order]
-    sd = np.array(fit.noise.white)
-    empty = Gram(np.zeros((len(order), len(order))), np.zeros(len(order)), 0.0, 0)
-    found = [empty] * blocks.count
-    for trajectory, block in zip(fit.trajectories, blocks.of, strict=True):
-        residual = problem.residual(trajectory) / sd
-        jacobian = problem.jacobian(trajectory)[:, :, order] / sd[:, None]
-        for b in np.unique(block):
-            rows = np.isfinite(residual) & (block == b)[:, None]
-            j = jacobian[rows]
-            found[b] = gram(j, residual[rows] + j @ theta)
-    rest = [problem.unknowns[i] for i in order[common:]]
-    chosen = [problem.unknowns[i] for i in order[:common]]
-    return Evidence(
+    theta = fit.theta - means
+    columns, target, nuisance, precision, times = [], [], [], [], []
+    for trajectory in fit.trajectories:
+        grid = trajectory.system.grid
+        rest = [i for i in problem.concerns(trajectory.system) if i not in common]
+        residual = (problem.residual(trajectory) / sd).ravel()
+        jacobian = (problem.jacobian(trajectory) / sd[:, None]).reshape(len(residual), -1)
+        columns.append(jacobian[:, common])
+        nuisance.append(jacobian[:, rest])
+        target.append(residual + jacobian @ theta)
+        precision.append(np.array([_precision(problem.unknowns[i], fit.together) for i in rest]))
+        times.append(np.repeat(grid.time[grid.read], len(sd)))
+    chosen = [problem.unknowns[i] for i in common]
+    return Linearised(
         tuple(u.name for u in chosen),
-        tuple(found),
-        np.array(
-            [
-                0.0 if u.prior is None else u.prior[1] ** -2.0 * (fit.together if u.is_offset else 1.0)
-                for u in rest
-            ]
-        ),
+        tuple(columns),
+        tuple(target),
+        tuple(nuisance),
+        tuple(precision),
+        tuple(times),
         np.array([u.low for u in chosen]),
         np.array([u.high for u in chosen]),
     )
+
+
+def _precision(unknown: Unknown, together: float) -> float:
+    """Inverse variance of the prior of what belongs to one recording."""
+    if unknown.prior is None:
+        return 0.0
+    return float(unknown.prior[1] ** -2.0 * (together if unknown.is_offset else 1.0))
+
+
+def regress(
+    seen: Linearised,
+    keep: Sequence[str],
+    options: SparseOptions,
+    select: Callable[[Problem], Choice],
+    max_terms: int | None = None,
+) -> Choice:
+    """The choice of coefficients of a linearised fit, by `pysindy.SINDy` with a library of its filtered
+    terms.
+    """
+    import pysindy
+
+    from discovery.sparse.library import ModelTerms
+    from discovery.sparse.optimiser import SparseSearch
+
+    library = ModelTerms(seen.names, seen.columns, seen.nuisance, seen.precision, seen.times)
+    bounds = {
+        name: ends for name, *ends in zip(seen.names, seen.low.tolist(), seen.high.tolist(), strict=True)
+    }
+    search = SparseSearch(
+        library,
+        options.max_terms if max_terms is None else max_terms,
+        bounds,  # type: ignore[arg-type]
+        keep,
+        [1.0],
+        blocks=options.blocks,
+        bootstraps=options.bootstraps,
+        seed=options.seed,
+        select=select,
+    )
+    sindy = pysindy.SINDy(optimizer=search, feature_library=library)
+    sindy.fit([t[:, None] for t in seen.times], t=1.0, x_dot=[y[:, None] for y in seen.target])
+    return search.choices_[0]
 
 
 def extended_bic(g: Gram, sizes: Sequence[int], costs: Sequence[float], library: int) -> Array:
@@ -200,8 +244,9 @@ def extended_bic(g: Gram, sizes: Sequence[int], costs: Sequence[float], library:
 
 
 def masked(grid: Grid, keep: NDArray[np.bool_]) -> Grid:
-    """The grid with some readings (R,) left out."""
-    return replace(grid, readings=np.where(keep[:, None], grid.readings, np.nan))
+    """The grid with some readings (R,) left out, save the first of each output: free runs begin there."""
+    first = np.cumsum(np.isfinite(grid.readings), axis=0) <= 1
+    return replace(grid, readings=np.where(keep[:, None] | first, grid.readings, np.nan))
 
 
 def refit(

@@ -10,7 +10,7 @@ import numpy as np
 from discovery.sparse.gram import solve, total
 from discovery.sparse.ratedata import RateData
 from discovery.sparse.rates import Candidate
-from discovery.sparse.weak import weak_gram, weak_rows
+from discovery.sparse.weak import weak_rows
 
 
 def started(
@@ -27,10 +27,12 @@ def started(
     for state, output in channel.items():
         mine = [c for c in found if c.into == state and "_mass" not in c.label]
         rows = [
-            weak_rows(data.grids[r], output, [c.expression for c in mine], constants, aliases=channel)
+            weak_rows(
+                data.grids[r], output, [c.expression for c in mine], constants, aliases=channel, second=3600.0
+            )
             for r in data.recordings
         ]
         low, high = (np.array([getattr(c, side) for c in mine]) for side in ("low", "high"))
-        theta = 3600 * solve(total([weak_gram(one) for one in rows]), range(len(mine)), low, high)
+        theta = solve(total([one.gram for one in rows]), range(len(mine)), low, high)
         placed |= {c: float(np.clip(value, c.low, c.high)) for c, value in zip(mine, theta, strict=True)}
     return [replace(c, start=placed.get(c, c.start)) for c in found]

@@ -10,6 +10,7 @@ import numpy as np
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign
 from discovery.sparse.byrates import discover_rates
+from discovery.sparse.constraints import kept
 from discovery.sparse.discovery import Discovery
 from discovery.sparse.drives import AMBIENT, Inputs
 from discovery.sparse.families import candidates
@@ -70,7 +71,8 @@ def discover_temperatures(
     plain = [n for n, label in labels.items() if label.split(": ", 1)[1] in simple]
     first = {"1", *simple, *(text(parse(f"{a} - {b}")) for a in bodies for b in bodies if a != b)}
     easy = [n for n, label in labels.items() if label.split(": ", 1)[1] in first]
-    found = discover_rates(data, nearer(data, model, slow), labels, decay, options, plain=plain, easy=easy)
+    always = [*decay, *kept(labels, options, campaign.path)]
+    found = discover_rates(data, nearer(data, model, slow), labels, always, options, plain=plain, easy=easy)
     return replace(found, model=without_idle(found.model, outputs))
 
 

@@ -8,9 +8,8 @@ import pytest
 from discovery.errors import UserError
 from discovery.models import Model, State
 from discovery.recordings import Campaign, Channel, Recording
-from discovery.sparse.drives import Inputs, make_inputs, mass_drives
+from discovery.sparse.drives import Inputs, make_drives, make_inputs, mass_drives
 from discovery.sparse.families import candidates
-from discovery.sparse.masses import make_mass_library
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.rates import Candidate
 from discovery.terms import Number, text
@@ -75,18 +74,14 @@ def test_what_drives_a_hidden_mass() -> None:
     assert mass_drives(inputs(["drive", "fluid"])) == ["fluid - 20", "drive"]
 
 
-def test_masses_are_quicker_in_fluid_but_not_quicker_than_they_can_be() -> None:
-    found = make_mass_library(inputs(["air", "pump", "drive"]), (250.0, 1000.0), (1.0, 5.0, 10.0))
-    assert [(m.dry, m.wet) for m in found.masses] == [(250.0, 250.0), (1000.0, 1000.0), (1000.0, 200.0)]
-    dry = make_mass_library(inputs(["air", "drive"]), (250.0,), (1.0, 0.5))
-    assert [(m.dry, m.wet) for m in dry.masses] == [(250.0, 250.0)]
-    assert dict(zip(map(text, found.drives), found.soaked, strict=True)) == {
-        "air - 21.5": True,
-        "drive": False,
-        "pump*(air - 21.5)": False,
-        "pump*drive": False,
-        "pump": False,
-    }
+def test_masses_of_air_and_bodies_begin_in_balance_and_others_at_rest() -> None:
+    found = make_drives(inputs(["air", "pump", "drive", "oil"]), campaign())
+    assert set(found.settled) == {"air - 21.5", "oil - 21.5"}
+    assert found.integrals == ()  # a temperature is no charge
+    with pytest.raises(UserError, match="'velocity'"):
+        make_drives(inputs(["drive"]), campaign(), ["velocity**2"])
+    laws = make_drives(inputs(["drive", "high"]), campaign(), ["linear", "product", "drive**3"])
+    assert laws.expressions == ("drive", "high", "drive*high", "drive**3")
 
 
 def offered(

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -145,11 +144,20 @@ def test_one_recording_is_enough(gated: Campaign) -> None:
     assert np.sqrt(np.mean((trajectory.system.grid.readings - predict(trajectory)) ** 2)) < 1.0
 
 
-@pytest.mark.parametrize("optimiser", ["stlsq", "ssr", "sr3"])
+@pytest.mark.parametrize(
+    ("optimiser", "arguments"),
+    [("STLSQ", {"threshold": 0.02, "alpha": 1e-8}), ("SR3", {"reg_weight_lam": 1e-4, "regularizer": "L0"})],
+)
 def test_the_optimisers_of_pysindy_serve_too(
-    gated: Campaign, optimiser: Literal["stlsq", "ssr", "sr3"]
+    gated: Campaign, optimiser: str, arguments: dict[str, float | str]
 ) -> None:
-    options = SparseOptions(form="rates", library=LIBRARY, optimiser=optimiser, bootstraps=0)
+    options = SparseOptions(
+        form="rates",
+        library=LIBRARY,
+        optimiser=f"pysindy:{optimiser}",
+        optimiser_arguments=arguments,
+        bootstraps=0,
+    )
     assert {"y", "P", "pump*T_fluid"} <= set(coefficients(discover(gated, ["a", "b"], ["E"], options)))
 
 
@@ -187,7 +195,7 @@ def test_a_term_that_entered_in_place_of_another_gives_way() -> None:
     model, labels = with_candidates(baseline, offered)
     growth, noise = Growth(restart=baseline.values()), rough_noise(data)
     for first in (["body_p1"], ["body_p1", "body_p2"], ["body_p3"]):
-        found, entered = _exchanged(data, model, labels, first, growth, noise)
+        found, entered = _exchanged(data, model, labels, first, growth, noise, SparseOptions())
         assert entered == ["body_p3"]
         assert found.parameters["body_p3"].value == pytest.approx(25, rel=0.05)
         assert found.parameters["body_p1"].value == found.parameters["body_p2"].value == 0.0
@@ -236,8 +244,12 @@ def test_two_measured_temperatures_are_found_to_be_coupled() -> None:
 def test_a_users_mistakes_are_named(gated: Campaign) -> None:
     with pytest.raises(ValidationError, match="max_term"):
         SparseOptions.model_validate({"kind": "sindy", "max_term": 3})
-    with pytest.raises(ValidationError, match="positive"):
-        SparseOptions(time_constants=(0.0,))
+    with pytest.raises(ValidationError, match="the shorter one first"):
+        SparseOptions(time_constants=(600.0, 300.0))
+    with pytest.raises(UserError, match="no optimiser STLQS"):
+        discover(gated, ["a"], ["E"], SparseOptions(optimiser="pysindy:STLQS"))
+    with pytest.raises(UserError, match="optimiser_arguments"):
+        discover(gated, ["a"], ["E"], SparseOptions(optimiser="pysindy:SR3", optimiser_arguments={"x": 1}))
     with pytest.raises(UserError, match="'T_air', which is no channel"):
         discover(gated, ["a"], ["E"], SparseOptions(inputs=("T_air",)))
     with pytest.raises(UserError, match="cannot drive"):

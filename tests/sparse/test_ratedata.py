@@ -26,7 +26,7 @@ def campaign(count: int, error: Array) -> Campaign:
 
 def test_thinned_recordings_say_the_same_with_fewer_stamps() -> None:
     whole = campaign(10_000, np.arange(10_000.0))
-    few = thinned(whole, ["r"], ["E"], ["P", "air"]).recordings["r"]
+    few = thinned(whole, ["r"], ["E"], ["P", "air"], 250).recordings["r"]
     data = whole.recordings["r"]
     kept = np.flatnonzero(np.isfinite(few.values["P"]))
     assert np.array_equal(kept, np.arange(0, 10_000, 50))  # where it changes
@@ -41,7 +41,7 @@ def test_thinned_recordings_say_the_same_with_fewer_stamps() -> None:
 
 def test_few_readings_all_stay() -> None:
     whole = campaign(300, np.arange(300.0))
-    few = thinned(whole, ["r"], ["E"], ["P"]).recordings["r"]
+    few = thinned(whole, ["r"], ["E"], ["P"], 250).recordings["r"]
     assert np.array_equal(few.values["E"], whole.recordings["r"].values["E"])
 
 

@@ -11,9 +11,10 @@ from discovery.fitting import fit_model, predict_recording
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.sparse import Discovery, SparseOptions, discover
-from discovery.sparse.byrates import _plainer
+from discovery.sparse.byrates import plainer
 from discovery.sparse.gram import gram
-from discovery.sparse.rates import Evidence, without_idle
+from discovery.sparse.rates import without_idle
+from discovery.sparse.search import Search, plain
 from discovery.sparse.temperatures import second_masses
 from discovery.terms import Term, parse
 
@@ -140,15 +141,17 @@ def test_a_block_without_readings_is_no_warning() -> None:
 
 def test_the_plainer_of_two_twins_is_named_and_no_other() -> None:
     rng = np.random.default_rng(4)
-    plain = rng.uniform(0, 10, 300)
-    x = np.column_stack([plain, plain + 1e-3 * plain**2, rng.standard_normal(300)])
-    g = gram(x, 2 * x[:, 1] + x[:, 2] + 0.1 * rng.standard_normal(300))
-    free = np.full(3, np.inf)
-    seen = Evidence(("a", "b", "c"), (g,), np.array([]), -free, free)
+    twin = rng.uniform(0, 10, 300)
+    x = np.column_stack([twin, twin + 1e-3 * twin**2, rng.standard_normal(300)])
+    search = Search(
+        gram(x, 2 * x[:, 1] + x[:, 2] + 0.1 * rng.standard_normal(300)), plain(3), np.array([], int)
+    )
+    odd, names = search.of(np.array([1, 2])), ("a", "b", "c")
     labels = {"a": "T: P", "b": "T: odd", "c": "T: other"}
-    assert _plainer(g, seen, (1, 2), [], ["a"], labels, worth=20.0) == (0, 2)
-    assert _plainer(g, seen, (1, 2), [], ["a"], labels, worth=1e-9) == (1, 2)
-    assert _plainer(g, seen, (1, 2), [1], ["a"], labels, worth=20.0) == (1, 2)
+    assert plainer(search, odd, names, ["a"], labels, worth=20.0).members == (0, 2)
+    assert plainer(search, odd, names, ["a"], labels, worth=1e-9).members == (1, 2)
+    kept = Search(search.g, plain(3), np.array([1]))
+    assert plainer(kept, kept.of(np.array([1, 2])), names, ["a"], labels, worth=20.0).members == (1, 2)
 
 
 def test_what_moves_no_output_leaves_with_its_numbers() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from discovery.dynamics import make_grid
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.sparse.gram import solve
-from discovery.sparse.weak import weak_gram, weak_rows
+from discovery.sparse.weak import weak_rows
 from discovery.terms import parse
 
 
@@ -26,5 +26,5 @@ def test_weak_form_finds_the_rate_and_the_gain_of_a_step() -> None:
         "r", time, {"u": np.where(time >= switch, 1.0, 0.0), "y": np.where(read, y, np.nan)}
     )
     grid = make_grid(Campaign("c", channels, {"r": recording}, Path("c")), "r", ["u"], ["y"])
-    found = solve(weak_gram(weak_rows(grid, "y", [parse("y"), parse("u")])), (0, 1))
+    found = solve(weak_rows(grid, "y", [parse("y"), parse("u")]).gram, (0, 1))
     np.testing.assert_allclose(found, [-rate, gain], rtol=0.02)

@@ -1,0 +1,283 @@
+"""Discovery from Python: frames or arrays in, a sparse model with its evidence out, as a scikit-learn
+estimator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Self, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted
+
+from discovery.dynamics import make_grid
+from discovery.dynamics.system import inputs_of, predict
+from discovery.errors import UserError
+from discovery.fitting import fit_model, predict_recording
+from discovery.frames import campaign_from_frames
+from discovery.models.dimensions import with_coefficient_units
+from discovery.models.equations import equations
+from discovery.recordings import Campaign
+from discovery.schema import suggest
+from discovery.sparse import discover as discover_in
+from discovery.sparse.options import SparseOptions
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+Channels = Mapping[str, Mapping[str, Any]]
+
+INPUT = {"role": "other input", "unit": "1"}
+OUTPUT = {"role": "other output", "unit": "1"}
+
+
+def discover(
+    frames: Mapping[str, pd.DataFrame] | pd.DataFrame,
+    outputs: Sequence[str],
+    channels: Channels | None = None,
+    **options: Any,
+) -> SparseDiscovery:
+    """A sparse model of some columns of frames, driven by the others.
+
+    Args:
+        frames: recordings by name, or a single one; the index is time (seconds, or a DatetimeIndex), NaN
+        means "not
+            measured then".
+        outputs: columns that are to be predicted.
+        channels: column -> {"role": ..., "unit": ...} as in a campaign file; a column without an entry is
+            another input or output without a unit.
+        options: as in an experiment file (`form`, `library`, `bounds`, `keep`, `optimiser`, ...).
+
+    Raises:
+        UserError: a column that is missing, an option that does not fit.
+    """
+    recordings = dict(frames) if isinstance(frames, Mapping) else {"recording": frames}
+    if not recordings:
+        raise UserError("no frame to discover from; give a recording by its name, as {'monday': frame}")
+    first = next(iter(recordings.values()))
+    for output in outputs:
+        if output not in first:
+            raise UserError(f"no column '{output}'; {suggest(output, [str(c) for c in first.columns])}")
+    found = SparseDiscovery(channels=channels, **options)
+    inputs = [str(c) for c in first.columns if c not in outputs]
+    x = _stacked({name: frame[inputs] for name, frame in recordings.items()})
+    return found.fit(x, _stacked({name: frame[list(outputs)] for name, frame in recordings.items()}))
+
+
+class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """Sparse dynamics of outputs y driven by inputs X: `fit`, `predict`, `score`, `coefficients`, `summary`.
+
+    X and y are frames or arrays with a row for each instant. The index of a frame is time; with two levels
+    it is (recording, time). Rows of an array are `step` seconds apart. A frame keeps its time in the folds
+    of `GridSearchCV`, an array does not: cut it with `TimeSeriesSplit`.
+
+    Args:
+        channels: column -> {"role": ..., "unit": ...}; default inputs and outputs without unit.
+        step: s between rows of an array.
+        form, library, max_terms, time_constants, hidden, stable, keep, forbid, bounds, optimiser,
+            optimiser_arguments, tolerance, bootstraps, seed: as in an experiment file.
+
+    Attributes:
+        model_: the model, with 95 % intervals of its numbers.
+        discovery_: path, stability, costs of terms.
+    """
+
+    def __init__(
+        self,
+        channels: Channels | None = None,
+        step: float = 1.0,
+        form: str = "auto",
+        library: Sequence[str] | None = None,
+        max_terms: int = 15,
+        time_constants: tuple[float, float] | None = None,
+        hidden: str = "auto",
+        stable: bool = True,
+        keep: Sequence[str] = (),
+        forbid: Sequence[str] = (),
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        optimiser: str = "search",
+        optimiser_arguments: Mapping[str, Any] | None = None,
+        tolerance: float | None = None,
+        bootstraps: int = 0,
+        seed: int = 0,
+    ) -> None:
+        self.channels = channels
+        self.step = step
+        self.form = form
+        self.library = library
+        self.max_terms = max_terms
+        self.time_constants = time_constants
+        self.hidden = hidden
+        self.stable = stable
+        self.keep = keep
+        self.forbid = forbid
+        self.bounds = bounds
+        self.optimiser = optimiser
+        self.optimiser_arguments = optimiser_arguments
+        self.tolerance = tolerance
+        self.bootstraps = bootstraps
+        self.seed = seed
+
+    def fit(self, X: Any, y: Any) -> Self:
+        """Discover a model of y (T,) or (T, outputs) driven by X (T, inputs).
+
+        Raises:
+            UserError: X and y of different length, an option or a channel that does not fit.
+        """
+        x, z = _framed(X, self.step, "x"), _framed(y, self.step, "y")
+        if len(x) != len(z):
+            raise UserError(f"X has {len(x)} rows and y has {len(z)}; give a row of both for each instant")
+        self.n_features_in_ = x.shape[1]
+        self.inputs_, self.outputs_ = [str(c) for c in x.columns], [str(c) for c in z.columns]
+        campaign = self._campaign(x, z)
+        recordings = list(campaign.recordings)
+        found = discover_in(campaign, recordings, self.outputs_, self._options())
+        fit = fit_model(found.model, campaign, recordings, self.outputs_)
+        self.discovery_ = found
+        self.model_ = with_coefficient_units(fit.model, campaign.channels)
+        self.noise_ = fit.noise.white
+        self.first_ = np.array([_first(z[name].to_numpy(float)) for name in z.columns])
+        return self
+
+    def predict(self, X: Any, first: Any = None) -> Array:
+        """Free run (T,) or (T, outputs): no reading is used but the first one, where it is given.
+
+        Args:
+            first: (outputs,) reading at the first instant of each recording; default that of the fit.
+        """
+        check_is_fitted(self, "model_")
+        x = _framed(X, self.step, "x")
+        if [str(c) for c in x.columns] != self.inputs_:
+            raise UserError(f"X has the columns {list(x.columns)}, the fit had {self.inputs_}")
+        begin = self.first_ if first is None else np.atleast_1d(np.asarray(first, dtype=float))
+        runs = []
+        for name, table in _recordings(x).items():
+            runs.append(self._run(name, table, begin if begin.ndim == 1 else begin[len(runs)]))
+        out = np.concatenate(runs)
+        return out[:, 0] if out.shape[1] == 1 else out
+
+    def score(self, X: Any, y: Any, sample_weight: Any = None) -> float:
+        """R2 of free runs that begin at the first reading of each recording, mean over outputs."""
+        from sklearn.metrics import r2_score
+
+        z = _framed(y, self.step, "y")
+        firsts = [[_first(t[c].to_numpy(float)) for c in t.columns] for t in _recordings(z).values()]
+        predicted = self.predict(X, first=np.array(firsts)).reshape(len(z), -1)
+        readings = z.to_numpy(float)
+        known = np.isfinite(readings).all(axis=1)
+        weight = None if sample_weight is None else np.asarray(sample_weight)[known]
+        return float(r2_score(readings[known], predicted[known], sample_weight=weight))
+
+    def coefficients(self) -> pd.DataFrame:
+        """Value, 95 % interval and unit of each number of the model."""
+        import pandas as pd
+
+        check_is_fitted(self, "model_")
+        rows = {
+            name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
+            for name, p in self.model_.parameters.items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "low", "high", "unit"])
+
+    def equations(self) -> list[str]:
+        """A line for each state and output."""
+        check_is_fitted(self, "model_")
+        return equations(self.model_)
+
+    def summary(self) -> str:
+        """Equations, numbers with intervals, and what each term costs: a page of text."""
+        table = self.coefficients()
+        lines = ["Equations", *(f"  {line}" for line in self.equations()), "", "Numbers (95 % interval)"]
+        for name, p in self.model_.parameters.items():
+            known = p.low is not None and p.high is not None
+            interval = f"[{p.low:.4g}, {p.high:.4g}]" if known else "fixed" if p.fixed else "not determined"
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            lines.append(
+                f"  {name:<{max(map(len, table.index), default=0)}}  {p.value:.5g}{unit}  {interval}"
+            )
+        lines += ["", "Terms: how much more is left without each on what was left out"]
+        for group in self.discovery_.report["groups"]:
+            of = ", ".join(group["outputs"])
+            lines.append(f"  {of}: rms on what was left out {group['left_out_rms']:.4g} reading noises")
+            lines += [f"    {label}  {100 * cost:+.1f} %" for label, cost in group.get("costs", {}).items()]
+        return "\n".join(lines)
+
+    def _options(self) -> SparseOptions:
+        from pydantic import ValidationError
+
+        own = {k: v for k, v in self.get_params(deep=False).items() if k not in ("channels", "step")}
+        given = {k: v for k, v in own.items() if v is not None}
+        try:
+            return SparseOptions.model_validate(given)
+        except ValidationError as error:
+            what = error.errors(include_url=False)[0]
+            raise UserError(f"{'.'.join(str(k) for k in what['loc'])}: {what['msg']}") from None
+
+    def _campaign(self, x: pd.DataFrame, z: pd.DataFrame) -> Campaign:
+        import pandas as pd
+
+        said = self.channels or {}
+        channels = {c: said.get(c, INPUT) for c in self.inputs_} | {
+            c: said.get(c, OUTPUT) for c in self.outputs_
+        }
+        both = pd.concat([x.set_axis(self.inputs_, axis=1), z.set_axis(self.outputs_, axis=1)], axis=1)
+        return campaign_from_frames(_recordings(both), channels)
+
+    def _run(self, name: str, table: pd.DataFrame, first: Array) -> Array:
+        """Free run (T, outputs) at every row of a recording."""
+        import pandas as pd
+
+        rows = np.full((len(table), len(self.outputs_)), np.nan)
+        rows[0] = first
+        z = pd.DataFrame(rows, index=table.index, columns=self.outputs_)
+        campaign = self._campaign(_stacked({name: table}), _stacked({name: z}))
+        time = campaign.recordings[name].time
+        grid = make_grid(
+            campaign, name, inputs_of(self.model_, campaign, self.outputs_), self.outputs_, most=10**9
+        )
+        nodes = np.union1d(grid.time, time)
+        readings = np.full((len(time), len(self.outputs_)), np.nan)
+        readings[0] = first
+        every = replace(grid, time=nodes, read=np.searchsorted(nodes, time), readings=readings)
+        run = predict_recording(self.model_, campaign, name, self.outputs_, self.noise_, every)
+        return predict(run)
+
+
+def _first(series: Array) -> float:
+    known = series[np.isfinite(series)]
+    return float(known[0]) if len(known) else 0.0
+
+
+def _framed(data: Any, step: float, letter: str) -> pd.DataFrame:
+    """Rows as a frame whose index is time, or (recording, time)."""
+    import pandas as pd
+
+    if isinstance(data, pd.Series):
+        return data.to_frame(name=data.name if data.name is not None else f"{letter}0")
+    if isinstance(data, pd.DataFrame):
+        return data
+    table = np.asarray(data, dtype=float)
+    table = table.reshape(len(table), -1)
+    names = [f"{letter}{k}" for k in range(table.shape[1])]
+    return pd.DataFrame(table, index=step * np.arange(len(table)), columns=names)
+
+
+def _stacked(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Recordings one below the other, index (recording, time)."""
+    import pandas as pd
+
+    return pd.concat(dict(frames), names=["recording", "time"])
+
+
+def _recordings(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """The recordings of a frame by name, in their order."""
+    import pandas as pd
+
+    if not isinstance(table.index, pd.MultiIndex):
+        return {"recording": table}
+    names = list(dict.fromkeys(table.index.get_level_values(0)))
+    return {str(name): cast("pd.DataFrame", table.xs(name, level=0)) for name in names}

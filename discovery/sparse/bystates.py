@@ -1,0 +1,258 @@
+"""Discovery of terms in the rates of outputs of any kind, with hidden states where these predict better."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery import terms
+from discovery.dynamics import Grid
+from discovery.errors import RunsAwayError
+from discovery.fitting import Fit
+from discovery.models import Model, Parameter
+from discovery.models.model import TIME_UNITS
+from discovery.progress import Progress
+from discovery.sparse.byrates import discover_rates
+from discovery.sparse.constraints import UnknownTermError, matched
+from discovery.sparse.discovery import Discovery
+from discovery.sparse.folds import PREDICT
+from discovery.sparse.freeruns import left_out
+from discovery.sparse.gram import Gram, total
+from discovery.sparse.growth import Growth, grown
+from discovery.sparse.laws import with_levels
+from discovery.sparse.options import SparseOptions
+from discovery.sparse.ratedata import RateData, rough_noise
+from discovery.sparse.rates import refit, with_candidates
+from discovery.sparse.search import Search, plain
+from discovery.sparse.structures import WORDS, Structure, own, rate, started, upstream
+from discovery.sparse.weak import half_width, weak_rows
+from discovery.terms import Number
+
+Array = NDArray[np.float64]
+
+THERMAL_ROLES = {"error", "temperature"}  # their rates count per hour
+_ROUNDS = 6  # of a fit in a fold
+_LAST = 40  # of a fit with free levels
+_GROWTHS = 3  # of a set, levels refined in between
+_MOVED = 0.02  # share by which a level moves that makes the set grow anew
+_FIRST = 12  # of a fit of a linear chain from one of its starts
+_CHAIN = (0.3, 1.0, 3.0)  # times the time scale of the readings: time constants that a chain starts from
+
+
+def discover_states(
+    data: RateData, options: SparseOptions, hidden: Sequence[str], progress: Progress
+) -> list[Discovery]:
+    """A discovery for each kind of hidden state that was asked for and does not run away."""
+    words = options.library or WORDS
+    roles = {data.campaign.channels[y].role for y in data.outputs}
+    unit = "h" if roles <= THERMAL_ROLES else time_unit(data.scale)
+    found = []
+    for kind in hidden:
+        progress(f"terms of {', '.join(data.outputs)}, {kind}")
+        try:
+            found.append(_discovered(data, kind, words, unit, options))
+        except RunsAwayError:
+            continue
+        except UnknownTermError:  # a term that this form does not have: another one may
+            if options.form != "auto" and len(hidden) == 1:
+                raise
+    return found
+
+
+def _discovered(
+    data: RateData, kind: str, words: Sequence[str], unit: str, options: SparseOptions
+) -> Discovery:
+    """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free
+    runs.
+    """
+    y = data.outputs[0]
+    if kind == "upstream":
+        structure, options = _allowed(data, _chain(data, y, words, unit), options)
+        entered = {i for i, c in enumerate(structure.candidates) if c.start != 0.0}
+    else:
+        bare = (
+            own(data, data.outputs, words, unit, options.stable)
+            if kind == "own"
+            else rate(data, y, words, unit, options.stable)
+        )
+        bare, options = _allowed(data, bare, options)
+        structure, entered = _weakly(data, bare)
+    stay = {i for i, c in enumerate(structure.candidates) if c.label in options.keep}
+    for _ in range(_GROWTHS):
+        before = entered
+        model, labels = with_candidates(structure.model, structure.candidates)
+        names = list(labels)
+        growth = Growth(
+            tuple(names[i] for i in sorted(stay | entered)),
+            tuple(names[i] for i in sorted(stay)),
+            options.max_terms,
+            model.values(),
+        )
+        small, kept = grown(data, model, labels, growth, options)
+        entered = {names.index(name) for name in kept} | stay
+        structure, moved = _refined(data, structure, small, names)
+        if not moved and entered == before:
+            break
+    always = [names[i] for i in stay]
+    found = discover_rates(data, small, kept, always, options, grown=True, tolerance=PREDICT)
+    model = with_free_levels(data, found.model) if options.refine else found.model
+    return replace(found, model=model, report=found.report | {"hidden": kind})
+
+
+def _refined(
+    data: RateData, structure: Structure, small: Model, names: Sequence[str]
+) -> tuple[Structure, bool]:
+    """The structure with the values, and the levels of roots and thresholds, that its terms in use ask for.
+
+    Returns:
+        the structure, and whether a level moved.
+    """
+    fitted = with_free_levels(data, small)
+    found, moved = list(structure.candidates), False
+    parameters = {
+        n: replace(p, value=fitted.parameters[n].value) for n, p in structure.model.parameters.items()
+    }
+    for term in fitted.terms:
+        used = sorted(terms.names(term.expression) & set(names))
+        if not used:
+            continue
+        i = names.index(used[0])
+        expression = found[i].expression
+        for level in sorted(n for n in terms.names(term.expression) if "_level" in n):
+            value = float(f"{fitted.parameters[level].value:.4g}")
+            named, before = with_levels(expression, level) or (expression, value)
+            expression = terms.substitute(named, {level: Number(value)})
+            moved = moved or abs(value - before) > _MOVED * max(abs(before), abs(value))
+        found[i] = replace(found[i], expression=expression, start=fitted.parameters[used[0]].value)
+    model = replace(structure.model, parameters=parameters)
+    return replace(structure, model=model, candidates=tuple(found)), moved
+
+
+def _allowed(data: RateData, structure: Structure, options: SparseOptions) -> tuple[Structure, SparseOptions]:
+    """The structure without forbidden terms and within the bounds; the options as they match its terms."""
+    y = data.outputs[0]
+    aliases = {"y": y, "rate": f"{y}_rate", "up": f"{y}_up"}
+    options = matched(options, [c.label for c in structure.candidates], data.campaign.path, aliases)
+    kept = []
+    for c in structure.candidates:
+        if c.label in options.forbid:
+            continue
+        low, high = options.bounds.get(c.label, (c.low, c.high))
+        kept.append(replace(c, low=low, high=high))
+    return replace(structure, candidates=tuple(kept)), options
+
+
+def _weakly(data: RateData, structure: Structure) -> tuple[Structure, set[int]]:
+    """Start values of the candidates and the set to begin with, by the weak form of the readings."""
+    second = TIME_UNITS[structure.model.time_unit]
+    values: dict[int, float] = {}
+    chosen: set[int] = set()
+    for k, output in enumerate(data.outputs):
+        into = structure.rate or output
+        mine = [i for i, c in enumerate(structure.candidates) if c.into == into]
+        library = [structure.candidates[i].expression for i in mine]
+        grids = [data.grids[r] for r in data.recordings]
+        half = half_width(grids, output, rough_noise(data).white[k], structure.order)
+        rows = [
+            weak_rows(g, output, library, None, None, structure.order, half, structure.rate, second)
+            for g in grids
+        ]
+        g = total([one.gram for one in rows])
+        low, high = (
+            np.array([getattr(structure.candidates[i], side) for i in mine]) for side in ("low", "high")
+        )
+        search = Search(g, plain(len(mine), low, high), np.array([], int))
+        path = search.path(min(len(mine), 12))
+        independent = sum(float(one.time[-1] - one.time[0]) / one.half + 1 for one in rows)
+        best = min(path, key=lambda one: _criterion(g, independent, one.gain, len(one), len(mine)))
+        values |= {mine[f]: float(v) for f, v in zip(best.family, best.theta, strict=True)}
+        chosen |= {mine[f] for f in best.members}
+    return started(structure, values), chosen
+
+
+def _criterion(g: Gram, effective: float, gain: float, size: int, library: int) -> float:
+    """Extended BIC at the number of independent windows."""
+    left = max(g.square - gain, 1e-9 * g.square)
+    return float(effective * np.log(left / g.count) + size * (np.log(effective) + 2 * np.log(library)))
+
+
+def _chain(data: RateData, output: str, words: Sequence[str], unit: str) -> Structure:
+    """A hidden body upstream, begun as a chain of two linear ones that fits the readings best."""
+    scale = data.scale / TIME_UNITS[unit]
+    linear = upstream(data, output, ["linear"], unit)
+    h = f"{output}_up"
+    inputs = [c.label for c in linear.candidates if c.into == h and c.label != "1"]
+    fits = []
+    for first, then in product(_CHAIN, _CHAIN):
+        guess = {h: 1 / (first * scale), output: -1 / (then * scale)} | dict.fromkeys(
+            inputs, 0.1 / (first * scale)
+        )
+        coefficients = {i: guess.get(c.label, 0.0) for i, c in enumerate(linear.candidates)}
+        model, _ = with_candidates(linear.model, started(linear, coefficients).candidates)
+        try:
+            fits.append(_fit(data, model, {}, _FIRST))
+        except RunsAwayError:
+            continue
+    if not fits:
+        raise RunsAwayError(f"no chain of two bodies stays finite on the readings of {output}")
+    fit = min(fits, key=lambda one: one.cost)
+    column = list(fit.problem.model.states).index(h)
+    level = np.concatenate([t.x[:, column] for t in fit.trajectories])
+    full = upstream(data, output, words, unit, level)
+    _, labels = with_candidates(linear.model, linear.candidates)
+    found = dict(zip([(c.into, c.label) for c in linear.candidates], labels, strict=True))
+    values = {
+        i: fit.model.parameters[found[c.into, c.label]].value
+        for i, c in enumerate(full.candidates)
+        if (c.into, c.label) in found
+    }
+    return started(full, values)
+
+
+def _fit(data: RateData, model: Model, values: Mapping[str, float], rounds: int) -> Fit:
+    return refit(
+        model, data.campaign, data.recordings, data.outputs, values, data.grids, rough_noise(data), rounds
+    )
+
+
+def with_free_levels(data: RateData, model: Model) -> Model:
+    """The model fitted with the levels at which its roots and thresholds begin as parameters."""
+    parameters, found = dict(model.parameters), []
+    count = 0
+    for term in model.terms:
+        name = f"{term.into}_level{count + 1}"
+        levelled = with_levels(term.expression, name)
+        if levelled is not None:
+            count += 1
+            expression, level = levelled
+            spread = 3 * max(abs(level), 1.0)
+            unit = model.states[term.into].unit
+            parameters[name] = Parameter(level, unit, level - spread, level + spread)
+            term = replace(term, expression=expression)
+        found.append(term)
+    if not count:
+        return model
+    return _fit(data, replace(model, parameters=parameters, terms=tuple(found)), {}, _LAST).model
+
+
+def left_out_of(data: RateData, model: Model) -> Array:
+    """Mean squared error (B,) on each block of a model whose numbers are fitted without its fold."""
+
+    def fit_of(weights: Array, train: Mapping[str, Grid]) -> Fit:  # noqa: ARG001
+        recordings = [r for r in data.recordings if r in train]
+        return refit(model, data.campaign, recordings, data.outputs, {}, train, rough_noise(data), _ROUNDS)
+
+    return left_out(data, fit_of)
+
+
+def time_unit(seconds: float) -> str:
+    """The unit of time in which a time scale is a handy number.
+
+    >>> time_unit(0.2), time_unit(400.0), time_unit(7200.0)
+    ('s', 'min', 'h')
+    """
+    return next((unit for unit in ("d", "h", "min") if seconds >= 2 * TIME_UNITS[unit]), "s")

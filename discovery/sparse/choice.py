@@ -1,0 +1,194 @@
+"""Which set of terms: its size judged by free runs on what was left out, its members by what they cost."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.fitting.noise import readings_as_one
+from discovery.sparse.folds import Ints, bootstraps, choose
+from discovery.sparse.gram import Gram
+from discovery.sparse.problem import Problem, equal_shares
+from discovery.sparse.search import Search, Terms, on_grid
+
+Array = NDArray[np.float64]
+
+SPREADS = (0.01, 0.03, 0.1, 0.3)  # of start values, as shares of the spread of the readings
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The chosen set, and the evidence for it."""
+
+    terms: Terms
+    path: tuple[Terms, ...] = ()  # sets that were compared, smallest first
+    left_out: tuple[float, ...] = ()  # rms on what was left out, of each
+    fit: tuple[float, ...] = ()  # rms of the fit to everything, of each
+    row: int = 0  # the chosen one
+    start_sd: float = 0.0  # spread of start values
+    costs: tuple[float, ...] = ()  # of each term: share by which the left-out rms grows without it
+    stability: tuple[float, ...] = ()  # of each term: share of block bootstraps whose set has its family
+
+
+def chosen(problem: Problem) -> Choice:
+    """The smallest set within `tolerance` standard errors of the best on what was left out.
+
+    No set is larger than the one of the least extended BIC at the effective number of readings, and none
+    ends at the slow end of the time constants. Terms then share a time constant where the criterion is
+    better for it.
+    """
+    problem = _with_spread(problem)
+    while True:
+        search = problem.search()
+        path = search.path(problem.max_terms)
+        left = problem.residuals(on_grid(path[-1], problem.families))
+        effective = search.g.count / readings_as_one([r[:, None] for r in left])
+        worth = partial(_criterion, problem, search.g, effective)
+        folds = problem.folds()
+        errors = _left_out(problem, folds, path, int(np.argmin([worth(one) for one in path])) + 1)
+        row = choose(errors, problem.tolerance)
+        terms = search.shared(path[row], worth)
+        ended = search.ended(terms)
+        if not ended:
+            break
+        problem = replace(problem, families=problem.families.without(ended))
+    found = evidence(problem, terms)
+    fit = [max(search.g.square - one.gain, 0.0) / search.g.count for one in path[: len(errors)]]
+    return replace(
+        found,
+        path=tuple(path[: len(errors)]),
+        left_out=tuple(np.sqrt(errors.mean(axis=1)).tolist()),
+        fit=tuple(np.sqrt(fit).tolist()),
+        row=row,
+    )
+
+
+def evidence(problem: Problem, terms: Terms) -> Choice:
+    """A set as a choice: what each term costs, and how stable it is."""
+    left, costs = _costs(problem, terms)
+    return Choice(
+        terms, (terms,), (left,), (float("nan"),), 0, problem.start_sd, costs, stability(problem, terms)
+    )
+
+
+def _with_spread(problem: Problem) -> Problem:
+    """The problem with the spread of start values that makes its readings most likely (empirical Bayes).
+
+    -2 log p = n log(cost/n) + log det(1 + spread^2 D'D/m), with D the decays of each trajectory over the
+    noise.
+    """
+    counts = [d.shape[1] for d in problem.nuisance]
+    if not all(counts):
+        return problem
+    values = [
+        np.linalg.eigvalsh(d[np.isfinite(y)].T @ d[np.isfinite(y)])
+        for d, y in zip(problem.nuisance, problem.readings, strict=True)
+    ]
+    size = float(np.nanstd(np.concatenate(problem.readings)))
+    best, least = problem, np.inf
+    for share in SPREADS:
+        spread = share * size
+        tried = replace(problem, start_sd=spread, precision=equal_shares(spread, counts))
+        search = tried.search()
+        left = max(search.g.square - search.path(tried.max_terms)[-1].gain, 1e-12 * search.g.square)
+        volume = sum(np.log1p(np.maximum(v, 0.0) * spread**2 / len(v)).sum() for v in values)
+        score = search.g.count * np.log(left / search.g.count) + volume
+        if score < least:
+            best, least = tried, score
+    return best
+
+
+def _criterion(problem: Problem, g: Gram, effective: float, terms: Terms) -> float:
+    """Extended Bayesian criterion (Chen & Chen, Biometrika 95, 2008) at the effective number of readings."""
+    left = max(g.square - terms.gain, 1e-12 * g.square) / g.count
+    price = np.log(effective) * problem.numbers(terms) + 2 * len(terms) * np.log(len(problem.families.count))
+    return float(effective * np.log(left) + price)
+
+
+def _left_out(
+    problem: Problem, folds: Sequence[tuple[Ints, Search]], whole: Sequence[Terms], sizes: int
+) -> Array:
+    """Mean squared error (sizes, B) of the free run on each block.
+
+    Each fold searches on its own. Where its readings themselves prefer the set of that size that was found on
+    all of them, that set stands: that a search on less misses it says nothing against the size.
+
+    Args:
+        whole: sets found on everything.
+    """
+    paths = [_better(search, search.path(len(problem.always) + sizes - 1), whole) for _, search in folds]
+    rows = min(len(path) for path in paths)
+    errors = np.full((rows, problem.blocks.count), np.nan)
+    for (fold, _), path in zip(folds, paths, strict=True):
+        for row in range(min(rows, sizes)):
+            _missed(problem, path[row], fold, errors[row])
+    return errors[:, np.isfinite(errors).all(axis=0)]
+
+
+def _better(search: Search, path: Sequence[Terms], whole: Sequence[Terms]) -> list[Terms]:
+    """Of each size the set that takes more off: the own one, or one found elsewhere and refined here."""
+    others = {len(one): one for one in whole}
+    found = []
+    for one in path:
+        if other := others.get(len(one)):
+            refined = search.refined(other.family, other.place, other.pole)
+            one = refined if refined.gain > one.gain else one
+        found.append(one)
+    return found
+
+
+def _missed(problem: Problem, terms: Terms, fold: Ints, errors: Array) -> None:
+    """Fill in the mean squared error (B,) of the free run on the blocks of a fold."""
+    blocks = problem.blocks
+    for i in dict.fromkeys(blocks.recording[fold].tolist()):
+        left = problem.readings[i] - free_run(problem, terms, i)
+        for b in fold[blocks.recording[fold] == i]:
+            mine = left[(blocks.of[i] == b) & np.isfinite(left)]
+            if len(mine):
+                errors[b] = max(float(np.mean(mine**2)), 1e-12)
+
+
+def free_run(problem: Problem, terms: Terms, i: int) -> Array:
+    """Prediction (R,) of a trajectory, zeroed on its first reading alone.
+
+    The same Bayesian step as `fitting.predict_recording`: the masses in use share what the first reading
+    says.
+    """
+    readings = problem.readings[i]
+    predicted = problem.columns[i] @ on_grid(terms, problem.families)
+    places = np.unique(terms.place[problem.curved(terms)])
+    first = np.flatnonzero(np.isfinite(readings))
+    if not len(places) or not len(first):
+        return np.asarray(predicted)
+    low = np.minimum(places.astype(int), problem.nuisance[i].shape[1] - 2)
+    share = places - low
+    decays = (1 - share) * problem.nuisance[i][:, low] + share * problem.nuisance[i][:, low + 1]
+    decay = decays[first[0]]
+    gain = decay / (decay @ decay + problem.start_sd**-2.0)
+    return np.asarray(predicted + decays @ gain * (readings[first[0]] - predicted[first[0]]))
+
+
+def _costs(problem: Problem, terms: Terms) -> tuple[float, tuple[float, ...]]:
+    """rms on what was left out, and the share by which it grows without each term."""
+    sets = [None, *range(len(problem.always), len(terms))]
+    errors = np.full((len(sets), problem.blocks.count), np.nan)
+    for fold, search in problem.folds():
+        whole = search.refined(terms.family, terms.place, terms.pole)
+        for row, k in zip(errors, sets, strict=True):
+            _missed(problem, whole if k is None else search.without(whole, k), fold, row)
+    rms = np.sqrt(np.nanmean(errors, axis=1))
+    unknown = (float("nan"),) * len(problem.always)
+    return float(rms[0]), unknown + tuple((rms[1:] / rms[0] - 1).tolist())
+
+
+def stability(problem: Problem, terms: Terms) -> tuple[float, ...]:
+    """Share of block bootstraps whose set of the same size has a term of the same family."""
+    kept: Counter[int] = Counter()
+    for weights in bootstraps(problem.blocks.count, problem.bootstraps, problem.seed):
+        kept.update(set(problem.search(weights).path(len(terms))[-1].members))
+    return tuple(kept[int(f)] / max(problem.bootstraps, 1) for f in terms.family)

@@ -1,0 +1,56 @@
+"""What an experiment file says about single terms (keep, forbid, bounds), matched to the terms of a
+library.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from discovery.errors import UserError
+from discovery.sparse.options import SparseOptions
+from discovery.terms import Name, parse, substitute, text
+
+
+class UnknownTermError(UserError):
+    """A term that a library does not have; another form of a model may."""
+
+
+def matched(
+    options: SparseOptions, offered: Sequence[str], path: Path, aliases: Mapping[str, str] | None = None
+) -> SparseOptions:
+    """The options with keep, forbid and bounds written as the library writes its terms.
+
+    A temperature goes into a library as its difference from the room; its own name stands for that, too.
+
+    Args:
+        offered: terms of the library.
+        path: of the campaign, for messages.
+        aliases: further names, as {"y": "E_Y0C"}.
+
+    Raises:
+        UnknownTermError: a term that the library does not have.
+    """
+    names = {alias: Name(name) for alias, name in (aliases or {}).items()}
+
+    def terms_of(word: str, key: str) -> list[str]:
+        said = text(substitute(parse(word, f"{key} of the discovery"), names))
+        found = [one for one in offered if one == said] or [o for o in offered if o.startswith(f"{said} - ")]
+        if not found and not (key == "forbid" and options.form == "auto"):
+            raise UnknownTermError(
+                f"{path}: the discovery has '{word}' under {key}, which is no term of its library; write it "
+                f"as it stands there: {', '.join(dict.fromkeys(offered))}"
+            )
+        return found
+
+    bounds = {term: ends for word, ends in options.bounds.items() for term in terms_of(word, "bounds")}
+    keep = tuple(term for word in options.keep for term in terms_of(word, "keep"))
+    forbid = tuple(term for word in options.forbid for term in terms_of(word, "forbid"))
+    return options.model_copy(update={"bounds": bounds, "keep": keep, "forbid": forbid})
+
+
+def kept(labels: Mapping[str, str], options: SparseOptions, path: Path) -> list[str]:
+    """Coefficients, of those with labels "state: term", that the options keep. Raises UnknownTermError."""
+    terms = {name: label.split(": ", 1)[1] for name, label in labels.items()}
+    stay = matched(options.model_copy(update={"bounds": {}, "forbid": ()}), [*terms.values()], path).keep
+    return [name for name, term in terms.items() if term in stay]

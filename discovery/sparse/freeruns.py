@@ -1,0 +1,57 @@
+"""Free runs on what a fit has not seen: how far off they are, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import Grid
+from discovery.dynamics.system import predict
+from discovery.errors import RunsAwayError
+from discovery.fitting import Fit, predict_recording
+from discovery.sparse.folds import make_folds
+from discovery.sparse.ratedata import RateData, has_reading
+from discovery.sparse.rates import masked
+
+Array = NDArray[np.float64]
+FitOf = Callable[[Array, Mapping[str, Grid]], Fit]  # weights of the blocks (B,), grids of what may be seen
+
+RAN_AWAY = 1e12  # instead of the squared error of a model that runs away
+
+
+def left_out(data: RateData, fit_of: FitOf, whole: bool = True) -> Array:
+    """Mean squared error (B,) of the free run on each block, over outputs, by fits that have not seen its
+    fold.
+
+    Args:
+        fit_of: makes a fit without a fold.
+        whole: leave whole recordings out, where there are several.
+    """
+    blocks, noise = data.blocks, np.array(data.size)
+    errors = np.full(blocks.count, np.nan)
+    for fold in make_folds(blocks, whole):
+        keep = {r: ~np.isin(block, fold) for r, block in zip(data.recordings, blocks.of, strict=True)}
+        train = {r: masked(data.grids[r], keep[r]) for r in data.recordings if keep[r].any()}
+        weights = np.ones(blocks.count)
+        weights[fold] = 0.0
+        try:
+            fit = fit_of(weights, train)
+            trajectories = {t.system.grid.recording: t for t in fit.trajectories}
+            for i, r in enumerate(data.recordings):
+                mine = [b for b in fold if blocks.recording[b] == i]
+                if not mine:
+                    continue
+                trajectory = trajectories.get(r) or predict_recording(
+                    fit.model, data.campaign, r, data.outputs, fit.noise.white, data.grids[r]
+                )
+                left = (data.grids[r].readings - predict(trajectory)) / noise
+                for b in mine:
+                    here = left[blocks.of[i] == b] ** 2
+                    errors[b] = np.nanmean(here) if np.isfinite(here).any() else np.nan
+        except RunsAwayError:  # a sparse model that runs away is a bad model
+            errors[fold] = np.inf
+    # a block without a reading says nothing: it must not tell the sizes apart
+    silent = np.array([not has_reading(data, b) for b in range(blocks.count)])
+    return np.where(np.isfinite(errors), errors, np.where(silent, 1.0, RAN_AWAY))

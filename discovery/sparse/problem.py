@@ -1,0 +1,108 @@
+"""A sparse regression of one output on several trajectories: everything over its noise, ready to be
+searched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.sparse.folds import Blocks, Ints, make_folds
+from discovery.sparse.gram import Gram, gram, project_out, total
+from discovery.sparse.pursuit import POINTS
+from discovery.sparse.search import Families, Search, Terms
+
+Array = NDArray[np.float64]
+
+WHOLE = 4  # trajectories from which whole ones are left out; of fewer a quarter of each
+
+
+@dataclass(frozen=True)
+class Problem:
+    """readings = columns theta + nuisance delta + noise, by trajectory; delta has a normal prior.
+
+    The nuisance is what is left of unknown start values. It is of one trajectory each, and is taken out of
+    the normal equations of every trajectory before anything is searched.
+    """
+
+    columns: tuple[Array, ...]  # (R, M) each
+    nuisance: tuple[Array, ...]  # (R, m) each
+    precision: tuple[Array, ...]  # (m,) each: inverse variances of delta, over the noise
+    readings: tuple[Array, ...]  # (R,) each, NaN: not read
+    blocks: Blocks
+    families: Families
+    always: Ints  # families that are in every set
+    max_terms: int  # with those of `always`
+    start_sd: float = 1.0  # spread of a start value over the noise
+    tolerance: float = 1.0  # standard errors by which a sparser set may be worse on what was left out
+    bootstraps: int = 0
+    seed: int = 0
+
+    @cached_property
+    def grams(self) -> tuple[dict[int, Gram], ...]:
+        """Normal equations by trajectory and block, columns [library, nuisance]."""
+        found = []
+        for x, d, y, block in zip(self.columns, self.nuisance, self.readings, self.blocks.of, strict=True):
+            rows, known = np.column_stack([x, d]), np.isfinite(y)
+            mine = {int(b): known & (block == b) for b in np.unique(block)}
+            found.append({b: gram(rows[one], y[one]) for b, one in mine.items()})
+        return tuple(found)
+
+    def pooled(self, weights: Array | None = None) -> Gram:
+        """Normal equations of the library, the nuisance taken out; `weights` (B,) says how often a block
+        counts.
+        """
+        weights = np.ones(self.blocks.count) if weights is None else weights
+        parts = []
+        for blocks, precision in zip(self.grams, self.precision, strict=True):
+            used = [b for b in blocks if weights[b] > 0]
+            if used:
+                whole = total([blocks[b] for b in used], [weights[b] for b in used])
+                starts = np.arange(self.families.columns, len(whole.vector))
+                parts.append(project_out(whole, starts, precision) if len(starts) else whole)
+        return total(parts)
+
+    def search(self, weights: Array | None = None) -> Search:
+        """Moves between sets on the pooled normal equations."""
+        return Search(self.pooled(weights), self.families, self.always)
+
+    def folds(self) -> list[tuple[Ints, Search]]:
+        """What is left out in each fold, and the search on the rest."""
+        found = []
+        for fold in make_folds(self.blocks, len(self.columns) >= WHOLE):
+            weights = np.ones(self.blocks.count)
+            weights[fold] = 0.0
+            found.append((fold, self.search(weights)))
+        return found
+
+    def curved(self, terms: Terms) -> NDArray[np.bool_]:
+        """Which terms have a time constant."""
+        return np.asarray(self.families.count[terms.family] >= POINTS)
+
+    def numbers(self, terms: Terms) -> int:
+        """Numbers that a set holds: coefficients and time constants."""
+        return len(terms) + len(set(terms.pole[self.curved(terms)].tolist()))
+
+    def residuals(self, theta: Array) -> list[Array]:
+        """What coefficients (M,) and the nuisance leave of the readings of each trajectory."""
+        left = []
+        for x, d, y, precision in zip(
+            self.columns, self.nuisance, self.readings, self.precision, strict=True
+        ):
+            known = np.isfinite(y)
+            rest, decays = (y - x @ theta)[known], d[known]
+            if decays.size:
+                rest = rest - decays @ np.linalg.solve(
+                    decays.T @ decays + np.diag(precision), decays.T @ rest
+                )
+            left.append(rest)
+        return left
+
+
+def equal_shares(start_sd: float, counts: Sequence[int]) -> tuple[Array, ...]:
+    """Precisions of nuisances (m,) that share the variance of a start value equally."""
+    return tuple(np.full(m, m / start_sd**2) for m in counts)

@@ -1,0 +1,229 @@
+"""The search for a sparse set of terms on normal equations: sets of every size, poles shared where that is
+cheaper.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.sparse import pursuit
+from discovery.sparse.gram import RIDGE, Gram
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+_EXCHANGES = 10  # of one member of a set, at most, before the next size
+_EDGE = 0.01  # of the grid's spacing
+_TRIES = 6  # entries that run into a term of their own family before growth ends
+
+
+@dataclass(frozen=True)
+class Families:
+    """How columns belong together: first column and number of columns of each family, bounds of
+    coefficients.
+    """
+
+    start: Ints  # (F,)
+    count: Ints
+    low: Array
+    high: Array
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
+        return int(self.count.sum())
+
+    def without(self, barred: Sequence[int]) -> Families:
+        """The same with some families that may not enter."""
+        low, high = self.low.copy(), self.high.copy()
+        low[list(barred)], high[list(barred)] = 0.0, 0.0
+        return replace(self, low=low, high=high)
+
+
+def plain(columns: int, low: Array | None = None, high: Array | None = None) -> Families:
+    """Columns that stand where they are, each a family of its own."""
+    free = np.full(columns, np.inf)
+    return Families(
+        np.arange(columns),
+        np.ones(columns, int),
+        -free if low is None else low,
+        free if high is None else high,
+    )
+
+
+@dataclass(frozen=True)
+class Terms:
+    """A set: family and place of each term, which terms share a place, coefficients, what it takes off the
+    cost.
+    """
+
+    family: Ints  # (n,)
+    place: Array
+    pole: Ints
+    theta: Array
+    gain: float
+
+    def __len__(self) -> int:
+        return len(self.family)
+
+    @property
+    def members(self) -> tuple[int, ...]:
+        """Families in use, in order."""
+        return tuple(sorted(int(f) for f in self.family))
+
+
+class Search:
+    """Moves between sets on the normal equations of one output."""
+
+    def __init__(self, g: Gram, families: Families, always: Ints) -> None:
+        self.g, self.families, self.always = g, families, np.asarray(always, int)
+        f = families
+        self._problem = (np.ascontiguousarray(g.matrix), np.ascontiguousarray(g.vector), f.start, f.count)
+
+    def refined(self, family: Ints, place: Array, pole: Ints | None = None) -> Terms:
+        """The terms at their best places near `place`."""
+        pole = np.arange(len(family)) if pole is None else pole
+        where = (family, place, pole, self.families.low, self.families.high)
+        found, theta, gain = pursuit.refine(*self._problem, *where)
+        return Terms(family, found, pole, theta, gain)
+
+    def of(self, family: Ints) -> Terms:
+        """The terms of some families without time constants."""
+        return self.refined(family, np.zeros(len(family)))
+
+    def grown(self, terms: Terms) -> Terms | None:
+        """The set with the term that takes most off, all refined; None where none may enter.
+
+        A new term that runs into one of its own family was that one's other half: its place is barred. Two
+        old ones that run into each other once the new one is there were standing in for it: they become
+        one.
+        """
+        f, size = self.families, len(terms)
+        barred = np.zeros(f.columns, dtype=bool)
+        for _ in range(_TRIES):
+            where = (terms.family, terms.place, f.low, f.high, barred)
+            family, place = pursuit.entry(*self._problem, *where)
+            if family < 0:
+                return None
+            found = self.refined(np.append(terms.family, family), np.append(terms.place, float(place)))
+            pair = together(found)
+            if pair is None:
+                if len(found) > size:
+                    return found
+                terms = found
+            elif len(found) - 1 in pair:
+                barred[f.start[family] + np.arange(max(place - 3, 0), min(place + 4, f.count[family]))] = True
+            else:
+                terms = self.without(found, max(pair))
+        return None
+
+    def ended(self, terms: Terms) -> list[int]:
+        """Families whose time constant ended at the slow end of the grid: there they only add up their
+        input.
+        """
+        last = self.families.count[terms.family] - 1
+        return [int(f) for f in terms.family[(last > 0) & (terms.place > last - _EDGE)]]
+
+    def without(self, terms: Terms, k: int) -> Terms:
+        """The set without its term k, refined."""
+        rest = np.arange(len(terms)) != k
+        _, pole = np.unique(terms.pole[rest], return_inverse=True)
+        return self.refined(terms.family[rest], terms.place[rest], pole)
+
+    def shrunk(self, terms: Terms) -> Terms:
+        """The set without the term whose loss costs least: theta_j^2 / (S^-1)_jj at the places as they are.
+
+        A coefficient at a bound of zero costs nothing and goes first.
+        """
+        n, f, kept = len(terms), self.families, len(self.always)
+        work = tuple(np.empty((n, k)) for k in (f.columns, pursuit.POINTS, pursuit.POINTS))
+        S = np.empty((n, n))
+        where = (terms.family, terms.place, f.low, f.high)
+        theta, _ = pursuit.solved(*self._problem, *where, *work, np.empty(n, int), S)  # type: ignore[call-arg]
+        scale = np.sqrt(np.diag(S))
+        inverse = np.linalg.inv(S / np.outer(scale, scale) + RIDGE * np.eye(n))
+        rise = (theta * scale) ** 2 / np.diag(inverse)
+        return self.without(terms, kept + int(np.argmin(rise[kept:])))
+
+    def path(self, size: int) -> list[Terms]:
+        """Sets of growing size, from `always` alone up to `size` terms.
+
+        The term that takes most off enters, all places are refined, weak members are exchanged; then the
+        largest set (all columns, where none has a time constant) shrinks again. The better set of each size
+        stays: growth finds first what two others imitate together, shrinking keeps what growth has a proxy
+        for.
+        """
+        terms = self.of(self.always)
+        found = {len(terms): terms}
+        while len(terms) < size:
+            more = self.grown(terms)
+            if more is None:
+                break
+            terms = self._exchanged(more)
+            found[len(terms)] = terms
+        if self.families.count.max() == 1:
+            rest = np.setdiff1d(np.flatnonzero(np.diag(self.g.matrix) > 0), self.always)
+            terms = self.of(np.concatenate([self.always, rest]))
+        while len(terms) > len(self.always) + 1:
+            terms = self.shrunk(terms)
+            known = found.get(len(terms))
+            better = known is None or terms.gain > known.gain
+            if better and len(terms) <= size and together(terms) is None:
+                found[len(terms)] = terms
+        return [found[n] for n in sorted(found)]
+
+    def _exchanged(self, terms: Terms) -> Terms:
+        for _ in range(_EXCHANGES):
+            if len(terms) <= len(self.always) + 1:
+                break
+            other = self.grown(self.shrunk(terms))
+            if other is None or other.gain <= terms.gain * (1 + 1e-9):
+                break
+            terms = other
+        return terms
+
+    def shared(self, terms: Terms, worth: Callable[[Terms], float]) -> Terms:
+        """The set with places shared by terms that do as well at one: `worth` falls as long as pairs are
+        joined.
+        """
+        curved = self.families.count[terms.family] >= pursuit.POINTS
+        while True:
+            poles = sorted({int(q) for q in terms.pole[curved]})
+            tried = []
+            for a, b in combinations(poles, 2):
+                pole = np.where(terms.pole == b, a, terms.pole)
+                mine = (pole == a) & curved
+                if len(set(terms.family[mine])) < mine.sum():
+                    continue  # two terms of one family are two masses
+                _, pole = np.unique(pole, return_inverse=True)
+                place = np.where(mine, terms.place[mine].mean(), terms.place)
+                tried.append(self.refined(terms.family, place, pole))
+            best = min(tried, key=worth, default=terms)
+            if not worth(best) < worth(terms):
+                return terms
+            terms = best
+
+
+def on_grid(terms: Terms, families: Families) -> Array:
+    """The coefficients (M,) that the terms are on the columns of the grid."""
+    theta = np.zeros(families.columns)
+    w, slopes = np.empty(pursuit.POINTS), np.empty(pursuit.POINTS)
+    for f, p, value in zip(terms.family, terms.place, terms.theta, strict=True):
+        count = families.count[f]
+        first = families.start[f] + pursuit.weights(p, count, w, slopes)
+        points = pursuit.POINTS if count >= pursuit.POINTS else 1
+        theta[first : first + points] += value * w[:points]
+    return theta
+
+
+def together(terms: Terms) -> tuple[int, int] | None:
+    """Two terms of one family that have run into each other."""
+    for k, j in combinations(range(len(terms)), 2):
+        if terms.family[k] == terms.family[j] and abs(terms.place[k] - terms.place[j]) < pursuit.APART:
+            return k, j
+    return None

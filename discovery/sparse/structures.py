@@ -1,0 +1,157 @@
+"""What stands behind a measured output: its own state alone, its rate as a hidden state, or a body that
+empties into it.
+
+    own        y' = sum of terms in y and the inputs
+    rate       y' = v,  v' = sum of terms in y, v and the inputs            a mass on a spring, a resonant
+    circuit upstream   y' = flow(h) - flow(y),  h' = terms in the inputs - flow(h)  a tank above a tank, a
+    body behind a body
+
+What leaves the body upstream enters the output: that fixes the scale in which the hidden state counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.models import Model, Parameter, State
+from discovery.models.model import TIME_UNITS
+from discovery.sparse.laws import laws, products
+from discovery.sparse.ratedata import RateData
+from discovery.sparse.rates import Candidate
+from discovery.terms import Number, Term, parse
+
+Array = NDArray[np.float64]
+
+WORDS = ("linear", "square", "cubic", "drag", "sqrt")
+FREE, UP, DOWN = (-np.inf, np.inf), (0.0, np.inf), (-np.inf, 0.0)
+FINER = 10.0  # times the distance of two readings: quicker rates are not told from steps
+REST = 0.1  # spread of the start of a hidden state, as a share of its size
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A model without its library, the library, and the names that the weak form uses."""
+
+    word: str
+    model: Model
+    candidates: tuple[Candidate, ...]
+    order: int = 1  # of the derivative that the library makes
+    rate: str | None = None  # hidden state that is the rate of the output
+
+
+def own(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str, stable: bool) -> Structure:
+    """Terms in the rates of the outputs themselves."""
+    states = {y: _measured(data, y, unit) for y in outputs}
+    inputs = _inputs(data, outputs)
+    found = []
+    for y in outputs:
+        others = [o for o in outputs if o != y and "coupling" in words]
+        seen = _seen(data, y)
+        found += [Candidate(y, parse("1"))] * ("linear" in words)
+        found += [Candidate(y, parse(u)) for u in (*inputs, *others) if "linear" in words]
+        found += [_law(y, y, one, stable) for one in laws(words, y, seen)]
+        found += [Candidate(y, parse(one)) for one in products(words, [y, *others, *inputs])]
+        found += _expressions(words, y, {"y": y})
+    return Structure("own", Model("own", {}, states, (), {}, unit), tuple(found))
+
+
+def rate(data: RateData, output: str, words: Sequence[str], unit: str, stable: bool) -> Structure:
+    """Terms in the second derivative of an output."""
+    v = f"{output}_rate"
+    measured = _measured(data, output, unit)
+    speed = float(np.nanstd(np.diff(_seen(data, output)))) or 1.0
+    per = 1.0 / TIME_UNITS[unit]
+    states = {
+        output: measured,
+        v: State(v, f"{measured.unit}/{unit}", None, Number(0.0), REST * speed, per),
+    }
+    terms = (Term(f"{v} moves {output}", output, parse(v)),)
+    inputs = _inputs(data, [output])
+    found = [Candidate(v, parse(u)) for u in ("1", *inputs) if "linear" in words]
+    found += [_law(v, output, one, stable) for one in laws(words, output, _seen(data, output))]
+    found += [_law(v, v, one, stable) for one in laws([w for w in words if w not in ("sqrt", "square")], v)]
+    found += [Candidate(v, parse(one)) for one in products(words, [output, v, *inputs])]
+    found += _expressions(words, v, {"y": output, "rate": v})
+    return Structure("rate", Model("rate", {}, states, terms, {}, unit), tuple(found), 2, v)
+
+
+def upstream(
+    data: RateData, output: str, words: Sequence[str], unit: str, level: Array | None = None
+) -> Structure:
+    """Flows out of a hidden body into an output, and out of the output.
+
+    Args:
+        level: values that the hidden state takes, where a first fit knows them.
+    """
+    h, start = f"{output}_up", f"{output}_up_start"
+    measured = _measured(data, output, unit)
+    seen = _seen(data, output)
+    states = {
+        output: measured,
+        h: State(h, measured.unit, None, parse(start), REST * float(np.std(seen)), 1.0 / TIME_UNITS[unit]),
+    }
+    known = (
+        seen if level is None else level
+    )  # where none of the readings tells the start, it is one of its values
+    parameters = {start: Parameter(float(known[0]), measured.unit, float(known.min()), float(known.max()))}
+    inputs = _inputs(data, [output])
+    found = [Candidate(h, parse(u)) for u in ("1", *inputs) if "linear" in words]
+    most = quickest(data, unit)
+    found += [_flow(output, one, most, h) for one in laws(words, h, level)]
+    found += [_flow(output, one, most) for one in laws(words, output, seen)]
+    found += [_flow(h, one, most) for one in laws([w for w in words if w == "threshold"], h, level)]
+    found += _expressions(words, output, {"y": output, "up": h})
+    return Structure("upstream", Model("upstream", parameters, states, (), {}, unit), tuple(found))
+
+
+def quickest(data: RateData, unit: str) -> float:
+    """Greatest rate constant [1/unit] that readings can show: a tenth of their distance."""
+    steps = [float(np.median(np.diff(g.time[g.read]))) for g in data.grids.values() if len(g.read) > 1]
+    return FINER * TIME_UNITS[unit] / min(steps)
+
+
+def _flow(into: str, law: str, most: float, source: str | None = None) -> Candidate:
+    """A flow into a state and out of its source, or out of the state."""
+    return Candidate(into, parse(law), 0.0 if source else -most, most if source else 0.0, source=source)
+
+
+def _law(into: str, variable: str, law: str, stable: bool) -> Candidate:
+    """A law of a state; its linear part draws it back where the model must be stable."""
+    return Candidate(into, parse(law), *(DOWN if stable and law == variable else FREE))
+
+
+def _expressions(words: Sequence[str], into: str, aliases: Mapping[str, str]) -> list[Candidate]:
+    """Expressions of the user; `y`, `rate` and `up` stand for the states."""
+    from discovery.sparse.options import FAMILIES
+    from discovery.terms import Name, substitute
+
+    replaced = {alias: Name(name) for alias, name in aliases.items()}
+    return [Candidate(into, substitute(parse(w), replaced)) for w in words if w not in FAMILIES]
+
+
+def _measured(data: RateData, output: str, unit: str) -> State:
+    """An output as a state that starts at its first reading."""
+    return State(output, data.campaign.channels[output].unit, scale=1.0 / TIME_UNITS[unit])
+
+
+def _inputs(data: RateData, outputs: Sequence[str]) -> list[str]:
+    return [name for name in next(iter(data.grids.values())).samples if name not in outputs]
+
+
+def _seen(data: RateData, output: str) -> Array:
+    column = data.outputs.index(output)
+    series = np.concatenate([data.grids[r].readings[:, column] for r in data.recordings])
+    return np.asarray(series[np.isfinite(series)])
+
+
+def started(structure: Structure, coefficients: Mapping[int, float]) -> Structure:
+    """The structure with start values of its candidates, by their place."""
+    found = [
+        replace(c, start=float(np.clip(coefficients.get(i, 0.0), c.low, c.high)))
+        for i, c in enumerate(structure.candidates)
+    ]
+    return replace(structure, candidates=tuple(found))

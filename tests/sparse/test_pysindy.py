@@ -1,0 +1,125 @@
+"""PySINDy is the frame: our library and optimiser in a SINDy of the user's, and his optimiser in ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pysindy
+import pytest
+from numpy.typing import NDArray
+
+from discovery.experiment.form import ExperimentForm
+from discovery.files import read_toml
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.sparse import SparseOptions, discover
+from discovery.sparse.library import FilteredInputs
+from discovery.sparse.optimiser import SparseSearch
+from discovery.sparse.plain import fit_plain, settings
+
+Array = NDArray[np.float64]
+STEP, COUNT = 120.0, 1200
+
+
+def loads(seed: int) -> Array:
+    rng = np.random.default_rng(seed)
+    return np.column_stack([np.repeat(rng.choice([0.0, 100.0, 250.0], 40), 30) for _ in range(3)])
+
+
+def lag(u: Array, tau: float) -> Array:
+    decay, s, out = np.exp(-STEP / tau), 0.0, []
+    for one in u:
+        out.append(s)
+        s = one + decay * (s - one)
+    return np.array(out)
+
+
+def tables(seed: int) -> tuple[Array, Array]:
+    """E_Y = 0.02 of P0 at 3600 s; E_Z = 0.03 of P1 at 7200 s and 0.01 of P2 at 1800 s; 0.1 um."""
+    u = loads(seed)
+    y = np.column_stack(
+        [0.02 * lag(u[:, 0], 3600.0), 0.03 * lag(u[:, 1], 7200.0) + 0.01 * lag(u[:, 2], 1800.0)]
+    )
+    noise = 0.1 * np.random.default_rng(seed + 100).standard_normal(y.shape)
+    return np.column_stack([STEP * np.arange(COUNT), u]), y + noise
+
+
+def made() -> Campaign:
+    channels = {f"P{k}": Channel(f"P{k}", "heat load", "W", None, "held") for k in range(3)}
+    channels |= {y: Channel(y, "error", "um", 0.1, "linear") for y in ("E_Y", "E_Z")}
+    recordings = {}
+    for name, seed in (("a", 0), ("b", 1)):
+        x, y = tables(seed)
+        values = {f"P{k}": x[:, k + 1] for k in range(3)} | {"E_Y": y[:, 0], "E_Z": y[:, 1]}
+        recordings[name] = Recording(name, x[:, 0], values)
+    return Campaign("masses", channels, recordings, Path("masses"))
+
+
+def test_our_library_and_search_serve_in_a_sindy_of_the_user() -> None:
+    (x_a, y_a), (x_b, y_b) = tables(0), tables(1)
+    library = FilteredInputs(["time", "P0", "P1", "P2"])
+    model = pysindy.SINDy(optimizer=SparseSearch(library), feature_library=library)
+    model.fit([x_a, x_b], t=1, x_dot=[y_a, y_b])
+    used = [
+        {name.split(",")[0] for name, c in zip(model.get_feature_names(), row, strict=True) if c}
+        for row in model.coefficients()
+    ]
+    assert used[0] - {"1"} == {"lag(P0"}
+    assert used[1] - {"1"} == {"lag(P1", "lag(P2"}
+    assert model.score(x_a, t=1, x_dot=y_a) > 0.99
+
+
+def test_an_optimiser_of_pysindy_serves_with_our_library() -> None:
+    x, y = tables(0)
+    library = FilteredInputs(["time", "P0", "P1", "P2"], time_constants=(1800.0, 7200.0))
+    model = pysindy.SINDy(optimizer=pysindy.STLSQ(threshold=1e-3, alpha=1e-6), feature_library=library)
+    model.fit([x], t=1, x_dot=[y])
+    assert model.score(x, t=1, x_dot=y) > 0.95
+
+
+def test_every_discovery_is_made_by_pysindy(monkeypatch: pytest.MonkeyPatch) -> None:
+    optimisers: list[Any] = []
+    original = pysindy.SINDy.fit
+
+    def spied(self: Any, *given: Any, **named: Any) -> Any:
+        optimisers.append(self.optimizer)
+        return original(self, *given, **named)
+
+    monkeypatch.setattr(pysindy.SINDy, "fit", spied)
+    found = discover(made(), ["a", "b"], ["E_Y", "E_Z"], SparseOptions(bootstraps=0))
+    assert [type(one) for one in optimisers] == [SparseSearch, SparseSearch]
+    kept = [{k.split(",")[0] for k in g["kept"]} - {"1"} for g in found.report["groups"]]
+    assert kept == [{"lag(P0"}, {"lag(P1", "lag(P2"}]
+    assert all(cost > 0 for g in found.report["groups"] for cost in g["costs"].values())
+    for name, p in found.model.parameters.items():
+        assert p.low is not None
+        assert p.high is not None
+        assert not p.low <= 0 <= p.high, name
+
+
+def test_the_demonstrations_reach_it() -> None:
+    for path in Path("experiments").glob("*.toml"):
+        if path.name in ("nmv5000.toml", "tclab.toml", "tanks.toml"):
+            kinds = [entry.kind for entry in read_toml(path, ExperimentForm).models.values()]
+            assert {"sindy", "pysindy", "regression"} <= set(kinds)
+
+
+def test_constraints_are_lines_of_the_experiment() -> None:
+    def terms(**said: Any) -> list[str]:
+        options = SparseOptions.model_validate({"bootstraps": 0, "form": "masses", **said})
+        return list(discover(made(), ["a", "b"], ["E_Z"], options).report["groups"][0]["kept"])
+
+    assert not any("P2" in one for one in terms(forbid=["P2"]))
+    assert not any("P1" in one for one in terms(bounds={"P1": [float("-inf"), 0.0]}))
+    assert any("P0" in one for one in terms(keep=["P0"]))
+
+
+@pytest.mark.parametrize("form", ["plain", "weak"])
+def test_pysindy_as_its_users_take_it_finds_a_single_mass(form: str) -> None:
+    """E_Y is of the first order in its own rate, what PySINDy can say."""
+    fit, setting, report = fit_plain(made(), ["a", "b"], ["E_Y"], ["P0", "P1", "P2"], settings(form))
+    assert (setting.weak, report["form"]) == (form == "weak", form)
+    readings = np.concatenate([t.system.grid.readings for t in fit.trajectories])
+    left = np.concatenate(list(fit.residuals().values()))
+    assert np.sqrt(np.mean(left**2)) < 0.5 * np.std(readings)
