@@ -30,22 +30,18 @@ from discovery.models.modelfile import read_model
 from discovery.recordings import Campaign, Recording, load_campaign
 from discovery.runtime.hypotheses import compare
 from discovery.runtime.update import revision_of
-from discovery.virtual.effects import Request
 from discovery.virtual.machine import Machine
-from discovery.virtual.record import Order, take
+from discovery.virtual.nmv5000.plant import five_axis
+from discovery.virtual.record import Order, Request, take
 
 DATA = Path(__file__).parents[1] / "datasets" / "nmv5000"
 ERRORS = ("E_Y0C", "E_Z0T", "E_R0T", "E_A0C")
 Values = dict[str, NDArray[np.float64]]
 
 
-def worn(share: float) -> Machine:
+def worn(share: float) -> tuple[Request, ...]:
     """Losses that reach the bodies, as a share of those of a new machine."""
-    fresh = Machine()
-    return fresh._replace(
-        friction_share=tuple(share * s for s in fresh.friction_share),
-        motor_share=tuple(share * s for s in fresh.motor_share),
-    )
+    return tuple(Request("wear", 1.0 - share, (body,)) for body in ("c_body_1", "c_body_2"))
 
 
 def recorded(
@@ -63,7 +59,7 @@ def recorded(
     """Recordings of a machine; `readings`: so many a day, None: all (every 10 to 15 min)."""
     found = {}
     for k in range(count):
-        order = Order(f"r{k}", cycle, seed + k, hours, machine=plant or Machine(), effects=effects)
+        order = Order(f"r{k}", cycle, seed + k, hours, machine=plant or five_axis(), effects=effects, age=1.0)
         columns = take(order).columns
         values = {name: series.copy() for name, series in columns.items() if name != "time"}
         if readings is not None:
@@ -105,8 +101,8 @@ def cases(exported: Exported, campaign: Campaign, seed: int) -> None:
     def warm(values: Values) -> None:
         values["T_env"] = values["T_env"] + 1.5
 
-    fresh = Machine()
-    fan = fresh._replace(air=tuple(a * 1.6 for a in fresh.air))
+    fresh = five_axis()
+    fan = fresh.scaled("air", 1.6)
     gap = (Request("flooded_gap", 25.0, ("c_body_1", "b_body_1")),)
     hysteresis = (Request("cooling_hysteresis", 1.5, ("c_body_2",)),)
     for readings in (None, 8):
@@ -116,7 +112,7 @@ def cases(exported: Exported, campaign: Campaign, seed: int) -> None:
             ("fan, air +60 %", {"plant": fan}),
             ("room sensor +1.5 K", {"spoil": warm}),
             ("hysteresis 1.5 K", {"effects": hysteresis}),
-            ("wear, losses -10 %", {"plant": worn(0.9)}),
+            ("wear, losses -10 %", {"effects": worn(0.9)}),
         ):
             these = recorded(campaign, 3, 72.0, seed, readings=readings, **options)  # type: ignore[arg-type]
             found = compare(exported, these, list(these.recordings))
@@ -136,9 +132,9 @@ def days(exported: Exported, campaign: Campaign, seed: int, count: int) -> None:
     """Losses fall by 1 % a day."""
     first, since, rows = exported, list[Recording](), []
     for day in range(1, count + 1):
-        whole = recorded(campaign, 1, 24.0, seed + day, plant=worn(1.0 - 0.01 * (day - 1)))
+        whole = recorded(campaign, 1, 24.0, seed + day, effects=worn(1.0 - 0.01 * (day - 1)))
         rows.append((error_left(exported.model, whole), error_left(first.model, whole)))
-        few = recorded(campaign, 1, 24.0, seed + day, plant=worn(1.0 - 0.01 * (day - 1)), readings=8)
+        few = recorded(campaign, 1, 24.0, seed + day, effects=worn(1.0 - 0.01 * (day - 1)), readings=8)
         since.append(replace(few.recordings["r0"], name=f"day_{day}"))
         seen = replace(campaign, recordings={one.name: one for one in since})
         found = compare(exported, seen, list(seen.recordings))

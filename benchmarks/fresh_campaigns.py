@@ -27,7 +27,9 @@ from discovery.experiment.pipeline import starting_model
 from discovery.fitting import fit_model
 from discovery.recordings import load_campaign
 from discovery.virtual.machine import Machine
-from discovery.virtual.nmv5000 import ORDERS
+from discovery.virtual.network import Law
+from discovery.virtual.nmv5000.campaign import ORDERS
+from discovery.virtual.nmv5000.plant import five_axis
 from discovery.virtual.record import write_campaign
 
 EXPERIMENT = Path(__file__).parents[1] / "experiments" / "nmv5000.toml"
@@ -36,26 +38,24 @@ DISCOVERED = ("discovered", "black_box")
 MODELS = (*EQUATIONS, *DISCOVERED)
 HELD_OUT = ("validation", "left_nozzle")
 CRITERIA = ("peak", "mean", "variance")
-SHARES = ("friction_share", "motor_share")
-THERMAL = (
-    *("air", "cooling_ua", "wet_area", "coolant_flow", "tau_bed", "h_still"),
-    *("G_table_c1", "G_c1_c2", "G_c1_b1", "G_c2_b1", "G_b1_b2", "G_b2_bed"),
-    *("M_coulomb", "M_viscous", "iron", "copper", "sump_capacity", "pump_power", "sump_ua"),
-)
+STREAMS = ("supply", "return")  # what the pump moves goes round
 Scores = Mapping[str, Mapping[str, Mapping[str, Any]]]  # recording -> error -> what results.json says
 
 
 def machine(seed: int, spread: float) -> Machine:
-    """The plant with each thermal number times its own factor between 1 - spread and 1 + spread."""
-    rng, fresh = np.random.default_rng([seed, 20]), Machine()
-    drawn: dict[str, Any] = {}
-    for name in (*THERMAL, *SHARES):
-        value = np.asarray(getattr(fresh, name), dtype=float)
-        value = value * rng.uniform(1.0 - spread, 1.0 + spread, value.shape)
-        if name in SHARES:
-            value = value / value.sum()
-        drawn[name] = tuple(value.tolist()) if value.ndim else float(value)
-    return fresh._replace(**drawn)
+    """The plant with each group of laws (air, losses, films, joints, ...) times its own factor between
+    1 - spread and 1 + spread.
+    """
+    rng, fresh = np.random.default_rng([seed, 20]), five_axis()
+    factors = {
+        name: rng.uniform(1.0 - spread, 1.0 + spread)
+        for name in dict.fromkeys(law.name for law in fresh.network.laws if law.name not in STREAMS)
+    }
+
+    def drawn(law: Law) -> Law:
+        return replace(law, size=law.size * factors.get(law.name, 1.0))
+
+    return replace(fresh, network=fresh.network.changed(drawn))
 
 
 def campaign(experiment: Experiment, seed: int, spread: float, folder: Path) -> Experiment:

@@ -9,6 +9,7 @@ that was never off.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +23,8 @@ from discovery.models.modelfile import read_model
 from discovery.recordings import Recording, load_campaign
 from discovery.runtime.compensator import Compensator, Settings
 from discovery.runtime.guards import Reading
-from discovery.virtual.cycles import make_cycle
-from discovery.virtual.measurement import Chain, observe
-from discovery.virtual.plant import simulate
+from discovery.virtual.network import Inputs
+from discovery.virtual.record import Order, take
 
 DATA = Path(__file__).parents[1] / "datasets" / "nmv5000"
 TICK, OFF_AT = 60.0, 24 * 3600.0
@@ -48,17 +48,19 @@ def offsets(exported: Exported, inputs: np.ndarray, gap_s: float, how: str) -> n
     return np.array(found)
 
 
+def power_cut(hours: float, inputs: Inputs) -> Inputs:
+    """Drive and pump stand still for some hours."""
+    off = (inputs["clock"] >= OFF_AT) & (inputs["clock"] < OFF_AT + hours * 3600.0)
+    return {**inputs, **{name: np.where(off, 0.0, inputs[name]) for name in ("speed", "flow", "pump")}}
+
+
 def main() -> None:
     """Print the largest difference from the runtime that was never off, over 24 h after the gap."""
     campaign = load_campaign(DATA / "campaign.toml", only=["fit"])
     model = fit_model(read_model(DATA / "thermobalance.toml"), campaign, ["fit"]).model
     exported = from_document(*open_seal(render(make_document(model, campaign, ["fit"])), "model"), "model")
     for hours in (0.5, 4.0, 16.0, 62.0):
-        cycle = make_cycle("fit", 77, 48.0 + hours)
-        time = np.arange(len(cycle.speed)) * cycle.step_s
-        off = (time >= OFF_AT) & (time < OFF_AT + hours * 3600.0)
-        cycle = replace(cycle, speed=np.where(off, 0.0, cycle.speed), flow=np.where(off, 0.0, cycle.flow))
-        columns = observe(cycle, simulate(cycle), np.random.default_rng(5), Chain())
+        columns = take(Order("gap", "fit", 77, 48.0 + hours, change=partial(power_cut, hours))).columns
         values = {name: series for name, series in columns.items() if name != "time"}
         one = replace(campaign, recordings={"gap": Recording("gap", columns["time"], values)})
         inputs = sampled_inputs(one, "gap", exported.compiled.inputs, TICK)

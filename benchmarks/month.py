@@ -42,11 +42,12 @@ from discovery.runtime.opcua import _tell_jump
 from discovery.runtime.output import Output
 from discovery.runtime.session import Session, header
 from discovery.runtime.shadow import Rule
-from discovery.virtual import physics as laws
-from discovery.virtual.cycles import make_cycle
+from discovery.virtual.log import observe
 from discovery.virtual.machine import Machine
-from discovery.virtual.measurement import Chain, everyday_heat, observe
-from discovery.virtual.plant import simulate
+from discovery.virtual.network import Inputs
+from discovery.virtual.network import times as product
+from discovery.virtual.nmv5000.plant import five_axis
+from discovery.virtual.record import Order, ran
 
 Array = NDArray[np.float64]
 DATA = Path(__file__).parents[1] / "datasets" / "nmv5000"
@@ -124,42 +125,44 @@ def world(plan: Plan, seed: int, *, faults: bool, ageing: bool, lost: float = 0.
     """The virtual machine over the month. `faults`: door, chiller and power cuts, which are physics.
     `lost`: share of the losses that is gone from the beginning; `ageing`: 1 % more every day.
     """
-    machine, chain = Machine(), Chain()
-    cycle = make_cycle("fit", seed, plan.hours)
-    n, step = len(cycle.speed), cycle.step_s
-    at = np.arange(n) * step
-    rng = np.random.default_rng([seed, 5])
-    heat = everyday_heat(rng, n, step, chain)
-    coolant = np.zeros(n)
-    if faults:
-        for f in plan.faults:
+
+    def happens(inputs: Inputs) -> Inputs:
+        u, at = dict(inputs), inputs["clock"]
+        for f in plan.faults if faults else ():
             on = (at >= f.start) & (at < f.end)
             if f.kind == "door":
-                cycle = replace(cycle, air=cycle.air + 2.5 * on)
+                u["T_env"] = u["T_env"] + 2.5 * on
             elif f.kind == "chiller":
-                coolant -= 2.0 * on
+                u["T_set"] = u["T_set"] - 2.0 * on
             elif f.kind == "power":
-                cycle = replace(
-                    cycle, speed=np.where(on, 0.0, cycle.speed), flow=np.where(on, 0.0, cycle.flow)
-                )
-    for i, ua in enumerate(machine.cooling_ua):  # a colder coolant takes so much more heat
-        heat[:, i] += machine.coolant_flow * (1.0 - np.exp(-ua / machine.coolant_flow)) * coolant
-    if ageing or lost:
-        speeds, which = np.unique(cycle.speed, return_inverse=True)
-        friction = np.array([laws.friction_torque(float(v), machine) * v * laws.RPM for v in speeds])[which]
-        motor = np.array([laws.motor_loss(float(v), machine) for v in speeds])[which]
-        for i in range(5):
-            loss = machine.friction_share[i] * friction + machine.motor_share[i] * motor
-            heat[:, i] -= (lost + 0.01 * ageing * at / DAY) * loss
-    run = simulate(cycle, machine, heat=heat)
-    columns = observe(cycle, run, np.random.default_rng([seed, 6]), chain)
+                u |= {name: np.where(on, 0.0, u[name]) for name in ("speed", "flow", "pump")}
+        return u
+
+    order = Order("month", "fit", seed, plan.hours, machine=worn(lost, ageing), change=happens)
+    machine, cycle, run = ran(order)
+    columns = observe(
+        machine, run, cycle.first, cycle.readings, np.random.default_rng([seed, 6]), order.chain
+    )
     known = np.flatnonzero(np.isfinite(columns["T_env"]))
     times = columns["time"][known]
-    inputs = {name: columns[name][known] for name in columns if name not in (*ERRORS, "time")}
-    inputs["T_cool"] = inputs["T_cool"] + np.interp(times, at, coolant)
-    errors = run.errors[np.round(times / step).astype(int)]
-    noise = np.random.default_rng([seed, 7]).normal(0.0, chain.white, errors.shape)
+    inputs = {name: columns[name][known] for name in columns if name not in (*machine.outputs, "time")}
+    index = [machine.outputs.index(name) for name in ERRORS]
+    errors = machine.read(run)[cycle.first + np.round(times / run.step_s).astype(int)][:, index]
+    noise = np.random.default_rng([seed, 7]).normal(0.0, order.chain.white, errors.shape)
     return World(times, inputs, errors, errors + noise)
+
+
+def worn(lost: float, ageing: bool) -> Machine:
+    """A machine whose bodies receive less of the losses: a share is gone, 1 % more a day with `ageing`."""
+    fresh = five_axis()
+
+    def gone(u: Inputs) -> Array:
+        return np.asarray(-lost - 0.01 * ageing * np.maximum(u["clock"], 0.0) / DAY)
+
+    losses = [law for law in fresh.network.laws if law.name.startswith("loss ")]
+    return fresh.plus(
+        [replace(law, name="wear", gate=product(law.gate, gone) if law.gate else gone) for law in losses]
+    )
 
 
 @dataclass
@@ -316,7 +319,7 @@ def live(
 
 def happening_noise(seed: int, shape: tuple[int, ...]) -> Array:
     """The noise of a probe, for errors as an operator reads them."""
-    return np.random.default_rng([seed, 8]).normal(0.0, Chain().white, shape)
+    return np.random.default_rng([seed, 8]).normal(0.0, Order("month").chain.white, shape)
 
 
 def _kill(session: Session) -> None:

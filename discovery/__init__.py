@@ -1,10 +1,11 @@
 """Discovery workbench: models of thermal errors from recordings, and what physics they miss.
 
-    recordings -> terms -> models -> dynamics -> fitting -> evaluation -> effects -> evidence
-        -> diagnosis, design -> sparse -> report, export -> experiment, runtime
+    terms -> recordings -> models -> dynamics -> fitting, effects -> evidence, evaluation, sparse
+        -> diagnosis -> design, report, export -> experiment, runtime
 
-A folder each; an import goes only to the left. `virtual` makes recordings, `challenge` puts the diagnosis to
-the proof, `firsthour` helps a user begin, `commands` holds the verbs of `cli`.
+A folder each; an import goes only to the left (`tests/test_imports.py`). `virtual` makes recordings,
+`challenge` puts the diagnosis to the proof, `firsthour` helps a user begin, `commands` holds the verbs of
+`cli`.
 
 Nothing heavy is imported here: ``import discovery`` takes a few milliseconds; each name below loads what
 it needs.

@@ -154,7 +154,7 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         if [str(c) for c in x.columns] != self.inputs_:
             raise UserError(f"X has the columns {list(x.columns)}, the fit had {self.inputs_}")
         begin = self.first_ if first is None else np.atleast_1d(np.asarray(first, dtype=float))
-        runs = []
+        runs: list[Array] = []
         for name, table in _recordings(x).items():
             runs.append(self._run(name, table, begin if begin.ndim == 1 else begin[len(runs)]))
         out = np.concatenate(runs)

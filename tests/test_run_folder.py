@@ -190,7 +190,7 @@ def test_a_run_exports_out_of_its_folder(folder: Path) -> None:
 
 
 def test_every_target_may_stand_in_an_experiment() -> None:
-    assert set(TARGETS) == {"json", "c", "fmu", "fmu3", "st"}
+    assert set(TARGETS) == {"json", "c", "fmu", "fmu3", "st", "plcopen", "scl"}
     assert ExportForm(model="m", to=list(TARGETS)).to == list(TARGETS)
     printed = CliRunner().invoke(app, ["schema", "experiment"]).output
     assert json.loads(printed)["$defs"]["ExportForm"]["properties"]["to"]["items"]["enum"] == list(TARGETS)
@@ -207,8 +207,7 @@ def test_a_baseline_file_is_hashed_like_any_other_input(folder: Path) -> None:
 
 
 def test_a_model_is_discovered_once_and_then_diagnosed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import discovery.mismatch
-
+    import discovery.diagnosis
     import discovery.sparse
 
     really, searches, diagnosed = discovery.sparse.discover, [], []
@@ -220,10 +219,11 @@ def test_a_model_is_discovered_once_and_then_diagnosed(folder: Path, monkeypatch
     def noted(model: Any, *_: Any, **__: Any) -> Any:
         diagnosed.append(model)
         document = {"model": "found", "verdict": "no mismatch", "physics": []}
-        return SimpleNamespace(repaired=None, document=lambda: document)
+        written = SimpleNamespace(model_dump=lambda **_: document)
+        return SimpleNamespace(repaired=None, document=lambda: written)
 
     monkeypatch.setattr(discovery.sparse, "discover", counted)
-    monkeypatch.setattr(discovery.mismatch, "diagnose", noted)
+    monkeypatch.setattr(discovery.diagnosis, "diagnose", noted)
     text = EXPERIMENT[: EXPERIMENT.index("[models]")]
     text += '[models]\nfound = { kind = "sindy", bootstraps = 4 }\n[mismatch]\nmodel = "found"\n'
     (folder / "experiment.toml").write_text(text)

@@ -28,6 +28,7 @@ VERDICTS = {
 KINDS = {
     "none": "no effect",
     "one": "one effect",
+    "input": "unused input",
     "two": "two effects",
     "measuring": "measuring chain",
     "outside": "out of catalogue",

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from discovery import __version__
-from discovery.challenge.document import power_rows, reliability_rows, said, told, wrong
+from discovery.challenge.document import CHOSEN, family_rows, power_rows, reliability_rows, said, told, wrong
 from discovery.challenge.figures import KINDS, all_figures
 from discovery.challenge.lines import LINES, behind, rows
 from discovery.challenge.methods import WORKBENCH
@@ -39,6 +39,8 @@ def render(seal: Mapping[str, Any], changed: Sequence[str], tallies: Mapping[str
             charts=[c for c in charts if not c.get("wide")],
             wide=[c for c in charts if c.get("wide")],
             behind=behind(tallies),
+            families=family_rows(ours),
+            chosen=CHOSEN,
             power=power_rows(ours),
             reliability=reliability_rows(ours),
             wrong=[_row(s) for s in wrong(ours)],

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import secrets
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import cycle
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from discovery.challenge.seal import ANSWERS, CASES, SEAL, read_seal, write_seal
-from discovery.errors import UserError
+from discovery.errors import UsageError, UserError
 from discovery.files import read_text, write_atomic
 from discovery.progress import Progress
-from discovery.virtual.cases import Case, draw_kinds, make_case
+from discovery.virtual.cases import Case, Plan, draw_plans, make_case
+from discovery.virtual.families import FAMILIES
 
 CONTRACT = (
     "experiment.toml",
@@ -33,32 +35,45 @@ class Order:
     """One case to be made."""
 
     name: str
+    family: str
     seed: int
-    kind: str
+    plan: Plan
 
 
-def draw_orders(count: int, seed: int) -> list[Order]:
-    """Cases of a challenge; the title of a case is its number.
+def draw_orders(families: Sequence[str], count: int, seed: int) -> list[Order]:
+    """Cases of a challenge, families in turn; the name of a case is its number.
 
-    Of the cases without effect every second one has slow noise and small heat, which make_case takes from the
-    parity of its seed.
+    Raises:
+        UsageError: a family that does not exist.
     """
+    for family in families:
+        if family not in FAMILIES:
+            raise UsageError(f"There is no family '{family}'; choose from: {', '.join(FAMILIES)}.")
     rng = np.random.default_rng([seed, 7])
-    orders, quiet = [], 0
-    for number, kind in enumerate(draw_kinds(count, seed), start=1):
-        own = 2 * int(rng.integers(2**30))
-        if kind == "none":
-            own, quiet = own + quiet % 2, quiet + 1
-        orders.append(Order(f"case_{number:03d}", own, kind))
-    return orders
+    plans = {f: iter(draw_plans(f, -(-count // len(families)), seed)) for f in families}
+    digits = max(2, len(str(count)))
+    return [
+        Order(f"case_{k + 1:0{digits}d}", family, int(rng.integers(2**31)), next(plans[family]))
+        for k, family in zip(range(count), cycle(families), strict=False)
+    ]
 
 
 def make(order: Order) -> Case:
     """The case of an order."""
-    return make_case(order.seed, order.kind, order.name.replace("_", " "))
+    return make_case(order.family, order.seed, order.plan, order.name.replace("_", " "))
 
 
-def prepare(folder: Path, count: int, seed: int, jobs: int, progress: Progress) -> dict[str, Any]:
+def made(orders: Sequence[Order], jobs: int, progress: Progress) -> Iterator[tuple[Order, Case]]:
+    """The cases of some orders, as they get ready."""
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        for done, (order, case) in enumerate(zip(orders, pool.map(make, orders), strict=True), start=1):
+            yield order, case
+            progress(f"writing case {done} of {len(orders)}")
+
+
+def prepare(
+    folder: Path, families: Sequence[str], count: int, seed: int, jobs: int, progress: Progress
+) -> dict[str, Any]:
     """Write and seal `count` cases drawn from `seed`.
 
     Returns:
@@ -67,16 +82,42 @@ def prepare(folder: Path, count: int, seed: int, jobs: int, progress: Progress) 
     Raises:
         UserError: `folder` holds something else already.
     """
+    orders = draw_orders(families, count, seed)
     begin(folder)
-    answers: dict[str, Any] = {"salt": secrets.token_hex(32), "seed": seed, "cases": {}}
-    orders = draw_orders(count, seed)
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        for done, (order, case) in enumerate(zip(orders, pool.map(make, orders), strict=True), start=1):
-            for name, content in case.files.items():
-                write_atomic(folder / CASES / order.name / name, content)
-            answers["cases"][order.name] = case.key
-            progress(f"writing case {done} of {count}")
+    answers: dict[str, Any] = {
+        "salt": secrets.token_hex(32),
+        "seed": seed,
+        "families": list(families),
+        "cases": {},
+    }
+    for order, case in made(orders, jobs, progress):
+        write_case(folder / CASES / order.name, case)
+        answers["cases"][order.name] = case.key
     return _close(folder, answers)
+
+
+def practise(
+    folder: Path, families: Sequence[str], count: int, seed: int, jobs: int, progress: Progress
+) -> None:
+    """Write cases to practise on: folders `case_01`, ... and `keys.json` beside them, nothing sealed.
+
+    Raises:
+        UserError: `folder` holds something else already.
+    """
+    orders = draw_orders(families, count, seed)
+    if folder.is_dir() and any(folder.iterdir()):
+        raise UserError(f"{folder}: not empty; choose another folder with --write")
+    keys = {}
+    for order, case in made(orders, jobs, progress):
+        write_case(folder / order.name, case)
+        keys[order.name] = case.key
+    write_atomic(folder / "keys.json", json.dumps(keys, indent=1) + "\n")
+
+
+def write_case(folder: Path, case: Case) -> None:
+    """The files of a case, into its folder."""
+    for name, content in case.files.items():
+        write_atomic(folder / name, content)
 
 
 def adopt(folder: Path, source: Path) -> dict[str, Any]:
@@ -126,6 +167,8 @@ def kind_of(key: dict[str, Any]) -> str:
     effect = key["effect"]
     if effect is None:
         return "none"
+    if str(effect).startswith("input_"):
+        return "input"
     if "unexplained" in key.get("accepts", []):
         return "outside"
     return "two" if "effects" in key else "measuring" if effect in MEASURING else "one"

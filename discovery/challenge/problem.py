@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from discovery.diagnosis.context import Context, make_context
-from discovery.diagnosis.proof import explained, improvements
-from discovery.diagnosis.scored import Assessment, assess
+from discovery.diagnosis.proof import explained, free_runs, improvement
+from discovery.diagnosis.scored import Scored, score, scored
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.experiment import Experiment, load_experiment
 from discovery.experiment.pipeline import starting_model
+from discovery.fitting import Fit
+from discovery.fitting.noise import white_noise
 from discovery.models import Model
 
 Answer = dict[str, Any]  # the part of diagnosis.json that is scored
@@ -40,26 +42,42 @@ class Problem:
     def context(self) -> Context:
         """Baseline fitted to the recordings that may be seen."""
         outputs = [y for y in self.experiment.outputs if y in self.model.outputs or y in self.model.states]
+        fit = self.experiment.fit
+        after = {run: tuple(fit[k:]) for k, run in enumerate(fit)}
         return make_context(
-            self.experiment.fitting, self.model, self.experiment.fit, outputs, list(catalogue().values())
+            self.experiment.fitting, self.model, fit, outputs, list(catalogue().values()), after
         )
 
     @cached_property
-    def baseline(self) -> Assessment:
-        """The baseline under the everyday noise that explains what it leaves best."""
-        return assess(self.context, ())
+    def baseline(self) -> Scored:
+        """The baseline under the everyday noise that makes what it leaves most likely."""
+        noise = self.context.settings[len(self.context.settings) // 2].noise
+        found = score(self.context, (), noise)
+        assert found is not None  # the context has fitted it
+        return found
 
-    def improvement(self, repaired: Model | None, chosen: Sequence[Hypothesis]) -> Answer:
+    @cached_property
+    def white(self) -> Context:
+        """The context with one noise: white, as large as the residual of the baseline."""
+        context = self.context
+        fit, (first, *_) = context.baseline, context.settings
+        stated = {name: context.campaign.channels[name].noise for name in context.outputs}
+        residuals = [fit.problem.residual(t) for t in fit.trajectories]
+        noise = white_noise(context.outputs, stated, residuals)
+        exact = tuple(columns[:, :, :0] for columns in context.form)  # laws of the right form
+        return replace(context, settings=(replace(first, noise=noise, log_weight=0.0),), form=exact)
+
+    def improvement(self, repaired: Fit | None, chosen: Sequence[Hypothesis]) -> Answer:
         """`improvement` of diagnosis.json for a repaired model with `chosen` in it; nothing without one.
 
         The noise floor is that of the everyday noise beside these effects, as in the workbench's own proof.
         """
         if repaired is None:
             return {"held_out": {}, "explained": None}
-        noise, fitted = assess(self.context, chosen).best_view.noise, self.baseline.fit.model
-        found = improvements(
-            self.experiment.campaign, self.experiment.held_out, self.context.outputs, fitted, repaired, noise
-        )
+        context, held_out = self.context, self.experiment.held_out
+        noise = scored(context, chosen, repaired).noise
+        runs = free_runs(self.experiment.campaign, held_out, context.baseline, repaired, noise)
+        found = {run: improvement([one], context.outputs) for run, one in runs.items()}
         rows = {
             run: {
                 "rms_before": i.before,

@@ -55,7 +55,7 @@ class Scored:
     @property
     def large(self) -> bool:
         """One effect of size 1 or more that a diagnosis could name."""
-        return bool(self.key["kind"] == "one" and self.key.get("rms_over_noise", 0.0) >= 1.0)
+        return bool(self.key["kind"] in ("one", "input") and self.key.get("rms_over_noise", 0.0) >= 1.0)
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
     """All figures of one method."""
     quiet = [s for s in scored if s.key["effect"] is None]
     outside = [s for s in scored if s.key["kind"] == "outside"]
-    inside = [s for s in scored if s.key["kind"] in ("one", "two", "measuring")]
+    inside = [s for s in scored if s.key["kind"] in ("one", "input", "two", "measuring")]
     told = [s for s in inside if s.verdict in NAMING]
     large = [s for s in scored if s.large]
     large_told = [s for s in large if s.verdict in NAMING]
@@ -137,7 +137,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
         verdicts=_counts((str(s.key["kind"]), s.verdict) for s in scored),
         words=Counter(s.judgement.word for s in scored),
         confusion=_counts(pair for s in scored for pair in _confused(s)),
-        power=_power([s for s in scored if s.key["kind"] == "one" and "rms_over_noise" in s.key]),
+        power=_power([s for s in scored if s.key["kind"] in ("one", "input") and "rms_over_noise" in s.key]),
         false_alarms=share([s.verdict != "no mismatch" for s in quiet]),
         false_alarms_coloured=share([s.verdict != "no mismatch" for s in quiet if s.key.get("coloured")]),
         outside_named=share([s.judgement.word in (WRONG, WRONG_KIND) for s in outside]),
@@ -154,7 +154,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
             [
                 _first_body(s) in places(s.key)
                 for s in scored
-                if s.key["kind"] in ("one", "outside") and s.key["states"]
+                if s.key["kind"] in ("one", "input", "outside") and s.key["states"]
             ]
         ),
         reliability=reliability,
@@ -172,6 +172,15 @@ def tally(scored: Sequence[Scored]) -> Tally:
         processor=median(processor) if processor else None,
         failed=sum(s.answer is None for s in scored),
     )
+
+
+def by_family(t: Tally) -> dict[str, Tally]:
+    """The figures of each family of machines; nothing where the keys do not say of which family a case is."""
+    found: dict[str, list[Scored]] = {}
+    for s in t.scored:
+        if "family" in s.key:
+            found.setdefault(str(s.key["family"]), []).append(s)
+    return {name: tally(scored) for name, scored in found.items()}
 
 
 def _counts(pairs: Any) -> dict[str, dict[str, int]]:

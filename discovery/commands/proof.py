@@ -7,6 +7,10 @@ import typer
 
 
 def challenge(
+    family: Annotated[
+        list[str] | None,
+        typer.Option(help="Family of machines, may be repeated; `help` lists them [all]."),
+    ] = None,
     cases: Annotated[int | None, typer.Option(min=1, help="How many cases are written [200].")] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Everything random comes from it [drawn now].")
@@ -17,16 +21,32 @@ def challenge(
     cases_from: Annotated[
         Path | None, typer.Option(help="Take the cases of this folder, with keys.json or answers.json.")
     ] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="Write cases and keys.json into this folder, and stop.")
+    ] = None,
 ) -> None:
     """Conceal effects in many cases, seal the answers, solve the cases, score what was found.
+
+    With --write the cases are written to practise on, with their keys beside them, and nothing is solved.
+
+    \b
+    discovery challenge --family headstock --cases 40 --seed 7 --write practice/headstock
+    discovery challenge --family portal --family printer --cases 60
 
     Run it again to go on where it stopped. Writes OUT/report.html, OUT/results.json and OUT/challenge.md.
     """
     from discovery.challenge.run import challenge as run_challenge
+    from discovery.challenge.run import family_list, practice
     from discovery.progress import shown
 
+    if family and "help" in family:
+        typer.echo(family_list())
+        return
     with shown() as progress:
-        outcome = run_challenge(out, cases, seed, jobs, baselines, cases_from, progress)
+        if write is not None:
+            typer.echo(practice(write, family or [], cases, seed, jobs, progress))
+            return
+        outcome = run_challenge(out, family or [], cases, seed, jobs, baselines, cases_from, progress)
     for line in outcome.lines:
         typer.echo(line)
     typer.echo(f"report: {outcome.folder / 'report.html'}")

@@ -71,11 +71,15 @@ def record(
     ] = 1,
     cycle: Annotated[
         str,
-        typer.Option(help="fit, validation, dry, flow, environment, fluid, internal or warm_up."),
+        typer.Option(
+            help="fit, validation, dry, flow, environment, fluid, internal, warm_up, warm_up_dry, load_wet, "
+            "cooling, nozzle or flooded."
+        ),
     ] = "fit",
     seed: Annotated[int, typer.Option(min=0, help="Everything random comes from it.")] = 1,
     hours: Annotated[float, typer.Option(help="Length of a recording.")] = 72.0,
     nozzle_height: Annotated[float, typer.Option(help="Nozzle above the table, mm.")] = 50.0,
+    nozzle_side: Annotated[float, typer.Option(help="0: over the centre, 1: left of the table.")] = 0.0,
     effect: Annotated[
         list[str] | None,
         typer.Option(
@@ -97,7 +101,7 @@ def record(
     ] = False,
     reveal: Annotated[bool, typer.Option("--reveal", help="Put the answer into OUT, too.")] = False,
 ) -> None:
-    """Record the virtual machine: a rotary table of five bodies under cutting fluid, with R-Test readings.
+    """Record the virtual machine: a rotary table under cutting fluid, some 50 nodes, with R-Test readings.
 
     The same options give the same files, bit for bit. What was concealed stands in OUT.answer.json.
 
@@ -110,7 +114,16 @@ def record(
     from discovery.virtual.command import orders_of, record_orders
 
     title, orders = orders_of(
-        campaign, recordings, cycle, seed, hours, nozzle_height, effect or [], fault or [], conceal
+        campaign,
+        recordings,
+        cycle,
+        seed,
+        hours,
+        nozzle_height,
+        nozzle_side,
+        effect or [],
+        fault or [],
+        conceal,
     )
     for line in record_orders(out, title, orders, reveal=reveal, envelope=campaign is None):
         typer.echo(line)

@@ -26,9 +26,11 @@ def explain(
 
 
 def schema(
-    file: Annotated[str, typer.Argument(metavar="campaign|model|experiment", help="Which file.")],
+    file: Annotated[
+        str, typer.Argument(metavar="campaign|model|experiment|results|diagnosis", help="Which.")
+    ],
 ) -> None:
-    """Print the JSON schema of a file, for completion in an editor."""
+    """Print the JSON schema of a file: for an editor, or for programs that read results."""
     from discovery.firsthour.schemas import schema as schema_of
 
     typer.echo(schema_of(file))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from discovery.design.next_experiment import Aim, believed, next_experiment
-from discovery.design.when import instants, told
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import RIVAL
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, Verdict
+from discovery.diagnosis.when import instants, told
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Score
 from discovery.models import Model

@@ -1,4 +1,4 @@
-"""What a diagnosis works on: recordings that it may see, noise to reckon with, and how large effects can be."""
+"""What a diagnosis works on: recordings it may see, noise to reckon with, and how large effects can be."""
 
 from __future__ import annotations
 
@@ -62,6 +62,7 @@ class Context:
     belief: float | None
     outliers: tuple[Outlier, ...]  # set aside
     form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
+    laws: int  # of these, the first, that are of laws and not of edges
     known: dict[tuple[str, ...], list[tuple[float, float, float]]] = field(default_factory=dict, repr=False)
 
     @property
@@ -85,8 +86,8 @@ class Context:
         return candidates(self.model, self.effects, self.scene)
 
     def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:
-        """Prior of the size of each amplitude: usual on machines of the catalogue, but no more than a share of
-        what flows in the model; of what an output shows more, some reading noises.
+        """Prior of the size of each amplitude: usual on machines of the catalogue, but no more than a share
+        of what flows in the model; of what an output shows more, some reading noises.
         """
         for h in hypotheses:
             if h.amplitudes not in self.known:
@@ -119,7 +120,7 @@ class Context:
         """For each amplitude: rms of what one of it shows, and the reading noise there."""
         white = dict(zip(self.outputs, self.white.white, strict=True))
         several = len(h.amplitudes) > 1
-        names = list(h.shown) if several else [list(h.shown)[0]]
+        names = list(h.shown) if several else [next(iter(h.shown))]
         size = np.zeros(len(names))
         for run in self.baseline.trajectories:
             for k, name in enumerate(names):
@@ -178,6 +179,7 @@ def make_context(
         grids = thinned(without(whole, outliers))
         fit = fitted(grids, fit)
         white = reading_noise(fit, stated, floor, process_prior())
+    form, laws = model_form(fit, np.array(white.white))
     own = {n: replace(s, start_sd=fit.model.states[n].start_sd) for n, s in model.states.items()}
     scene = Scene(
         campaign.channels,
@@ -204,12 +206,13 @@ def make_context(
         floor,
         belief,
         tuple(outliers),
-        tuple(model_form(fit, np.array(white.white))),
+        tuple(form),
+        laws,
     )
 
 
 def with_noise_of(context: Context, fit: Fit) -> Context:
-    """The context with the reading noise as it stands with a better fit, where the campaign does not state it."""
+    """The context with the reading noise that a better fit leaves, where the campaign states none."""
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
     white = reading_noise(fit, stated, context.floor, process_prior())
     unsure = any(g.unsure for g in context.grids.values())

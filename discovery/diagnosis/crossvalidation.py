@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 def left_out(context: Context, answer: Scored, h: Hypothesis) -> Improvement | None:
     """What an effect changes of free runs on recordings that are left out of the fit in turn.
 
-    Models are fitted anew to the others, and start, as those of an experiment are; rms in reading noises. None where nothing can be left out, or where recordings left out can say
-    nothing of an effect because it does not act in all of them.
+    Models are fitted anew to the others, and start, as those of an experiment are; rms in reading noises.
+    None where nothing can be left out, or where recordings left out can say nothing of an effect because it
+    does not act in all of them.
     """
     if len(context.recordings) < 2 or h.recording is not None:
         return None

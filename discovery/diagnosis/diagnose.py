@@ -1,4 +1,4 @@
-"""The diagnosis from start to end: fit, noise, search, posterior, verdict, proof, location, next experiment."""
+"""The diagnosis from start to end: fit, noise, search, posterior, verdict, proof, location, what to do."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from discovery.design.question import ask
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
@@ -75,8 +74,8 @@ class Diagnosis:
         return explained(self.held_out)
 
     def interval(self, h: Hypothesis, name: str) -> tuple[float | None, float | None]:
-        """95 % interval of a parameter of what was named: of the diagnosis and of the fit that goes out, which
-        need not agree, each wider by what a law slightly off in form leaves open.
+        """95 % interval of a parameter of what was named: of the diagnosis and of the fit that goes out,
+        which need not agree, each wider by what a law slightly off in form leaves open.
         """
         assert self.after is not None
         p = self.after.model.parameters[name]
@@ -144,6 +143,8 @@ def diagnose(
     Raises:
         UserError: a model that does not run, or recordings without readings.
     """
+    from discovery.design.question import ask  # it asks about what is found here
+
     began = clock.perf_counter()
     shared = [n for n in {**model.outputs, **model.states} if n in campaign.channels]
     outputs = tuple(dict.fromkeys(outputs or shared))
@@ -177,7 +178,8 @@ def diagnose(
     runs = free_runs(campaign, [*fit, *read], before, after or before, noise)
     fitting = improvement([runs[r] for r in fit if r in runs], outputs)
     proof = {r: improvement([runs[r]], outputs) for r in read if r in runs}
-    verdict = refuted(idle(verdict, fitting), proof)
+    everywhere = improvement(list(runs.values()), outputs)
+    verdict = refuted(idle(verdict, everywhere, size_of(campaign, noise)), proof)
     if not verdict.named and after is not None:
         after = None
     verdict = replace(verdict, reasons=(*verdict.reasons, *_reasons(context, verdict, read, proof, effects)))

@@ -1,17 +1,17 @@
-"""diagnosis.json: its schema, and what a diagnosis writes there (contract section 6, and what a report wants)."""
+"""diagnosis.json: its schema, and what a diagnosis writes there."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 from pydantic import Field
 
-from discovery.design.when import instants
 from discovery.diagnosis.proof import Improvement, unit_of
 from discovery.diagnosis.thresholds import RIVALS_SHOWN
 from discovery.diagnosis.verdict import FAULT, UNEXPLAINED, Named
+from discovery.diagnosis.when import instants
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.latent_force import alike, heat_over_time
@@ -36,6 +36,12 @@ class Size(Strict):
     unit: str
     at: str | None = Field(None, description="speed that it is a size at")
     output: str | None = Field(None, description="output that it is a size of, where each has its own")
+
+
+class _Claimed(TypedDict):
+    effect: str
+    states: list[str]
+    recording: str | None
 
 
 class Claim(Strict):
@@ -97,7 +103,7 @@ class Window(Strict):
     start_s: Number
     end_s: Number
     state: str
-    heat_W: Number
+    heat_W: Number  # noqa: N815 - the unit is part of the name
 
 
 class LocationDocument(Strict):
@@ -108,7 +114,7 @@ class LocationDocument(Strict):
     alike: list[list[str]] = Field(description="states at which missing heat looks the same in the readings")
     windows: list[Window]
     regime: str | None
-    unmodelled_heat_W: dict[str, Number]
+    unmodelled_heat_W: dict[str, Number]  # noqa: N815
 
 
 class Gain(Strict):
@@ -230,7 +236,7 @@ def number(value: float | None, digits: int = 5) -> Number:
     return None if value is None or not np.isfinite(value) else float(f"{value:.{digits}g}")
 
 
-def _claim(h: Hypothesis) -> dict[str, object]:
+def _claim(h: Hypothesis) -> _Claimed:
     return {"effect": h.effect.word, "states": list(h.places), "recording": h.recording}
 
 

@@ -1,9 +1,9 @@
 """How sure an answer is: the posterior over everything that was tried, bagged.
 
-A posterior of approximate models is too sure of itself: a little more data, other priors or one recording less
-and another model wins. So it is averaged over resampled blocks of time and over wider and narrower priors
-(Huggins & Miller, Bayesian Analysis 18, 2023). The models stay where they were fitted; everything else is
-algebra on their normal equations.
+A posterior of approximate models is too sure of itself: a little more data, other priors or one recording
+less and another model wins. So it is averaged over resampled blocks of time and over wider and narrower
+priors (Huggins & Miller, Bayesian Analysis 18, 2023). The models stay where they were fitted; everything else
+is algebra on their normal equations.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Posterior:
     @property
     def shares(self) -> Array:
         """(M,) share of each model among those that were tried."""
-        return np.exp(self.evidence - log_sum_exp(self.evidence)[None, :]).mean(axis=1)
+        return np.asarray(np.exp(self.evidence - log_sum_exp(self.evidence)[None, :]).mean(axis=1))
 
     def of(self, holds: Callable[[Scored], bool]) -> float:
         """Probability of a statement about the machine."""

@@ -35,6 +35,13 @@ def written(model: Model, hypotheses: Sequence[Hypothesis]) -> Model:
                 break
         terms.append(replace(term, expression=plain))
     parameters = {n: p for n, p in model.parameters.items() if n not in switches or _used(n, terms, model)}
+    for h in hypotheses:  # what acts in some recordings is a matter of these: a clock may be ahead there
+        for name in h.shapes if h.switch else ():
+            if not parameters[name].fixed:
+                value = parameters[name].value
+                parameters[name] = replace(
+                    parameters[name], per_recording=True, values=dict.fromkeys(h.acting, value)
+                )
     return replace(model, name=f"{model.name}, repaired", terms=tuple(terms), parameters=parameters)
 
 

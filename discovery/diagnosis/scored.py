@@ -94,13 +94,13 @@ class Scored:
         return float(log_sum_exp(np.array([self._level(g, k) for g in self._forms(k)])))
 
     def _forms(self, k: int) -> tuple[Grams, ...]:
-        """The laws of the effects as they are, and each off by a share that depends on the operating point."""
-        spread = self.seen.spread[self.seen.form :]
+        """The laws of the effects as they are, and each off by a share that the operating point sets."""
+        spread = self.seen.spread[sum(self.seen.form) :]
         return (self.grams[k].without(spread), self.grams[k]) if len(spread) else (self.grams[k],)
 
     @property
     def _count(self) -> int:
-        return 2 if len(self.seen.spread) > self.seen.form else 1
+        return 2 if len(self.seen.spread) > sum(self.seen.form) else 1
 
     def _level(self, gram: Grams, k: int) -> float:
         level, step, covariance = gram.solved()
@@ -219,7 +219,7 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     extra = tuple(np.concatenate(parts, axis=2) for parts in zip(context.form, own, strict=True))
     model, effects = context.form[0].shape[2], own[0].shape[2]
     spread = np.concatenate([np.ones(model), np.full(effects, thresholds.FORM)])
-    seen = Whitened(fit, context.blocks, extra, spread, model)
+    seen = Whitened(fit, context.blocks, extra, spread, (context.laws, model - context.laws))
     free = [h for h in chosen if h.effect.amplitude.fixed is None]
     place = {u.name: i for i, u in enumerate(fit.problem.unknowns) if not u.is_nuisance}
     index = np.array([place[name] for h in free for name in h.amplitudes], dtype=np.intp)
@@ -275,7 +275,7 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
 def _distance(one: Noise, other: Noise) -> float:
     """How far two noises are apart in slow noise, form error and jitter."""
     slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
-    form = abs(one.share - other.share) + abs(one.form - other.form)
+    form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
     return slow + form + abs(one.jitter - other.jitter)
 
 
@@ -297,7 +297,7 @@ def light(one: Scored) -> Scored:
 
 @dataclass(frozen=True)
 class Scan:
-    """Claims on what a model leaves, the best odds first, and on what it leaves without one of its effects."""
+    """Claims on what a model leaves, the best odds first; and on what it leaves without one effect."""
 
     claims: tuple[Score, ...]
     without: Mapping[Key, tuple[Score, ...]]
@@ -362,6 +362,6 @@ def attempt(
     h = claim.hypothesis
     sizes: dict[str, float] = {}
     if h.effect.amplitude.fixed is None:
-        low = np.where(h.effect.amplitude.sign > 0, 0.0, -h.effect.amplitude.most)
-        sizes = {n: float(max(s, low)) for n, s in zip(h.amplitudes, claim.size, strict=True)}
+        low = 0.0 if h.effect.amplitude.sign > 0 else -h.effect.amplitude.most
+        sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
     return score(context, (*others, h), current.noise, current.fit, sizes)

@@ -1,7 +1,8 @@
 """The search for the set of effects that makes the readings most likely, one refit at a time.
 
-Effects are added while they add to the posterior; then each one is questioned: is it needed, and would another
-one stand better in its place? Everything that is refitted on the way is kept: these models share the posterior.
+Effects are added while they add to the posterior; then each one is questioned: is it needed, and would
+another one stand better in its place? Everything that is refitted on the way is kept: these models share the
+posterior.
 """
 
 from __future__ import annotations

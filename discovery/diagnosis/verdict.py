@@ -1,7 +1,7 @@
 """The verdict: what is named, how sure it is, what else it could be, and when to say that nothing is known.
 
-An effect is named where its probability says so, where it also predicts recordings that a fit has not seen, and
-where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
+An effect is named where its probability says so, where it also predicts recordings that a fit has not seen,
+and where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
 """
 
 from __future__ import annotations
@@ -70,9 +70,8 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
             key=lambda n: -_added(found, answer, n.hypothesis),
         )
     )
-    if posterior.nothing > 1 - thresholds.DETECTED:
-        return _nothing(context, answer, candidates)
-    if gain < thresholds.MATTERS:
+    more = posterior.best.evidence - found.baseline.evidence
+    if posterior.nothing > 1 - thresholds.DETECTED or more < thresholds.SHORT or gain < thresholds.MATTERS:
         return _nothing(context, answer, candidates)
     sure = [n for n in candidates if n.probability >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in sure if (text := _refused(context, answer, n.hypothesis))}
@@ -116,16 +115,19 @@ def _short(
     return posterior.best.evidence - alone.evidence if alone is not None else inf
 
 
-def idle(verdict: Verdict, fit: Improvement) -> Verdict:
-    """The verdict with its names withdrawn where they do nothing for free runs, even of the recordings that
-    were fitted.
+def idle(verdict: Verdict, everywhere: Improvement, noise: float) -> Verdict:
+    """No mismatch where what was named does too little for free runs of all recordings, fitted and unseen.
+
+    Args:
+        noise: one reading noise in the unit of the proof.
     """
-    if not verdict.named or fit.low > 0:
+    if not verdict.named or everywhere.explained >= thresholds.MATTERS * noise:
         return verdict
-    reason = "with what was named, free runs of the fitted recordings are no better than without it"
-    return replace(
-        verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
+    reason = (
+        "what could be named changes free runs of all recordings too little to matter (rms "
+        f"{printed(everywhere.before)} without it, {printed(everywhere.after)} with it)"
     )
+    return replace(verdict, word=NO_MISMATCH, named=(), candidates=(), reasons=(reason, *verdict.reasons))
 
 
 def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:

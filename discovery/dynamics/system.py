@@ -72,7 +72,8 @@ class Trajectory:
 
 def make_system(model: Model, grid: Grid) -> System:
     """Bind a model to a grid."""
-    taken = [name for name, seen in zip(grid.outputs, grid.measured.any(axis=0), strict=True) if seen]
+    seen = np.atleast_1d(grid.measured.any(axis=0))
+    taken = [name for name, read in zip(grid.outputs, seen, strict=True) if read]
     model = read_at_start(expanded(model, {*grid.samples, *grid.outputs}), taken)
     states = tuple(model.states)
     index = {name: i for i, name in enumerate(states)}

@@ -116,18 +116,14 @@ def _choices(variable: str, effect: Effect, model: Model, scene: Scene) -> list[
     ]
 
 
-def _is_second(name: str, scene: Scene) -> bool:
-    """Whether a flow is none that the laws of the fluid follow: these are the model's, or all of a dry one."""
-    flows = [n for n, c in scene.channels.items() if c.role == "fluid flow"]
-    return name in scene.unused and not scene.unused.issuperset(flows)
-
-
 def _is_flow(channel: Channel) -> bool:
     return channel.role == "fluid flow" or same_dimension(channel.unit, "l/min")
 
 
 def _is_second(name: str, scene: Scene) -> bool:
-    """Whether a flow is none that the laws of the fluid follow: these are the model's, or all of a dry one."""
+    """Whether a flow is none that the laws of the fluid follow: these are the model's, or all of a dry
+    one.
+    """
     flows = [n for n, c in scene.channels.items() if c.role == "fluid flow"]
     return name in scene.unused and not scene.unused.issuperset(flows)
 

@@ -178,6 +178,10 @@ class Effect:
 
     @property
     def at(self) -> str:
-        """The speed that the amplitude is a size at, "1000 rpm", where the formula divides by one."""
+        """The speed that the amplitude is a size at, "1000 rpm", where the formula divides by one; of what a
+        speed adds to, it is the size at standstill.
+        """
         found = re.search(r"\bspeed\s*/\s*(\d+(?:\.\d+)?)", self.formula)
+        if re.search(r"\+[^()]*\bspeed\b", self.formula):
+            return ""
         return f"{float(found[1]):g} rpm" if found else ""

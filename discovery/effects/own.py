@@ -8,17 +8,33 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from discovery.effects.form import ROLE_OF, Amplitude, Effect, Place, Shape
+from discovery.effects.form import (
+    INPUT,
+    LEVEL,
+    RATE,
+    ROLE_OF,
+    TERM,
+    TERM_PLACES,
+    Amplitude,
+    Effect,
+    Place,
+    Shape,
+)
 from discovery.errors import UserError
 from discovery.models import Parameter
 from discovery.models.memory import check_memory
 from discovery.models.units import known as known_unit
+from discovery.models.units import same_dimension
+from discovery.recordings.roles import Role
 from discovery.schema import Strict
 from discovery.terms import Expression, degree, evaluate, names, parse
 from discovery.terms.expression import rewrite
 
-# places where the formula is what a channel becomes, not a flow that comes in addition
-REPLACING = ("fluid terms", "cooling terms", "inputs of a recording")
+# places of effects by how many instants are searched for: a jump, or heat for some hours
+_SEARCHED: dict[int, tuple[Place, ...]] = {
+    1: ("output of a recording", "recording"),
+    2: ("body", "fluid-free body", "wet body", "driven body", "air body"),
+}
 
 
 def _unit(text: str) -> str:
@@ -40,22 +56,35 @@ def _is_a_factor(amplitude: str, formula: Expression) -> bool:
 
 
 class ShapeForm(Strict):
-    """A parameter inside the formula."""
+    """A parameter inside the formula, and what is believed of it before the recordings are read.
+
+    With `factor`: 68 % of values lie within this factor of `middle`. With `spread`: within so much of it.
+    Neither: any time that the recordings can show. `instant`: a time in the recording, found by search.
+    """
 
     unit: Unit = "1"
-    grid: list[float] = Field(min_length=1, description="values that the search tries")
-    low: float = Field(description="smallest value that the refit may give")
-    high: float = Field(description="largest value that the refit may give")
+    middle: float | None = Field(None, description="a usual value")
+    factor: float | None = Field(None, gt=1, description="68 % of values lie within this factor of it")
+    spread: float | None = Field(None, gt=0, description="68 % of values lie within so much of it")
+    instant: bool = Field(False, description="a time in the recording, which the search finds")
 
     @model_validator(mode="after")
-    def _grid_lies_within(self) -> Self:
-        outside = [value for value in self.grid if not self.low <= value <= self.high]
-        if outside:
-            raise ValueError(
-                f"{outside[0]:g} of its grid does not lie within low {self.low:g} and high {self.high:g}; "
-                "mend one of the three"
-            )
+    def _is_a_prior(self) -> Self:
+        given = {name for name in ("middle", "factor", "spread") if getattr(self, name) is not None}
+        if given and (self.instant or "middle" not in given or len(given) != 2):
+            raise ValueError("give a middle with a factor or a spread, or instant = true, or none of them")
+        if self.factor and not (self.middle or 0.0) > 0:
+            raise ValueError(f"a middle with a factor is more than zero, not {self.middle:g}; give a spread")
+        if not (given or self.instant) and not same_dimension(self.unit, "s"):
+            raise ValueError(f"in {self.unit} it needs a middle with a factor or with a spread")
+        if not given and self.unit != "s":
+            raise ValueError("a time that is searched for has the unit s")
         return self
+
+    def shape(self, name: str) -> Shape:
+        """The shape as the catalogue holds it."""
+        middle = 0.0 if self.instant else self.middle
+        return Shape(name, self.unit, middle, self.factor or 0.0, self.spread or 0.0, self.instant)
 
 
 class EffectForm(Strict):
@@ -63,7 +92,8 @@ class EffectForm(Strict):
 
     `formula` is a heat flow into `body` (out of `other`, for two bodies) with `amplitude` as a factor; the
     variables are body, other, y (for outputs), ambient, fluid, flow, speed, load, cooling, coolant, height
-    and other_input.
+    and other_input; `input` (as it is) and `level` (over its largest value) are any recorded input of the
+    `roles`, `rate` the level of a flow. At terms of the model, `term` is the term that changes.
     """
 
     word: str = Field(pattern="^[a-z][a-z0-9_]*$", description="its name in results")
@@ -81,6 +111,11 @@ class EffectForm(Strict):
     )
     sign: Literal[-1, 0, 1] = Field(1, description="sign of the amplitude, 0 where physics leaves it open")
     shapes: dict[str, ShapeForm] = {}
+    roles: list[Role] = Field([], description="of the inputs that `input` and `level` may stand for")
+    acts: Literal["always", "in one recording", "from a recording on"] | None = Field(
+        None, description="default: in one recording where its place or an instant says so, else always"
+    )
+    shared: bool = Field(False, description="also with one size at all its bodies at once")
     source: str = "given in the experiment file"
 
     def effect(self) -> Effect:
@@ -91,31 +126,22 @@ class EffectForm(Strict):
             nothing here.
         """
         where = f"effect '{self.word}'"
-        known = {self.amplitude, *self.shapes, *ROLE_OF, "body", "other", "y", "time"}
-        formula = parse(self.formula, where)
-        for name in sorted(names(formula) - known):
-            raise UserError(
-                f"{where}: '{name}' means nothing in its formula; known: {', '.join(sorted(known))}"
-            )
-        if self.amplitude not in names(formula):
-            raise UserError(f"{where}: the amplitude '{self.amplitude}' does not stand in the formula")
-        formula = parse(self.formula, where)
-        if self.place not in REPLACING and not _is_a_factor(self.amplitude, formula):
-            raise UserError(
-                f"{where}: its formula has to be zero where {self.amplitude} is zero, and linear in it; "
-                f"write it as {self.amplitude}*(...)"
-            )
+        formula = self._formula(where)
         if self.plausible > self.most:
             raise UserError(
                 f"{where}: its usual size {self.plausible:g} is more than {self.most:g}, its most; "
                 "give a smaller one"
             )
-        own = self.place.endswith("of a recording")
-        shapes = {
-            name: Parameter(s.grid[0], s.unit, s.low, s.high, per_recording=own)
-            for name, s in self.shapes.items()
-        }
-        check_memory(formula, shapes, ("body", "other", "y"), where)
+        shapes = tuple(form.shape(name) for name, form in self.shapes.items())
+        instants = sum(shape.instant for shape in shapes)
+        of_one = bool(instants) or self.place.endswith("recording")
+        if instants and self.place not in _SEARCHED.get(instants, ()):
+            raise UserError(
+                f"{where}: one instant is when an output jumps, two are when heat at a body begins and ends; "
+                f"with {instants} it cannot act at the place '{self.place}'"
+            )
+        given = {s.name: Parameter(s.middle or 1.0, s.unit, s.ends[0], per_recording=of_one) for s in shapes}
+        check_memory(formula, given, ("body", "other", "y"), where)
         return Effect(
             word=self.word,
             title=self.title or self.word.replace("_", " "),
@@ -123,9 +149,34 @@ class EffectForm(Strict):
             place=self.place,
             formula=self.formula,
             amplitude=Amplitude(self.amplitude, self.unit, self.plausible, self.sign, most=self.most),
-            shapes=tuple(
-                Shape(name, s.unit, tuple(s.grid), s.low, s.high) for name, s in self.shapes.items()
-            ),
             source=self.source,
             signature="given by the user",
+            shapes=shapes,
+            search=("shapes", "step", "window")[instants],
+            acts=self.acts or ("in one recording" if of_one else "always"),
+            shared=self.shared,
+            roles=tuple(self.roles),
         )
+
+    def _formula(self, where: str) -> Expression:
+        """The formula, of names that mean something, zero where its amplitude is."""
+        variables = {*ROLE_OF, INPUT, LEVEL, RATE, TERM, "body", "other", "y", "time"}
+        known = {self.amplitude, *self.shapes} | variables
+        formula = parse(self.formula, where)
+        used = names(formula)
+        for name in sorted(used - known):
+            raise UserError(
+                f"{where}: '{name}' means nothing in its formula; known: {', '.join(sorted(known))}"
+            )
+        if self.amplitude not in used:
+            raise UserError(f"{where}: the amplitude '{self.amplitude}' does not stand in the formula")
+        at_terms = self.place in (*TERM_PLACES, "inputs of a recording")
+        replaces = at_terms and TERM not in used  # then it is what a channel becomes, no change
+        if not replaces and not _is_a_factor(self.amplitude, formula):
+            raise UserError(
+                f"{where}: its formula has to be zero where {self.amplitude} is zero, and linear in it; "
+                f"write it as {self.amplitude}*(...)"
+            )
+        if used & {INPUT, LEVEL} and not at_terms and not self.roles:
+            raise UserError(f"{where}: say under `roles` which inputs '{INPUT}' and '{LEVEL}' may stand for")
+        return formula

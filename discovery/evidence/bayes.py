@@ -33,7 +33,7 @@ _NARROW = 4.0  # standard deviations from zero beyond which the posterior is tak
 
 @dataclass(frozen=True)
 class Slab:
-    """Prior of sizes: `median` (A,) of their magnitudes, 68 % within `factor` (A,), sign +1, -1 or 0 (either)."""
+    """Prior of sizes (A,): `median` of their magnitudes, 68 % within `factor`, sign +1, -1 or 0 (either)."""
 
     median: Array
     factor: Array
@@ -55,7 +55,7 @@ class Slab:
     def average(self, mean: Array, variance: Array) -> Array:
         """log of the prior density, averaged over Gaussian sizes of `mean` (A,) and `variance` (A,)."""
         sd = np.sqrt(np.maximum(variance, 1e-300))
-        narrow = np.abs(mean) > _NARROW * sd
+        narrow = (np.abs(mean) > _NARROW * sd) & (self.sign * mean >= 0)
         out = np.zeros(len(mean))
         for flat in (False, True):
             index = np.flatnonzero(narrow != flat)
@@ -78,7 +78,8 @@ class Slab:
         for sign in (1.0, -1.0):
             share = np.where(self.sign == 0, 0.5, (self.sign == sign).astype(float))
             z = (sign * size - mean) / sd
-            part = np.log(np.maximum(prior * share, 1e-300)) - 0.5 * z**2 - np.log(sd * np.sqrt(2 * np.pi))
+            with np.errstate(divide="ignore"):  # what has the wrong sign cannot be
+                part = np.log(prior * share) - 0.5 * z**2 - np.log(sd * np.sqrt(2 * np.pi))
             wide = np.logaddexp(wide, log_sum_exp(part))
         return wide
 
@@ -117,7 +118,7 @@ class Projected:
     gram: Array
     length: Array
 
-    def block(self, index: Sequence[int]) -> Array:
+    def block(self, index: Sequence[int] | NDArray[np.intp]) -> Array:
         """Gram matrix of some of the signatures."""
         z = self.columns[:, list(index)]
         inside = self.basis.T @ z
@@ -153,8 +154,8 @@ def scan(
     slab: Slab,
     without: Sequence[Without] = (),
 ) -> list[list[Score]]:
-    """Every claim among the hypotheses scored on what a fit leaves, the best odds first; then on what it leaves
-    with one of its own effects taken out, to first order, for each of `without`.
+    """Every claim among the hypotheses scored on what a fit leaves, the best odds first; then on what it
+    leaves with one of its own effects taken out, to first order, for each of `without`.
 
     Args:
         hypotheses: claims at all their shape values.

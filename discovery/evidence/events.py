@@ -70,8 +70,8 @@ class _Search:
         return project(self.seen, self.setting, padded)
 
     def rough(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
-        """The claim at the best of evenly spread instants, with what share of them the readings leave, and its
-        log Bayes factor; None where the recording is too short.
+        """The claim at the best of evenly spread instants, with what share of them the readings leave, and
+        its log Bayes factor; None where the recording is too short.
         """
         return self._rough_window(h, slab) if h.effect.search == "window" else self._rough_step(h, slab)
 

@@ -3,9 +3,9 @@
     q_k (1 + sum_m e_km psi_m),   e_km ~ N(0, share^2)
 
 for each flow of the model, and likewise for what each output shows. psi_m are the inputs, the body and the
-recording, each less its mean and over its spread, scaled so that a flow is off by the share in all. Bodies of
-a machine have no sharp edges either: a share of each flow enters a neighbour of the body that it is drawn at.
-The part of form error that wanders with time is process noise (`process_noise.py`); this one does not average
+recording, each less its mean and over its spread, scaled so that a flow is off by the share in all. And the
+bodies of a lumped model have no sharp edges: a share of each flow enters a neighbour of the body that it is
+drawn at. Both shares are unknown, together on a ladder from an exact model to a coarse one. The part of form error that wanders with time is process noise (`process_noise.py`); this one does not average
 out over a long recording (Kennedy & O'Hagan, J. R. Stat. Soc. B 63, 2001).
 """
 
@@ -24,38 +24,62 @@ from discovery.terms import Term, evaluate
 
 Array = NDArray[np.float64]
 
-RANK = 40  # directions in the readings that the form error of a whole model is kept in
+LAWS, EDGES = 36, 16  # directions in the readings in which form errors of laws and edges are kept
 
 
-def model_form(fit: Fit, white: Array) -> list[Array]:
+def model_form(fit: Fit, white: Array) -> tuple[list[Array], int]:
     """By recording, what the readings (R, Y, M) show more for form errors of the whole model of a share of
     one: the directions, each as likely as any other (unit normal), that hold nearly all of what the
-    parameters of the fit do not absorb.
+    parameters of the fit do not absorb. The number of those that are laws; the rest are edges.
 
     Args:
         white: (Y,) reading noise, in which directions are compared.
     """
-    trajectories = fit.trajectories
-    scales = _scales(trajectories)
-    columns = []
-    for k, run in enumerate(trajectories):
-        system, pieces = run.system, []
+    runs = fit.trajectories
+    own = _stacked(runs, [fit.problem.jacobian(t) for t in runs], white)
+    basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0]
+    kept = [
+        _directions(columns, _stacked(runs, columns, white), basis, most)
+        for columns, most in ((_laws(runs), LAWS), (_edges(runs), EDGES))
+    ]
+    return [np.concatenate(pair, axis=2) for pair in zip(*kept, strict=True)], kept[0][0].shape[2]
+
+
+def _laws(runs: Sequence[Trajectory]) -> list[Array]:
+    """What the readings show more where each flow, and each output, is off by its own size times each psi."""
+    scales, found = _scales(runs), []
+    for k, run in enumerate(runs):
+        pieces: list[Column] = []
         count = 0
-        for term in (t for t in system.model.terms if not system.model.states[t.into].memory):
-            points = _points(run, scales, term.into, k, len(trajectories))
+        for term in _flows(run):
+            points = _points(run, scales, term.into, k, len(runs))
             pieces += _pieces(run, term, points, count)
             count += len(points)
-            beyond = _beyond(run, term, count)
-            pieces += beyond
-            count += len(beyond)
         flows = sensitivities(run, (), (), pieces, count=count)
-        columns.append(np.concatenate([flows, _levers(run, scales, k, len(trajectories))], axis=2))
-    seen = _stacked(trajectories, columns, white)
-    own = _stacked(trajectories, [fit.problem.jacobian(t) for t in trajectories], white)
-    basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0]
+        found.append(np.concatenate([flows, _levers(run, scales, k, len(runs))], axis=2))
+    return found
+
+
+def _edges(runs: Sequence[Trajectory]) -> list[Array]:
+    """What the readings show more where each flow enters each neighbour of its body in place of the body."""
+    found = []
+    for run in runs:
+        pieces: list[Column] = []
+        for term in _flows(run):
+            pieces += _beyond(run, term, len(pieces))
+        found.append(sensitivities(run, (), (), pieces, count=len(pieces)))
+    return found
+
+
+def _flows(run: Trajectory) -> list[Term]:
+    return [t for t in run.system.model.terms if not run.system.model.states[t.into].memory]
+
+
+def _directions(columns: Sequence[Array], seen: Array, basis: Array, most: int) -> list[Array]:
+    """The few combinations of columns that hold most of what a basis (N, U) leaves of them, `seen` (N, M)."""
     left = seen - basis @ (basis.T @ seen)
     size, axes = np.linalg.eigh(left.T @ left)
-    kept = axes[:, np.argsort(-size)[:RANK]]
+    kept = axes[:, np.argsort(-size)[:most]]
     return [c @ kept for c in columns]
 
 

@@ -51,7 +51,7 @@ class Prior:
     weights: tuple[float, ...]
     slow: tuple[float, ...]  # shares of the reading noise
     slow_weights: tuple[float, ...]
-    forms: tuple[float, ...]  # shares by which laws are off
+    forms: tuple[tuple[float, float], ...]  # shares by which laws are off, and flows beyond the edge of a body
     form_weights: tuple[float, ...]
 
 
@@ -92,14 +92,16 @@ def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: boo
         [(jitter, 1.0) for jitter in jitters],
         list(zip(prior.slow, prior.slow_weights, strict=True)),
         list(zip(prior.levels, prior.weights, strict=True)),
-        list(zip(prior.forms, prior.form_weights, strict=True)),
+        [(float(k), weight) for k, weight in enumerate(prior.form_weights)],
     )
     total = float(np.prod([sum(weight for _, weight in axis) for axis in axes]))
     found = []
     for place in np.ndindex(*(len(axis) for axis in axes)):
-        (jitter, a), (slow, b), (level, c), (form, d) = (axis[k] for axis, k in zip(axes, place, strict=True))
-        noise = replace(_noise(white, floor, prior, level, slow, jitter), form=form)
-        found.append(Setting(noise, float(np.log(a * b * c * d / total)), place))
+        jitter, slow, level, _ = (axis[k][0] for axis, k in zip(axes, place, strict=True))
+        form, edge = prior.forms[place[3]]
+        weight = np.prod([axis[k][1] for axis, k in zip(axes, place, strict=True)])
+        noise = replace(_noise(white, floor, prior, level, slow, jitter), form=form, edge=edge)
+        found.append(Setting(noise, float(np.log(weight / total)), place))
     return tuple(found)
 
 
@@ -118,8 +120,8 @@ def _noise(
 def reading_noise(
     fit: Fit, stated: Mapping[str, float | None], floor: Mapping[str, float], prior: Prior
 ) -> Noise:
-    """White reading noise: what is stated, else the most likely level with slow noise and process noise of any
-    size.
+    """White reading noise: what is stated, else the most likely level with slow noise and process noise of
+    any size.
 
     Process noise far above the usual is offered, so that a mismatch passes for that and not for reading
     noise. Time constants are 2 h of slow noise and 3 h of process noise, or a share of shorter recordings.

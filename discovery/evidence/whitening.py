@@ -112,7 +112,7 @@ class Whitened:
     blocks: int  # of time in each recording
     extra: tuple[Array, ...] = ()  # by recording (R, Y, E): what may act with coefficients ...
     spread: Array = field(default_factory=lambda: np.zeros(0))  # (E,) ... that are known to be about zero
-    form: int = 0  # of them, the first, that count with the form error of a noise
+    form: tuple[int, int] = (0, 0)  # of them, the first: form errors of laws, then of edges, of a model
     last: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def absorbed(self, noise: Noise) -> Absorbed:
@@ -170,7 +170,7 @@ class Whitened:
 
     def rows(self, noise: Noise) -> tuple[Array, Array]:
         """Whitened residual and sensitivities (N, 1 + U), logarithms (N,) as in `whiten`."""
-        rows, log = self._rows(replace(noise, form=1.0))
+        rows, log = self._rows(replace(noise, form=1.0, edge=1.0))
         return rows * self._scale(noise), log
 
     def _rows(self, unit: Noise) -> tuple[Array, Array]:
@@ -188,7 +188,9 @@ class Whitened:
         """What multiplies the columns (1 + U,) under the form error of a noise."""
         scale = np.ones(1 + len(self.moving) + len(self.spread))
         first = 1 + len(self.moving)
-        scale[first : first + self.form] = noise.form
+        laws, edges = self.form
+        scale[first : first + laws] = noise.form
+        scale[first + laws : first + laws + edges] = noise.edge
         return scale
 
     @cached_property
@@ -212,7 +214,7 @@ class Whitened:
 
     def grams(self, noise: Noise) -> Grams:
         """The fit under one noise setting, as normal equations by block."""
-        unit = replace(noise, form=1.0)
+        unit = replace(noise, form=1.0, edge=1.0)
         known = self.last.setdefault("grams", [])
         same = next((pieces for other, pieces in known if other == unit), None)
         if same is None:

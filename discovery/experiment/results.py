@@ -21,6 +21,7 @@ import discovery
 from discovery.evaluation.paper import parts_of_the_paper
 from discovery.evaluation.recommendation import recommend
 from discovery.evaluation.shares import term_shares
+from discovery.experiment.document import ResultsDocument
 from discovery.experiment.experiment import Experiment
 from discovery.experiment.inputfiles import hashes, input_files
 from discovery.files import write_atomic
@@ -46,7 +47,8 @@ def write_run(
     seconds: float,
 ) -> None:
     """Everything that a run leaves behind but the report. `verb`: of the command that made it."""
-    write_json(folder / RESULTS, results_document(verb, experiment, fitted, seconds))
+    document = results_document(verb, experiment, fitted, seconds)
+    write_json(folder / RESULTS, document.model_dump(exclude_unset=True))
     if diagnosis is not None:
         write_json(folder / DIAGNOSIS, diagnosis)
     for name, one in fitted.items():
@@ -58,10 +60,10 @@ def write_run(
 
 def results_document(
     verb: str, experiment: Experiment, fitted: Mapping[str, Fitted], seconds: float
-) -> dict[str, Any]:
-    """The content of results.json."""
+) -> ResultsDocument:
+    """results.json of a run."""
     channels = experiment.campaign.channels
-    return {
+    content = {
         "experiment": experiment.name,
         "command": shlex.join(["discovery", verb, str(experiment.path)]),
         "campaign": experiment.campaign.name,
@@ -82,6 +84,7 @@ def results_document(
         "versions": versions(),
         "inputs": hashes(input_files(experiment)),
     }
+    return ResultsDocument.model_validate(_plain(content))
 
 
 def recommended(experiment: Experiment, fitted: Mapping[str, Fitted]) -> dict[str, dict[str, Any]]:

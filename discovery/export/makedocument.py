@@ -58,10 +58,10 @@ def exportable(model: Model, campaign: Campaign) -> Model:
                 f"model '{model.name}': state '{name}' starts at the reading of {read[0]}, which a "
                 "controller does not have, and no channel is an ambient temperature; give it a start value"
             )
+        spread = START_SD if state.start_sd is None else state.start_sd
         if start is not None and read:
-            spread = max(state.start_sd, START_SD)
-            state = replace(state, start=substitute(start, unread), start_sd=spread)
-        states[name] = state
+            state, spread = replace(state, start=substitute(start, unread)), max(spread, START_SD)
+        states[name] = replace(state, start_sd=spread)
     return replace(model, outputs=outputs, states=states)
 
 

@@ -9,7 +9,7 @@ from discovery.errors import UsageError
 from discovery.schema import suggest
 
 if TYPE_CHECKING:
-    from discovery.effects.catalogue import Effect
+    from discovery.effects.form import Effect, Shape
 
 MODELS = {
     "file": 'a model of your own: { file = "model.toml" }, a sparse sum of terms with named parameters',
@@ -97,9 +97,7 @@ def _entry(effect: Effect) -> Iterator[str]:
         usual = f"{size.name}, about {size.plausible:g} {size.unit}"
         yield f"  size           {usual} on machines of this class{sign}"
     for shape in effect.shapes:
-        tried = _listed([f"{value:g}" for value in shape.grid])
-        limits = "" if shape.fixed else f", refined between {shape.low:g} and {shape.high:g}"
-        yield f"  shape          {shape.name} [{shape.unit}]: tried at {tried}{limits}"
+        yield f"  shape          {shape.name} [{shape.unit}]: {_believed(shape)}"
     yield f"  signature      {effect.signature}"
     if effect.confused_with:
         yield f"  confused with  {_listed(effect.confused_with)}"
@@ -107,6 +105,16 @@ def _entry(effect: Effect) -> Iterator[str]:
         values = ", ".join(f"{name} = {value:g}" for name, value in example.values.items())
         yield f"  example        {values}: {example.expected:g}"
     yield f"  source         {effect.source}"
+
+
+def _believed(shape: Shape) -> str:
+    """What is believed of a shape before recordings are read."""
+    if shape.instant:
+        return "searched for"
+    if shape.middle is None:
+        return "any that the recordings can show"
+    within = f"a factor of {shape.factor:g}" if shape.factor else f"{shape.spread:g}"
+    return f"about {shape.middle:g}, 68 % of machines within {within}"
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""JSON schemas of the three files, for completion and checks in an editor."""
+"""JSON schemas: of the files that a user writes, for an editor, and of those that a run leaves behind."""
 
 from __future__ import annotations
 
@@ -8,17 +8,19 @@ from typing import Any
 from discovery.errors import UsageError
 from discovery.schema import suggest
 
-FILES = ("campaign", "model", "experiment")
+FILES = ("campaign", "model", "experiment", "results", "diagnosis")
 
 
 def schema(file: str) -> str:
-    """JSON schema (draft 2020-12) of a campaign, model or experiment file.
+    """JSON schema (draft 2020-12) of a campaign, model or experiment file, of results.json or diagnosis.json.
 
     Raises:
         UsageError: another word.
     """
     from pydantic import BaseModel
 
+    from discovery.diagnosis.document import DiagnosisDocument
+    from discovery.experiment.document import ResultsDocument
     from discovery.experiment.form import ExperimentForm
     from discovery.models.modelfile import ModelForm
     from discovery.recordings.campaignfile import CampaignForm
@@ -27,6 +29,8 @@ def schema(file: str) -> str:
         "campaign": CampaignForm,
         "model": ModelForm,
         "experiment": ExperimentForm,
+        "results": ResultsDocument,
+        "diagnosis": DiagnosisDocument,
     }
     if file not in forms:
         raise UsageError(f"there is no schema of '{file}'; {suggest(file, list(FILES))}")

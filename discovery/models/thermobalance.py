@@ -111,10 +111,10 @@ def thermobalance(*, fluid: bool = True, variant: Speeding = "none") -> Model:
         parameters |= _fluid_parameters()
     parameters["T_ref"] = Parameter(22.0, "degC", fixed=True)
     states = {
-        name: State(name, "degC", body.capacity, parse("T_env"), 0.5, 1.0 / body.capacity)
+        name: State(name, "degC", body.capacity, parse("T_env"), scale=1.0 / body.capacity)
         for name, body in BODIES.items()
     }
-    states["bed"] = State("bed", "degC", None, parse("T_env"), 0.5, 1.0)
+    states["bed"] = State("bed", "degC", None, parse("T_env"), scale=1.0)
     outputs = {error: parse(levers) for error, levers in LEVERS.items()}
     title = "thermobalance, five bodies" if fluid else "dry thermobalance, five bodies"
     return Model(title, parameters, states, tuple(terms), outputs)

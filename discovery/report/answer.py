@@ -177,9 +177,9 @@ def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
         sentence += f"; but the unseen {listed([f'“{name}”' for name in worse])} {contradict} the repair"
     points = [f"Size of {words(one['effect'])}: {listed(sizes(one))}." for one in found if sizes(one)]
     p_value = diagnosis.get("detection", {}).get("p_value")
-    if p_value is not None and verdict != "no mismatch":  # the first look alone, not the answer
-        chance = "less than 1 in 1000" if p_value < 1e-3 else f"p = {number(p_value, 2)}"
-        points.append(f"Chance that a complete model would look this wrong: {chance}.")
+    if p_value is not None and verdict != "no mismatch":
+        chance = "less than 1 in 1000" if p_value < 1e-3 else percent(p_value)
+        points.append(f"Probability that the model lacks nothing: {chance}.")
     points += _proof(diagnosis) if found else []
     rivals = [one for one in diagnosis.get("alternatives") or [] if one["log_evidence_below_best"] <= NEAR]
     if rivals:

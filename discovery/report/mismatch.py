@@ -12,7 +12,7 @@ from discovery.report.run import Run, pretty_unit
 from discovery.report.text import listed, number, percent, with_unit, words
 
 _MOST_RIVALS = 6
-NEAR = 3.0  # log evidence below which no rival is told apart: `mismatch.verdict.RIVAL`, not loaded here
+NEAR = 3.0  # log evidence below which no rival is told apart: `thresholds.RIVAL`, not loaded here
 _HEAT_NOTE = (
     "What would close the gap, cause unknown, over time and against each input and state (band: 95 %). "
     "What it follows is missing."
@@ -92,15 +92,9 @@ def _physics(d: Mapping[str, Any]) -> Printed:
             one.get("expression") or "",
             "; ".join(sizes(one)),
         )
-        again = percent(one["named_again"]) if one.get("named_again") is not None else "–"
-        rows.append(Line((*cells, again)))
-    header = ("Effect", "Where", "Probability", "Term", "Size", "Named again")
-    return Printed(
-        "What the repaired model adds; the last column: how often a blind search finds it again",
-        header,
-        tuple(rows),
-        frozenset({1, 3, 4}),
-    )
+        rows.append(Line(cells))
+    header = ("Effect", "Where", "Probability", "Term", "Size")
+    return Printed("What the repaired model adds", header, tuple(rows), frozenset({1, 3, 4}))
 
 
 def _proof(d: Mapping[str, Any]) -> Printed:
@@ -208,10 +202,10 @@ def _considered(d: Mapping[str, Any]) -> Printed:
     for c in d.get("considered") or []:  # best first
         best.setdefault((words(c["effect"]), _place(c)), c)
     rows = [
-        Line((*named, number(c.get("log_evidence")), "yes" if c.get("decidable") else "no"))
+        Line((*named, number(c.get("log_evidence")), percent(c.get("share_that_a_refit_leaves"))))
         for named, c in best.items()
     ]
-    header = ("Effect", "Where", "Log evidence", "Can these recordings decide it?")
+    header = ("Effect", "Where", "Log evidence", "Share of it that no other parameter shows")
     return Printed("What came closest", header, tuple(rows), frozenset({1, 3}))
 
 

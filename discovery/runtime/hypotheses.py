@@ -214,11 +214,11 @@ def _linear(
         data = np.concatenate([problem.residual(trajectory)[:, :, None], dy], axis=2)
         flows = heat_flows(trajectory)
         for found, (share, time) in zip(blocks, settings, strict=True):
-            white, half = part.apply(_noise(flows, known, outputs, share, time), data)
+            white, log = part.whitened(_noise(flows, known, outputs, share, time), data)
             own = np.zeros((len(white), shared + len(nuisance)))
             own[:, :shared] = white[:, 1 : 1 + shared]
             own[:, [shared + k for k in places]] = white[:, 1 + shared :]
-            found.append((white[:, 0], own, half))
+            found.append((white[:, 0], own, float(np.sum(log))))
         rows = np.broadcast_to(system.grid.time[system.grid.read][:, None], system.grid.measured.shape)
         ages.append(after - rows[system.grid.measured])
         after -= float(system.grid.time[-1])

@@ -1,8 +1,8 @@
 """Values and exact first derivatives of expressions, vectorised over time (forward-mode differentiation).
 
 An expression is compiled once into a list of array operations, derivatives included and equal operations
-shared; it is then run on all instants at once. Sparse by construction: a name that does not occur costs nothing.
-"""
+shared; it is then run on all instants at once. Sparse by construction: a name that does not occur costs
+nothing."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ class _Builder:
             case Apply(function="delay", arguments=(Name(id=channel), seconds)):
                 return self._delay(channel, self.node(seconds))
             case Apply(function="lag", arguments=(inner, tau)):
-                # a model's own lags are states (models.expanded); here are those of candidates on a trajectory
+                # a model's own lags are states (models.expanded); these are those of candidates
                 return _Node(self.call(_lagged, self.node(inner).value, self.node(tau).value, memory=True))
             case Apply(function="play", arguments=(inner, width)):
                 return self._play(self.node(inner), self.node(width))

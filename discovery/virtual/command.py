@@ -8,10 +8,19 @@ from pathlib import Path
 from discovery.errors import UsageError, UserError
 from discovery.files import read_toml
 from discovery.recordings.campaignfile import CampaignForm
-from discovery.virtual.effects import EFFECTS, parse_request
-from discovery.virtual.faults import FAULTS, parse_fault
-from discovery.virtual.nmv5000 import CAMPAIGNS
-from discovery.virtual.record import Order, draw_effect, file_name, write_answers, write_campaign
+from discovery.virtual.effects import EFFECTS
+from discovery.virtual.nmv5000.campaign import CAMPAIGNS
+from discovery.virtual.nmv5000.plant import five_axis
+from discovery.virtual.record import (
+    FAULTS,
+    Order,
+    draw_effect,
+    file_name,
+    parse_fault,
+    parse_request,
+    write_answers,
+    write_campaign,
+)
 
 
 def orders_of(
@@ -21,6 +30,7 @@ def orders_of(
     seed: int,
     hours: float,
     nozzle_height_mm: float,
+    nozzle_side: float,
     effects: Sequence[str],
     faults: Sequence[str],
     conceal: bool,
@@ -48,6 +58,7 @@ def orders_of(
             seed + i,
             hours,
             nozzle_height_mm,
+            nozzle_side,
             requests,
             chain_faults if i == 0 else (),
             age=float(i),
@@ -98,9 +109,16 @@ def _refuse_another_campaign(out: Path, orders: Sequence[Order]) -> None:
 
 def effect_list() -> str:
     """The effects and faults with unit, default place and law, one a line."""
+    machine = five_axis()
     effects = [
-        (name, f"{e.low:g} to {e.high:g} {e.unit}".removesuffix(" 1"), f"at {'+'.join(e.at)}", e.law)
-        for name, e in EFFECTS.items()
+        (
+            word,
+            f"up to {e.reach(machine, places[0]):.3g} {e.unit}".removesuffix(" 1"),
+            f"at {'+'.join(places[0])}",
+            e.law,
+        )
+        for word, e in EFFECTS.items()
+        if (places := e.places(machine))
     ]
     faults = [
         (name, f"e.g. {example:g} {unit}", f"on {channel}" if channel else "", "")

@@ -1,89 +1,154 @@
-"""The virtual rotary table: every number of the plant in one readable table.
-
-Five thermally uniform bodies stand on a machine bed and are flooded from a sump:
-
-    C_i T_i' = sum_j G_ij (T_j - T_i) + hA_i (T_env - T_i) + a_i P_fric(n) + c_i P_mot(n)
-               + g_i (T_cool - T_i) + pump A_i h(n, h_nozzle) (T_fluid - T_i)
-    C_f T_f' = pump (P_pump + sum_i A_i h (T_i - T_f)) - UA_f (T_f - T_env)
-    T_bed'   = (T_env - T_bed)/tau_bed
-
-Sources: [S] Mayr et al., "Compensation of cutting fluid influences on five axis machine tools".
-[J] judgement, chosen so that a 72 h cycle has the uncompensated errors of that paper's Table 3. They are
-plausible, not identified from the real machine.
-"""
+"""A virtual machine: a plant, what its log shows, and the baseline that somebody believes in."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-BODIES = ("table", "c_body_1", "c_body_2", "b_body_1", "b_body_2")
-ERRORS = ("E_Y0C", "E_Z0T", "E_R0T", "E_A0C")
+import numpy as np
 
-Five = tuple[float, float, float, float, float]
+from discovery.models import Model
+from discovery.virtual.materials import Bar
+from discovery.virtual.network import Array, Inputs, Law, Network, Switch
+from discovery.virtual.signals import Draw
+from discovery.virtual.simulate import Run
+
+T_REF = 22.0
 
 
-class Machine(NamedTuple):
-    """Parameters of the plant in SI units (speed in rpm); a named tuple: the compiled kernel reads it."""
+@dataclass(frozen=True)
+class Channel:
+    """A column of the log. `series` gives it over the steps of a run; outputs have none, they are levers."""
 
-    #                   table    c_body_1 c_body_2 b_body_1 b_body_2
-    capacity: Five = (44.7e3, 62.4e3, 81.6e3, 165.0e3, 240.0e3)  # J/K           [J] mass x specific heat
-    air: Five = (4.16, 1.68, 2.88, 6.72, 8.64)  # W/K   [J] area x 16 (spinning table) or 4.8 W/m2K
-    friction_share: Five = (0.06, 0.42, 0.52, 0.0, 0.0)  # 1             [J] bearings
-    motor_share: Five = (0.05, 0.10, 0.85, 0.0, 0.0)  # 1             [J] direct drive
-    cooling_ua: Five = (0.0, 30.0, 113.0, 0.0, 0.0)  # W/K           [J] jacket, at unlimited coolant flow
-    wet_area: Five = (
-        0.0757,
-        0.0224,
-        0.0,
-        0.0,
-        0.0,
-    )  # m2    [J] x h(600 rpm) = 220 and 65 W/K; [S] which two bodies
-    length_z: Five = (0.064, 0.151, 0.180, 0.149, 0.0)  # m             [J] lever of E_Z0T
-    length_y: Five = (0.0, 0.155, 0.080, 0.480, 0.252)  # m             [J] lever of E_Y0C
-    tilt: Five = (
-        0.0,
-        5.83,
-        2.87,
-        -6.29,
-        -2.41,
-    )  # um/m/K        [J] of E_A0C; sums to 0: uniform growth tilts nothing
+    name: str
+    role: str
+    unit: str
+    decimals: int = 2
+    series: Callable[[Run], Array] | None = None
+    sd: float = 0.0  # noise of an input; of an output in its unit, as a multiple of the machine's noise
 
-    # conduction, W/K [J]
-    G_table_c1: float = 24.0
-    G_c1_c2: float = 25.0
-    G_c1_b1: float = 29.0
-    G_c2_b1: float = 11.0
-    G_b1_b2: float = 13.0
-    G_b2_bed: float = 9.6
-    tau_bed: float = 108e3  # s [J] 30 h
-    coolant_flow: float = 220.0  # W/K [J] mass flow x specific heat
 
-    # expansion
-    alpha_steel: float = 11.5  # um/m/K [J]
-    alpha_cast: float = 10.8  # um/m/K [J]
-    radius: float = 0.167  # m [J] measuring radius of E_R0T
-    T_ref: float = 22.0  # degC, uniform temperature at which the errors are zero
+def felt(name: str, role: str, of: str = "", sd: float = 0.03, decimals: int = 2) -> Channel:
+    """A temperature [degC] that the log shows: that of a node or input, `name` where no other is given."""
+    source = of or name
+    return Channel(name, role, "degC", decimals, lambda run: run[source], sd)
 
-    # drive: P_fric = (M_c + M_v (n/600)^(2/3)) w, P_mot = iron (n/600)^1.5 + copper (M/6.5 Nm)^2  [J]
-    M_coulomb: float = 2.84  # Nm
-    M_viscous: float = 2.72  # Nm at 600 rpm
-    iron: float = 80.0  # W at 600 rpm
-    copper: float = 40.0  # W at 6.5 Nm
 
-    # film: eqs. (1) to (5) [S], numbers [J]
-    nozzle: float = 0.010  # m, d_n
-    disk_radius: float = 0.25  # m, r_d
-    lambda_s: float = 45.0  # W/m/K, steel
-    lambda_f: float = 0.58  # W/m/K, emulsion
-    nu: float = 1.2e-6  # m2/s, kinematic: a dynamic viscosity has the wrong dimension in eq. (2)
-    Re: float = 1000.0  # jet Reynolds number
-    h_still: float = 300.0  # W/m2K, gravity film at standstill, where eq. (1) gives 0
+def logged(name: str, role: str, unit: str, decimals: int = 0) -> Channel:
+    """An input that the log shows as it is."""
+    return Channel(name, role, unit, decimals, lambda run: run[name])
 
-    # sump [J]: 300 l
-    sump_capacity: float = 1.2e6  # J/K
-    pump_power: float = 635.0  # W
-    sump_ua: float = 91.0  # W/K
-    flow_exponent: float = 1.0  # wet conductance ~ flow^m; 1: proportional
 
-    # what the drive power channel sees of friction that an effect adds: 0 nothing (concealed), 1 all
-    power_seen: float = 0.0
+@dataclass(frozen=True)
+class Pace:
+    """How long and how often a machine of a family is recorded and read."""
+
+    hours: float = 72.0
+    step_s: float = 20.0
+    log_s: float = 60.0
+    read_s: tuple[float, float] = (300.0, 900.0)
+    before_h: float = 30.0  # history before a recording begins
+    noise: tuple[float, float] = (0.25, 0.9)  # least and largest noise of a reading, um
+    heat_w: float = 2.0  # rms of the heat that no channel shows, at each body
+
+
+@dataclass(frozen=True)
+class Spare:
+    """A recorded input that the baseline does not use: where it acts if it does."""
+
+    channel: str
+    kind: str  # input_exchange, input_heat or input_path
+    body: str = ""
+    source: str = ""  # of an exchange
+    output: str = ""  # of a path
+    size: float = 1.0  # W/K, W or um at full input, typical
+    full: float = 1.0  # value of the input that counts as full
+
+
+@dataclass(frozen=True)
+class Words:
+    """Names that inputs and nodes have on this machine; empty: it has none."""
+
+    air: str = "T_env"
+    fluid: str = ""  # node or input that wets
+    fluid_channel: str = ""
+    water: bool = True  # the fluid evaporates
+    pump: str = ""
+    flow: str = ""  # channel of a flow in steps
+    speed: str = ""
+    top_speed: float = 1.0  # rpm
+    power: str = ""
+    cooling: str = ""  # channel of a cooling power that the baseline takes as it is
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A plant, its log, and the baseline that somebody believes in."""
+
+    title: str
+    network: Network
+    bodies: Mapping[str, Bar]
+    levers: Mapping[str, Mapping[str, float]]  # output -> node -> unit/K
+    offsets: Mapping[str, float]  # output -> value at which all nodes are at T_REF
+    channels: tuple[Channel, ...]
+    baseline: Model
+    nominal: Mapping[str, float]  # of its parameters: what a drawing gives; a refit begins there
+    cycle: Callable[[Draw, float], Inputs]  # hours -> inputs
+    words: Words = Words()
+    pace: Pace = Pace()
+    heat: float = 200.0  # W that such a machine makes
+    warm: float = T_REF  # degC of a body that rests
+    joints: Mapping[tuple[str, str], float] = field(default_factory=dict)  # W/K, of links of the baseline
+    air: Mapping[str, float] = field(default_factory=dict)  # W/K, of bodies with a term of air
+    wet: Mapping[str, float] = field(default_factory=dict)  # W/K, of bodies with a term of fluid
+    driven: Mapping[str, str] = field(default_factory=dict)  # body -> channel that its loss follows
+    cooled: tuple[str, ...] = ()  # bodies that a recorded cooling power cools
+    rotating: tuple[str, ...] = ()
+    splashed: tuple[str, ...] = ()  # dry in the baseline, and within reach of the fluid
+    chips: tuple[str, ...] = ()  # bodies that hot swarf falls on
+    gaps: tuple[tuple[str, str], ...] = ()  # pairs of bodies that fluid may bridge
+    unlinked: tuple[tuple[str, str], ...] = ()  # pairs that might touch
+    on_bed: tuple[str, ...] = ()
+    spare: tuple[Spare, ...] = ()
+    work: tuple[str, ...] = ()  # inputs that are zero while the machine rests
+    shown: tuple[
+        Callable[[Array, float], Array], ...
+    ] = ()  # what joints and sensors do to the outputs (n, Y)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of what is read."""
+        return tuple(self.levers)
+
+    def read(self, run: Run) -> Array:
+        """Outputs at every instant of the plant, (n + 1, Y)."""
+        index = {name: k for k, name in enumerate(run.network.nodes)}
+        columns = []
+        for output, levers in self.levers.items():
+            rise = run.nodes[:, [index[node] for node in levers]] - T_REF
+            columns.append(rise @ np.array(list(levers.values())) + self.offsets.get(output, 0.0))
+        y = np.column_stack(columns)
+        for show in self.shown:
+            y = show(y, run.step_s)
+        return np.asarray(y)
+
+    def plus(
+        self,
+        laws: Sequence[Law] = (),
+        nodes: Mapping[str, float] | None = None,
+        switches: Mapping[str, Switch] | None = None,
+    ) -> Machine:
+        """This machine with more in its plant; the baseline does not know."""
+        return replace(self, network=self.network.plus(laws, nodes, switches))
+
+    def scaled(self, laws: str, factor: float) -> Machine:
+        """This machine with every law whose name begins with `laws` so many times as strong."""
+        changed = self.network.changed(
+            lambda law: replace(law, size=factor * law.size) if law.name.startswith(laws) else law
+        )
+        return replace(self, network=changed)
+
+    def mean(self, run: Run, body: str) -> Array:
+        """Mean temperature of a body at the step beginnings, (n,)."""
+        nodes = self.bodies[body].nodes
+        return np.asarray(sum(run[node] for node in nodes) / len(nodes))

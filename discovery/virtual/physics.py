@@ -1,89 +1,63 @@
-"""Laws of the plant, one small compiled function each; speeds in rpm, temperatures in degC, heat in W."""
+"""Formulas of heat in machines: speeds in rpm, temperatures in degC, heat in W."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from discovery.virtual.machine import Machine
+from discovery.virtual.network import Array, Form, Law, Switch, heat, link
 
 RPM = 2.0 * np.pi / 60.0  # rad/s per rpm
-STEFAN_BOLTZMANN = 5.670374e-8
-TAU_HIDDEN = 3200.0  # s, second thermal mass
-TAU_DRYING = 2400.0  # s, wet film after the pump stops
-TAU_WETTING = 60.0  # s
-TAU_SUMP = 13.3e3  # s, 3.7 h
-HUMIDITY = 0.45
-COOLANT_CAPACITY = 65e3  # J/K
-CHILLER = 2000.0  # W
+
+# Vogel: nu ~ exp(a/(T + b)). Mineral oil ISO VG 32: 32 mm2/s at 40 degC, 5.4 at 100 degC. A pole at -95 degC.
+VOGEL_B = 95.0
+VG32 = 804.0  # K; ln(32/5.4) = a (1/135 - 1/195)
 
 
-@njit(cache=True)
-def film_coefficient(speed: float, height: float, m: Machine) -> float:
-    """h [W/m2K] of eqs. (1) to (5), blended with the gravity film at standstill: (h_0^4 + h_1^4)^(1/4)."""
-    if speed <= 0.0:
-        return m.h_still
-    ekman = m.nu / (4.0 * speed * RPM * m.disk_radius**2)
-    nusselt = (
-        1.97619
-        * (height / m.nozzle) ** 0.0909
-        * m.Re**0.75
-        * ekman ** (-0.1111)
-        * (m.lambda_s / m.lambda_f) ** (-0.9)
-    )
-    return float((m.h_still**4 + (nusselt * m.lambda_f / m.nozzle) ** 4) ** 0.25)
+def viscous_shape(exponent: float, reference: float = 22.0, a: float = VG32) -> tuple[float, float, float]:
+    """Shape of the forms VISCOUS and STRIBECK: viscosity to a power, 1 at `reference` [degC].
+
+    >>> shape = viscous_shape(1.0, 40.0)
+    >>> round(float(32.0 * np.exp(shape[0] / (100.0 + shape[1]) - shape[0] / (40.0 + shape[1]))), 1)
+    5.1
+    """
+    return exponent * a, VOGEL_B, reference
 
 
-@njit(cache=True)
-def friction_torque(speed: float, m: Machine) -> float:
-    """Bearing torque [Nm], Coulomb and viscous part (Palmgren); none at standstill."""
-    return float(m.M_coulomb + m.M_viscous * (speed / 600.0) ** (2.0 / 3.0)) if speed > 0.0 else 0.0
+def palmgren_power(speed: Array, mean_diameter_mm: float, f0: float = 2.0, nu: float = 25.0) -> Array:
+    """Load-free friction of a rolling bearing [W]: M_0 = 1e-7 f_0 (nu n)^(2/3) d_m^3 N mm for nu n > 2000.
+
+    f_0: 2 (oil-air) to 8 (oil bath); nu in mm2/s. Source: Palmgren 1959; Harris, Rolling Bearing Analysis.
+
+    >>> float(palmgren_power(np.array([3000.0]), 100.0).round(1)[0])
+    111.7
+    """
+    torque = 1e-7 * f0 * np.maximum(nu * speed, 2000.0) ** (2.0 / 3.0) * mean_diameter_mm**3 * (speed > 0)
+    return np.asarray(torque * 1e-3 * speed * RPM)
 
 
-@njit(cache=True)
-def copper_loss(speed: float, m: Machine) -> float:
-    """Copper loss [W], by the square of the torque."""
-    return m.copper * (friction_torque(speed, m) / 6.5) ** 2
+def film(
+    name: str, pump: str, flow_kg: float = 8e-4, thickness_kg: float = 0.12, dry_s: float = 2400.0
+) -> list[Law]:
+    """A film of fluid [kg/m2] on a wall: fed by the pump, drained by gravity with its cube, dried slowly.
+
+    Nusselt's film: the mass that runs off goes with the cube of the thickness. It fills within
+    thickness/flow; that and a third of it should not be much shorter than a step of the plant.
+    """
+    drain = flow_kg / thickness_kg**3
+    return [
+        heat(f"{name} fed", name, flow_kg, pump),
+        Law(f"{name} drains", Form.POWER, name, size=drain, shape=(2.0,)),
+        Law(f"{name} dries", Form.LINK, name, size=1.0 / dry_s),
+    ]
 
 
-@njit(cache=True)
-def motor_loss(speed: float, m: Machine) -> float:
-    """Iron and copper loss [W]."""
-    return float(m.iron * (speed / 600.0) ** 1.5 + copper_loss(speed, m))
-
-
-@njit(cache=True)
-def vapour(T: float) -> float:
-    """Saturated vapour relative to 22 degC (Magnus formula)."""
-    return float(np.exp(17.62 * T / (243.12 + T) - 17.62 * 22.0 / (243.12 + 22.0)))
-
-
-@njit(cache=True)
-def evaporation(T: float, T_env: float, wetness: float) -> float:
-    """Heat drawn from a wet surface, 1 at 22 degC in a room of 22 degC (Lewis relation, RH 45 %)."""
-    return wetness * max(0.0, vapour(T) - HUMIDITY * vapour(T_env)) / (1.0 - HUMIDITY)
-
-
-@njit(cache=True)
-def natural(T: float, T_env: float) -> float:
-    """Turbulence-free natural convection, (|dT|/5 K)^(1/4) dT: 1 W/K at 5 K."""
-    dT = T_env - T
-    return float((abs(dT) / 5.0) ** 0.25 * dT)
-
-
-@njit(cache=True)
-def radiation(T: float, T_env: float) -> float:
-    """Radiated heat [W/m2] per emissive area."""
-    return STEFAN_BOLTZMANN * ((T_env + 273.15) ** 4 - (T + 273.15) ** 4)
-
-
-@njit(cache=True)
-def viscosity_change(T: float) -> float:
-    """Viscous friction against its value at 22 degC, -1: exp(-0.03 (T - 22)) - 1."""
-    return float(np.exp(-0.03 * (T - 22.0)) - 1.0)
-
-
-@njit(cache=True)
-def play(x: float, width: float, y: float) -> float:
-    """Prandtl-Ishlinskii play: y follows x only beyond +-width."""
-    return max(x - width, min(x + width, y))
+def chiller(
+    tank: str, power: float, target: str | float, band: float
+) -> tuple[list[Law], dict[str, float], dict[str, Switch]]:
+    """A chiller on a tank: its evaporator, 4 kJ/K, is cooled while it is on. Laws, nodes, switches."""
+    plate, name = f"{tank} evaporator", f"{tank} chiller"
+    laws = [
+        Law(name, Form.HEAT, plate, size=-power, switch=name),
+        link(f"{name} plate", tank, plate, power / 4.0),
+    ]
+    return laws, {plate: 4e3}, {name: Switch(tank, target, band)}

@@ -1,24 +1,37 @@
-"""Recordings of the virtual machine: from a request to the files of a campaign, always the same bytes."""
+"""Recordings of the paper's virtual machine, from an order to files: always the same bytes."""
 
 from __future__ import annotations
 
-import gzip
-import io
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from discovery.files import write_atomic
-from discovery.virtual.cycles import HOUR, KINDS, Array, Cycle, make_cycle
-from discovery.virtual.effects import EFFECTS, Request, sizes
-from discovery.virtual.faults import FAULTS
-from discovery.virtual.machine import BODIES, Machine
-from discovery.virtual.measurement import CHANNELS, Chain, Columns, everyday_heat, observe
-from discovery.virtual.plant import simulate
+from discovery.errors import UsageError
+from discovery.files import format_toml, write_atomic
+from discovery.virtual import faults
+from discovery.virtual.effects import EFFECTS, Shapes
+from discovery.virtual.log import Chain, Columns, csv_gz, decimals, observe
+from discovery.virtual.machine import Machine
+from discovery.virtual.network import Inputs, heat
+from discovery.virtual.nmv5000.cycles import KINDS, STEP_S, Cycle, make_cycle
+from discovery.virtual.nmv5000.plant import five_axis
+from discovery.virtual.signals import HOUR, Draw, noise
+from discovery.virtual.simulate import Run, State, simulate
+
+MOST = 3.0  # times the reach of an effect: what the plant still computes
+
+
+@dataclass(frozen=True)
+class Request:
+    """An effect asked for: its name, its size, the bodies (or the output) where it acts."""
+
+    effect: str
+    size: float
+    states: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -30,12 +43,14 @@ class Order:
     seed: int = 1
     hours: float = 72.0
     nozzle_height_mm: float = 50.0
+    nozzle_side: float = 0.0  # 0 centre, 1 left
     effects: tuple[Request, ...] = ()
     faults: tuple[tuple[str, str, float], ...] = ()  # name, channel, size
     age: float = 0.0  # how many recordings came before, for `wear`
     note: str = ""
-    machine: Machine = field(default_factory=Machine)
-    chain: Chain = field(default_factory=Chain)
+    machine: Machine = field(default_factory=five_axis)
+    change: Callable[[Inputs], Inputs] | None = None  # what else happens to the inputs of the cycle
+    chain: Chain = field(default_factory=lambda: Chain(white=0.4, slow=0.3))
 
 
 @dataclass(frozen=True)
@@ -43,90 +58,148 @@ class Taken:
     """A recording, and what only its maker knows."""
 
     columns: Columns
-    windows: tuple[tuple[str, float, float], ...]  # body, start [s], end [s] of hidden heat
     fault_at_s: tuple[float, ...]
+
+
+def ran(order: Order) -> tuple[Machine, Cycle, Run]:
+    """The machine of an order with what is concealed in it, its cycle, and what it did."""
+    cycle = make_cycle(order.cycle, order.seed, order.hours, order.nozzle_height_mm, order.nozzle_side)
+    if order.change:
+        cycle = replace(cycle, inputs=order.change(cycle.inputs))
+    n = len(cycle.inputs["T_env"])
+    initial, everyday, *_ = _streams(order)
+    machine = concealing(order.machine, order.effects)
+    own = {b: noise(everyday, n, STEP_S, 3 * HOUR, machine.pace.heat_w) for b in machine.bodies}
+    machine = machine.plus(
+        [
+            heat("everyday", node, share, f"everyday {b}")
+            for b, bar in machine.bodies.items()
+            for node, share in bar.span()
+        ]
+    )
+    inputs = {**cycle.inputs, **{f"everyday {b}": x for b, x in own.items()}}
+    inputs |= {"number": np.full(n, 0.0), "age": np.full(n, order.age)}
+    room = float(cycle.inputs["T_env"][0]) + initial.normal(0.0, 0.1)
+    start = State(dict.fromkeys(("sump", "hose"), cycle.fluid_start), {}, room)
+    return machine, cycle, simulate(machine.network, inputs, STEP_S, start)
 
 
 def take(order: Order) -> Taken:
     """Run the machine once and record it."""
-    cycle = make_cycle(order.cycle, order.seed, order.hours, order.nozzle_height_mm)
-    n = len(cycle.speed)
-    # Separate streams, so that an effect changes nothing but itself.
-    rng = np.random.default_rng([order.seed, list(KINDS).index(order.cycle), 1])
-    initial, everyday, reading, hidden, fault = rng.spawn(5)
-    heat, windows = hidden_heat(hidden, cycle, order.effects)
-    run = simulate(
-        cycle,
-        order.machine,
-        sizes(order.effects),
-        heat=heat + everyday_heat(everyday, n, cycle.step_s, order.chain),
-        start=cycle.air[0] + initial.normal(0.0, 0.1, 5),
-        age=order.age,
-    )
-    columns = observe(cycle, run, reading, order.chain)
+    machine, cycle, run = ran(order)
+    *_, reading, fault = _streams(order)
+    columns = observe(machine, run, cycle.first, cycle.readings, reading, order.chain)
     instants = []
     for name, channel, size in order.faults:
         instants.append(float(np.round(fault.uniform(0.2, 0.8) * order.hours * HOUR)))
         columns = FAULTS[name][0](columns, channel, size, instants[-1])
-    return Taken(columns, windows, tuple(instants))
+    return Taken(columns, tuple(instants))
 
 
-def hidden_heat(
-    rng: np.random.Generator, cycle: Cycle, requests: Sequence[Request]
-) -> tuple[Array, tuple[tuple[str, float, float], ...]]:
-    """Heat (n, 5) [W] that no channel shows: a window of 3 to 10 h, swarf in pulses while the pump runs."""
-    n = len(cycle.speed)
-    heat, windows = np.zeros((n, 5)), []
+def _streams(order: Order) -> list[Draw]:
+    """Separate streams for start, small heat, readings and faults: an effect changes nothing but itself."""
+    return np.random.default_rng([order.seed, list(KINDS).index(order.cycle), 1]).spawn(4)
+
+
+def concealing(machine: Machine, requests: Sequence[Request]) -> Machine:
+    """A machine with effects in it, in their textbook shapes."""
     for request in requests:
-        spans = []
-        if request.effect == "unmeasured_heat":
-            length = min(n // 2, round(rng.uniform(3, 10) * HOUR / cycle.step_s))
-            start = int(rng.integers(0, n - length))
-            spans = [(start, start + length)]
-        elif request.effect == "swarf_heat":
-            start = 0
-            while start < n:
-                start += round(rng.exponential(2 * HOUR) / cycle.step_s)
-                end = start + round(rng.uniform(300, 2400) / cycle.step_s)
-                spans.append((start, end))
-                start = end
-        for start, end in spans:
-            for state in request.states:
-                working = cycle.flow[start:end] > 0 if request.effect == "swarf_heat" else 1.0
-                heat[start:end, BODIES.index(state)] += request.size * working
-        if request.effect == "unmeasured_heat":
-            windows += [
-                (state, a * cycle.step_s, b * cycle.step_s) for a, b in spans for state in request.states
-            ]
-    return heat, tuple(windows)
+        machine = EFFECTS[request.effect].conceal(machine, request.states, request.size, Shapes())
+    return machine
+
+
+def parse_request(text: str) -> Request:
+    """Read `name[@body[+body]]=size`.
+
+    Raises:
+        UsageError: an unknown name or place, a size that is no number or far from any machine.
+    """
+    machine = five_axis()
+    known = {word: e for word, e in EFFECTS.items() if e.places(machine)}
+    head, equals, size_text = text.partition("=")
+    name, at, where = head.strip().partition("@")
+    if name not in known:
+        raise UsageError(f"There is no effect '{name}' in '{text}'; choose one of: {', '.join(known)}.")
+    effect, places = known[name], known[name].places(machine)
+    size, unit = _number(size_text), effect.unit.removesuffix("1")
+    place = tuple(where.split("+")) if at else places[0]
+    if place not in places and place[::-1] not in places:
+        choice = ", ".join("+".join(p) for p in places)
+        raise UsageError(f"'{name}' cannot act at '{where}' in '{text}'; choose one of: {choice}.")
+    usual = effect.reach(machine, place)
+    if not equals or not np.isfinite(size):
+        raise UsageError(
+            f"The effect '{text}' needs a size, for example {name}={0.2 * usual:.3g} ({unit or 'a number'})."
+        )
+    if not 0.0 <= size <= MOST * usual:
+        raise UsageError(
+            f"The size in '{text}' is not possible; give 0 to {MOST * usual:.3g} {unit}".rstrip() + "."
+        )
+    return Request(name, size, place if place in places else place[::-1])
 
 
 def draw_effect(seed: int) -> Request:
     """An effect, its place and size drawn by seed, for a machine that hides something."""
-    rng = np.random.default_rng([seed, 4711])
-    name = str(rng.choice(list(EFFECTS)))
-    effect = EFFECTS[name]
-    size = float(f"{rng.uniform(effect.low, effect.high):.3g}")
-    states = effect.at
-    if name in ("fluid_convection", "air_convection", "second_thermal_mass", "unmeasured_heat", "radiation"):
-        states = (str(rng.choice([b for b in BODIES if name != "fluid_convection" or b[0] == "b"])),)
-    return Request(name, size, states)
+    rng, machine = np.random.default_rng([seed, 4711]), five_axis()
+    names = [word for word, e in EFFECTS.items() if e.places(machine)]
+    effect = EFFECTS[str(rng.choice(names))]
+    places = effect.places(machine)
+    place = places[int(rng.integers(len(places)))]
+    return Request(effect.word, float(f"{effect.reach(machine, place) * rng.uniform(0.1, 0.6):.3g}"), place)
 
 
-def csv_gz(columns: Columns, decimals: Mapping[str, int]) -> bytes:
-    """The recording as gzip CSV, without name and date in the header: the same bytes every time."""
-    cells = [
-        ["" if np.isnan(v) else f"{v:.{decimals.get(name, 2)}f}" for v in values]
-        for name, values in columns.items()
-    ]
-    text = ",".join(columns) + "\n" + "\n".join(map(",".join, zip(*cells, strict=True))) + "\n"
-    buffer = io.BytesIO()
-    with gzip.GzipFile(filename="", mode="wb", fileobj=buffer, mtime=0, compresslevel=9) as file:
-        file.write(text.encode())
-    return buffer.getvalue()
+def _rezero(columns: Columns, channel: str, size: float, at_s: float) -> Columns:
+    del channel
+    shares = dict(zip(five_axis().outputs, (0.2, 1.0, -1.0, 0.5, -2.0), strict=True))
+    return faults.rezero(columns, {o: size * share for o, share in shares.items()}, at_s)
 
 
-DECIMALS = {"time": 0} | {name: decimals for name, (_, _, decimals) in CHANNELS.items()}
+def _clock_shift(columns: Columns, channel: str, size: float, at_s: float) -> Columns:
+    del channel, at_s
+    return faults.clock_shift(columns, five_axis().outputs, size)
+
+
+def _lag(columns: Columns, channel: str, size: float, at_s: float) -> Columns:
+    del at_s
+    return faults.sensor_lag(columns, channel, size)
+
+
+FAULTS: dict[str, tuple[Any, str, str, float]] = {
+    # name: function, default channel, unit of the size, example size
+    "sensor_offset": (faults.sensor_offset, "E_Z0T", "um", 4.0),
+    "sensor_drift": (faults.sensor_drift, "E_R0T", "um a day", 1.2),
+    "sensor_lag": (_lag, "T_fluid", "s", 1200.0),
+    "outlier": (faults.outlier, "E_A0C", "um", 60.0),
+    "clock_shift": (_clock_shift, "", "s", 900.0),
+    "rezero": (_rezero, "", "um", 5.0),
+}
+
+
+def parse_fault(text: str) -> tuple[str, str, float]:
+    """Read `name[@channel]=size`.
+
+    Raises:
+        UsageError: an unknown name or channel, a size that is no number.
+    """
+    head, _, size_text = text.partition("=")
+    name, _, channel = head.strip().partition("@")
+    if name not in FAULTS:
+        raise UsageError(f"There is no fault '{name}' in '{text}'; choose one of: {', '.join(FAULTS)}.")
+    channels, channel = [c.name for c in five_axis().channels], channel or FAULTS[name][1]
+    if channel and channel not in channels:
+        raise UsageError(f"There is no channel '{channel}' in '{text}'; choose from: {', '.join(channels)}.")
+    size = _number(size_text)
+    if not np.isfinite(size):
+        _, _, unit, example = FAULTS[name]
+        raise UsageError(f"The fault '{text}' needs a size in {unit}, for example {name}={example:g}.")
+    return name, channel, size
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
 
 
 def file_name(order: Order) -> str:
@@ -134,15 +207,21 @@ def file_name(order: Order) -> str:
     return f"{order.name}.csv.gz"
 
 
+def recording_file(order: Order, taken: Taken) -> bytes:
+    """The recording as gzip CSV."""
+    return csv_gz(taken.columns, decimals(order.machine.channels))
+
+
 def write_campaign(out: Path, title: str, orders: Sequence[Order]) -> list[dict[str, Any]]:
     """Record every order into `out`, its `campaign.toml` last. Returns the answers, one for each recording.
 
-    Raises UserError when `out` cannot be written.
+    Raises:
+        UserError: `out` cannot be written.
     """
     answers = []
     for order in orders:
         taken = take(order)
-        write_atomic(out / file_name(order), csv_gz(taken.columns, DECIMALS))
+        write_atomic(out / file_name(order), recording_file(order, taken))
         answers.append(answer(order, taken))
     write_atomic(out / "campaign.toml", campaign_toml(title, orders))
     return answers
@@ -156,7 +235,6 @@ def answer(order: Order, taken: Taken) -> dict[str, Any]:
             {"effect": r.effect, "states": list(r.states), "size": r.size, "unit": EFFECTS[r.effect].unit}
             for r in order.effects
         ],
-        "windows": [{"state": s, "start_s": a, "end_s": b} for s, a, b in taken.windows],
         "faults": [
             {"effect": name, "channel": channel, "size": size, "at_s": at}
             for (name, channel, size), at in zip(order.faults, taken.fault_at_s, strict=True)
@@ -170,15 +248,11 @@ def write_answers(path: Path, answers: Sequence[dict[str, Any]]) -> None:
 
 
 def campaign_toml(title: str, orders: Sequence[Order]) -> str:
-    """The campaign file, laid out for a reader."""
-    white = dict(zip([c for c in CHANNELS if c[:2] == "E_"], asdict(orders[0].chain)["white"], strict=True))
-    lines = [f"name = {json.dumps(title)}", "", "[channels]"]
-    for name, (role, unit, _) in CHANNELS.items():
-        extra = f", noise = {white[name]:g}" if name in white else ""
-        lines.append(f'{name:8s} = {{ role = "{role}", unit = "{unit}"{extra} }}')
-    lines += ["", "[recordings]"]
-    width = max(len(order.name) for order in orders)
-    for order in orders:
-        note = f", note = {json.dumps(order.note)}" if order.note else ""
-        lines.append(f'{order.name:{width}s} = {{ file = "{file_name(order)}"{note} }}')
-    return "\n".join(lines) + "\n"
+    """The campaign file."""
+    white = orders[0].chain.white
+    channels = {
+        c.name: {"role": c.role, "unit": c.unit} | ({} if c.series else {"noise": white * c.sd})
+        for c in orders[0].machine.channels
+    }
+    recordings = {o.name: {"file": file_name(o)} | ({"note": o.note} if o.note else {}) for o in orders}
+    return format_toml({"name": title, "channels": channels, "recordings": recordings})

@@ -1,146 +1,172 @@
-"""A drawn machine with three recordings, and what a refit of its lumped baseline can and cannot absorb.
-
-A refit is judged by projection: the baseline's sensitivities (finite differences of the lumped plant) explain
-what they can of a change of the readings, the rest is left.
-"""
+"""A drawn machine with its recordings, and what a refit of its baseline can and cannot absorb of a change."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from discovery.virtual.chains import Law, Propagator, propagator, run
-from discovery.virtual.cycles import HOUR, noise
-from discovery.virtual.fine import (
-    BODIES,
-    STEP_S,
-    T_REF,
-    Array,
-    FineMachine,
-    Inputs,
-    draw_inputs,
-    draw_machine,
-    lumped,
-)
+from discovery.virtual.log import Chain, Columns, observe, reading_instants
+from discovery.virtual.machine import Machine
+from discovery.virtual.network import Array, Inputs, heat
+from discovery.virtual.refit import Refit, refit
+from discovery.virtual.signals import HOUR, Draw, noise
+from discovery.virtual.simulate import Run, simulate
 
 RECORDINGS = ("a", "b", "c")
-FIT = (0, 1)  # recordings to fit; the last is held out
-READ_EVERY = round(600.0 / STEP_S)  # steps between readings
-LUMPING = 0.25  # largest rms over noise that the cutting into nodes may leave after a refit
+FIT = ("a", "b")  # recordings to fit; the last is held out
+LUMPING = (
+    0.2,
+    0.6,
+)  # rms over noise that a baseline leaves of its machine without effect; the noise is set by it
+TRIES = 8
 
 
 @dataclass(frozen=True)
 class World:
-    """A machine and its three recordings. Readings are stacked: recordings, instants, four outputs."""
+    """A machine, the inputs of its recordings and the noise of a reading."""
 
-    plant: Propagator
-    inputs: tuple[Inputs, ...]
-    starts: tuple[Array, ...]  # (5,) degC
-    heat: tuple[Array, ...]  # (n, 5) W, everyday
-    noise: float  # um
-    columns: (
-        Array  # (3 R 4, P): what a refit can move, readings for a relative change or for 1 K of a start value
-    )
-    of_c: NDArray[np.bool_]  # (P,): start values of `c`, which a fit of `a` and `b` does not touch
+    machine: Machine
+    inputs: dict[str, Inputs]
+    instants: dict[str, Array]  # s, of the readings
+    origins: dict[str, str] | None  # ISO 8601 instants of time 0, where the log has a calendar
+    noise: float  # of a reading, times the `sd` of its channel
+    coloured: bool
+    seed: int  # of the noise
+    lumping: float  # rms over noise that the baseline leaves of the machine in silence
+    fitted: Refit  # the baseline on readings without noise and without effect
 
     @property
-    def seen(self) -> int:
-        """Number of values to fit; the rest is held out."""
-        return len(self.columns) * len(FIT) // len(RECORDINGS)
+    def sigma(self) -> Array:
+        """Noise of a reading of each output, (Y,)."""
+        return sigma_of(self.machine, self.noise)
 
-    def readings(self, laws: Sequence[Sequence[Law]] | None = None) -> Array:
-        """(3 R 4,) noise-free readings, with laws for each recording."""
-        return self.shown(self.bodies(laws))
+    def runs(self, machine: Machine, recordings: tuple[str, ...] = RECORDINGS) -> dict[str, Run]:
+        """What a machine does over the recordings."""
+        return {r: _run(machine, self.inputs[r]) for r in recordings}
 
-    def bodies(self, laws: Sequence[Sequence[Law]] | None = None) -> list[Array]:
-        """Body means of the three recordings, (n + 1, 5) each."""
-        each = laws or ((),) * len(RECORDINGS)
-        return [run(self.plant, *x) for x in zip(self.inputs, self.starts, self.heat, each, strict=True)]
+    def logs(
+        self, machine: Machine, recordings: tuple[str, ...] = RECORDINGS, *, noisy: bool = False
+    ) -> dict[str, Columns]:
+        """Logs of a machine, its readings with or without noise."""
+        chain = Chain(self.noise, 0.3 if self.coloured else 0.0, machine.pace.hours * 3600.0 / 36.0)
+        return {
+            r: observe(machine, run, first_step(machine), self.instants[r],
+            np.random.default_rng([self.seed, k]),
+                       chain if noisy else None)
+            for k, (r, run) in enumerate(self.runs(machine, recordings).items())
+        }  # fmt: skip
 
-    def shown(self, bodies: Sequence[Array]) -> Array:
-        """(3 R 4,) readings of body means."""
-        return _stack(bodies, self.plant.machine)
+    def change(self, machine: Machine) -> Array:
+        """Change (R,) of what the baseline leaves to fit, over noise, when the machine is this one.
 
-    def left(self, change: Array) -> Array:
-        """What a refit on `a` and `b` leaves of a change (3 R 4,); `c` has its own start values refitted."""
-        n, common, own = self.seen, self.columns[:, ~self.of_c], self.columns[:, self.of_c]
-        rest = change - common @ np.linalg.lstsq(common[:n], change[:n], rcond=1e-9)[0]
-        return np.asarray(rest - own @ np.linalg.lstsq(own[n:], rest[n:], rcond=1e-9)[0])
+        The baseline runs on the inputs that this machine shows: a chiller that switches at other times, or a
+        warmer sump, stands in the log.
+        """
+        logs = self.logs(machine, FIT)
+        return self.fitted.residual - self.fitted.on(machine, logs)
 
-    def size_of(self, change: Array) -> float:
-        """Rms that a refit leaves of a change on the recordings to fit, over noise."""
-        return float(np.sqrt(np.mean(self.left(change)[: self.seen] ** 2))) / self.noise
+    def size(self, machine: Machine) -> float:
+        """Rms over noise that the first step of a refit leaves of a change."""
+        return float(np.sqrt(np.mean(self.fitted.left(self.change(machine)) ** 2)))
+
+    def visible(self, logs: dict[str, Columns]) -> float:
+        """Rms over noise by which the residual of a full refit differs with an effect and without it."""
+        found = refit(self.machine, {r: logs[r] for r in FIT}, self.sigma, self.fitted)
+        with_it, without = found.residual, self.fitted.residual
+        if len(with_it) != len(without):  # readings were moved in time
+            return float(np.sqrt(max(0.0, found.rms**2 - self.fitted.rms**2)))
+        return float(np.sqrt(np.mean((with_it - without) ** 2)))
 
 
-def draw_world(rng: np.random.Generator, *, coloured: bool) -> World:
-    """A machine, stiff enough inside that its lumped baseline fits it well below noise, and three cycles.
+def draw_world(rng: Draw, family: Callable[[Draw], Machine], *, coloured: bool) -> World:
+    """A machine whose baseline misfits by a share of the noise, with its recordings.
 
-    coloured: small unmodelled heat (2 W, 3 h) at every body.
+    The noise is drawn; where the misfit is too large for it, more noise, else another machine.
+
+    Raises:
+        RuntimeError: no machine of TRIES fits, which is a mistake in the family.
     """
-    sigma = round(float(rng.uniform(0.3, 0.7)), 2)
-    machine = replace(draw_machine(rng), stiffness=float(rng.uniform(0.4, 2.5)))
-    inputs = tuple(draw_inputs(rng, machine) for _ in RECORDINGS)
-    starts = tuple(np.asarray(u.air[0] + rng.normal(0.0, 0.25, 5)) for u in inputs)
-    n, sd = len(inputs[0].air), 2.0 if coloured else 0.0
-    heat = tuple(np.column_stack([noise(rng, n, STEP_S, 3 * HOUR, sd) for _ in BODIES]) for _ in RECORDINGS)
-    columns, of_c = sensitivities(machine, inputs, starts)
-    world = World(propagator(machine), inputs, starts, heat, sigma, columns, of_c)
-    while (too_much := lumping(world) / LUMPING) > 1.0:  # the rms falls as one over the stiffness
-        machine = replace(machine, stiffness=machine.stiffness * too_much * 1.05)
-        world = replace(world, plant=propagator(machine))
-    return world
+    for _ in range(TRIES):
+        machine = family(rng)
+        if coloured:
+            machine = machine.plus(
+                [
+                    heat("everyday", node, share, f"everyday {body}")
+                    for body, bar in machine.bodies.items()
+                    for node, share in bar.span()
+                ]
+            )
+        origins, ages = draw_calendar(rng)
+        inputs = {r: draw_inputs(rng, machine, k, ages[k]) for k, r in enumerate(RECORDINGS)}
+        gaps = draw_gaps(rng, *machine.pace.read_s)
+        instants = {r: reading_instants(rng, machine.pace, gaps) for r in RECORDINGS}
+        low, high = machine.pace.noise
+        seed = int(rng.integers(2**31))
+        quiet = {
+            r: {k: np.zeros_like(v) if k.startswith("everyday") else v for k, v in u.items()}
+            for r, u in inputs.items()
+        }
+        blank = World(machine, quiet, instants, origins, low, coloured, seed, 0.0, None)  # type: ignore[arg-type]
+        found = refit(machine, blank.logs(machine, FIT), sigma_of(machine, low))
+        level = round(max(low, low * found.rms / rng.uniform(*LUMPING)), 3)
+        if level > high:
+            continue
+        world = replace(blank, inputs=inputs, noise=level, lumping=found.rms * low / level)
+        return replace(world, fitted=refit(machine, world.logs(machine, FIT), world.sigma, found))
+    raise RuntimeError(f"no machine of {TRIES} has a baseline that fits it well enough")
 
 
-def lumping(world: World) -> float:
-    """Rms over noise that the cutting into nodes leaves after a refit of the lumped baseline."""
-    quiet = replace(world, heat=tuple(np.zeros_like(h) for h in world.heat))
-    coarse = replace(quiet, plant=propagator(lumped(world.plant.machine)))
-    return world.size_of(quiet.readings() - coarse.readings())
+def draw_gaps(rng: Draw, low: float, high: float) -> tuple[float, float]:
+    """Smallest and largest gap [s] between readings: all alike, or irregular."""
+    gap = float(np.exp(rng.uniform(np.log(low), np.log(high))))
+    return (gap, gap) if rng.uniform() < 0.5 else (max(low, 0.75 * gap), min(high, 1.35 * gap))
 
 
-def sensitivities(
-    machine: FineMachine, inputs: Sequence[Inputs], starts: Sequence[Array]
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Columns (3 R 4, P) of every free number of the baseline, and which are start values of `c`."""
-    coarse, step = lumped(machine), 1e-3
-    quiet = np.zeros((len(inputs[0].air), 5))
-
-    def readings(m: FineMachine) -> Array:
-        p = propagator(m)
-        return _stack([run(p, u, s, quiet) for u, s in zip(inputs, starts, strict=True)], m)
-
-    base, columns = readings(coarse), []
-    for name in ("links", "air", "loss", "wet"):
-        values = getattr(coarse, name)
-        for i in range(len(values)):
-            changed = values * np.where(np.arange(len(values)) == i, 1 + step, 1.0)
-            columns.append((readings(replace(coarse, **{name: changed})) - base) / step)
-    columns.append((readings(replace(coarse, cooling=coarse.cooling * (1 + step))) - base) / step)
-    p, one_k = propagator(coarse), np.eye(5)
-    still = _only_pumping(inputs)
-    for k, u in enumerate(still):
-        for i in range(5):
-            alone = [
-                run(p, u, one_k[i], quiet) + T_REF if j == k else _nothing(u) for j in range(len(inputs))
-            ]
-            columns.append(_stack(alone, coarse))
-    of_c = np.arange(len(columns)) >= len(columns) - 5
-    return np.column_stack(columns), of_c
+def sigma_of(machine: Machine, level: float) -> Array:
+    """Noise of a reading of each output at a noise level."""
+    return level * np.array([c.sd for c in machine.channels if c.series is None])
 
 
-def _only_pumping(inputs: Sequence[Inputs]) -> list[Inputs]:
-    """The same pumping with nothing else: the answer to a start value alone."""
-    none = np.zeros_like(inputs[0].air)
-    return [Inputs(none, none, u.pump, none, none, none) for u in inputs]
+def first_step(machine: Machine) -> int:
+    """The step at which the recording begins."""
+    return round(machine.pace.before_h * HOUR / machine.pace.step_s)
 
 
-def _nothing(u: Inputs) -> Array:
-    """Body means of a recording in which nothing happens."""
-    return np.full((len(u.air) + 1, 5), T_REF)
+def draw_inputs(rng: Draw, machine: Machine, number: int, age: float) -> Inputs:
+    """Inputs of a recording and of the hours before it; the machine rests for a part of these.
+
+    Adds `clock` [s since the recording began], `number` and `age` of the recording, and the heat that no
+    channel shows at each body, `everyday ...`.
+    """
+    pace = machine.pace
+    u = dict(machine.cycle(rng, pace.hours + pace.before_h))
+    n, first = len(next(iter(u.values()))), first_step(machine)
+    rest = rng.uniform(0.05, 0.45) * pace.before_h
+    idle = slice(max(0, first - round(rest * HOUR / pace.step_s)), first)
+    for name in machine.work:
+        u[name] = u[name].copy()
+        u[name][idle] = 0.0
+    u["clock"] = np.asarray((np.arange(n) - first + 0.5) * pace.step_s)
+    u |= {"number": np.full(n, float(number)), "age": np.full(n, age)}
+    tau = pace.hours * HOUR / 24.0
+    return u | {f"everyday {b}": noise(rng, n, pace.step_s, tau, pace.heat_w) for b in machine.bodies}
 
 
-def _stack(bodies: Sequence[Array], m: FineMachine) -> Array:
-    return np.concatenate([((b[::READ_EVERY] - T_REF) @ m.outputs.T).ravel() for b in bodies])
+def draw_calendar(rng: Draw) -> tuple[dict[str, str] | None, tuple[float, ...]]:
+    """Dates of the recordings, or none, and their ages: 0, 1, ... or in proportion to the dates."""
+    days = np.cumsum([rng.integers(0, 300), rng.integers(5, 20), rng.integers(5, 25)])
+    begin = np.datetime64("2024-01-08T00:00:00") + days.astype("timedelta64[D]")
+    at = [str(d + np.timedelta64(int(rng.integers(0, 86400)), "s")) for d in begin]
+    if rng.uniform() < 0.5:
+        return None, (0.0, 1.0, 2.0)
+    return dict(zip(RECORDINGS, at, strict=True)), (
+        0.0,
+        1.0,
+        float((days[2] - days[0]) / (days[1] - days[0])),
+    )
+
+
+def _run(machine: Machine, inputs: Inputs) -> Run:
+    return simulate(machine.network, inputs, machine.pace.step_s, float(inputs[machine.words.air][0]))

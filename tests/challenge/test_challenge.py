@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from discovery.challenge import pool, seal
 from discovery.challenge.methods import METHODS
 from discovery.challenge.methods.refit_only import ljung_box
-from discovery.challenge.prepare import adopt, draw_orders, make
+from discovery.challenge.prepare import adopt, draw_orders
 from discovery.challenge.run import challenge
 from discovery.cli import app
 from discovery.errors import UserError
@@ -150,24 +150,16 @@ def test_changed_code_is_noticed(tmp_path: Path) -> None:
 
 
 def test_orders_have_their_shares_and_come_from_the_seed() -> None:
-    orders = draw_orders(200, 5)
-    kinds = [o.kind for o in orders]
-    shares = {"none": 50, "one": 80, "two": 20, "measuring": 20, "outside": 30}
-    assert {k: kinds.count(k) for k in shares} == shares
-    assert (
-        sum(o.seed % 2 for o in orders if o.kind == "none") == 25
-    )  # half of them with slow noise and small heat
-    assert draw_orders(200, 5) == orders
-    assert draw_orders(200, 6) != orders
+    families = ["portal", "headstock"]
+    orders = draw_orders(families, 200, 5)
+    for family in families:
+        kinds = [o.plan.kind for o in orders if o.family == family]
+        shares = {"none": 23, "one": 40, "input": 10, "two": 9, "measuring": 10, "outside": 8}
+        assert {k: kinds.count(k) for k in shares} == shares
+    assert draw_orders(families, 200, 5) == orders
+    assert draw_orders(families, 200, 6) != orders
     assert len({o.seed for o in orders}) == 200
-
-
-def test_a_case_does_not_show_its_seed() -> None:
-    order = draw_orders(1, 5)[0]
-    files = make(order).files
-    assert not any(
-        str(order.seed).encode() in content for name, content in files.items() if name.endswith(".toml")
-    )
+    assert orders[0].family != orders[1].family
 
 
 def test_end_to_end_and_going_on(cases: Path, tmp_path: Path) -> None:

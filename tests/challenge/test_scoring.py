@@ -8,12 +8,13 @@ from typing import Any
 import pytest
 
 from discovery.challenge import scoring
+from discovery.challenge.document import family_rows
 from discovery.challenge.intervals import Share
 from discovery.challenge.overlap import overlap
 from discovery.challenge.prepare import kind_of
 from discovery.challenge.scoring import judge
 from discovery.challenge.sizes import covered
-from discovery.challenge.tally import score_all, tally
+from discovery.challenge.tally import by_family, score_all, tally
 
 GAP = {"effect": "flooded_gap", "states": ["c_body_1", "b_corpus"]}
 OFFSET = {"effect": "sensor_offset", "states": [], "output": "E_Z0T"}
@@ -184,3 +185,22 @@ def test_figures_by_counting() -> None:
     assert t.confusion["friction_speed"] == {"not named": 1}
     assert t.confusion["no effect"] == {"no mismatch": 1, "unexplained": 1}
     assert t.seconds == 3.0
+
+
+def test_families_have_figures_of_their_own_and_say_which_chose_settings() -> None:
+    keys = {
+        "a": QUIET | {"kind": "none", "family": "portal"},
+        "b": QUIET | {"kind": "none", "family": "headstock"},
+        "c": QUIET | {"kind": "none", "family": "headstock"},
+    }
+    t = tally(score_all(keys, {"a": UNKNOWN, "b": NOTHING, "c": NOTHING}))
+    assert {name: one.false_alarms for name, one in by_family(t).items()} == {
+        "portal": Share(1, 1),
+        "headstock": Share(0, 2),
+    }
+    head, portal, headstock = family_rows(t)
+    assert head[:3] == ["family", "settings", "cases"]
+    assert portal[:3] == ["portal", "confirms", "1"]
+    assert headstock[:3] == ["headstock", "chosen on it", "2"]
+    nameless = tally(score_all({"a": QUIET | {"kind": "none"}}, {"a": NOTHING}))
+    assert family_rows(nameless) == []

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from discovery.dynamics import make_grid, make_system, simulate
-from discovery.dynamics.series import play
+from discovery.dynamics.series import lag_ends, play
 from discovery.dynamics.system import predict
 from discovery.errors import UserError
 from discovery.models import Model, Parameter
@@ -87,3 +87,15 @@ def test_readings_stay_where_they_were_taken() -> None:
     assert np.array_equal(grid.time[grid.read], reads)
     assert np.array_equal(grid.readings[:, 0], reads)
     assert np.allclose(grid.nodes["u"], grid.time / 1000)
+
+
+@pytest.mark.parametrize("tau", [20.0, 300.0, 1e7])
+def test_a_lag_of_a_straight_input_trails_by_its_time_constant(tau: float) -> None:
+    """A ramp of slope c: y = u - c tau (1 - exp(-t/tau)), whatever the steps."""
+    time = np.array([0.0, 10.0, 70.0, 400.0, 410.0, 2000.0])
+    ramp = 5.0 + 0.3 * time
+    ends = np.column_stack([ramp[:-1], ramp[1:]]).ravel()
+    found = lag_ends(ends, np.diff(time), tau)
+    expected = ramp - 0.3 * tau * -np.expm1(-time / tau)
+    assert found[1::2] == pytest.approx(expected[1:], rel=1e-6)
+    assert found[0::2] == pytest.approx(expected[:-1], rel=1e-6)

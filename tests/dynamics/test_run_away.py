@@ -24,7 +24,9 @@ def test_far_is_away(rate: float, runs: bool) -> None:
     }
     recording = Recording("r", time, {"u": np.zeros(len(time)), "T": np.zeros(len(time))})
     terms = (Term("growth", "T", parse("a*T + 0*u")),)
-    model = Model("m", {"a": Parameter(rate, "1/s")}, {"T": State("T", "degC", None, parse("1"))}, terms, {})
+    model = Model(
+        "m", {"a": Parameter(rate, "1/s")}, {"T": State("T", "degC", None, parse("1"), 0.0)}, terms, {}
+    )
     grid = make_grid(Campaign("c", channels, {"r": recording}), "r", ["u"], ["T"])
     if runs:
         x = simulate(make_system(model, grid), model.values()).x

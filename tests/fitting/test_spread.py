@@ -107,7 +107,7 @@ def test_without_a_spread_nothing_is_estimated() -> None:
     r = cold(np.random.default_rng(3), "r", 0.7)
     fit = fit_model(model(), campaign(r, spread=0.0), ["r"])
     assert fit.offsets == {}
-    assert fit.together == 1.0
+    assert fit.together >= 1.0  # readings that hang together count for the start, too
     assert not any(u.is_offset for u in fit.problem.unknowns)
 
 

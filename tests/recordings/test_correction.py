@@ -14,8 +14,9 @@ from discovery.models.reduced import reduced
 from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.check import check_campaign
 from discovery.recordings.correction import uncompensated
-from discovery.virtual.measurement import CHANNELS
-from discovery.virtual.record import Order, csv_gz, take
+from discovery.virtual.log import csv_gz
+from discovery.virtual.nmv5000.plant import five_axis
+from discovery.virtual.record import Order, take
 from tests.recordings.conftest import CAMPAIGN, Write, rows
 
 ERRORS = ("E_Y0C", "E_Z0T", "E_R0T", "E_A0C")
@@ -36,9 +37,8 @@ def twice(tmp_path_factory: pytest.TempPathFactory) -> tuple[Campaign, Campaign]
     folder = tmp_path_factory.mktemp("compensated")
     columns = dict(take(Order("day", "fit", 31, hours=30.0)).columns)
     lines = ["name = 'two days'", "[channels]"]
-    lines += [
-        f"{name} = {{ role = '{role}', unit = '{unit}' }}" for name, (role, unit, _) in CHANNELS.items()
-    ]
+    channels = {c.name: c for c in five_axis().channels}
+    lines += [f"{name} = {{ role = '{c.role}', unit = '{c.unit}' }}" for name, c in channels.items()]
     written = {name: np.round(values, 2 if name in ERRORS else 6) for name, values in columns.items()}
     (folder / "day.csv.gz").write_bytes(csv_gz(written, dict.fromkeys(written, 6)))
     recordings = ["[recordings]", "day = { file = 'day.csv.gz' }"]
@@ -50,7 +50,7 @@ def twice(tmp_path_factory: pytest.TempPathFactory) -> tuple[Campaign, Campaign]
         held = applied[np.maximum.accumulate(np.where(known, np.arange(len(applied)), 0))]
         written[error] = written[error] - held
         written[f"{error}_applied"] = applied / 1000.0 if k == 0 else applied
-        unit = "mm" if k == 0 else CHANNELS[error][1]
+        unit = "mm" if k == 0 else channels[error].unit
         lines.append(f"{error}_applied = {{ role = 'applied correction', unit = '{unit}' }}")
     (folder / "compensated.csv.gz").write_bytes(csv_gz(written, dict.fromkeys(written, 6)))
     recordings[1] = "day = { file = 'compensated.csv.gz' }"

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from discovery.challenge import scoring
-from discovery.diagnosis.verdict import RIVAL
+from discovery.diagnosis.thresholds import RIVAL
 from discovery.errors import UserError
 from discovery.models import Parameter
 from discovery.report import equations, write_comparison, write_figures, write_report
@@ -215,12 +215,12 @@ def test_the_proof_says_what_its_figures_are(tmp_path: Path, unit: str, said: st
 
 
 def test_what_came_closest_has_its_recording_and_hours_and_stands_once(tmp_path: Path) -> None:
-    heat = {"effect": "unmeasured_heat", "states": ["head"], "decidable": True}
+    heat = {"effect": "unmeasured_heat", "states": ["head"], "share_that_a_refit_leaves": 0.6}
     considered = [
         {**heat, "recording": "mon", "instants_s": [36000, 50400], "log_evidence": 60.0},
         {**heat, "recording": "fri", "instants_s": [600, 1800], "log_evidence": 50.0},
-        {"effect": "film_drag", "states": ["head"], "log_evidence": 20.0, "decidable": False},
-        {"effect": "film_drag", "states": ["head"], "log_evidence": 10.0, "decidable": False},
+        {"effect": "film_drag", "states": ["head"], "log_evidence": 20.0, "share_that_a_refit_leaves": 0.02},
+        {"effect": "film_drag", "states": ["head"], "log_evidence": 10.0, "share_that_a_refit_leaves": 0.02},
     ]
     document = {**sample.diagnosed(24.0), "verdict": "unexplained", "physics": [], "considered": considered}
     (tmp_path / "diagnosis.json").write_text(json.dumps(document))
@@ -228,9 +228,9 @@ def test_what_came_closest_has_its_recording_and_hours_and_stands_once(tmp_path:
     assert found
     (table,) = (t for t in found["tables"] if t.title == "What came closest")
     assert [row.cells for row in table.rows] == [
-        ("unmeasured heat", "head in mon (10 to 14 h)", "60", "yes"),
-        ("unmeasured heat", "head in fri (10 to 30 min)", "50", "yes"),
-        ("film drag", "head", "20", "no"),
+        ("unmeasured heat", "head in mon (10 to 14 h)", "60", "60 %"),
+        ("unmeasured heat", "head in fri (10 to 30 min)", "50", "60 %"),
+        ("film drag", "head", "20", "2 %"),
     ]
 
 

@@ -17,9 +17,9 @@ from discovery.recordings import Campaign, Recording
 from discovery.runtime import update as module
 from discovery.runtime.hypotheses import Comparison, ageing
 from discovery.runtime.update import Update, update_file
-from discovery.virtual.effects import Request
 from discovery.virtual.machine import Machine
-from discovery.virtual.record import Order, take
+from discovery.virtual.nmv5000.plant import five_axis
+from discovery.virtual.record import Order, Request, take
 
 ERRORS = ("E_Y0C", "E_Z0T", "E_R0T", "E_A0C")
 
@@ -30,7 +30,7 @@ def days(
     """Days of 24 h with a few readings each."""
     recordings = {}
     for k in range(count):
-        columns = take(Order(f"d{k}", "fit", 300 + k, 24.0, machine=plant, effects=effects)).columns
+        columns = take(Order(f"d{k}", "fit", 300 + k, 24.0, machine=plant, effects=effects, age=1.0)).columns
         values = {name: series for name, series in columns.items() if name != "time"}
         read = np.flatnonzero(np.isfinite(values[ERRORS[0]]))
         chosen = read[np.linspace(0, len(read) - 1, readings).astype(int)]
@@ -41,12 +41,8 @@ def days(
     return replace(machine, recordings=recordings)
 
 
-def less_loss(factor: float) -> Machine:
-    fresh = Machine()
-    return fresh._replace(
-        friction_share=tuple(factor * share for share in fresh.friction_share),  # type: ignore[arg-type]
-        motor_share=tuple(factor * share for share in fresh.motor_share),  # type: ignore[arg-type]
-    )
+def less_loss(factor: float) -> tuple[Request, ...]:
+    return tuple(Request("wear", 1.0 - factor, (body,)) for body in ("c_body_1", "c_body_2"))
 
 
 @pytest.fixture
@@ -57,7 +53,7 @@ def at_work(document: bytes, tmp_path: Path) -> Path:
 
 
 def test_a_machine_that_has_not_changed_keeps_its_model(machine: Campaign, at_work: Path) -> None:
-    campaign = days(machine, 3, Machine())
+    campaign = days(machine, 3, five_axis())
     found = update_file(at_work, campaign, list(campaign.recordings), at_work.with_name("new.json"))
     assert found.comparison.verdict == "nothing"
     assert max(v for n, v in found.comparison.odds.items() if n != "nothing") < 3.0
@@ -73,7 +69,7 @@ def test_only_what_wear_can_change_is_told_to_age(exported: Exported) -> None:
 
 
 def test_wear_is_followed_and_written_with_its_history(machine: Campaign, at_work: Path) -> None:
-    campaign = days(machine, 3, less_loss(0.8), readings=24)
+    campaign = days(machine, 3, five_axis(), less_loss(0.8), readings=24)
     out = at_work.with_name("new.json")
     found = update_file(at_work, campaign, list(campaign.recordings), out)
     assert found.comparison.verdict == "wear"
@@ -101,7 +97,7 @@ def test_wear_is_followed_and_written_with_its_history(machine: Campaign, at_wor
 
 
 def test_a_revision_is_exported_to_further_targets(machine: Campaign, at_work: Path) -> None:
-    campaign = days(machine, 2, less_loss(0.8), readings=24)
+    campaign = days(machine, 2, five_axis(), less_loss(0.8), readings=24)
     out = at_work.with_name("new.json")
     assert update_file(at_work, campaign, list(campaign.recordings), out).path == out
     done = CliRunner().invoke(app, ["export", str(out), "--to", "st", "--to", "scl"])
@@ -123,7 +119,7 @@ def warm_room(campaign: Campaign) -> Campaign:
 
 
 def test_a_faulty_sensor_is_named_and_nothing_is_signed(machine: Campaign, at_work: Path) -> None:
-    campaign = warm_room(days(machine, 3, Machine()))
+    campaign = warm_room(days(machine, 3, five_axis()))
     found = update_file(at_work, campaign, list(campaign.recordings), at_work.with_name("new.json"))
     assert (found.comparison.verdict, found.comparison.what) == ("input sensor", "T_env")
     assert found.path is None
@@ -133,8 +129,8 @@ def test_a_faulty_sensor_is_named_and_nothing_is_signed(machine: Campaign, at_wo
 @pytest.mark.parametrize(
     ("plant", "effects", "verdict"),
     [
-        (Machine(), (Request("flooded_gap", 25.0, ("c_body_1", "b_body_1")),), "missing physics"),
-        (Machine()._replace(air=tuple(1.6 * a for a in Machine().air)), (), "unexplained"),  # type: ignore[arg-type]
+        (five_axis(), (Request("flooded_gap", 25.0, ("c_body_1", "b_body_1")),), "missing physics"),
+        (five_axis().scaled("air", 1.6), (), "unexplained"),
     ],
     ids=["flooded gap", "fan"],
 )
@@ -198,7 +194,7 @@ def test_heat_flows_are_those_of_the_terms(machine: Campaign, fitted: Model) -> 
 
 
 def test_mistakes_are_sentences(machine: Campaign, at_work: Path, exported: Exported, tmp_path: Path) -> None:
-    campaign = days(machine, 1, Machine())
+    campaign = days(machine, 1, five_axis())
     values = {n: s for n, s in campaign.recordings["d0"].values.items() if n not in ERRORS}
     blind = replace(campaign, recordings={"d0": replace(campaign.recordings["d0"], values=values)})
     with pytest.raises(UserError, match="holds no reading"):

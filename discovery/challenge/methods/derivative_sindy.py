@@ -10,15 +10,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.challenge.methods.forward_selection import with_white_noise
 from discovery.challenge.methods.named import named_entry
 from discovery.challenge.problem import Answer, Problem
-from discovery.diagnosis.scored import Assessment, assess
+from discovery.diagnosis.scored import refit
 from discovery.dynamics import Trajectory
 from discovery.dynamics.system import output_matrix
-from discovery.effects.candidates import hypotheses
+from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError
+from discovery.fitting import Fit
 from discovery.sparse.derivative import discrepancy_terms, smoothed_derivative
 from discovery.terms import evaluate
 
@@ -30,12 +30,13 @@ MOST = 3  # effects that may be named
 def derivative_sindy(problem: Problem) -> Answer:
     """The effects whose terms the regression keeps, largest first, with their shares as probabilities."""
     context, fit = problem.context, problem.context.baseline
-    model = fit.problem.model
-    claims = hypotheses(
-        model, context.campaign.channels, context.outputs, context.recordings, context.effects
-    )
-    library = [h for h in claims if h.terms and h.recording is None]
-    white = np.array(fit.noise.white)
+    library = [
+        one
+        for h in context.candidates
+        if h.terms and h.recording is None and h.effect.search == "shapes"
+        for one in with_shapes(h)
+    ]
+    white = np.array(problem.white.white.white)
     blocks = [
         block
         for t in fit.trajectories
@@ -60,7 +61,7 @@ def derivative_sindy(problem: Problem) -> Answer:
         "physics": physics,
         "alternatives": [],
         "location": {"states": {s: 1.0 for h, _ in chosen[:1] for s in h.states}, "windows": []},
-        "improvement": problem.improvement(found.fit.model if found else None, [h for h, _ in chosen]),
+        "improvement": problem.improvement(found, [h for h, _ in chosen]),
     }
 
 
@@ -99,9 +100,9 @@ def _blocks(trajectory: Trajectory, residual: Array, rates: Array) -> list[tuple
     return [(x[quarter == q], d[quarter == q]) for q in range(4)]
 
 
-def _refit(problem: Problem, chosen: list[Hypothesis]) -> Assessment | None:
+def _refit(problem: Problem, chosen: list[Hypothesis]) -> Fit | None:
     """The model with all chosen terms, refitted; None where there are none or it runs away."""
     try:
-        return assess(with_white_noise(problem.context), chosen) if chosen else None
-    except UserError:
+        return refit(problem.white, chosen, problem.white.white) if chosen else None
+    except RunsAwayError:
         return None

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from discovery.challenge.problem import Answer, Problem
-from discovery.diagnosis.doubts import FREE
 from discovery.diagnosis.location import locate
-from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED
-from discovery.evidence.latent_force import free_forcing
+from discovery.diagnosis.posterior import Posterior
+from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict
+from discovery.evidence.latent_force import latent_forces
+
+FIRES = 9.0  # log evidence of free heat at the body where it explains most
 
 
 def free_forcing_only(problem: Problem) -> Answer:
     """`unexplained` with place and windows where free heat at some body adds evidence."""
-    found = free_forcing(problem.context, problem.baseline)
-    fires = bool(found) and found[0].gain > FREE
-    place = locate(problem.context, problem.baseline, problem.baseline, (), found)
+    context, baseline = problem.context, problem.baseline
+    found = latent_forces(baseline.seen, baseline.settings[baseline.best], context.floor)
+    fires = bool(found) and found[0].gain > FIRES
+    verdict = Verdict(UNEXPLAINED if fires else NO_MISMATCH, baseline, (), (), ())
+    place = locate(context, baseline, verdict, Posterior((baseline,), np.zeros((1, 1))), found)
     windows = [
         {"recording": w.recording, "start_s": w.start_s, "end_s": w.end_s, "state": w.state}
         for w in place.windows
     ]
     return {
-        "verdict": UNEXPLAINED if fires else NO_MISMATCH,
+        "verdict": verdict.word,
         "physics": [],
         "alternatives": [],
         "location": {"states": dict(place.states), "windows": windows},

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from discovery.diagnosis.scored import Assessment
 from discovery.effects.hypothesis import Hypothesis
+from discovery.fitting import Fit
 
 
-def named_entry(found: Assessment, h: Hypothesis, probability: float) -> dict[str, Any]:
+def named_entry(fit: Fit, h: Hypothesis, probability: float) -> dict[str, Any]:
     """An effect with the parameters and 95 % intervals of a fit."""
     sizes = {}
     for name in (*h.amplitudes, *h.shapes):
-        p = found.model.parameters[name]
+        p = fit.model.parameters[name]
         value = (p.values or {}).get(h.recording, p.value) if h.recording else p.value
         half = next(
             (
                 1.96 * float(sd)
-                for u, sd in zip(found.fit.problem.unknowns, found.fit.standard_errors, strict=True)
+                for u, sd in zip(fit.problem.unknowns, fit.standard_errors, strict=True)
                 if u.name == name and not u.is_start
             ),
             0.0,

@@ -4,8 +4,8 @@ evaporates faster.
     q = -q_ev w (1 + b n/1000) exp(0.06 (T - 22)),   w = max(flow, film), t_dry film' = flow - film    [W]
 
 q_ev in W at standstill and 22 degC; b: 1 to 5 for surfaces of 0.05 to 0.2 m2, 90 to 240 W/m2 still and 500 to
-1400 W/m2 at 600 rpm; 6 % per kelvin is what the vapour pressure of water does (Clausius-Clapeyron). Source: Lewis
-relation h_m = h/(rho c_p Le^(2/3)) with h of a rotating disk. Limits: humidity is not recorded.
+1400 W/m2 at 600 rpm; 6 % per kelvin is what the vapour pressure of water does (Clausius-Clapeyron). Source:
+Lewis relation h_m = h/(rho c_p Le^(2/3)) with h of a rotating disk. Limits: humidity is not recorded.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape

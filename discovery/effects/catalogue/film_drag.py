@@ -2,9 +2,9 @@
 
     q = q_d flow (n/1000)^m_drag    [W]
 
-q_d in W at 1000 rpm, 20 to 200; m_drag near 2. Source: momentum balance P = m_drag' (w r)^2: 41 to 82 W at 600 rpm
-and 164 to 327 W at 1200 rpm for 10 to 20 l/min. Limits: all of the share lands on one body; the fluid's
-own warming is measured.
+q_d in W at 1000 rpm, 20 to 200; m_drag near 2. Source: momentum balance P = m_drag' (w r)^2: 41 to 82 W at
+600 rpm and 164 to 327 W at 1200 rpm for 10 to 20 l/min. Limits: all of the share lands on one body; the
+fluid's own warming is measured.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape
@@ -20,7 +20,8 @@ EFFECT = Effect(
     signature="heat with the square of the speed, only while the pump runs",
     confused_with=("friction_speed",),
     source=(
-        "momentum balance: P = m_drag'(w r)^2, 41 to 82 W at 600 rpm, 164 to 327 W at 1200 rpm for 10 to 20 l/min"
+        "momentum balance: P = m_drag'(w r)^2, 41 to 82 W at 600 rpm, 164 to 327 W at 1200 rpm "
+        "for 10 to 20 l/min"
     ),
     examples=(Example({"q_d": 80.0, "flow": 1.0, "speed": 500.0, "m_drag": 2.0}, 20.0),),
 )

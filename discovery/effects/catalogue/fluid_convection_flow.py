@@ -4,8 +4,8 @@
 
 q_fluid is what the fluid brings in the model; Q: a recorded flow; m: what is missing in the exponent, 0.5 to
 0.8 where the model does not know the flow, -0.5 to -0.2 where it counts in proportion. Source: Liu, Lienhard,
-Lombara, J. Heat Transfer 113, 1991: Nusselt numbers of jets and films follow the flow with 0.5 to 0.8. Limits:
-seen only where the flow takes more than two levels; with a pump that is on or off it changes nothing.
+Lombara, J. Heat Transfer 113, 1991: Nusselt numbers of jets and films follow the flow with 0.5 to 0.8.
+Limits: seen only where the flow takes more than two levels; with a pump that is on or off it changes nothing.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape

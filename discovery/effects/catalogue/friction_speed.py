@@ -2,8 +2,8 @@
 
     q = P_f (n/1000)^m_loss    [W]
 
-P_f in W at 1000 rpm, 20 to 400; m_loss of 1 to 2.5. Source: Palmgren (M_c + M_v n^(2/3)) n, seals n^2. Limits:
-one power law for both parts; with measured drive power as an input most of it is inside the model
+P_f in W at 1000 rpm, 20 to 400; m_loss of 1 to 2.5. Source: Palmgren (M_c + M_v n^(2/3)) n, seals n^2.
+Limits: one power law for both parts; with measured drive power as an input most of it is inside the model
 already.
 """
 

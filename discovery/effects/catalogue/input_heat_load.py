@@ -2,8 +2,8 @@
 
     q = q_in P/P_max    [W]
 
-P: a recorded heat load; q_in in W at the largest value that was recorded. Source: heat balance of a body: what a
-drive takes and does not put into work is heat, somewhere. Limits: in proportion to the power, at once.
+P: a recorded heat load; q_in in W at the largest value that was recorded. Source: heat balance of a body:
+what a drive takes and does not put into work is heat, somewhere. Limits: in proportion to the power, at once.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example

@@ -19,6 +19,8 @@ EFFECT = Effect(
     shapes=(Shape("t_m", "s", None),),
     signature="errors follow a body with a second time constant",
     confused_with=("input_path", "sensor_lag"),
-    source="a hidden mass C_m = G_m t_m behind a conductance; inner time constants L^2/(pi^2 a) of 14 to 28 min",
+    source=(
+        "a hidden mass C_m = G_m t_m behind a conductance; inner time constants L^2/(pi^2 a) of 14 to 28 min"
+    ),
     examples=(Example({"k_m": 2.0, "body": 26.0, "t_m": 1800.0}, -2.943, {"body": 22.0}, 1800.0),),
 )

@@ -2,8 +2,9 @@
 
     error shown = y + k (lag(y, t_m) - y)    [um]
 
-k: share of the error, of either sign; t_m: whatever the recordings can show. Source: as `second_thermal_mass`,
-for models whose states are the errors themselves. Limits: settled at the first instant.
+k: share of the error, of either sign; t_m: whatever the recordings can show. Source: as
+`second_thermal_mass`, for models whose states are the errors themselves. Limits: settled at the first
+instant.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape
@@ -18,6 +19,8 @@ EFFECT = Effect(
     shapes=(Shape("t_m", "s", None),),
     signature="fast then slow: a part of the error lags behind",
     confused_with=("sensor_lag", "input_path"),
-    source="a hidden mass C_m = G_m t_m behind a conductance; inner time constants L^2/(pi^2 a) of 14 to 28 min",
+    source=(
+        "a hidden mass C_m = G_m t_m behind a conductance; inner time constants L^2/(pi^2 a) of 14 to 28 min"
+    ),
     examples=(Example({"k_m": 0.5, "y": 10.0, "t_m": 600.0}, -1.839, {"y": 0.0}, 600.0),),
 )

@@ -1,0 +1,141 @@
+"""How many rules and constants decide in a diagnosis: `python -m benchmarks.rules`.
+
+A constant is a number (or a tuple of numbers) in capitals at the top of a file of `discovery/evidence` or
+`discovery/diagnosis`. It decides unless it stands below among those that do not: numbers that give integrals
+or a search its resolution (finer gives the same answer in more time), and numbers of what is shown. A rule is
+a comparison with a constant that decides, a veto, or a comparison with zero in the verdict.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1] / "discovery"
+FOLDERS = ("evidence", "diagnosis")
+AIM_RULES, AIM_CONSTANTS = 15, 20
+TODAY_RULES, TODAY_CONSTANTS = 22, 31  # what a test holds: the aim is not reached yet
+
+RESOLUTION = {  # finer gives the same answer in more time
+    "evidence/bayes.py": "_NARROW",
+    "evidence/events.py": "COARSE FINE CLOSER",
+    "evidence/form_error.py": "RANK",
+    "evidence/latent_force.py": "BLOCKS SIZES MEMORY_BLOCKS",
+    "evidence/process_noise.py": "_TRIED _BLOCKS JITTER",
+    "evidence/whitening.py": "_AT_BOUND _UNSEEN",
+    "diagnosis/context.py": "MOST_READINGS NODES",
+    "diagnosis/diagnose.py": "ANOTHER_NOISE",
+    "diagnosis/posterior.py": "FAR MOST IN_PLAY SETTINGS",
+    "diagnosis/proof.py": "DRAWS BLOCKS",
+    "diagnosis/scored.py": "ENOUGH NEAR",
+    "diagnosis/selection.py": "MOST REFITS RIVALS HOPE HALF FAR",
+    "diagnosis/thresholds.py": "DRAWS BLOCKS",
+}
+SHOWN = {  # what is told beside an answer, not the answer
+    "evidence/late.py": "TOLD SMALL",
+    "diagnosis/description.py": "MOST_TERMS LAGS",
+    "diagnosis/document.py": "CONSIDERED WRONG_READINGS",
+    "diagnosis/location.py": "*",
+    "diagnosis/proof.py": "CLOSABLE",
+    "diagnosis/regime.py": "ACTS MOST HOLDS",
+    "diagnosis/thresholds.py": "RIVAL RIVALS_SHOWN",
+}
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number at the top of a file."""
+
+    file: str
+    name: str
+    value: str
+
+    @property
+    def decides(self) -> bool:
+        """Whether an answer hangs on it."""
+        for listed in (RESOLUTION, SHOWN):
+            names = listed.get(self.file, "").split()
+            if self.name in names or names == ["*"]:
+                return False
+        return True
+
+
+def _files() -> Iterator[tuple[str, ast.Module]]:
+    for folder in FOLDERS:
+        for path in sorted((ROOT / folder).glob("*.py")):
+            yield f"{folder}/{path.name}", ast.parse(path.read_text("utf-8"))
+
+
+def constants() -> list[Constant]:
+    """Every number at the top of a file."""
+    found = []
+    for file, tree in _files():
+        for node in tree.body:
+            if not isinstance(node, ast.Assign):
+                continue
+            names = [n.id for target in node.targets for n in ast.walk(target) if isinstance(n, ast.Name)]
+            if all(name.lstrip("_").isupper() for name in names) and _is_number(node.value):
+                found += [Constant(file, name, ast.unparse(node.value)) for name in names]
+    return found
+
+
+def _is_number(value: ast.expr) -> bool:
+    """A number, a tuple of them, or what numpy makes of numbers."""
+    leaves = [n for n in ast.walk(value) if isinstance(n, ast.Constant)]
+    plain = (ast.Constant, ast.Tuple, ast.UnaryOp, ast.BinOp)
+    numbers = all(isinstance(n.value, (int, float)) for n in leaves)
+    return bool(leaves) and isinstance(value, plain) and numbers
+
+
+def rules() -> list[str]:
+    """Every rule, as the file and the words of the code."""
+    deciding = {(c.file, c.name) for c in constants() if c.decides}
+    thresholds = {name for file, name in deciding if file == "diagnosis/thresholds.py"}
+    found = []
+    for file, tree in _files():
+        for node in ast.walk(tree):
+            by_constant = isinstance(node, ast.Compare) and (
+                _used(node, thresholds) or any((file, name) in deciding for name in _names(node))
+            )
+            if by_constant or (file == "diagnosis/verdict.py" and _withdraws(node)):
+                found.append(f"{file}: {ast.unparse(node)}")
+            elif isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "VETOES":
+                found += [f"{file}: veto {ast.unparse(veto)}" for veto in getattr(node.value, "elts", [])]
+    return found
+
+
+def _names(node: ast.AST) -> set[str]:
+    return {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+
+
+def _used(node: ast.AST, thresholds: set[str]) -> bool:
+    return any(
+        isinstance(n, ast.Attribute) and ast.unparse(n.value) == "thresholds" and n.attr in thresholds
+        for n in ast.walk(node)
+    )
+
+
+def _withdraws(node: ast.AST) -> bool:
+    """A comparison with zero, or the question whether recordings contradict a name."""
+    if isinstance(node, ast.Compare):
+        return any(isinstance(c, ast.Constant) and c.value == 0 for c in node.comparators)
+    return isinstance(node, ast.Attribute) and node.attr == "contradicts"
+
+
+def main() -> None:
+    """Print what is counted."""
+    every = constants()
+    deciding = [c for c in every if c.decides]
+    print(f"{len(deciding)} constants decide (aim {AIM_CONSTANTS}), of {len(every)}:")
+    for c in deciding:
+        print(f"  {c.file}: {c.name} = {c.value}")
+    told = rules()
+    print(f"{len(told)} rules decide (aim {AIM_RULES}):")
+    for rule in told:
+        print(f"  {rule}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""What recordings say of a claim: noise, whitening, signatures, Bayes factors, a latent force, events."""

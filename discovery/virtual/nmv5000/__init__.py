@@ -1,0 +1,1 @@
+"""The paper's machine: a plant finer than any model of the tool, its test cycles, its campaign."""

@@ -1,0 +1,55 @@
+"""The campaign of the repository: the recordings that the paper speaks of, drawn once."""
+
+from __future__ import annotations
+
+from discovery.virtual.record import Order
+
+TITLE = "virtual NMV 5000, cutting fluid"
+SEED = 20261122  # fixed before anything was run on these recordings; never changed since
+
+
+def _order(
+    k: int, name: str, cycle: str, hours: float, note: str, height: float = 50.0, side: float = 0.0
+) -> Order:
+    return Order(name, cycle, SEED + k, hours, height, side, note=note)
+
+
+ORDERS = (
+    _order(1, "fit", "fit", 72.0, "random cycle, fluid on and warm, nozzle at 50 mm"),
+    _order(2, "validation", "validation", 72.0, "second random cycle, nozzle at 50 mm"),
+    _order(
+        3,
+        "left_nozzle",
+        "fit",
+        72.0,
+        "nozzle on the left: 30 % of the jet meets the table, the rest the structure",
+        side=1.0,
+    ),
+    _order(4, "height_100", "validation", 72.0, "nozzle at 100 mm", height=100.0),
+    _order(5, "dry", "dry", 72.0, "random cycle without fluid"),
+    _order(6, "only_environment", "environment", 48.0, "only the room changes, machine at rest"),
+    _order(7, "only_fluid", "fluid", 48.0, "only the fluid changes, table at 60 rpm"),
+    _order(8, "only_load", "internal", 48.0, "only the drive works, pump off, room held"),
+    _order(
+        9, "only_load_wet", "load_wet", 48.0, "only the drive works, under fluid that is kept near the room"
+    ),
+    _order(
+        10, "only_cooling", "cooling", 48.0, "only the set point of the axis cooling changes, machine at rest"
+    ),
+    _order(11, "warm_up", "warm_up", 25.0, "600 rpm for 15 h, then 10 h at rest, under fluid: figure 3"),
+    _order(
+        12, "warm_up_dry", "warm_up_dry", 25.0, "600 rpm for 15 h, then 10 h at rest, without fluid: figure 3"
+    ),
+    _order(
+        13,
+        "nozzle",
+        "nozzle",
+        24.0,
+        "table at rest, warm fluid in pulses; height 20 to 400 mm and flow 2 to 14 l/min in steps",
+    ),
+    _order(
+        14, "nozzle_flooded", "flooded", 24.0, "table turns under 8 to 16 l/min; height 20 to 400 mm in steps"
+    ),
+)
+
+CAMPAIGNS = {"nmv5000": (TITLE, ORDERS)}

@@ -1,0 +1,148 @@
+"""What a refit of the baseline can absorb: the very model of the case file, fitted to readings without noise.
+
+Parameters and the start values of all states are free. A signature that a refit absorbs is no evidence,
+whoever looks at it; what a refit leaves of it, over the noise of a reading, is the size of an effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from discovery.dynamics import System, make_grid, make_system, sensitivities, simulate, start_values
+from discovery.dynamics.system import inputs_of, predict
+from discovery.errors import RunsAwayError
+from discovery.models import Model, expanded
+from discovery.recordings import Campaign, Recording
+from discovery.recordings import Channel as Column
+from discovery.recordings.roles import ROLES
+from discovery.virtual.log import Columns
+from discovery.virtual.machine import Machine
+from discovery.virtual.network import Array
+
+_FAR = 1e6  # residual, in noise, of a trial that runs away
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A baseline fitted to noise-free readings of some recordings; residual and slopes in units of noise."""
+
+    systems: tuple[System, ...]
+    model: Model
+    sigma: Array  # (Y,)
+    theta: Array  # (U,): parameters, then start values recording by recording
+    residual: Array  # (R,)
+    slopes: Array  # (R, U)
+
+    @property
+    def rms(self) -> float:
+        """Rms over noise that the baseline leaves."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    def left(self, change: Array) -> Array:
+        """What a further refit leaves of a small change of the readings (R,), in units of noise."""
+        scale = np.linalg.norm(self.slopes, axis=0) + 1e-300
+        moved = np.linalg.lstsq(self.slopes / scale, change, rcond=1e-8)[0]
+        return np.asarray(change - self.slopes / scale @ moved)
+
+    def on(self, machine: Machine, recordings: Mapping[str, Columns]) -> Array:
+        """The residual (R,) that this fit leaves of other logs of the same recordings."""
+        systems = _systems(machine, self.model, recordings)
+        return _Problem(systems, self.model, self.sigma).residual(self.theta)
+
+
+def refit(
+    machine: Machine, recordings: Mapping[str, Columns], sigma: Array, begin: Refit | None = None
+) -> Refit:
+    """Fit the baseline of a machine.
+
+    Args:
+        recordings: logs with noise-free readings, by name.
+        sigma: (Y,) noise of a reading of each output.
+        begin: a refit of the same recordings with other readings, to start from.
+    """
+    from scipy.optimize import least_squares
+
+    channels = campaign_of(machine, recordings).channels
+    model = expanded(machine.baseline.with_values(machine.nominal), channels)
+    systems = _systems(machine, model, recordings)
+    problem = _Problem(systems, model, sigma)
+    start = problem.start if begin is None else begin.theta
+    found = least_squares(
+        problem.residual, start, problem.jacobian, method="trf", x_scale="jac", max_nfev=60, ftol=1e-5
+    )
+    return Refit(systems, model, sigma, found.x, found.fun, np.asarray(found.jac))
+
+
+def _systems(machine: Machine, model: Model, recordings: Mapping[str, Columns]) -> tuple[System, ...]:
+    campaign = campaign_of(machine, recordings)
+    inputs = inputs_of(model, campaign, machine.outputs)
+    return tuple(make_system(model, make_grid(campaign, r, inputs, machine.outputs)) for r in recordings)
+
+
+def campaign_of(machine: Machine, recordings: Mapping[str, Columns]) -> Campaign:
+    """Logs in memory as a campaign."""
+    channels = {c.name: Column(c.name, c.role, c.unit, None, ROLES[c.role].between) for c in machine.channels}
+    return Campaign(
+        machine.title,
+        channels,
+        {
+            name: Recording(name, c["time"], {k: v for k, v in c.items() if k != "time"})
+            for name, c in recordings.items()
+        },
+    )
+
+
+class _Problem:
+    """Residual and slopes of one trial, run once for both."""
+
+    def __init__(self, systems: Sequence[System], model: Model, sigma: Array) -> None:
+        self.systems, self.model, self.sigma = systems, model, sigma
+        self.free = {name: model.parameters[name].min >= 0.0 for name in model.free}  # these as logarithms
+        self.states = [name for name, state in model.states.items() if not state.memory]
+        self.latest: tuple[Array, Array, Array] | None = None
+
+    @property
+    def start(self) -> Array:
+        values = self.model.values()
+        free = [np.log(values[p]) if logged else values[p] for p, logged in self.free.items()]
+        return np.array(free + [0.0] * (len(self.states) * len(self.systems)))
+
+    def values(self, theta: Array) -> dict[str, float]:
+        """Parameters by name."""
+        pairs = zip(self.free.items(), theta.tolist(), strict=False)
+        return {name: float(np.exp(min(z, 50.0))) if logged else z for (name, logged), z in pairs}
+
+    def residual(self, theta: Array) -> Array:
+        return self._run(theta)[0]
+
+    def jacobian(self, theta: Array) -> Array:
+        return self._run(theta)[1]
+
+    def _run(self, theta: Array) -> tuple[Array, Array]:
+        if self.latest is not None and np.array_equal(self.latest[2], theta):
+            return self.latest[0], self.latest[1]
+        P, S = len(self.free), len(self.states)
+        own_values = self.values(theta)
+        values = self.model.values() | own_values
+        inner = np.array([own_values[p] if logged else 1.0 for p, logged in self.free.items()])
+        residuals, slopes = [], []
+        for k, system in enumerate(self.systems):
+            own = slice(P + k * S, P + (k + 1) * S)
+            start = start_values(system, values)
+            start[[system.states.index(name) for name in self.states]] += theta[own]
+            rows = system.grid.readings.size
+            wide = np.zeros((rows, len(theta)))
+            try:
+                trajectory = simulate(system, values, start)
+                residuals.append(((predict(trajectory) - system.grid.readings) / self.sigma).ravel())
+                dy = sensitivities(trajectory, list(self.free), self.states) / self.sigma[:, None]
+                wide[:, :P] = dy[:, :, :P].reshape(rows, P) * inner
+                wide[:, own] = dy[:, :, P:].reshape(rows, S)
+            except RunsAwayError:
+                residuals.append(np.full(rows, _FAR))
+            slopes.append(wide)
+        self.latest = np.concatenate(residuals), np.concatenate(slopes), theta.copy()
+        return self.latest[0], self.latest[1]

@@ -1,0 +1,78 @@
+"""What stands between a body and its reading: lags, hysteresis, offsets, one beside the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from discovery.diagnosis import diagnose
+from discovery.diagnosis.scored import with_effects
+from discovery.effects.hypothesis import Hypothesis
+from discovery.recordings import Recording
+from discovery.terms import Apply, Expression, names
+from tests.machine import SEEN, campaign, changed, claims, model, simulated
+
+
+def claim(word: str) -> Hypothesis:
+    """The claim on the second error, in the second recording where it is an event."""
+    found = claims(model(), word)
+    return next(h for h in found if h.outputs == ("E_Z",) and h.recording in (None, "r2"))
+
+
+def lags(expression: Expression) -> Iterator[Apply]:
+    if isinstance(expression, Apply):
+        if expression.function == "lag":
+            yield expression
+        for argument in expression.arguments:
+            yield from lags(argument)
+
+
+def test_what_was_taken_up_beside_another_stands_without_it() -> None:
+    """A lag beside a hysteresis: what the output showed before is looked up anew."""
+    play, lag = claim("joint_hysteresis"), claim("sensor_lag")
+    assert not set(play.amplitudes) & names(lag.added_to(model()).outputs["E_Z"])
+    assert set(play.amplitudes) < names(lag.added_to(play.added_to(model())).outputs["E_Z"])
+
+
+@pytest.mark.parametrize("first", ["sensor_offset", "sensor_lag"])
+def test_an_offset_is_not_smoothed_by_a_lag(first: str) -> None:
+    """Whatever was taken up first: a jump of the device's zero stays a jump."""
+    offset, lag = claim("sensor_offset"), claim("sensor_lag")
+    both = with_effects(model(), (offset, lag) if first == "sensor_offset" else (lag, offset))
+    shown = both.outputs["E_Z"]
+    assert set(offset.amplitudes) < names(shown)
+    smoothed = [*lags(shown)]
+    assert smoothed
+    assert all(not set(offset.amplitudes) & names(part) for part in smoothed)
+
+
+def test_a_drift_in_every_recording_is_a_drift() -> None:
+    """Also on a recording that no fit saw; a slow body would show in the other errors, too."""
+    runs = [simulated(seed) for seed in (1, 2, 3)]
+    drifting = campaign(*(changed(r, E_Z=r.values["E_Z"] + 12.0 * r.time / 86400.0) for r in runs))
+    answer = diagnose(model(), drifting, ["r1", "r2"], ["r3"])
+    (named,) = answer.verdict.named
+    assert (named.hypothesis.effect.word, named.hypothesis.places) == ("sensor_drift", ("E_Z",))
+    assert named.hypothesis.recording is None
+    assert answer.after is not None
+    assert answer.after.model.parameters["drift_E_Z"].value == pytest.approx(12.0, abs=0.6)
+    assert answer.held_out["r3"].after < 1.1 * answer.held_out["r3"].floor < answer.held_out["r3"].before
+
+
+def test_clocks_that_are_all_late_may_be_a_dead_time() -> None:
+    """Readings that come 40 minutes late in every recording: heat may take as long."""
+    late = [_late(simulated(seed), 2400.0) for seed in (1, 2)]
+    answer = diagnose(model(), campaign(*late), ["r1", "r2"])
+    assert answer.verdict.word == "unexplained"
+    assert any("dead time" in reason for reason in answer.verdict.reasons)
+
+
+def _late(recording: Recording, by: float) -> Recording:
+    """The recording with its readings `by` seconds late."""
+    steps = round(by / (recording.time[1] - recording.time[0]))
+    moved = {name: np.roll(recording.values[name], steps) for name in SEEN}
+    for values in moved.values():
+        values[:steps] = np.nan
+    return changed(recording, **moved)

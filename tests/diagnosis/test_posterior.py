@@ -1,0 +1,113 @@
+"""The posterior on models whose evidence is written down."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.posterior import FAR, Posterior, posterior
+from discovery.diagnosis.scored import Scored
+from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis
+from tests.diagnosis.parts import bare, dry, wetted
+
+Array = NDArray[np.float64]
+
+FLUID = Hypothesis(catalogue()["fluid_convection"], ("table",), ("h",))
+LAG = Hypothesis(catalogue()["sensor_lag"], (), ("on",), outputs=("E_Y",))
+
+
+@dataclass(frozen=True)
+class Known:
+    """A model whose evidence is known: `per_block` (B,) is what each block of time adds."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    evidence: float = 0.0
+    per_block: Array = field(default_factory=lambda: np.zeros(24))
+    forced: str = ""
+    prior: float = 0.0
+
+    @property
+    def levels(self) -> Array:
+        return np.array([self.evidence - self.prior])
+
+    def drawn(self, _: int, draws: Array, __: Array) -> Array:
+        return np.asarray(draws @ self.per_block)
+
+
+def known(*models: Known, draws: Array | None = None) -> Posterior:
+    evidence = np.array([[m.evidence] for m in models]) if draws is None else draws
+    return Posterior(cast(tuple[Scored, ...], models), evidence)
+
+
+def sigmoid(x: float) -> float:
+    return float(1 / (1 + np.exp(-x)))
+
+
+def test_a_claim_is_as_likely_as_its_odds_say_on_average_over_draws() -> None:
+    found = known(Known((FLUID,)), Known(()), draws=np.array([[4.0, 2.0, -1.0], [1.0, 2.0, 1.0]]))
+    expected = np.mean([sigmoid(3.0), sigmoid(0.0), sigmoid(-2.0)])
+    assert found.of_claim(FLUID) == pytest.approx(expected)
+    assert found.nothing == pytest.approx(1 - expected)
+
+
+def test_how_many_models_were_tried_says_nothing() -> None:
+    few = known(Known((FLUID,), 5.0), Known((), 3.0))
+    many = known(Known((FLUID,), 5.0), *(Known((FLUID, LAG), 4.0 - k) for k in range(20)), Known((), 3.0))
+    assert many.of_claim(FLUID) == pytest.approx(few.of_claim(FLUID)) == pytest.approx(sigmoid(2.0))
+
+
+def test_what_all_models_claim_or_none_is_certain() -> None:
+    found = known(Known((FLUID,), 5.0), Known((FLUID, LAG), 3.0))
+    assert found.of_claim(FLUID) == 1.0
+    assert found.nothing == 0.0
+
+
+def test_heat_of_unknown_cause_is_not_nothing() -> None:
+    found = known(Known((), 0.0), Known((), 3.0, forced="bed"))
+    assert found.nothing == pytest.approx(sigmoid(-3.0))
+    assert found.best.forced == "bed"
+
+
+def test_draws_keep_the_number_of_blocks_of_each_recording() -> None:
+    """So evidence that each block adds alike is certain, and evidence of one block is not."""
+    context = cast(Context, type("Two", (), {"recordings": ("a", "b")}))
+    blocks = 2 * thresholds.BLOCKS
+    even = Known((FLUID,), 2.0, np.full(blocks, 2.0 / blocks))
+    lone = Known((LAG,), 2.0, np.where(np.arange(blocks) == 3, 2.0, 0.0))
+    found = posterior(context, cast(list[Scored], [even, lone, Known((), 0.0, np.zeros(blocks))]))
+    words = ["".join(h.effect.word for h in m.hypotheses) for m in found.models]
+    by_word = dict(zip(words, found.evidence, strict=True))
+    assert by_word["fluid_convection"] == pytest.approx(2.0)
+    assert len(by_word["sensor_lag"]) == thresholds.DRAWS
+    assert by_word["sensor_lag"].mean() == pytest.approx(
+        2.0, abs=0.6
+    )  # multinomial: mean one, variance 11/12
+    assert by_word["sensor_lag"].std() == pytest.approx(2.0 * np.sqrt(11 / 12), rel=0.25)
+
+
+def test_models_that_are_far_off_take_no_part() -> None:
+    context = cast(Context, type("One", (), {"recordings": ("a",)}))
+    models = [Known((FLUID,), evidence, np.zeros(12)) for evidence in (0.0, -FAR + 1, -FAR - 1)]
+    assert len(posterior(context, cast(list[Scored], models)).models) == 2
+
+
+def test_each_block_once_is_what_was_scored() -> None:
+    """The draw that is no draw gives the level of a fitted model under each noise setting."""
+    for one in (bare(), wetted()):
+        blocks = thresholds.BLOCKS * len(dry().recordings)
+        for k in range(len(one.levels)):
+            drawn = one.drawn(k, np.ones((1, blocks)), np.ones(1))
+            assert drawn[0] == pytest.approx(one.levels[k], abs=0.01)
+
+
+def test_the_same_models_give_the_same_posterior() -> None:
+    first, again = (posterior(dry(), [bare(), wetted()]) for _ in range(2))
+    assert np.array_equal(first.evidence, again.evidence)
+    assert first.of_claim(wetted().hypotheses[0]) > 0.95

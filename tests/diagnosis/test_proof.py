@@ -1,0 +1,160 @@
+"""The figures of a proof, by closed forms: models that say a constant, bodies that only add up their heat."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import exp, inf, sqrt
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import binom
+
+from discovery.diagnosis.proof import (
+    BLOCKS,
+    MULTIPLES,
+    FreeRuns,
+    Improvement,
+    explained,
+    free_runs,
+    improvement,
+    size_of,
+    unit_of,
+)
+from discovery.dynamics import Trajectory, make_grid, make_system, simulate
+from discovery.evidence.process_noise import noise_in_free_runs
+from discovery.fitting import Fit, Noise, fit_model
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
+from tests import machine
+
+Array = NDArray[np.float64]
+TIME = np.arange(0.0, 240 * 600.0, 600.0)
+CHANNELS = {name: Channel(name, "error", "um", sd, "linear") for name, sd in (("E", 1.0), ("F", 3.0))}
+WHITE = Noise(("E", "F"), (1.0, 3.0))
+
+
+def said(readings: dict[str, Array], channels: dict[str, Channel] | None = None) -> Campaign:
+    return Campaign("c", channels or CHANNELS, {"r": Recording("r", TIME, readings)})
+
+
+def constant(seen: Campaign, **formulas: str) -> Fit:
+    """A model that says the same all the time, as a fit that has nothing to fit."""
+    states = {"x": State("x", "degC", 1000.0, parse("0"), 0.0, 1e-3)}
+    model = Model("m", {}, states, (), {n: parse(f) for n, f in formulas.items()})
+    return fit_model(model, seen, ["r"], list(formulas))
+
+
+def body(heat: float = 0.0) -> Trajectory:
+    """A free run of a body of 1000 J/K without any loss, through which some W flow."""
+    states = {"x": State("x", "degC", 1000.0, parse("0"), 0.0, 1e-3)}
+    terms = (Term("in", "x", parse(f"{heat}")), Term("out", "x", parse(f"-{heat}"))) if heat else ()
+    model = Model("m", {}, states, terms, {"E": parse("x")})
+    return simulate(make_system(model, make_grid(said({"E": np.zeros(240)}), "r", [], ["E"])), {})
+
+
+def test_each_output_counts_in_units_of_its_noise() -> None:
+    """Two noises off before the repair and one after it, in every reading: each draw is the same."""
+    seen = said({"E": np.full(240, 3.0), "F": np.where(np.arange(240) % 3 == 0, 9.0, np.nan)})
+    unit = sqrt((1.0**2 + 3.0**2) / 2)
+    runs = free_runs(seen, ["r"], constant(seen, E="x+1", F="x+3"), constant(seen, E="x+2", F="x+6"), WHITE)
+    found = improvement([runs["r"]], ["E", "F"])
+    assert size_of(seen, WHITE) == pytest.approx(unit)
+    assert (found.before, found.after, found.floor) == pytest.approx((2 * unit, unit, unit))
+    assert (found.low, found.high) == pytest.approx((unit, unit))
+    assert found.outputs["E"] == pytest.approx((2.0, 1.0))
+    assert found.outputs["F"] == pytest.approx((6.0, 3.0))
+
+
+@pytest.mark.parametrize(("unit", "word"), [("um", "um"), ("degC", MULTIPLES)])
+def test_outputs_of_several_units_are_told_in_multiples_of_their_noise(unit: str, word: str) -> None:
+    """A mean of um and K is neither; the mean noise of outputs of one unit is a size in it."""
+    channels = {**CHANNELS, "F": replace(CHANNELS["F"], unit=unit)}
+    seen = said({"E": np.zeros(240), "F": np.zeros(240)}, channels)
+    assert unit_of(seen, ["E", "F"]) == word
+    assert size_of(seen, WHITE) == pytest.approx(sqrt(5.0) if unit == "um" else 1.0)
+
+
+def test_a_single_wrong_reading_is_set_aside_in_a_proof() -> None:
+    """One reading of 400 um among 240: with it the rms would be 26."""
+    wrong = np.random.default_rng(1).normal(0.0, 1.0, 240)
+    wrong[100] += 400.0
+    seen = said({"E": wrong})
+    fit = constant(seen, E="x")
+    (run,) = free_runs(seen, ["r"], fit, fit, Noise(("E",), (1.0,))).values()
+    found = improvement([run], ["E"])
+    assert found.before == pytest.approx(np.std(np.delete(wrong, 100)), rel=0.02)
+
+
+def test_the_bounds_are_those_of_a_draw_of_blocks() -> None:
+    """Better in half of the blocks, worse in the others: how many of each are drawn is binomial."""
+    one = np.repeat([1.0, -1.0], 120)[:, None]
+    found = improvement([FreeRuns(one, one - 0.5, 1.0, np.ones(1))], ["E"])
+    better = binom.ppf([0.025, 0.975], BLOCKS, 0.5) / BLOCKS
+    low, high = 1 - np.sqrt(0.25 * better + 2.25 * (1 - better))
+    assert (found.low, found.high) == pytest.approx((low, high), abs=0.08)
+    assert not found.contradicts
+
+
+def test_what_is_worse_everywhere_contradicts_a_repair() -> None:
+    rng = np.random.default_rng(2)
+    one = rng.normal(0.0, 1.0, (240, 2))
+    assert improvement([FreeRuns(one, 2 * one, 1.0, np.ones(2))], ["E", "F"]).contradicts
+    lost = improvement([FreeRuns(one, None, 1.0, np.ones(2))], ["E", "F"])
+    assert lost.contradicts
+    assert lost.after == inf
+
+
+def test_slow_noise_adds_to_the_floor() -> None:
+    assert noise_in_free_runs(body(), Noise(("E",), (3.0,), (4.0,))) == pytest.approx(5.0 / 3.0)
+
+
+@pytest.mark.parametrize(("floor", "share", "flow"), [(0.05, 0.0, 0.0), (0.03, 0.4, 0.1)])
+def test_process_noise_adds_to_the_floor_what_a_body_makes_of_it(
+    floor: float, share: float, flow: float
+) -> None:
+    """The variance of the integral of first-order noise of 0.05 W, of which a share may follow the flows."""
+    tau = 3 * 3600.0
+    noise = Noise(("E",), (1.0,), (), {"x": floor, "gone": 9.0}, share, heat_time=tau)
+    found = noise_in_free_runs(body(flow / sqrt(2)), noise)  # what comes in and what goes out
+    walk = [2 * (0.05 / 1000.0) ** 2 * tau * (t - tau * (1 - exp(-t / tau))) for t in TIME]
+    assert np.mean(walk) > 1.0
+    assert found == pytest.approx(sqrt(1.0 + np.mean(walk)), rel=0.02)
+
+
+def improved(before: float, after: float, floor: float = 1.0) -> Improvement:
+    return Improvement(before, after, floor, 0.0, 0.0, {})
+
+
+def test_what_is_explained_is_a_share_of_what_can_be() -> None:
+    two = improved(3.0, 2.0)  # 5 of 8
+    assert explained({"a": two}) == pytest.approx(5 / 8)
+    assert explained({"a": two, "b": improved(5.0, 5.0)}) == pytest.approx(5 / 32)
+    assert explained({"a": improved(3.0, 0.5)}) == 1.0  # nothing goes below the noise
+    assert explained({"a": improved(3.0, inf)}) == -1.0
+
+
+def test_where_only_noise_is_nothing_can_be_explained() -> None:
+    noisy = improved(1.02, 0.5)
+    assert explained({}) is None
+    assert explained({"a": noisy}) is None
+    assert explained({"a": noisy, "b": improved(3.0, 2.0)}) == pytest.approx(5 / 8)
+
+
+def test_a_model_that_runs_away_on_other_inputs_is_told() -> None:
+    """Heat that grows with what it heats: stable while the table turns slowly, not at the speed of r2."""
+    terms = (*machine.model().terms, Term("feedback", "table", parse("k*speed*(table - T_env)")))
+    k = Parameter(0.001, "1", fixed=True)
+    plain = machine.model()
+    hot = replace(plain, terms=terms, parameters={**plain.parameters, "k": k})
+    slow = machine.simulated(1)
+    slow = machine.changed(slow, speed=np.full(len(slow.time), 300.0))
+    fast = replace(machine.changed(slow, speed=np.full(len(slow.time), 3e6)), name="r2")
+    runs = machine.campaign(slow, fast)
+    before, after = (fit_model(one, runs, ["r1"], list(machine.SEEN)) for one in (plain, hot))
+    noise = Noise(tuple(machine.SEEN), (machine.NOISE,) * 3)
+    found = free_runs(runs, ["r1", "r2"], before, after, noise)
+    assert found["r1"].after is not None
+    assert found["r2"].after is None
+    assert free_runs(runs, ["r2"], after, before, noise) == {}  # a baseline that runs away proves nothing

@@ -1,0 +1,78 @@
+"""The score of a model: what it adds up, and what it says of a machine that lacks the fluid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.crossvalidation import left_out
+from discovery.diagnosis.scored import scan_model, with_force
+from tests.diagnosis.parts import bare, claim_of, dry, scored_of, wetted
+
+
+def test_the_effect_that_is_there_makes_the_readings_more_likely() -> None:
+    assert wetted().evidence > bare().evidence + 50.0
+    assert wetted().rms() < bare().rms()
+    wrong = scored_of(dry(), claim_of(dry(), "friction_speed", "motor"))
+    assert wrong.evidence < wetted().evidence - 50.0
+
+
+def test_evidence_is_integrated_over_noise_settings() -> None:
+    one = wetted()
+    (h,) = one.hypotheses
+    total = one.levels.max() + np.log(np.sum(np.exp(one.levels - one.levels.max())))
+    assert one.evidence == pytest.approx(total + h.log_odds)
+    assert one.best == int(np.argmax(one.levels))
+
+
+def test_an_interval_is_of_95_percent() -> None:
+    one = wetted()
+    (name,) = one.hypotheses[0].amplitudes
+    interval = one.interval(name)
+    assert interval is not None
+    (index,) = (i for i, u in enumerate(one.fit.problem.unknowns) if u.name == name)
+    gram = one.grams[one.best].without(one.seen.spread[one.seen.form :])
+    _, step, covariance = gram.solved()
+    k = int(np.flatnonzero(one.seen.moving == index)[0])
+    low, high = norm.interval(0.95, one.fit.theta[index] + step[k], np.sqrt(covariance[k, k]))
+    assert interval == pytest.approx((low, high), rel=1e-4)
+    assert interval[0] < 30.0 < interval[1]  # W/K, as it is
+
+
+def test_what_presses_against_zero_does_not_act() -> None:
+    nothing = replace(wetted(), sizes=np.array([-1], dtype=np.intp))
+    assert nothing.level(0) == -np.inf
+
+
+def test_a_latent_force_explains_what_is_missing_and_nothing_else() -> None:
+    lacking = with_force(dry(), bare(), "table")
+    assert lacking.evidence > bare().evidence + 10.0
+    assert with_force(dry(), wetted(), "table").evidence < wetted().evidence
+    odds = np.log(thresholds.ODDS / len(dry().floor))
+    assert lacking.prior - bare().prior == pytest.approx(odds)
+
+
+def test_a_scan_sees_the_effect_and_what_would_stand_without_it() -> None:
+    first = scan_model(dry(), bare())
+    assert first.claims[0].hypothesis.key == wetted().hypotheses[0].key
+    found = scan_model(dry(), wetted())
+    (key,) = wetted().keys
+    assert key not in {c.hypothesis.key for c in found.claims}
+    assert max(c.odds for c in found.claims) < 0.0
+    assert max(c.odds for c in found.without[key]) > 0.0
+
+
+def test_what_is_there_predicts_recordings_that_are_left_out() -> None:
+    (h,) = wetted().hypotheses
+    found = left_out(dry(), wetted(), h)
+    assert found is not None
+    assert found.after < 1.2 < found.before
+    assert found.low > 0
+    event = claim_of(dry(), "unmeasured_heat", "bed", "r2")
+    assert left_out(dry(), wetted(), event) is None  # other recordings say nothing of it
+    alone = replace(dry(), recordings=("r1",))
+    assert left_out(alone, wetted(), h) is None

@@ -1,0 +1,290 @@
+"""The verdict on searches whose evidence is written down: each bar from both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from discovery.diagnosis import thresholds, verdict
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.posterior import Posterior
+from discovery.diagnosis.proof import Improvement
+from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.selection import Search
+from discovery.diagnosis.verdict import Verdict, decide, idle, refuted
+from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis, Key
+
+
+def claim(word: str, *places: str, recording: str | None = None) -> Hypothesis:
+    effect = catalogue()[word]
+    at = {"outputs": places} if effect.group == "measuring chain" else {"states": places}
+    return Hypothesis(
+        effect, at.get("states", ()), ("a",), outputs=at.get("outputs", ()), recording=recording
+    )
+
+
+FLUID, FRICTION = claim("fluid_convection", "table"), claim("friction_speed", "motor")
+OFFSET, SUN = (
+    claim("sensor_offset", "E_Y", recording="r2"),
+    claim("unmeasured_heat", "bed", recording="r2"),
+)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model with some effects and its log evidence."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    evidence: float
+    forced: str = ""
+    share: float = thresholds.SHARE
+
+    @property
+    def keys(self) -> frozenset[Key]:
+        return frozenset(h.key for h in self.hypotheses)
+
+    @property
+    def noise(self) -> Any:
+        return SimpleNamespace(share=self.share)
+
+    fit: Any = None
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A search that tried some models; the baseline is the one without effects."""
+
+    models: Sequence[Model]
+
+    @property
+    def tried(self) -> dict[frozenset[Key], Model]:
+        return {m.keys: m for m in self.models}
+
+    @property
+    def best(self) -> Model:
+        return max(self.models, key=lambda m: m.evidence)
+
+    @property
+    def baseline(self) -> Model:
+        return self.tried[frozenset()]
+
+    @property
+    def gain(self) -> float:
+        return self.best.evidence - self.baseline.evidence
+
+
+@dataclass(frozen=True)
+class Believed:
+    """Each word has a probability; `best`: the most likely model with what is unknown."""
+
+    words: dict[str, float]
+    best: Model
+    nothing: float = 0.0
+
+    def of_claim(self, h: Hypothesis) -> float:
+        return self.words[h.effect.word]
+
+
+@dataclass(frozen=True)
+class World:
+    recordings: tuple[str, ...] = ("r1", "r2")
+    outliers: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ("E_Y",)
+    known: dict[str, float] = field(default_factory=dict)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verdict, "left_out", lambda *_: None)
+
+
+def said(
+    found: Tried,
+    words: dict[str, float],
+    world: World | None = None,
+    unknown: Model | None = None,
+    **more: Any,
+) -> Verdict:
+    chances = Believed(words, unknown or found.best, **more)
+    return decide(cast(Context, world or World()), cast(Search, found), cast(Posterior, chances))
+
+
+def pair(first: Hypothesis, other: Hypothesis, both: float, one: float, second: float) -> Tried:
+    """Two effects: log evidence of both, of the first alone and of the other alone, over none."""
+    return Tried([Model((first, other), both), Model((first,), one), Model((other,), second), Model((), 0.0)])
+
+
+WET = Tried([Model((FLUID,), 100.0), Model((), 0.0)])
+
+
+@pytest.mark.parametrize(
+    ("probability", "word"), [(0.71, "missing physics"), (0.69, "unexplained"), (1.0, "missing physics")]
+)
+def test_a_name_needs_its_probability(probability: float, word: str) -> None:
+    found = said(WET, {"fluid_convection": probability})
+    assert found.word == word
+    if word == "unexplained":
+        assert found.candidates[0].hypothesis is FLUID
+        assert any("may act, too (probability 0.69)" in text for text in found.reasons)
+    else:
+        assert found.named[0].probability == pytest.approx(min(probability, 0.98))
+        assert found.reasons == ()
+
+
+@pytest.mark.parametrize(("nothing", "word"), [(0.09, "missing physics"), (0.11, "no mismatch")])
+def test_what_is_not_there_is_not_named(nothing: float, word: str) -> None:
+    assert said(WET, {"fluid_convection": 0.9}, nothing=nothing).word == word
+
+
+def test_single_wrong_readings_are_all_that_is_wrong() -> None:
+    found = said(WET, {"fluid_convection": 0.1}, World(outliers=("one", "two")), nothing=0.5)
+    assert found.word == "measurement fault"
+    assert found.reasons == ("2 single wrong readings, nothing else",)
+
+
+def test_a_fault_is_told_from_physics() -> None:
+    faulty = Tried([Model((OFFSET,), 100.0), Model((), 0.0)])
+    assert said(faulty, {"sensor_offset": 0.9}).word == "measurement fault"
+    both = Tried(
+        [Model((FLUID, OFFSET), 150.0), Model((FLUID,), 100.0), Model((OFFSET,), 20.0), Model((), 0.0)]
+    )
+    assert said(both, {"sensor_offset": 0.9, "fluid_convection": 0.9}).word == "missing physics"
+
+
+@pytest.mark.parametrize(
+    ("gain", "unknown", "word"),
+    [
+        (100.0, 119.0, "missing physics"),  # a fifth of what there is to explain
+        (100.0, 121.0, "unexplained"),
+        (20.0, 25.9, "missing physics"),  # or 6
+        (20.0, 26.1, "unexplained"),
+    ],
+)
+def test_what_has_no_name_may_not_explain_much_more(gain: float, unknown: float, word: str) -> None:
+    found = Tried([Model((FLUID,), gain), Model((), 0.0)])
+    verdict = said(found, {"fluid_convection": 0.9}, unknown=Model((FLUID,), unknown, forced="bed"))
+    assert verdict.word == word
+    if word == "unexplained":
+        assert verdict.reasons[0] == "heat of unknown cause at bed explains more than what can be named"
+
+
+def test_what_is_left_unnamed_may_not_carry_the_answer() -> None:
+    """Friction is not sure, and the fluid alone is 60 short of the two."""
+    both = Tried(
+        [Model((FLUID, FRICTION), 160.0), Model((FLUID,), 100.0), Model((FRICTION,), 30.0), Model((), 0.0)]
+    )
+    found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.5})
+    assert found.word == "unexplained"
+    assert "what can be named explains too little (log evidence 60 below the best)" in found.reasons
+
+
+def test_what_would_be_missed_most_is_named_first() -> None:
+    both = Tried(
+        [Model((FRICTION, FLUID), 160.0), Model((FLUID,), 150.0), Model((FRICTION,), 30.0), Model((), 0.0)]
+    )
+    found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
+    assert [n.hypothesis for n in found.named] == [FLUID, FRICTION]
+
+
+def test_rivals_stand_in_the_place_of_one_effect() -> None:
+    drag = claim("film_drag", "table")
+    models = [
+        Model((FLUID, FRICTION), 160.0),
+        Model((drag, FRICTION), 158.0),
+        Model((SUN, FRICTION), 150.0),
+        Model((FLUID,), 100.0),
+        Model((drag,), 90.0),
+        Model((FRICTION,), 60.0),
+        Model((), 0.0),
+    ]
+    found = said(Tried(models), {"fluid_convection": 0.95, "friction_speed": 0.95})
+    rivals = {n.hypothesis.effect.word: n.rivals for n in found.named}
+    assert [(r.hypothesis.effect.word, r.below) for r in rivals["fluid_convection"]] == [
+        ("film_drag", 2.0),
+        ("unmeasured_heat", 10.0),
+    ]
+    assert rivals["friction_speed"] == ()
+
+
+def test_a_name_that_makes_recordings_left_out_worse_is_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    worse = Improvement(1.0, 2.0, 0.5, -1.2, -0.8, {})
+    monkeypatch.setattr(verdict, "left_out", lambda *_: worse)
+    found = said(WET, {"fluid_convection": 0.98})
+    assert found.word == "unexplained"
+    assert "makes free runs worse on recordings that are left out of the fit" in found.reasons[0]
+
+
+@pytest.mark.parametrize(
+    ("models", "world", "words", "reason"),
+    [
+        ([Model((SUN,), 50.0)], World(("r2",)), {"unmeasured_heat": 0.98}, "record the machine once more"),
+        ([Model((OFFSET,), 50.0, share=0.24)], World(), {"sensor_offset": 0.98}, "off by about 24 %"),
+        (
+            [Model(tuple(claim("clock_shift", recording=r) for r in ("r1", "r2")), 50.0)],
+            World(),
+            {"clock_shift": 0.98},
+            "every recording would need its clock shifted",
+        ),
+    ],
+)
+def test_a_veto_of_physics_stands_against_any_probability(
+    models: list[Model], world: World, words: dict[str, float], reason: str
+) -> None:
+    single = [Model((h,), 20.0) for m in models for h in m.hypotheses if len(m.hypotheses) > 1]
+    found = said(Tried([*models, *single, Model((), 0.0)]), words, world)
+    assert found.word == "unexplained"
+    assert any(reason in text for text in found.reasons)
+
+
+def test_a_law_that_always_acts_needs_no_model_that_is_nearly_right() -> None:
+    found = Tried([Model((FLUID,), 50.0, share=0.24), Model((), 0.0)])
+    assert said(found, {"fluid_convection": 0.9}).word == "missing physics"
+
+
+def improved(before: float, after: float, low: float, high: float) -> Improvement:
+    return Improvement(before, after, 0.5, low, high, {})
+
+
+def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
+    named = said(WET, {"fluid_convection": 0.9})
+    assert idle(named, improved(2.0, 1.0, 0.1, 1.5)) is named
+    withdrawn = idle(named, improved(2.0, 1.9, -0.1, 0.3))
+    assert (withdrawn.word, withdrawn.named) == ("unexplained", ())
+    assert withdrawn.candidates == named.named
+
+
+def test_unseen_recordings_withdraw_a_name_and_never_add_one() -> None:
+    named = said(WET, {"fluid_convection": 0.9})
+    better, worse = improved(2.0, 1.0, 0.5, 1.5), improved(1.0, 3.0, -2.5, -1.5)
+    assert refuted(named, {"r3": better}) is named
+    withdrawn = refuted(named, {"r3": worse})
+    assert (withdrawn.word, withdrawn.named) == ("unexplained", ())
+    assert withdrawn.candidates == named.named
+    assert withdrawn.reasons[0].startswith("fluid_convection at table is refuted on r3")
+    unnamed = said(WET, {"fluid_convection": 0.5})
+    assert refuted(unnamed, {"r3": better}) is unnamed
+
+
+def test_one_recording_of_another_machine_is_told_and_refutes_nothing() -> None:
+    """Twice as good on two, a third worse on one: the mean of the logarithms decides."""
+    named = said(WET, {"fluid_convection": 0.9})
+    better, worse = improved(2.0, 1.0, 0.5, 1.5), improved(1.0, 1.3, -0.5, -0.1)
+    kept = refuted(named, {"r3": better, "r4": better, "r5": worse})
+    assert kept.word == "missing physics"
+    assert "holds on the other unseen recordings but not on r5" in kept.reasons[-1]
+
+
+def test_an_event_is_no_matter_of_other_recordings() -> None:
+    named = said(Tried([Model((SUN,), 50.0), Model((), 0.0)]), {"unmeasured_heat": 0.9})
+    assert refuted(named, {"r3": improved(1.0, 3.0, -2.5, -1.5)}) is named
+
+
+def test_scores_are_no_part_of_these_tests() -> None:
+    """What stands for a model here has what the verdict reads of a real one."""
+    assert {"hypotheses", "fit", "forced"} <= set(Scored.__dataclass_fields__)
+    assert {"keys", "evidence", "noise"} <= set(dir(Scored))

@@ -1,0 +1,165 @@
+"""Where effects are offered, and what they make of terms that somebody wrote down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import exp
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from discovery.diagnosis.repair import written
+from discovery.dynamics.system import predict
+from discovery.effects.candidates import candidates
+from discovery.effects.catalogue import catalogue
+from discovery.effects.form import TERM_PLACES
+from discovery.models import Model, read_model, write_model
+from discovery.terms import Term, parse, substitute
+from tests.effects.sample import EVENT_ODDS, ODDS, claims, expand, inside, sample, scene, trajectory
+
+DRIVEN = ("friction_speed", "viscosity_temperature", "thermal_preload", "windage")
+REPLACING = (*TERM_PLACES, "inputs of a recording")
+INPUTS = ("drive", "chiller", "emulsion", "pump", "room", "rpm")
+DELAYS = {"drive": 120.0, "chiller": 90.0, "emulsion": 60.0}  # s, of what its author wrote as late
+
+
+def late(seconds: Mapping[str, float]) -> Model:
+    """The sample machine with channels that reach it late."""
+    model, _ = sample()
+    swaps = {channel: parse(f"delay({channel}, {by})") for channel, by in seconds.items()}
+    return replace(
+        model, terms=tuple(replace(t, expression=substitute(t.expression, swaps)) for t in model.terms)
+    )
+
+
+def test_a_clock_shifts_what_is_late_already() -> None:
+    baseline = late(DELAYS)
+    shift = next(h for h in claims(baseline, catalogue()["clock_shift"]) if h.recording == "two")
+    shift = shift.at(dict.fromkeys(shift.shapes, 900.0))
+    shifted = {c: DELAYS.get(c, 0.0) + 900.0 for c in INPUTS}
+    found = predict(trajectory(shift.added_to(baseline)))
+    assert np.allclose(found, predict(trajectory(late(shifted))), rtol=0, atol=1e-9)
+
+
+def test_a_fluid_that_is_late_already_is_later() -> None:
+    baseline = late(DELAYS)
+    later = claims(baseline, catalogue()["fluid_delay"])[0]
+    later = later.at(dict.fromkeys(later.shapes, 600.0))
+    found = predict(trajectory(later.added_to(baseline)))
+    expected = predict(trajectory(late({**DELAYS, "emulsion": 660.0})))
+    assert np.allclose(found, expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("word", [w for w, e in catalogue().items() if e.place in REPLACING])
+def test_what_stands_for_a_late_channel_is_written_read_and_simulated(word: str, tmp_path: Path) -> None:
+    baseline = late(DELAYS)
+    for h in claims(baseline, catalogue()[word]):
+        start = dict.fromkeys(h.amplitudes, h.effect.amplitude.fixed or h.effect.amplitude.plausible)
+        on = inside(h).added_to(baseline, start)
+        on = written(on, [h])
+        write_model(tmp_path / "m.toml", on)
+        found = predict(trajectory(read_model(tmp_path / "m.toml")))
+        assert np.isfinite(found).all()
+        assert np.allclose(found, predict(trajectory(on)), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("file", DRIVEN)
+def test_losses_come_of_a_recorded_heat_or_of_a_law_of_the_speed(file: str) -> None:
+    effect = catalogue()[file]
+    single = {h.states for h in expand(effect) if len(h.states) == 1}
+    assert single == {("motor",), ("table",)}
+    assert {h.states for h in expand(effect, without={"heat load"})} == {("table",)}
+
+
+def test_a_bearing_lies_beside_either_of_them() -> None:
+    rings = catalogue()["thermal_preload_rings"]
+    assert {h.states[0] for h in expand(rings)} == {"motor", "table"}
+    assert ("motor", "motor") not in {h.states for h in expand(rings)}
+    assert {h.states for h in expand(rings, without={"heat load"})} == {("table", "motor"), ("table", "bed")}
+
+
+def test_a_share_of_a_recorded_heat_is_asked_for_where_that_goes() -> None:
+    copper = catalogue()["copper_resistance"]
+    assert {h.states for h in expand(copper)} == {("motor",)}
+    assert not expand(copper, without={"heat load"})
+
+
+@pytest.mark.parametrize(
+    ("law", "friction"),
+    [
+        ("P_b*cut*(rpm/1000)", True),
+        ("P_b*delay(rpm, 60)", True),
+        ("P_b*cut", False),
+        ("P_b*rpm*(room - bed)", False),
+        ("P_b*rpm*(emulsion - 22)", False),
+        ("P_b*rpm*bed", False),
+    ],
+)
+def test_what_holds_a_temperature_is_an_exchange_and_no_friction(law: str, friction: bool) -> None:
+    model, channels = sample()
+    model = replace(model, terms=(*model.terms, Term("law", "bed", parse(law))))
+    found = {h.states for h in claims(model, catalogue()["windage"], channels)}
+    assert (("bed",) in found) == friction
+
+
+def test_losses_age_all_together_or_at_one_body() -> None:
+    """Whatever their law, from the second recording on: what is common to all is the model's own gain."""
+    found = expand(catalogue()["wear"])
+    assert {h.states for h in found} == {("motor", "table"), ("motor",), ("table",)}
+    assert {(h.recording, h.acting) for h in found} == {("two", ("two",))}
+    assert {h.states for h in expand(catalogue()["wear"], without={"heat load"})} == {("table",)}
+
+
+def test_what_begins_acts_in_the_recordings_that_were_made_later() -> None:
+    model, channels = sample()
+    three = replace(scene(model, channels), recordings=("a", "b"), after={"a": ("a", "c", "b"), "b": ("b",)})
+    (wear, *_) = candidates(model, [catalogue()["wear"]], replace(three, recordings=("b", "a")))
+    assert wear.recording == "a"
+    assert wear.acting == ("a", "c", "b")
+    switch = wear.added_to(model).parameters[wear.switch]
+    assert [switch.at(run) for run in ("a", "b", "c", "earlier")] == [1.0, 1.0, 1.0, 0.0]
+
+
+def test_every_recorded_input_may_be_heat_a_path_or_a_factor() -> None:
+    """Each input of a role at each place, not the first alone; what the model has already is not offered."""
+    heat = {(h.channels, h.states) for h in expand(catalogue()["input_heat"])}
+    assert heat == {((name,), (body,)) for name in ("cut", "spray") for body in ("motor", "table", "bed")}
+    path = {(h.channels, h.outputs) for h in expand(catalogue()["input_path"])}
+    assert {c for (c,), _ in path} >= {"cut", "spray", "drive", "rpm", "pump"}
+    assert {y for _, y in path} == {("E_Y",), ("E_Z",)}
+    model, _ = sample()
+    known = replace(model, terms=(*model.terms, Term("cut", "bed", parse("loss*cut"))))
+    left = {(h.channels, h.states) for h in claims(known, catalogue()["input_heat"])}
+    assert left == heat - {(("cut",), ("bed",))}
+
+
+def test_two_channels_of_a_role_are_both_asked_for() -> None:
+    model, channels = sample()
+    other = {**channels, "oil": replace(channels["emulsion"], name="oil")}
+    dry = replace(model, terms=tuple(t for t in model.terms if t.name != "fluid"))
+    found = {(h.channels, h.states) for h in claims(dry, catalogue()["fluid_convection"], other)}
+    assert {channels[0] for channels, _ in found} == {"emulsion", "oil"}
+
+
+def test_one_law_on_a_group_of_bodies_has_one_size() -> None:
+    model, channels = sample()
+    air = Term("air at motor", "motor", parse("hA*(room - motor)"))
+    shared = catalogue()["radiation"]
+    assert shared.shared
+    found = claims(replace(model, terms=(*model.terms, air)), shared, channels)
+    (both,) = (h for h in found if len(h.states) > 1)
+    assert set(both.states) == {"motor", "bed"}
+    assert len(both.amplitudes) == 1
+    assert {t.into for t in both.terms} == {"motor", "bed"}
+
+
+@pytest.mark.parametrize("word", ["air_convection", "conduction_path", "sensor_offset", "wear"])
+def test_an_effect_has_the_same_odds_at_however_many_places(word: str) -> None:
+    """The odds of a word (of an event: in each recording) are shared by its places."""
+    model, channels = sample()
+    found = candidates(model, [catalogue()[word]], scene(model, channels))
+    for run in {h.recording for h in found if h.effect.is_event} or {None}:
+        total = sum(exp(h.log_odds) for h in found if run is None or h.recording == run)
+        assert total == pytest.approx(EVENT_ODDS if run else ODDS)

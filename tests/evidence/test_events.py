@@ -1,0 +1,84 @@
+"""When heat acted or a sensor jumped: against signatures of the very event, and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from discovery.dynamics import make_grid
+from discovery.evidence.bayes import Slab, scan
+from discovery.evidence.events import _span, heat_steps, place_events
+from discovery.evidence.process_noise import Setting
+from discovery.evidence.whitening import Whitened
+from discovery.fitting import Noise, fit_model
+from discovery.recordings import Recording
+from tests import machine
+from tests.effects.sample import sample, trajectory
+from tests.machine import Array, Inputs
+
+NOISE = Noise(tuple(machine.SEEN), (machine.NOISE,) * 3)
+SETTING = Setting(NOISE, 0.0, (0, 0, 0))
+SLAB = Slab(np.array([60.0]), np.array([3.5]), np.array([0.0]))
+
+
+def test_a_span_holds_95_percent() -> None:
+    """Log evidence of a normal instant, tried each second: one tried instant more on each side."""
+    instants = np.arange(0.0, 1001.0)
+    low, high = _span(norm.logpdf(instants, 480.0, 40.0), instants)
+    assert (low, high) == pytest.approx(norm.interval(0.95, 480.0, 40.0), abs=2.0)
+
+
+def test_a_span_ends_where_the_recording_does() -> None:
+    instants = np.arange(0.0, 11.0)
+    assert _span(np.where(instants == 0, 50.0, 0.0), instants) == (0.0, 1.0)
+    assert _span(np.where(instants == 10, 50.0, 0.0), instants) == (9.0, 10.0)
+
+
+def test_steps_of_heat_between_nodes_keep_their_share() -> None:
+    """Heat that sets in within an interval keeps its energy, so its late response is that of the instant."""
+    steps = heat_steps(trajectory(sample()[0]), "bed", np.array([3000.0, 3150.0, 3300.0]))[-1]
+    assert np.allclose(steps[:, 1], 0.5 * (steps[:, 0] + steps[:, 2]), rtol=1e-3)
+
+
+def sun(t: float, _: Array, __: Inputs) -> tuple[float, float, float]:
+    return (0.0, 0.0, 40.0 * (30000 <= t < 52000))
+
+
+def seen_of(*runs: Recording) -> Whitened:
+    seen, outputs = machine.campaign(*runs), list(machine.SEEN)
+    grids = {r.name: make_grid(seen, r.name, machine.INPUTS, outputs) for r in runs}
+    return Whitened(fit_model(machine.model(), seen, list(grids), outputs, grids=grids), 12)
+
+
+def test_heat_of_some_hours_is_found_where_and_when_it_acted() -> None:
+    seen = seen_of(machine.simulated(1), machine.simulated(2, concealed=sun))
+    claims = machine.claims(machine.model(), "unmeasured_heat")
+    placed = place_events(seen, SETTING, claims, [SLAB] * len(claims))
+    assert len(placed) == len(claims)
+    count = sum(len(h.amplitudes) for h in placed)
+    (scores,) = scan(seen, [SETTING], placed, SLAB.take(np.zeros(count, dtype=np.intp)))
+    h = scores[0].hypothesis
+    assert (h.states, h.recording) == (("bed",), "r2")
+    on, off = h.shapes.values()
+    assert (on, off) == pytest.approx((30000, 52000), abs=3000)
+    for (low, high), instant in zip(h.spans.values(), (30000, 52000), strict=True):
+        assert low - 3600 <= instant <= high + 3600
+    assert abs(scores[0].size[0]) == pytest.approx(40.0, rel=0.25)
+    assert h.log_weight < 0  # an instant that had to be found among many
+
+
+def test_a_jump_of_a_sensor_is_found_between_two_readings() -> None:
+    other = machine.simulated(2)
+    jumped = machine.changed(other, E_Z=other.values["E_Z"] + 3.0 * (other.time >= 50000))
+    seen = seen_of(machine.simulated(1), jumped)
+    claims = machine.claims(machine.model(), "sensor_offset")
+    placed = place_events(seen, SETTING, claims, [Slab(*(np.array([v]) for v in (3.0, 4.0, 0.0)))] * 6)
+    slab = Slab(np.full(6, 3.0), np.full(6, 4.0), np.zeros(6))
+    (scores,) = scan(seen, [SETTING], placed, slab)
+    h = scores[0].hypothesis
+    assert (h.outputs, h.recording) == (("E_Z",), "r2")
+    ((low, high),) = h.spans.values()
+    assert low < 50000 <= high
+    assert high - low < 4 * machine.EVERY
+    assert scores[0].size[0] == pytest.approx(3.0, abs=0.3)

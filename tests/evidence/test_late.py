@@ -1,0 +1,128 @@
+"""A light machine, read each minute, whose power is logged late: a false alarm where nobody asks for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from discovery.diagnosis.context import make_context
+from discovery.diagnosis.selection import Search
+from discovery.dynamics import make_grid
+from discovery.effects.catalogue import catalogue
+from discovery.evidence.late import beside_switches, perhaps_late
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
+from tests import machine
+
+Array = NDArray[np.float64]
+COIL, FRAME, LINK, AIR = 3000.0, 30000.0, 14.0, 6.0  # J/K, W/K
+INTERVAL, FINE = 60.0, 5.0  # s, of the logger and of the machine here
+WORDS = ("second_thermal_mass", "unmeasured_heat", "friction_speed", "sensor_lag", "conduction_path")
+
+
+def light(seed: int, late: float, jitter: float = 0.0) -> Recording:
+    """A coil that answers within minutes on a frame; the power switches `late` s before its stamp, and each
+    time by up to `jitter` s more or less.
+    """
+    rng = np.random.default_rng(seed)
+    time: Array = INTERVAL * np.arange(480, dtype=float)
+    power = np.repeat(rng.choice([0.0, 100.0, 250.0, 400.0], 32), 15)
+    fine = FINE * np.arange(int(time[-1] / FINE) + 1)
+    early = np.repeat(late + rng.uniform(-jitter, jitter, 32), 15)
+    stamps = np.where(np.diff(power, prepend=power[0]) != 0, time - early, time)
+    true = power[np.searchsorted(stamps, fine, side="right") - 1]
+    x: Array = np.full((len(fine), 2), 22.0)
+    for k, heat in enumerate(true[:-1]):
+        coil, frame = x[k]
+        link = LINK * (frame - coil)
+        x[k + 1] = coil + FINE * (heat + link) / COIL, frame + FINE * (AIR * (22 - frame) - link) / FRAME
+    read = x[:: int(INTERVAL / FINE)] + 0.1 * rng.standard_normal((len(time), 2))
+    values = {"P": power, "room": np.full(len(time), 22.0), "coil": read[:, 0], "frame": read[:, 1]}
+    return Recording(f"r{seed}", time, values)
+
+
+def campaign(*recordings: Recording) -> Campaign:
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+        "coil": Channel("coil", "temperature", "degC", 0.1, "linear"),
+        "frame": Channel("frame", "temperature", "degC", 0.1, "linear"),
+    }
+    return Campaign("light", channels, {r.name: r for r in recordings})
+
+
+def model() -> Model:
+    terms = (
+        Term("power", "coil", parse("share*P")),
+        Term("link", "coil", parse("G*(frame - coil)"), "frame"),
+        Term("air", "frame", parse("hA*(room - frame)")),
+    )
+    sizes = {"share": (0.9, "1"), "G": (16.0, "W/K"), "hA": (5.0, "W/K")}
+    parameters = {name: Parameter(value, unit, 0.0) for name, (value, unit) in sizes.items()}
+    capacity = {"coil": COIL, "frame": FRAME}
+    states = {name: State(name, "degC", c, parse("room"), 0.3, 1 / c) for name, c in capacity.items()}
+    return Model("light", parameters, states, terms, {})
+
+
+def after(seen: Campaign) -> dict[str, tuple[str, ...]]:
+    """By recording, those that were made then or later."""
+    names = tuple(seen.recordings)
+    return {run: names[k:] for k, run in enumerate(names)}
+
+
+def found(seen: Campaign) -> tuple[str, ...]:
+    """Effects that a search takes up."""
+    effects = [e for e in catalogue().values() if e.word in WORDS]
+    context = make_context(seen, model(), list(seen.recordings), ("coil", "frame"), effects, after(seen))
+    return tuple(h.effect.word for h in Search(context).run().best.hypotheses)
+
+
+def test_a_power_that_is_logged_late_is_no_missing_physics(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = campaign(light(1, 40.0), light(2, 35.0))
+    assert found(seen) == ()
+    monkeypatch.setattr("discovery.diagnosis.context.perhaps_late", lambda _, grids: grids)
+    assert found(seen) != ()
+
+
+def test_switches_off_the_grid_of_the_logger_are_no_missing_physics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is logged at the next stamp: 0 to 60 s late."""
+    seen = campaign(light(1, 30.0, 30.0), light(2, 30.0, 30.0))
+    assert found(seen) == ()
+    monkeypatch.setattr("discovery.evidence.process_noise.JITTER", 0.0)
+    assert found(seen) != ()
+
+
+def test_stamps_that_are_exact_stay_so() -> None:
+    seen = campaign(light(3, 0.0), light(4, 0.0))
+    context = make_context(seen, model(), ["r3", "r4"], ("coil", "frame"), [], after(seen))
+    late = [
+        v for u, v in zip(context.baseline.problem.unknowns, context.baseline.theta, strict=True) if u.is_late
+    ]
+    assert late == pytest.approx([0.0, 0.0], abs=3.0)
+
+
+def test_it_is_asked_only_where_bodies_and_readings_are_fast() -> None:
+    seen = campaign(light(5, 0.0))
+    context = make_context(seen, model(), ["r5"], ("coil", "frame"), [], after(seen))
+    assert context.grids["r5"].unsure == {"P": INTERVAL}
+    rare = light(5, 0.0)
+    for name in ("coil", "frame"):
+        rare.values[name][np.arange(len(rare.time)) % 3 > 0] = np.nan
+    grid = make_grid(campaign(rare), "r5", ["P", "room"], ["coil", "frame"])
+    assert perhaps_late(context.baseline, {"r5": grid})["r5"].unsure == {}
+    slow = machine.campaign(machine.simulated(1), machine.simulated(2))
+    context = make_context(slow, machine.model(), ["r1", "r2"], tuple(machine.SEEN), [], after(slow))
+    assert not any(g.unsure for g in context.grids.values())
+
+
+def test_readings_beside_a_switch_that_may_be_late() -> None:
+    grid = make_grid(campaign(light(6, 0.0)), "r6", ["P", "room"], ["coil", "frame"])
+    assert not beside_switches(grid).any()
+    beside = beside_switches(replace(grid, unsure={"P": INTERVAL}))
+    switched = np.diff(grid.samples["P"].value, prepend=grid.samples["P"].value[0]) != 0
+    near = switched | np.roll(switched, 1) | np.roll(switched, -1)
+    assert np.array_equal(beside, near)

@@ -1,0 +1,91 @@
+"""Single wrong readings on residuals that are written down here, and units of effects at a place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import make_grid
+from discovery.effects.candidates import Scene, candidates
+from discovery.effects.catalogue import catalogue
+from discovery.evidence.outliers import find_outliers
+from discovery.fitting import fit_model
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
+
+NOISE = 0.7
+
+
+def found(residual: NDArray[np.float64]) -> list[int]:
+    """Rows that are set aside of one recording whose readings, of a constant, leave this residual."""
+    time = np.arange(len(residual), dtype=np.float64) * 2.0
+    channels = {"T": Channel("T", "temperature", "K", NOISE, "linear")}
+    recording = Recording("a", time, {"T": residual})
+    campaign = Campaign("one", channels, {"a": recording})
+    model = Model(
+        "constant", {}, {"x": State("x", "K", start=parse("0"), start_sd=0.0)}, (), {"T": parse("x")}
+    )
+    fit = fit_model(model, campaign, ["a"], ["T"])
+    grid = make_grid(campaign, "a", [], ["T"])
+    return [round(o.time / 2.0) for o in find_outliers(fit, {"a": grid}, np.array([NOISE]))]
+
+
+def noise(count: int = 200, seed: int = 1) -> NDArray[np.float64]:
+    return np.random.default_rng(seed).normal(0.0, NOISE, count)
+
+
+def test_two_wrong_readings_with_a_right_one_between_are_both_found() -> None:
+    residual = noise()
+    residual[[120, 122]] += (7.0, 11.0)  # as a thermistor of the Temperature Control Lab reads now and then
+    assert found(residual) == [120, 122]
+
+
+def test_a_jump_a_slope_and_a_slow_start_are_no_wrong_readings() -> None:
+    jump = noise()
+    jump[100:] += 12.0
+    assert found(jump) == []
+    assert found(noise() + 0.4 * np.arange(200)) == []
+    assert found(noise() + 30.0 * np.exp(-np.arange(200) / 8.0)) == []
+    kicked = noise()
+    kicked[100:] += 20.0 * 0.5 ** np.arange(100)  # a pump goes on, the model has no fluid
+    assert found(kicked) == []
+    late = noise()
+    late[0] -= 25.0  # where a recording starts may be far from what the model has settled to
+    assert found(late) == []
+
+
+def test_noise_that_is_larger_than_believed_is_not_thrown_away() -> None:
+    assert found(6.0 * noise(2000)) == []
+
+
+def test_sizes_carry_the_unit_of_the_place() -> None:
+    rate = Model(
+        "an error itself",
+        {"a": Parameter(0.1, "1/h", 0.0)},
+        {"E": State("E", "um"), "T": State("T", "degC")},
+        (Term("back", "E", parse("-a*E")), Term("back too", "T", parse("-a*T"))),
+        {},
+        "h",
+    )
+    channels = {
+        "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+        "E": Channel("E", "error", "um", 0.5, "linear"),
+        "T": Channel("T", "temperature", "degC", 0.1, "linear"),
+    }
+    entries = [catalogue()["sensor_offset"], replace(catalogue()["air_convection"], place="body")]
+    rates = replace(catalogue()["air_convection"], word="rate", place="error state")
+    entries.append(rates)
+    scene = Scene(channels, ("E", "T"), ("a",), {"a": ("a",)}, {}, frozenset(), 0.1, 0.1)
+    claims = {(h.effect.word, h.places): h for h in candidates(rate, entries, scene)}
+
+    def unit(word: str, place: str) -> str:
+        claim = claims[word, (place,)]
+        return claim.added_to(rate).parameters[claim.amplitudes[0]].unit
+
+    assert unit("rate", "E") == "um/h/K"
+    assert unit("air_convection", "T") == "1/h"
+    assert unit("sensor_offset", "E") == "um"
+    assert unit("sensor_offset", "T") == "K"
