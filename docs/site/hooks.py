@@ -69,7 +69,7 @@ def _linked(text: str, source: str, page: str) -> str:
         inside = normpath(str(PurePosixPath(source).parent / target))
         if inside in REPOSITORY:
             there = REPOSITORY[inside]
-        elif inside.startswith("docs/"):
+        elif inside.startswith("docs/") and (ROOT / inside).is_file() and not inside.endswith(".ipynb"):
             there = inside.removeprefix("docs/")
         else:  # a file of the repository that is no page: its name alone
             return NO_PAGE
