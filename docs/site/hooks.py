@@ -9,7 +9,6 @@ from posixpath import normpath, relpath
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
 
 # Files of the repository outside docs/ that are pages, too
 REPOSITORY = {
@@ -34,6 +33,7 @@ def on_files(files: Any, config: Any) -> Any:
     """Add the pages that are made from the code, and those of the repository outside docs/."""
     from mkdocs.structure.files import File
 
+    sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]  # here, since mkdocs puts the path back after loading
     import commands
     import forms
     import gallery
