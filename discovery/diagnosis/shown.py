@@ -29,7 +29,10 @@ def plot(d: DiagnosisDocument) -> Figure:
     """rms of free runs before and after the repair, a pair of bars for each recording set."""
     from matplotlib.figure import Figure
 
-    gains = {"fitted": d.improvement.fit, **{f"{r}\n(held out)": g for r, g in d.improvement.held_out.items()}}
+    gains = {
+        "fitted": d.improvement.fit,
+        **{f"{r}\n(held out)": g for r, g in d.improvement.held_out.items()},
+    }
     figure = Figure(figsize=(1.5 + 1.8 * len(gains), 3.2), layout="constrained")
     axes = figure.subplots()
     for place, gain in enumerate(gains.values()):

@@ -6,8 +6,8 @@ from typing import Any
 
 TEMPLATE = """# Commands
 
-`discovery --help` lists the verbs; `discovery VERB --help` explains one. Exit status: 0 done, 1 the work could not be
-done (the message says why), 2 wrong usage.
+`discovery --help` lists the verbs; `discovery VERB --help` explains one.
+Exit status: 0 done, 1 the work could not be done (the message says why), 2 wrong usage.
 
 """
 
@@ -55,7 +55,12 @@ def _name(p: Any) -> str:
 def _default(p: Any) -> str:
     if p.required:
         return "required"
-    if p.default is None or callable(p.default) or p.default in ((), [], False) or "Sentinel" in repr(p.default):
+    if (
+        p.default is None
+        or callable(p.default)
+        or p.default in ((), [], False)
+        or "Sentinel" in repr(p.default)
+    ):
         return ""
     return f"`{p.default}`"
 

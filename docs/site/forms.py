@@ -7,8 +7,9 @@ from typing import Any
 
 TEMPLATE = """# Files
 
-Every file of the workbench is checked against a schema. `discovery schema campaign` (or another word of this page) prints it;
-an editor that knows JSON schemas completes keys with it. Unknown keys are refused, with the nearest right one.
+Every file of the workbench is checked against a schema. `discovery schema campaign` (or another word of this
+page) prints it. An editor that knows JSON schemas completes keys with it. Unknown keys are refused, with the
+nearest right one.
 
 """
 
@@ -29,10 +30,19 @@ def pages() -> dict[str, str | bytes]:
 
 def _table(form: dict[str, Any], document: dict[str, Any]) -> list[str]:
     required = form.get("required", [])
-    lines = [_cell(form.get("description", "")), "", "| key | type | meaning | default |", "|---|---|---|---|"]
+    lines = [
+        _cell(form.get("description", "")),
+        "",
+        "| key | type | meaning | default |",
+        "|---|---|---|---|",
+    ]
     for key, one in form.get("properties", {}).items():
-        default = "required" if key in required else f"`{json.dumps(one['default'])}`" if one.get("default") else ""
-        lines.append(f"| `{key}` | {_type(one, document)} | {_cell(one.get('description', ''))} | {default} |")
+        default = (
+            "required" if key in required else f"`{json.dumps(one['default'])}`" if one.get("default") else ""
+        )
+        lines.append(
+            f"| `{key}` | {_type(one, document)} | {_cell(one.get('description', ''))} | {default} |"
+        )
     return [*lines, ""]
 
 

@@ -17,9 +17,10 @@ INSTANTS = (6.0, 14.0)  # h: where a jump or a window of the picture begins and 
 MEMORY = 3600.0  # s: time constants that the catalogue leaves to the recordings
 TEMPLATE = """# Gallery of effects
 
-The catalogue holds {count} laws of {words} effects. A diagnosis searches all of them at every place where they can act. `discovery
-explain WORD` prints the same text. Each picture shows one day of a simulated table (top: the inputs that matter; bottom: what
-the effect adds) with the usual size of the effect. Sizes are log-normal: about 68 % of machines lie within the typical range.
+The catalogue holds {count} laws of {words} effects. A diagnosis searches all of them at every place where they
+can act. `discovery explain WORD` prints the same text. Each picture shows one day of a simulated table with the
+usual size of the effect: the inputs of the formula above, its result below. Sizes are log-normal: about 68 % of
+machines lie within the typical range.
 
 """
 
@@ -61,7 +62,12 @@ def _entry(name: str, effect: Any, factor: float) -> Iterator[str]:
         yield f"| example | {values} gives {example.expected:g} |"
     if effect.confused_with:
         yield f"| looks like | {', '.join(f'`{word}`' for word in effect.confused_with)} |"
-    yield from (f"| source | {_text(effect.source)} |", "", f"![{effect.title}: inputs and effect]({name}.svg)", "")
+    yield from (
+        f"| source | {_text(effect.source)} |",
+        "",
+        f"![{effect.title}: inputs and effect]({name}.svg)",
+        "",
+    )
 
 
 def _range(shape: Any) -> str:
@@ -116,7 +122,7 @@ def _day() -> dict[str, Array]:
     """One day of a table under cutting fluid: inputs, two bodies and an error."""
 
     def during(*spans: tuple[float, float]) -> Array:
-        return np.any([(start <= HOURS) & (HOURS < end) for start, end in spans], axis=0).astype(float)
+        return np.any([(start <= HOURS) & (end > HOURS) for start, end in spans], axis=0).astype(float)
 
     speed = 800.0 * during((3, 8), (16, 21)) + 400.0 * during((9, 11))
     flow = during((2, 7), (10, 14), (17, 22))
@@ -168,7 +174,10 @@ def _label(effect: Any) -> str:
         return "added to the error [µm]"
     if effect.place == "error state":
         return "added to the rate"
-    if "term" in effect.formula.replace("_", " ").split("*")[-1] or effect.place in ("loss terms", "air terms"):
+    if "term" in effect.formula.replace("_", " ").split("*")[-1] or effect.place in (
+        "loss terms",
+        "air terms",
+    ):
         return "added to the term [W]"
     if effect.place in ("fluid terms", "cooling terms", "input temperature", "inputs of a recording"):
         return "the input as the term sees it"
@@ -192,7 +201,9 @@ def _picture(effect: Any) -> bytes:
         for name in shown:
             one = np.asarray(series[name], dtype=float)
             span = float(np.ptp(one)) or 1.0
-            top.plot(HOURS, (one - one.min()) / span, lw=1.1, label=f"{name} ({one.min():.3g} to {one.max():.3g})")
+            top.plot(
+                HOURS, (one - one.min()) / span, lw=1.1, label=f"{name} ({one.min():.3g} to {one.max():.3g})"
+            )
         if shown:
             top.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
         top.set_yticks([])

@@ -1,4 +1,4 @@
-"""Pages of the site that are made from the code when it is built (`make site`); nothing of them is committed."""
+"""Pages of the site that are made from the code at build time (`make site`); none of them is committed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ def on_files(files: Any, config: Any) -> Any:
     """Add the pages that are made from the code, and those of the repository outside docs/."""
     from mkdocs.structure.files import File
 
-    sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]  # here, since mkdocs puts the path back after loading
+    sys.path[:0] = [
+        str(ROOT),
+        str(Path(__file__).parent),
+    ]  # here, since mkdocs puts the path back after loading
     import commands
     import forms
     import gallery
