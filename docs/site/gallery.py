@@ -196,8 +196,10 @@ def _picture(effect: Any) -> bytes:
     result = np.broadcast_to(evaluate(tree, values, memory=_Series(series)).value, HOURS.shape)
     shown = sorted((names(tree) & set(series)) - {"time"})
     with rc_context({"svg.hashsalt": effect.word, "font.size": 8, "svg.fonttype": "none"}):
-        figure = Figure(figsize=(6.4, 3.0), layout="constrained")
-        top, bottom = figure.subplots(2, 1, sharex=True)
+        figure = Figure(figsize=(7.4, 3.0))
+        top, bottom = figure.subplots(
+            2, 1, sharex=True, gridspec_kw={"left": 0.09, "right": 0.72, "top": 0.97, "bottom": 0.14}
+        )
         for name in shown:
             one = np.asarray(series[name], dtype=float)
             span = float(np.ptp(one)) or 1.0

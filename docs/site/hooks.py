@@ -26,7 +26,18 @@ REPOSITORY = {
     "datasets/tclab/README.md": "datasets/tclab.md",
 }
 NO_PAGE = "]\0"  # behind the words of a link to a file that is no page
+IF_THERE = {
+    "Security": ("SECURITY.md", "project/security.md"),
+    "Licences": ("docs/licences.md", "licences.md"),
+}
 LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)]*)?\))")
+
+
+def on_config(config: Any) -> Any:
+    """Pages that not every state of the repository has come at the end of the navigation."""
+    project = next(entry["Project"] for entry in config["nav"] if "Project" in entry)
+    project += [{title: page} for title, (source, page) in IF_THERE.items() if (ROOT / source).exists()]
+    return config
 
 
 def on_files(files: Any, config: Any) -> Any:

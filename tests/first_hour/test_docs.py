@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from pathlib import Path
@@ -59,6 +60,27 @@ def test_the_tutorial_prints_what_it_says(place: Path) -> None:
     assert commands == 6
     assert (place / "runs" / "heaters" / "report.html").exists()
     assert list((place / "runs" / "heaters" / "figures").glob("*.pdf"))
+    _the_readme_agrees_with(json.loads((place / "runs" / "heaters" / "results.json").read_text("utf-8")))
+
+
+def _the_readme_agrees_with(results: dict[str, Any]) -> None:
+    """The caption of the picture: what the simple and the repaired model leave at sensor 2."""
+    text = " ".join((ROOT / "README.md").read_text("utf-8").split())
+    peak, lag, rms = (
+        re.search(pattern, text)
+        for pattern in (
+            r"error at sensor 2 reaches (\d+) K",
+            r"sensor lag of (\d+) s",
+            r"rms is below (\d+) K",
+        )
+    )
+    assert peak and lag and rms
+    at = {name: one["recordings"]["step_h1_up_090"]["T2"] for name, one in results["models"].items()}
+    assert at["first_order"]["peak"] == pytest.approx(float(peak[1]), rel=CLOSE)
+    assert at["repaired"]["rms"] < float(rms[1])
+    lags = [p["value"] for n, p in results["models"]["repaired"]["values"].items() if n.startswith("t_lag")]
+    assert lags
+    assert lags == pytest.approx([float(lag[1])] * len(lags), rel=CLOSE)
 
 
 @pytest.mark.usefixtures("place")
