@@ -17,10 +17,10 @@ INSTANTS = (6.0, 14.0)  # h: where a jump or a window of the picture begins and 
 MEMORY = 3600.0  # s: time constants that the catalogue leaves to the recordings
 TEMPLATE = """# Gallery of effects
 
-The catalogue holds {count} laws of {words} effects. A diagnosis searches all of them at every place where they
-can act. `discovery explain WORD` prints the same text. Each picture shows one day of a simulated table with the
-usual size of the effect: the inputs of the formula above, its result below. Sizes are log-normal: about 68 % of
-machines lie within the typical range.
+The catalogue holds {count} laws of {words} effects. A diagnosis searches all of them at every place where
+they can act. `discovery explain WORD` prints the same text. Each picture shows one day of a simulated table
+with the usual size of the effect: the inputs of the formula above, its result below. Sizes are log-normal:
+about 68 % of machines lie within the typical range.
 
 """
 
@@ -54,7 +54,8 @@ def _entry(name: str, effect: Any, factor: float) -> Iterator[str]:
     if size.fixed is None:
         low, high = size.plausible / factor, size.plausible * factor
         unit = "" if size.unit == "1" else f" {size.unit}"
-        yield f"| typical range | `{size.name}`: {low:.2g} to {high:.2g}{unit} (usual {size.plausible:g}), {sign} |"
+        span = f"{low:.2g} to {high:.2g}{unit} (usual {size.plausible:g}), {sign}"
+        yield f"| typical range | `{size.name}`: {span} |"
     for shape in effect.shapes:
         yield f"| shape | `{shape.name}`: {_range(shape)} |"
     for example in effect.examples:

@@ -8,8 +8,8 @@ from typing import Any
 
 TEMPLATE = """# Python
 
-Every public name of `discovery`. `dir(discovery)` lists them, all are typed (`py.typed`), and a mistake of the
-caller raises `discovery.UserError` with one sentence. Examples: [Use from Python](../python.md).
+Every public name of `discovery`. `dir(discovery)` lists them, all are typed (`py.typed`), and a mistake of
+the caller raises `discovery.UserError` with one sentence. Examples: [Use from Python](../python.md).
 
 """
 SECTIONS = ("Args", "Returns", "Raises", "Attributes", "Example", "Examples", "Limits")

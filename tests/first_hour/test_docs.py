@@ -74,7 +74,9 @@ def _the_readme_agrees_with(results: dict[str, Any]) -> None:
             r"rms is below (\d+) K",
         )
     )
-    assert peak and lag and rms
+    assert peak
+    assert lag
+    assert rms
     at = {name: one["recordings"]["step_h1_up_090"]["T2"] for name, one in results["models"].items()}
     assert at["first_order"]["peak"] == pytest.approx(float(peak[1]), rel=CLOSE)
     assert at["repaired"]["rms"] < float(rms[1])
