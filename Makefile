@@ -8,7 +8,7 @@ FITS   := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[
 PYTHON ?= $(shell for one in python3.11 python3.12 python3.13 python3 python; do \
 	"$$one" -c '$(FITS)' >/dev/null 2>&1 && echo "$$one" && break; done)
 
-.PHONY: demo test coverage site browser-test outside lint types lock clean
+.PHONY: demo test coverage site browser-test outside lint types lock audit licences fuzz clean
 
 demo: $(STAMP)
 	$(BIN)/discovery run experiments/nmv5000.toml
@@ -64,6 +64,20 @@ lock: $(STAMP)
 	$(BIN)/pip-compile --quiet --extra dev --all-build-deps --generate-hashes --allow-unsafe --strip-extras \
 	    --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-emit-options --no-header \
 	    --output-file requirements.lock pyproject.toml
+
+# Known holes in what is locked (asks the advisory database of the index, so it needs the network)
+audit: $(STAMP)
+	$(BIN)/python -m pip install --quiet pip-audit
+	$(BIN)/pip-audit --requirement requirements.lock --disable-pip --require-hashes
+
+licences: $(STAMP)
+	$(BIN)/python -m pip install --quiet pip-licenses
+	$(BIN)/pip-licenses --format=markdown --with-urls --output-file docs/licences.md \
+	    --packages $$(sed -n 's/^\([A-Za-z0-9_.-]*\)==.*/\1/p' requirements.lock) tomlkit openpyxl et-xmlfile
+
+# Files changed at random; longer with FUZZ="--seconds 3600"
+fuzz: $(STAMP)
+	$(BIN)/python -W ignore -m tests.fuzz $(FUZZ)
 
 clean:
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache

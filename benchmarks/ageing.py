@@ -114,7 +114,7 @@ def cases(exported: Exported, campaign: Campaign, seed: int) -> None:
             ("hysteresis 1.5 K", {"effects": hysteresis}),
             ("wear, losses -10 %", {"effects": worn(0.9)}),
         ):
-            these = recorded(campaign, 3, 72.0, seed, readings=readings, **options)  # type: ignore[arg-type]
+            these = recorded(campaign, 3, 72.0, seed, readings=readings, **options)
             found = compare(exported, these, list(these.recordings))
             signed = revision_of(exported, these, found) is not None
             print(f"{title}, {given}: {found}; {'revision' if signed else 'no revision'}", flush=True)

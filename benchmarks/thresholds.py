@@ -1,9 +1,9 @@
 """What each constant of the diagnosis does: `python -m benchmarks.thresholds CASES [--constant NAME ...]`.
 
-CASES is a folder of practice cases with `keys.json`, as `discovery challenge --practice` writes it. Every case
-is diagnosed with each constant of `discovery/diagnosis/thresholds.py` as it is, divided and multiplied by 1.5,
-one constant at a time; the table counts what was right, wrong or missed, and how far probabilities moved. A
-constant of which nothing moves on several families does not matter and should go.
+CASES is a folder of practice cases with `keys.json`, as `discovery challenge --practice` writes it. Every
+case is diagnosed with each constant of `discovery/diagnosis/thresholds.py` unchanged, divided and multiplied
+by 1.5, one constant at a time; the table counts what was right, wrong or missed, and how far probabilities
+moved. A constant of which nothing moves on several families does not matter and should go.
 """
 
 from __future__ import annotations
@@ -20,7 +20,14 @@ from typing import Any
 from discovery.diagnosis import thresholds
 
 FACTOR = 1.5
-FIXED = ("DRAWS", "BLOCKS", "RIVALS_SHOWN", "LEVEL_WEIGHTS", "SLOW_WEIGHTS", "FORM_WEIGHTS")  # resolution, shares
+FIXED = (
+    "DRAWS",
+    "BLOCKS",
+    "RIVALS_SHOWN",
+    "LEVEL_WEIGHTS",
+    "SLOW_WEIGHTS",
+    "FORM_WEIGHTS",
+)  # resolution, shares
 
 
 def constants() -> dict[str, Any]:

@@ -73,8 +73,9 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="A first hour: write campaign.toml beside your files, `discovery check` it, "
-    "then write an experiment and `discovery run` it. Every verb explains itself: `discovery VERB --help`. "
+    epilog="A first hour: `discovery new DIR --from FILE` makes campaign, model and experiment of your "
+    "recordings, `discovery check DIR` looks at them, `discovery run DIR/experiment.toml` answers. "
+    "Every verb explains itself: `discovery VERB --help`. "
     "Exit status: 0 done, 1 the work could not be done (the message says why), 2 wrong usage.",
 )
 

@@ -5,10 +5,12 @@ import re
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from discovery.errors import UserError
+from discovery.limits import read_whole
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -31,21 +33,14 @@ _ASSIGNMENT = re.compile(rf"\s*({_DOTTED})\s*=")
 def read_text(path: str | os.PathLike[str]) -> str:
     """The text of a UTF-8 file, without byte order mark and with plain line ends.
 
-    Raises UserError: no such file, a folder, not readable, not UTF-8.
+    Raises UserError: no regular file, too large, not readable, not UTF-8.
     """
-    data = b""
+    data = read_whole(path)
     try:
-        data = Path(path).read_bytes()
         return data.decode("utf-8-sig").replace("\r\n", "\n")
-    except FileNotFoundError:
-        raise UserError(f"{path}: there is no such file") from None
-    except IsADirectoryError:
-        raise UserError(f"{path}: this is a folder; name a file in it") from None
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise UserError(f"{path}, line {line}: not UTF-8 text; save the file as UTF-8") from None
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path}: cannot be read ({error})") from None
 
 
 def read_toml(path: str | os.PathLike[str], schema: type[Schema]) -> Schema:
@@ -93,7 +88,7 @@ def parse_toml(text: str, path: str | os.PathLike[str]) -> dict[str, Any]:
     """`text` as TOML; `path` is only named. Raises UserError with line and column."""
     try:
         return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # ValueError: of an integer of thousands of digits, too
         what, _, where = str(error).partition(" (at ")
         place = (
             where.rstrip(")") if where.startswith("line") else f"line {text.count(chr(10)) + 1}, at the end"
@@ -117,11 +112,17 @@ def locate(text: str, key: Key) -> int:
     >>> locate('name = "x"\\n[models]\\nreduced = { kind = "x" }\\n', ("models", "reduced", "kind"))
     3
     """
-    best, depth = 1, 0
-    for line, found in _keys(text):
-        if len(found) > depth and found == key[: len(found)]:
-            best, depth = line, len(found)
-    return best
+    lines = _lines(text)
+    return next((lines[key[:depth]] for depth in range(len(key), 0, -1) if key[:depth] in lines), 1)
+
+
+@lru_cache(maxsize=8)
+def _lines(text: str) -> dict[Key, int]:
+    """The line in which each key stands first."""
+    found: dict[Key, int] = {}
+    for line, key in _keys(text):
+        found.setdefault(key, line)
+    return found
 
 
 def _keys(text: str) -> Iterator[tuple[int, Key]]:

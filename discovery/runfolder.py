@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import platform
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -67,9 +69,25 @@ def staged(folder: Path) -> Iterator[Path]:
     """
     _refuse_foreign(folder)
     place = folder.resolve()  # behind a link the results change, not the link
+    with beside(folder) as temporary:
+        yield temporary
+        if place.exists():
+            _take_along(place, temporary)
+        _take_place(temporary, place)
+
+
+@contextmanager
+def beside(folder: Path) -> Iterator[Path]:
+    """A temporary folder beside `folder` that vanishes at the end, whatever happens. What a killed process
+    left of such a folder is cleared away first.
+
+    Raises UserError: it cannot be written.
+    """
+    place = folder.resolve()
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(dir=place.parent, prefix=f".{place.name}."))
+        _clear(place)
+        temporary = Path(tempfile.mkdtemp(dir=place.parent, prefix=f"{_mark(place)}{os.getpid()}."))
     except OSError as error:
         raise UserError(
             f"{folder}: cannot be written ({error.strerror}); choose another place with --out"
@@ -77,11 +95,39 @@ def staged(folder: Path) -> Iterator[Path]:
     try:
         temporary.chmod(0o755)
         yield temporary
-        if place.exists():
-            _take_along(place, temporary)
-        _take_place(temporary, place)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _mark(place: Path) -> str:
+    """What the temporary folders of this computer beside a place begin with; the number of a process
+    follows.
+    """
+    host = re.sub(r"[^\w-]", "_", platform.node())
+    return f".{place.name}.{host}."
+
+
+def _clear(place: Path) -> None:
+    """Remove what killed processes left; a place that was being replaced when one was killed comes back."""
+    mark = _mark(place)
+    for entry in place.parent.iterdir():
+        number = entry.name.removeprefix(mark).partition(".")[0]
+        if not entry.name.startswith(mark) or not number.isdecimal() or _alive(int(number)):
+            continue
+        if entry.name.endswith(".old") and not place.exists():
+            entry.replace(place)
+        else:
+            shutil.rmtree(entry, ignore_errors=True)
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # somebody else's, or no number of a process
+        return True
+    return True
 
 
 def _refuse_foreign(folder: Path) -> None:

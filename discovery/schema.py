@@ -80,7 +80,8 @@ def _explain(schema: type[BaseModel], mistake: ErrorDetails, key: Key) -> str:
     if kind == "missing":
         return f"the key '{mistake['loc'][-1]}' is missing"
     if kind in ("literal_error", "enum"):
-        return f"{given!r} is not known; {suggest(str(given), _quoted(context['expected']))}"
+        word = _short(given)
+        return f"{word} is not known; {suggest(word.strip(chr(39)), _quoted(context['expected']))}"
     if kind == "union_tag_invalid":
         known = suggest(context["tag"], _quoted(context["expected_tags"]))
         return f"kind {context['tag']!r} is not known; {known}"
@@ -157,5 +158,8 @@ def _is_model(annotation: Any) -> bool:
 
 
 def _short(value: object) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except ValueError:  # Python refuses to write out an integer of thousands of digits
+        return "an integer of thousands of digits"
     return text if len(text) <= 40 else f"{text[:37]}..."

@@ -1,9 +1,9 @@
 """How the cores are used: independent fits run side by side, each with one thread for its linear algebra.
 
 Problems are small: threads inside a matrix product would only get in each other's way. The command says so
-before numpy is loaded. A script has loaded it by then, so whatever computes for long pins the libraries itself
-while it runs. What the user has set stays. The kernels release the lock of the interpreter, so that threads
-share everything and nothing is copied.
+before numpy is loaded. A script has loaded it by then, so whatever computes for long pins the libraries
+itself while it runs. What the user has set stays. The kernels release the lock of the interpreter, so that
+threads share everything and nothing is copied.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ ORDER = (
     "diagnosis",
     "design report export",
     "experiment runtime",
-    "challenge estimator firsthour notebook",
+    "challenge firsthour estimator notebook",
     "commands",
     "cli",
 )

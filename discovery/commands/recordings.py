@@ -1,9 +1,12 @@
 """Verbs on recordings: look at them, make a campaign of them, record the virtual machine."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from discovery.firsthour.asking import Question
 
 
 def check(
@@ -16,15 +19,19 @@ def check(
         typer.Option("--model", help="A model file: do its names and units fit? Repeatable."),
     ] = None,
 ) -> None:
-    """List what is wrong with the recordings of CAMPAIGN: where, and what to do about it.
+    """List what is wrong with the recordings of CAMPAIGN, worst first: where, and what to do about it.
 
-    An `error` keeps the recording from being used (exit status 1); a `warning` is worth a look.
+    Each channel is looked at by itself, beside its siblings, and beside the other recordings: units,
+    signs, clocks,
+    swapped columns, dead or frozen sensors, copies. An `error` keeps the recording from being used (exit
+    status 1); a `warning` is worth a look.
     """
     from discovery.recordings.check import check_campaign, summary
+    from discovery.recordings.finding import folded
 
     findings, misfits = check_campaign(campaign), []
-    for finding in findings:
-        typer.echo(str(finding))
+    for line in folded(findings):
+        typer.echo(line)
     if models:
         from discovery.models.check import check_models
 
@@ -39,15 +46,78 @@ def check(
 def new(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that the files are written into.")],
     sources: Annotated[
-        list[Path],
-        typer.Option("--from", metavar="CSV", help="Your recording; repeat it for several of one machine."),
-    ],
+        list[Path] | None,
+        typer.Option(
+            "--from",
+            metavar="FILE",
+            help="Your recording (CSV of any kind, .xlsx, Parquet); repeat it for several of one machine.",
+        ),
+    ] = None,
+    joins: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--join", metavar="FILE", help="A second logger of the same hours, one for each --from."
+        ),
+    ] = None,
+    statements: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--is",
+            metavar="NAME=ROLE,UNIT",
+            help="What a column is: --is 'CH1=error,um'; the unit of the clock: --is time=min. Repeatable.",
+        ),
+    ] = None,
+    room: Annotated[
+        str | None,
+        typer.Option(metavar="COLUMN", help="A column that stands for the air around (outdoors, a cabinet)."),
+    ] = None,
+    again: Annotated[
+        bool,
+        typer.Option("--again", help="Make model and experiment anew; what you wrote in DIR stays."),
+    ] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Do not compare models: write a simple and a discovered one.")
+    ] = False,
+    ask: Annotated[
+        bool | None, typer.Option("--ask/--no-ask", help="Ask about doubtful guesses [if on a terminal].")
+    ] = None,
 ) -> None:
-    """Make campaign, model and experiment from your own CSV, and say what was guessed."""
-    from discovery.firsthour.new import new as make
+    """Make campaign, model and experiment from your own files, say what was guessed, choose a first model.
 
-    for line in make(folder, sources):
+    \b
+    discovery new lathe --from monday.csv --from tuesday.csv
+    discovery new lathe --from temperatures.csv --join displacements.xlsx
+    discovery new lathe --again          # after roles were corrected in lathe/campaign.toml
+    """
+    import sys
+
+    from discovery.firsthour.new import new as make
+    from discovery.progress import shown
+
+    asks = ask if ask is not None else sys.stdin.isatty() and sys.stderr.isatty()
+    with shown() as progress:
+        lines = make(
+            folder,
+            sources or [],
+            joins or [],
+            statements or [],
+            room,
+            _asked if asks else None,
+            progress,
+            again=again,
+            quick=quick,
+        )
+    for line in lines:
         typer.echo(line)
+
+
+def _asked(question: "Question") -> int:
+    """The place of the answer that a person chooses on the terminal; the first by just confirming."""
+    typer.echo(question.text, err=True)
+    for number, (words, _, _) in enumerate(question.answers, start=1):
+        typer.echo(f"  {number}  {words}", err=True)
+    choice = typer.prompt("which?", type=typer.IntRange(1, len(question.answers)), default=1, err=True)
+    return int(choice) - 1
 
 
 def _list_effects(given: list[str] | None) -> list[str] | None:

@@ -11,19 +11,46 @@ def run(
         Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, e.g. experiments/nmv5000.toml.")
     ],
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the results [runs/NAME].")] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Run although the recordings cannot be used as they are.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Nothing but the last five lines.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="What was found as one JSON object on stdout, nothing else.")
+    ] = False,
 ) -> None:
-    """Do the main job: fit, discover, cross-validate, compare, diagnose, report, export.
+    """Do the main job: look at the recordings, fit, discover, cross-validate, compare, diagnose, report,
+    export.
 
-    The results in the folder are replaced as a whole at the end: an interrupted run leaves nothing behind.
-    Exports, figures and notes in it stay.
+    Recordings that are wrong (`discovery check`) stop it, unless --force. The last five lines say which
+    model wins,
+    how sure that is, what is missing, what is doubtful, what to do next. The results in the folder are
+    replaced as a
+    whole at the end: an interrupted run leaves nothing behind. Exports, figures and notes in it stay.
     """
-    from discovery.experiment import run as run_experiment
-    from discovery.experiment.summary import summary
-    from discovery.progress import shown
+    import json
 
-    with shown() as progress:
-        folder = run_experiment(experiment, out, progress)
-    for line in summary(folder):
+    from discovery.experiment import run as run_experiment
+    from discovery.experiment.ending import ending
+    from discovery.experiment.summary import summary
+    from discovery.progress import shown, silent
+
+    def tell(line: str) -> None:
+        typer.echo(line, err=True)
+
+    with shown(quiet=quiet or as_json) as progress:
+        folder = run_experiment(
+            experiment, out, progress, force=force, tell=silent if quiet or as_json else tell
+        )
+    found = ending(folder)
+    if as_json:
+        typer.echo(json.dumps(found.document(), indent=1, ensure_ascii=False))
+        return
+    if not quiet:
+        for line in summary(folder):
+            typer.echo(line)
+        typer.echo()
+    for line in found.lines():
         typer.echo(line)
 
 

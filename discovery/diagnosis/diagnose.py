@@ -18,7 +18,7 @@ from discovery.diagnosis.location import Location, locate
 from discovery.diagnosis.posterior import Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, size_of
 from discovery.diagnosis.repair import written
-from discovery.diagnosis.scored import Scored, with_effects, with_force
+from discovery.diagnosis.scored import Scored, shape_priors, with_effects, with_force
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide, idle, refuted
 from discovery.effects.catalogue import catalogue
@@ -229,7 +229,17 @@ def _repaired(
     grown = with_effects(model, chosen)
     values = answer.fit.model.parameters
     start = {n: values[n].value for n in grown.free if n in values}
-    return fit_model(grown, seen, context.recordings, context.outputs, guess=start, begin=before)
+    priors = shape_priors(chosen)  # readings may leave the shape of an effect open
+    return fit_model(
+        grown,
+        seen,
+        context.recordings,
+        context.outputs,
+        priors=priors,
+        guess=start,
+        begin=before,
+        max_rounds=25,
+    )
 
 
 def _gain(context: Context, answer: Scored, model: Model, seen: Campaign, before: Fit) -> float:

@@ -167,12 +167,6 @@ def refit(
     Raises:
         RunsAwayError: the model does not stay finite with them.
     """
-    priors = {
-        name: _prior(shape)
-        for h in chosen
-        for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
-        if not shape.instant
-    }
     return fit_model(
         with_effects(context.model, chosen),
         context.campaign,
@@ -180,13 +174,23 @@ def refit(
         context.outputs,
         noise=noise,
         grids=context.grids,
-        priors=priors,
+        priors=shape_priors(chosen),
         belief=context.belief,
         guess=sizes,
         begin=start or context.baseline,
         max_rounds=25,
         tolerance=ENOUGH,
     )
+
+
+def shape_priors(chosen: Sequence[Hypothesis]) -> dict[str, Prior]:
+    """Priors of the shape parameters of effects, by name."""
+    return {
+        name: _prior(shape)
+        for h in chosen
+        for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
+        if not shape.instant
+    }
 
 
 def _prior(shape: Shape) -> Prior:
@@ -246,7 +250,7 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
     def level(k: int) -> float:
         if k not in known:
             setting = context.settings[k]
-            gram = bare.seen.grams(replace(setting.noise, force=force) if force else setting.noise)
+            gram = bare.seen.grams(_forced(setting.noise, force) if force else setting.noise)
             known[k] = replace(bare, settings=(setting,), grams=(gram,))
         return float(known[k].levels[0])
 
@@ -277,6 +281,12 @@ def _distance(one: Noise, other: Noise) -> float:
     slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
     form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
     return slow + form + abs(one.jitter - other.jitter)
+
+
+def _forced(noise: Noise, force: Mapping[str, float]) -> Noise:
+    """A noise with forces that are so many times the usual process noise, whatever it is elsewhere."""
+    usual = thresholds.SHARE / noise.share
+    return replace(noise, force={state: usual * times for state, times in force.items()})
 
 
 def _is_usual(noise: Noise) -> bool:

@@ -15,13 +15,13 @@ FLOOR = 0.02  # of the largest rms flow of the model, at level one: heat at a bo
 SHARE = 0.08  # of what flows through a body at level one: form error of a lumped model
 LEVELS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of process noise, integrated over ...
 LEVEL_WEIGHTS = (0.15, 0.35, 0.35, 0.12, 0.03)  # ... with these weights
-FORMS = ((0.0, 0.0), (0.0, 0.1), (0.025, 0.1), (0.08, 0.1), (0.25, 0.25))  # shares by which laws are off at an
-# operating point, and by which flows enter the neighbours of a body: from an exact model to a coarse one ...
+FORMS = ((0.0, 0.0), (0.0, 0.1), (0.025, 0.1), (0.08, 0.1), (0.25, 0.25))  # by which laws are off at an
+# operating point, and share of flows into the neighbours of a body: from an exact model to a coarse one ...
 FORM_WEIGHTS = (0.25, 0.25, 0.25, 0.15, 0.1)  # ... with these weights
-SLOW = (0.0, 0.3, 1.0, 3.0, 10.0)  # slow noise of outputs, as shares of the reading noise, integrated over ...
+SLOW = (0.0, 0.3, 1.0, 3.0, 10.0)  # slow noise of outputs, shares of the reading noise, integrated over ...
 SLOW_WEIGHTS = (0.35, 0.35, 0.2, 0.08, 0.02)  # ... with these weights
 FORM = 0.2  # of the flow of a named effect, at each operating point: no law is quite that of nature
-UNKNOWN_FORCE = 10.0  # of the process noise of a body: a latent force, "none of these"
+UNKNOWN_FORCE = 3.0  # times the process noise of a body at level one: a latent force, "none of these"
 
 # --- effects ----------------------------------------------------------------------------------------------
 BELIEF = 0.5  # log of the factor within which the start values of a hand-built model are believed
@@ -34,7 +34,7 @@ JUMP_FACTOR = 4.0
 
 # --- what is said -----------------------------------------------------------------------------------------
 SUREST = 0.98  # probability that is never exceeded: causes that nobody thought of
-DETECTED = 0.9  # probability of any mismatch from which one is reported
+DETECTED = 0.75  # probability of any mismatch from which one is reported
 NAMED = 0.7  # probability from which an effect is named
 MATTERS = 0.15  # reading noises, rms: what explains less of free runs (1 % of their rms) has no name
 SHORT = 10.0  # log evidence that what is named, or nothing at all, may be short of the best model of all

@@ -101,8 +101,8 @@ def _refused(context: Context, answer: Scored, h: Hypothesis) -> str | None:
         return None
     rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
     return (
-        f"{h.effect.word} at {h.where} does not make free runs better by what would matter on recordings that "
-        f"are left out of the fit (rms over the reading noise: {rms})"
+        f"{h.effect.word} at {h.where} does not make free runs better by what would matter on recordings "
+        f"that are left out of the fit (rms over the reading noise: {rms})"
     )
 
 

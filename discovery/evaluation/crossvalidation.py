@@ -96,8 +96,8 @@ def _left_over(
             trajectory = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)
             yield fit.problem.residual(trajectory)
         return
-    masked = {name: _mask(campaign.recordings[name], outputs, fold.windows[name]) for name in recordings}
-    fit = refit(replace(campaign, recordings=masked), recordings)
+    hidden = {name: masked(campaign.recordings[name], outputs, fold.windows[name]) for name in recordings}
+    fit = refit(replace(campaign, recordings=hidden), recordings)
     for trajectory in fit.trajectories:
         name = trajectory.system.grid.recording
         whole = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)
@@ -107,7 +107,7 @@ def _left_over(
         yield np.where(((time >= low) & (time < high))[:, None], rows, np.nan)
 
 
-def _mask(recording: Recording, outputs: Sequence[str], window: Window) -> Recording:
+def masked(recording: Recording, outputs: Sequence[str], window: Window) -> Recording:
     """The recording with the readings of a window taken away, save the first one, on which models are zeroed.
 
     Inputs stay: the machine went on.

@@ -5,8 +5,9 @@
 for each flow of the model, and likewise for what each output shows. psi_m are the inputs, the body and the
 recording, each less its mean and over its spread, scaled so that a flow is off by the share in all. And the
 bodies of a lumped model have no sharp edges: a share of each flow enters a neighbour of the body that it is
-drawn at. Both shares are unknown, together on a ladder from an exact model to a coarse one. The part of form error that wanders with time is process noise (`process_noise.py`); this one does not average
-out over a long recording (Kennedy & O'Hagan, J. R. Stat. Soc. B 63, 2001).
+drawn at. Both shares are unknown, together on a ladder from an exact model to a coarse one. The part of form
+error that wanders with time is process noise (`process_noise.py`); this one does not average out over a long
+recording (Kennedy & O'Hagan, J. R. Stat. Soc. B 63, 2001).
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ def _stacked(trajectories: Sequence[Trajectory], columns: Sequence[Array], white
     """Columns (R, Y, M) by recording over the reading noise, what is not measured zero, as (N, M)."""
     measured = [t.system.grid.measured[:, :, None] for t in trajectories]
     parts = [np.where(m, c / white[None, :, None], 0.0) for m, c in zip(measured, columns, strict=True)]
-    return np.concatenate([p.reshape(-1, p.shape[2]) for p in parts])
+    return np.concatenate([p.reshape(p.shape[0] * p.shape[1], p.shape[2]) for p in parts])
 
 
 def effect_form(trajectories: Sequence[Trajectory], hypotheses: Sequence[Hypothesis]) -> list[Array]:

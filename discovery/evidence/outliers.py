@@ -68,14 +68,18 @@ def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Out
 
 def _returns(r: Array, middle: Array, limit: Array, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Whether the readings (N,) next to each one, on both sides, are near the median of those around it; of
-    `MOST` suspects in a row, those next to the row. At its ends a recording may just have begun to move.
+    `MOST` suspects of about one size in a row, those next to the row. At its ends a recording may just have
+    begun to move.
     """
-    found = np.zeros(len(r), dtype=bool)
+    found, size = np.zeros(len(r), dtype=bool), np.abs(r - middle)
     for k in np.flatnonzero(suspect):
         before, after = k - 1, k + 1
-        while before > 0 and suspect[before] and after - before <= MOST:
+        row = (
+            suspect & (size > 0.5 * size[k]) & (size < 2 * size[k])
+        )  # what fades is a response, not a row of wrong readings
+        while before > 0 and row[before] and after - before <= MOST:
             before -= 1
-        while after < len(r) - 1 and suspect[after] and after - before <= MOST:
+        while after < len(r) - 1 and row[after] and after - before <= MOST:
             after += 1
         if before < 0 or after >= len(r):
             continue

@@ -23,7 +23,7 @@ from discovery.fitting.noise import resolution
 Array = NDArray[np.float64]
 
 JITTER = 12**-0.5  # of a logging interval: a switch that comes anywhere in it
-_TRIED = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # levels with which the reading noise is sought where none is stated
+_TRIED = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # levels with which a reading noise is sought where none is stated
 _BLOCKS = 72  # of a recording, in each of which process noise is one number
 _CLIPPED = 4.0  # standard deviations beyond which an innovation counts no more: single wrong readings
 
@@ -51,7 +51,9 @@ class Prior:
     weights: tuple[float, ...]
     slow: tuple[float, ...]  # shares of the reading noise
     slow_weights: tuple[float, ...]
-    forms: tuple[tuple[float, float], ...]  # shares by which laws are off, and flows beyond the edge of a body
+    forms: tuple[
+        tuple[float, float], ...
+    ]  # shares by which laws are off, and flows beyond the edge of a body
     form_weights: tuple[float, ...]
 
 

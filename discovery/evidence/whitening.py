@@ -88,6 +88,7 @@ class Grams:
         """
         size = self.prior.shape[0]
         flat = self.blocks.reshape(len(self.logdet), -1)
+        widened = np.count_nonzero(np.diag(self.prior)[1:]) * np.log(widths)
         blocks = (weights @ flat).reshape(-1, size, size) * np.outer(self.scale, self.scale)
         total = blocks + self.prior / widths[:, None, None] ** 2
         hessian, slope = total[:, 1:, 1:], total[:, 1:, 0]
@@ -101,7 +102,8 @@ class Grams:
         variance = np.einsum("dji,dji->di", inverse, inverse) / scale**2
         volume = np.log(np.einsum("dii->di", chol)).sum(axis=1) + np.log(scale).sum(axis=1)
         quadratic = total[:, 0, 0] - np.sum(along**2, axis=1)
-        return -weights @ self.logdet - 0.5 * quadratic - volume + self.constant, step, variance
+        level = -weights @ self.logdet - 0.5 * quadratic - volume + self.constant - widened
+        return level, step, variance
 
 
 @dataclass(frozen=True)
@@ -216,7 +218,7 @@ class Whitened:
         """The fit under one noise setting, as normal equations by block."""
         unit = replace(noise, form=1.0, edge=1.0)
         known = self.last.setdefault("grams", [])
-        same = next((pieces for other, pieces in known if other == unit), None)
+        same: tuple[Array, Array] | None = next((pieces for other, pieces in known if other == unit), None)
         if same is None:
             same = self._blocks(unit)
             known.append((unit, same))

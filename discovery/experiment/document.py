@@ -76,6 +76,9 @@ class ResultsDocument(Strict):
     findings: list[str] = Field(description="what is wrong with the recordings")
     guessed: dict[str, str] | None = Field(None, description="of channels, what nobody has confirmed")
     models: dict[str, ModelResults]
+    recommended: dict[str, dict[str, Any]] | None = Field(
+        None, description="by output: the model that is best on held-out recordings, and how far others are"
+    )
     seconds: float
     versions: dict[str, str]
     inputs: dict[str, str] = Field(description="SHA-256 of each file that was read")

@@ -84,7 +84,7 @@ class PysindyEntry(Strict):
 
 
 class RegressionEntry(Strict):
-    """Ridge regression on the inputs as they are."""
+    """Ridge regression on the inputs, without memory."""
 
     kind: Literal["regression"]
     inputs: Inputs = None

@@ -23,6 +23,7 @@ from discovery.experiment.form import (
     separate,
 )
 from discovery.experiment.joining import check_joins, join
+from discovery.experiment.quality import quality, refuse
 from discovery.experiment.results import write_run
 from discovery.fitting import Fit, fit_model
 from discovery.fitting.fit import written_with
@@ -33,9 +34,11 @@ from discovery.fitting.starts import warm_start
 from discovery.models import Model
 from discovery.models.dimensions import with_coefficient_units
 from discovery.models.reduced import reduced
+from discovery.models.regression import regression
 from discovery.models.superposition import superposition
-from discovery.progress import Progress, silent
+from discovery.progress import Progress, Steps, silent
 from discovery.recordings import Campaign
+from discovery.recordings.finding import folded
 from discovery.report import write_report
 from discovery.runfolder import default_folder, staged
 from discovery.sparse.options import SparseOptions
@@ -45,7 +48,14 @@ if TYPE_CHECKING:
     from discovery.diagnosis import Diagnosis
 
 
-def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
+def run(
+    path: Path,
+    out: Path | None = None,
+    progress: Progress = silent,
+    *,
+    force: bool = False,
+    tell: Progress = silent,
+) -> Path:
     """Do what an experiment file says and write the results folder.
 
     Args:
@@ -54,36 +64,57 @@ def run(path: Path, out: Path | None = None, progress: Progress = silent) -> Pat
             at the very end, so an interrupted run leaves what was there before; exports, figures and
             whatever else stands there stay.
         progress: told what begins.
+        force: use recordings that are wrong all the same.
+        tell: told what is wrong with the recordings, a line each.
 
     Returns:
         The folder.
 
     Raises:
-        UserError: a mistake in a file, a model that cannot be fitted, or one that cannot be exported; then
-            the run is kept.
+        UserError: a mistake in a file, recordings that cannot be used, a model that cannot be fitted, or
+            one that
+            cannot be exported; then the run is kept.
     """
     began = clock.perf_counter()
     progress("reading the recordings")
     experiment = load_experiment(path)
+    progress("comparing the recordings with each other")
+    findings = quality(experiment)
+    if not force:
+        refuse(findings)
+    for line in folded(findings):
+        tell(line)
+    steps = Steps(progress, [*(_weight(entry) for entry in experiment.form.models.values()), *_DIAGNOSIS])
+    progress = steps
     folder = out or default_folder(experiment.name)
     if experiment.form.export:
         check_targets(experiment.form.export.to)
     with staged(folder) as temporary:
         fitted: dict[str, Fitted] = {}
         for name, entry in experiment.form.models.items():
+            steps.begin()
             fitted[name] = fit_entry(experiment, name, entry, progress)
+        steps.begin()
         found = diagnosis(experiment, progress, fitted)
         if found is not None and found.repaired is not None:
             name = _free_name("repaired", fitted)
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
         seconds = clock.perf_counter() - began
         progress("writing the report")
-        write_run(temporary, "run", experiment, fitted, _written(found), seconds)
+        write_run(temporary, "run", experiment, fitted, _written(found), seconds, findings)
         write_report(temporary)
     if experiment.form.export:
         progress(f"exporting {experiment.form.export.model}")
         export_of(folder, experiment.form.export)
     return folder
+
+
+_DIAGNOSIS = (4.0,)  # how long it takes beside a model that is only fitted
+
+
+def _weight(entry: ModelEntry) -> float:
+    """How long a model takes beside one that is only fitted."""
+    return 3.0 if isinstance(entry, SparseOptions) else 1.0
 
 
 def export_of(folder: Path, wanted: ExportForm) -> None:
@@ -147,37 +178,36 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
     if isinstance(entry, PysindyEntry | RegressionEntry):
         fitted = compared(experiment, name, entry, progress)
     else:
-        model, report = starting_model(experiment, name, entry, progress)
-        loss: Loss = getattr(entry, "loss", "linear")
-        fitted = fit_model_of(
-            experiment, name, entry.kind, model, report, experiment.outputs_of(entry), loss, progress
-        )
+        model, report, fit = fit_of(experiment, name, entry, progress)
+        seconds = clock.perf_counter() - began
+        fitted = judged(experiment, name, entry.kind, model, fit, report, seconds, progress)
     also = [recording for recording in experiment.fit if recording not in common]
     told = [f"is fitted to {', '.join(also)} besides"] if also else []
     return replace(fitted, notes=(*told, *fitted.notes), seconds=clock.perf_counter() - began)
 
 
-def fit_model_of(
+def fit_of(
     experiment: Experiment,
     name: str,
-    kind: str,
-    model: Model,
-    report: Mapping[str, Any] | None = None,
-    outputs: Sequence[str] | None = None,
-    loss: Loss = "linear",
+    entry: ModelEntry,
     progress: Progress = silent,
-) -> Fitted:
-    """A model with start values, wherever it comes from: fit, cross-validation, free runs."""
-    began = clock.perf_counter()
-    outputs = [y for y in outputs or experiment.outputs if y in model.outputs or y in model.states]
-    if not outputs:
+    max_rounds: int = 60,
+) -> tuple[Model, dict[str, Any], Fit]:
+    """A model as its fit starts, what a search reports, and the fit to the recordings of `fit`."""
+    campaign, recordings = experiment.fitting, experiment.fit
+    outputs = experiment.outputs_of(entry)
+    if isinstance(entry, RegressionEntry):  # its strength is found, not only its numbers
+        fit = fit_ridge(campaign, recordings, outputs, experiment.inputs(entry))
+        return replace(fit.problem.model, name=name), {}, fit
+    model, report = starting_model(experiment, name, entry, progress)
+    given = [y for y in outputs if y in model.outputs or y in model.states]
+    if not given:
         raise UserError(
-            f"{experiment.path}: model '{name}' gives none of the outputs {', '.join(experiment.outputs)}; "
+            f"{experiment.path}: model '{name}' gives none of the outputs {', '.join(outputs)}; "
             "write them under [outputs] of the model"
         )
-    fit = fit_model(model, experiment.fitting, experiment.fit, outputs, loss=loss)
-    seconds = clock.perf_counter() - began
-    return judged(experiment, name, kind, model, fit, report, seconds, progress)
+    loss: Loss = getattr(entry, "loss", "linear")
+    return model, report, fit_model(model, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
 
 
 def compared(
@@ -229,6 +259,8 @@ def starting_model(
     match entry:
         case FileEntry():
             return experiment.model_file(name), report
+        case RegressionEntry():
+            model = regression(inputs, outputs, campaign.channels)
         case ReducedEntry():
             model = warm_start(reduced(inputs, outputs, campaign.channels), campaign, recordings, outputs)
         case SuperpositionEntry(separate=None):

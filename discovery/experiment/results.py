@@ -8,7 +8,7 @@ import json
 import math
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -24,10 +24,11 @@ from discovery.evaluation.shares import term_shares
 from discovery.experiment.document import ResultsDocument
 from discovery.experiment.experiment import Experiment
 from discovery.experiment.inputfiles import hashes, input_files
+from discovery.experiment.quality import guessed, quality
 from discovery.files import write_atomic
 from discovery.models import Model, write_model
 from discovery.models.equations import equations
-from discovery.recordings.check import check_campaign
+from discovery.recordings.finding import Finding, folded
 from discovery.runfolder import DIAGNOSIS, RESULTS
 
 if TYPE_CHECKING:
@@ -45,9 +46,16 @@ def write_run(
     fitted: Mapping[str, Fitted],
     diagnosis: Mapping[str, Any] | None,
     seconds: float,
+    findings: Sequence[Finding] | None = None,
 ) -> None:
-    """Everything that a run leaves behind but the report. `verb`: of the command that made it."""
-    document = results_document(verb, experiment, fitted, seconds)
+    """Everything that a run leaves behind but the report.
+
+    Args:
+        verb: of the command that made it.
+        findings: of the recordings, where they were looked at before.
+    """
+    found = quality(experiment) if findings is None else findings
+    document = results_document(verb, experiment, fitted, seconds, found)
     write_json(folder / RESULTS, document.model_dump(exclude_unset=True))
     if diagnosis is not None:
         write_json(folder / DIAGNOSIS, diagnosis)
@@ -59,9 +67,13 @@ def write_run(
 
 
 def results_document(
-    verb: str, experiment: Experiment, fitted: Mapping[str, Fitted], seconds: float
+    verb: str,
+    experiment: Experiment,
+    fitted: Mapping[str, Fitted],
+    seconds: float,
+    findings: Sequence[Finding],
 ) -> ResultsDocument:
-    """results.json of a run."""
+    """The content of results.json."""
     channels = experiment.campaign.channels
     content = {
         "experiment": experiment.name,
@@ -77,7 +89,8 @@ def results_document(
         "noise": {name: channels[name].noise for name in experiment.outputs},
         "parts": parts_of_the_paper(experiment.campaign, experiment.fit, experiment.held_out),
         "notes": {name: r.note for name, r in experiment.campaign.recordings.items() if r.note},
-        "findings": findings(experiment),
+        "findings": folded(findings),
+        "guessed": guessed(experiment),
         "models": {name: model_entry(one) for name, one in fitted.items()},
         "recommended": recommended(experiment, fitted),
         "seconds": seconds,
@@ -108,12 +121,6 @@ def recommended(experiment: Experiment, fitted: Mapping[str, Fitted]) -> dict[st
                 "against": {one.model: asdict(one) for one in best.others},
             }
     return found
-
-
-def findings(experiment: Experiment) -> list[str]:
-    """What is wrong with the recordings that the experiment uses, a sentence each."""
-    used = {path.resolve() for path in input_files(experiment).values()}
-    return [str(one) for one in check_campaign(experiment.campaign.path) if one.file.resolve() in used]
 
 
 def model_entry(one: Fitted) -> dict[str, Any]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 
 import numpy as np
+from numpy.typing import NDArray
 
-from discovery.firsthour.stamps import CLOCK_NAMES, TIME_UNITS, Array
-from discovery.firsthour.words import plain
+from discovery.firsthour.measures import CLOCKS, TIME_UNITS, time_unit
+from discovery.firsthour.vocabulary import fold
+
+Array = NDArray[np.float64]
 
 _FEWEST = 5  # readings, to speak of a proportion
 _EXACT = 0.01  # of a step
@@ -29,7 +32,7 @@ _ID = re.compile(
 
 def is_clock(name: str, values: Array, seconds: Array) -> bool:
     """Whether a column tells the time once more, or counts the rows."""
-    words = plain(name)
+    words = fold(name)
     if not np.isfinite(values).all() or not (np.diff(values) > 0).all():
         return False
     if words in (
@@ -47,7 +50,7 @@ def is_clock(name: str, values: Array, seconds: Array) -> bool:
         "count",
     ):
         return bool(np.ptp(np.diff(values)) < 1e-9)
-    if not re.match("|".join(CLOCK_NAMES[:2]), words):
+    if not _says_time(words):
         return False
     return bool(np.corrcoef(values, seconds)[0, 1] > 0.999)
 
@@ -59,8 +62,7 @@ def tells_time(name: str, unit: str, values: Array, seconds: Array, role: str) -
     whose slope is that of no clock, is none.
     """
     known = np.isfinite(values)
-    unit = unit.strip().lower()
-    if (unit and unit not in TIME_UNITS) or np.sum(known) < _FEWEST:
+    if (unit and time_unit(unit) is None) or np.sum(known) < _FEWEST:
         return False
     values, seconds = values[known] - values[known][0], seconds[known] - seconds[known][0]
     steps = np.diff(values)
@@ -68,7 +70,21 @@ def tells_time(name: str, unit: str, values: Array, seconds: Array, role: str) -
     if not (steps > 0).all() or np.abs(values - slope * seconds).max() > _EXACT * np.median(steps):
         return False
     counts = any(abs(slope * one - 1) < 1e-3 for one in TIME_UNITS.values()) or (steps == 1).all()
-    return bool(unit or counts or role == "other input" or re.match("|".join(CLOCK_NAMES), plain(name)))
+    return bool(unit or counts or role == "other input" or CLOCKS.search(fold(name)))
+
+
+def counts_up(name: str) -> bool:
+    """Whether a name is that of a counter: an integral of a current or power.
+
+    >>> counts_up("Amp-Hours"), counts_up("Amps")
+    (True, False)
+    """
+    return bool(_COUNTER.search(fold(name)))
+
+
+def _says_time(words: str) -> bool:
+    """Whether a name is that of a clock; a t alone may be a temperature."""
+    return bool(CLOCKS.search(re.sub(r"\bt\b", "", words)))
 
 
 def bookkeeping(name: str, unit: str, values: Array, seconds: Array, role: str) -> str:
@@ -77,12 +93,12 @@ def bookkeeping(name: str, unit: str, values: Array, seconds: Array, role: str) 
     A column whose header names another unit than that of a time or a counter is none.
     """
     known = np.isfinite(values)
-    unit, words = unit.strip().lower(), plain(name)
+    unit, words = unit.strip().lower(), fold(name)
     values, seconds = values[known], seconds[known]
     if (
         len(values) < _FEWEST
         or np.ptp(values) == 0.0
-        or (unit and unit not in {*TIME_UNITS, *_COUNTER_UNITS})
+        or (unit and unit not in _COUNTER_UNITS and time_unit(unit) is None)
     ):
         return ""
     steps = np.diff(values)
@@ -94,7 +110,7 @@ def bookkeeping(name: str, unit: str, values: Array, seconds: Array, role: str) 
         return ""
     if not unit and _ID.fullmatch(words) and (values == np.round(values)).all():
         return "numbers rows or devices"
-    clock = unit in TIME_UNITS or any(re.match(form, words) for form in CLOCK_NAMES[:2])
+    clock = time_unit(unit) is not None or _says_time(words)
     steady = float(np.corrcoef(values, seconds)[0, 1])
     if ((steps > 0).all() and steady > _STEADY) or (clock and (steps >= 0).all() and steady > _NAMED):
         return "rises steadily with the time, as a second clock"

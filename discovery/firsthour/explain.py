@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 MODELS = {
     "file": 'a model of your own: { file = "model.toml" }, a sparse sum of terms with named parameters',
+    "regression": "ridge regression on the inputs, without memory: the least that a model has to beat",
     "reduced": "equation (9): each error first order, driven by all inputs together, fitted from one cycle",
     "superposition": "equation (8): each error a sum of parts, each first order and driven by one input",
     "sindy": "discovered: the fewest terms of a large library that predict parts of the data left out",
     "pysindy": "PySINDy as its users take it, threshold by cross-validation: to compare with",
-    "regression": "ridge regression on the inputs as they are, without memory: to compare with",
 }
 
 

@@ -1,105 +1,157 @@
-"""A first hand-built model where nobody has made one yet: first order, each output for itself."""
+"""First models by hand where nobody has made one yet: one or two thermal masses for each output."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
 
-from discovery.firsthour.guess import Guess, drives
-from discovery.firsthour.words import CURRENTS, VOLTAGES
+from discovery.firsthour.guess import Guess, drives, squared
+from discovery.firsthour.measures import DEGREES
 from discovery.recordings.units import UnitError, conversion
 
+_FAST, _SLOW = "5e-3", "2e-4"  # 1/s, where a fit begins: 3 minutes and 1.4 hours
 
-def first_model(guesses: Mapping[str, Guess], outputs: Sequence[str], *, has_room: bool) -> str:
+
+def first_model(
+    guesses: Mapping[str, Guess],
+    outputs: Sequence[str],
+    room: str | None,
+    inputs: Sequence[str] = (),
+    *,
+    masses: int = 1,
+) -> str:
     """Text of a model file.
 
     A temperature loses heat to the room and is warmed by the loads; loads and outputs that are numbered alike
-    belong together. An error (no temperature) decays and is driven by each input. A diagnosis then says
-    what is missing.
+    belong together. An error (no temperature) decays and is driven by each input. A second mass stands behind
+    each temperature, or beside each error. A diagnosis then says what is missing.
+
+    Args:
+        room: channel of the air around, if there is one.
+        inputs: of the errors.
     """
     roles = {name: one.role for name, one in guesses.items()}
-    room = (
-        "T_env"
-        if has_room
-        else next((name for name, role in roles.items() if role == "ambient temperature"), None)
-    )
+    blocks = []
+    for output in outputs:
+        if roles[output] == "temperature":
+            blocks.append(_temperature(output, guesses, room, outputs, masses))
+        else:
+            blocks.append(_error(output, guesses, inputs, masses))
+    count = "first order" if masses == 1 else "two masses"
     lines = [
-        "# Written by `discovery new`: the simplest model that could work, to be bettered.",
-        "# Each output for itself, first order.",
-        'name = "first order"',
+        "# The simplest model that could work, to be bettered. Each output for itself.",
+        f'name = "{count}"',
         "",
         "[parameters]",
+        *(line for block in blocks for line in block.parameters),
+        "",
+        "[states]   # what is measured starts at its first reading",
+        *(line for block in blocks for line in block.states),
+        "",
+        *(line for block in blocks for line in block.terms),
     ]
-    terms: list[str] = []
-    parameters: list[str] = []
-    for output in outputs:
-        add = _temperature if roles[output] == "temperature" else _error
-        found = add(output, guesses, room, outputs)
-        parameters += found[0]
-        terms += found[1]
-    states = [f'{output} = {{ unit = "{_canonical(guesses[output])}" }}' for output in outputs]
-    return "\n".join(
-        [*lines, *parameters, "", "[states]   # each starts at its first reading", *states, "", *terms]
-    )
+    given = [line for block in blocks for line in block.outputs]
+    return "\n".join([*lines, *(["[outputs]", *given, ""] if given else [])])
+
+
+class _Block:
+    """Lines of a model file that belong to one output."""
+
+    def __init__(self) -> None:
+        self.parameters: list[str] = []
+        self.states: list[str] = []
+        self.terms: list[str] = []
+        self.outputs: list[str] = []
+
+    def parameter(self, name: str, start: str, unit: str, *, least: str = "") -> str:
+        limit = f", min = {least}" if least else ""
+        self.parameters.append(f'{name} = {{ start = {start}, unit = "{unit}"{limit} }}')
+        return name
+
+    def term(self, name: str, into: str, expression: str) -> None:
+        self.terms.append(f'[[terms]]\nname = "{name}"\ninto = "{into}"\nexpression = "{expression}"\n')
 
 
 def _temperature(
-    output: str, guesses: Mapping[str, Guess], room: str | None, outputs: Sequence[str]
-) -> tuple[list[str], list[str]]:
-    parameters, terms = [], []
+    output: str, guesses: Mapping[str, Guess], room: str | None, outputs: Sequence[str], masses: int
+) -> _Block:
+    block = _Block()
+    block.states.append(f'{output} = {{ unit = "{canonical(guesses[output])}" }}')
     if room:
-        parameters.append(f'loss_{output} = {{ start = 1e-3, unit = "1/s", min = 0.0 }}')
-        terms.append(_term(f"{output} loses heat to the room", output, f"loss_{output}*({room} - {output})"))
+        loss = block.parameter(f"loss_{output}", "1e-3", "1/s", least="0.0")
+        block.term(f"{output} loses heat to the room", output, f"{loss}*({room} - {output})")
     for load in _belonging(output, drives(guesses), outputs):
-        unit = _canonical(guesses[load])
+        unit = canonical(guesses[load])
         # copper warms with the square of its current, a resistor with that of its voltage
-        squared = unit in (*CURRENTS, *VOLTAGES)
-        heat, per = (f"{load}**2", f"{unit}**2") if squared else (load, unit)
+        heat, per = (f"{load}**2", f"{unit}**2") if squared(guesses[load]) else (load, unit)
         # a load that is counted below zero, as a discharge is, may warm all the same
-        least = "" if guesses[load].below_zero and heat == load else ", min = 0.0"
-        parameters.append(f'gain_{output}_{load} = {{ start = {_start(per)}, unit = "K/{per}/s"{least} }}')
-        terms.append(_term(f"{load} warms {output}", output, f"gain_{output}_{load}*{heat}"))
+        least = "" if guesses[load].below_zero and heat == load else "0.0"
+        gain = block.parameter(f"gain_{output}_{load}", _start(per), f"K/{per}/s", least=least)
+        block.term(f"{load} warms {output}", output, f"{gain}*{heat}")
+    for fan in [name for name, one in guesses.items() if one.quantity == "fan"] if room else []:
+        more = block.parameter(f"{fan}_{output}", "1e-4", "1/s", least="0.0")
+        block.term(f"{fan} cools {output}", output, f"{more}*{fan}*({room} - {output})")
     fluid, pump = _first(guesses, "fluid temperature"), _first(guesses, "fluid flow")
     if fluid:
-        flow = _canonical(guesses[pump]) if pump else "1"
+        flow = canonical(guesses[pump]) if pump else "1"
         per = "" if flow == "1" else f"/({flow})"
-        parameters.append(f'fluid_{output} = {{ start = 1e-4, unit = "1/s{per}", min = 0.0 }}')
-        terms.append(
-            _term(
-                f"fluid on {output}",
-                output,
-                f"fluid_{output}*{f'{pump}*' if pump else ''}({fluid} - {output})",
-            )
+        name = block.parameter(f"fluid_{output}", "1e-4", f"1/s{per}", least="0.0")
+        block.term(f"fluid on {output}", output, f"{name}*{f'{pump}*' if pump else ''}({fluid} - {output})")
+    if masses == 2:
+        core = f"{output}_core"
+        block.states.append(
+            f'{core} = {{ unit = "degC", start = "{room}", start_sd = 5.0 }}'
+            if room
+            else f'{core} = {{ unit = "degC", start = 22.0, start_sd = 5.0 }}'
         )
-    return parameters, terms
+        into = block.parameter(f"into_{core}", "2e-3", "1/s", least="0.0")
+        back = block.parameter(f"back_{core}", "4e-4", "1/s", least="0.0")
+        block.term(f"{core} on {output}", output, f"{into}*({core} - {output})")
+        block.term(f"{output} on {core}", core, f"{back}*({output} - {core})")
+    return block
 
 
-def _error(
-    output: str, guesses: Mapping[str, Guess], room: str | None, outputs: Sequence[str]
-) -> tuple[list[str], list[str]]:
-    del outputs
-    unit = _canonical(guesses[output])
-    parameters = [
-        f'decay_{output} = {{ start = 1e-4, unit = "1/s", min = 1e-6 }}',
-        f'zero_{output} = {{ start = 0.0, unit = "{unit}/s" }}',
-    ]
-    terms = [
-        _term(f"{output} decays", output, f"-decay_{output}*{output}"),
-        _term(f"zero balance of {output}", output, f"zero_{output}"),
-    ]
+def _error(output: str, guesses: Mapping[str, Guess], inputs: Sequence[str], masses: int) -> _Block:
+    block, unit = _Block(), canonical(guesses[output])
+    if masses == 1:
+        parts = {output: "1e-4"}
+        block.states.append(f'{output} = {{ unit = "{unit}" }}')
+    else:
+        parts = {f"{output}_fast": _FAST, f"{output}_slow": _SLOW}
+        block.states += [f'{part} = {{ unit = "{unit}", start = 0.0, start_sd = 20.0 }}' for part in parts]
+        block.outputs.append(f'{output} = "{" + ".join(parts)}"')
+    for k, (state, start) in enumerate(parts.items()):
+        decay = block.parameter(f"decay_{state}", start, "1/s", least="1e-6")
+        block.term(f"{state} decays", state, f"-{decay}*{state}")
+        if k == len(parts) - 1:
+            zero = block.parameter(f"zero_{state}", "0.0", f"{unit}/s")
+            block.term(f"zero balance of {state}", state, zero)
+        for name in inputs:
+            per = canonical(guesses[name])
+            per = {"degC": "K"}.get(per, per)
+            heat = name
+            if squared(guesses[name]):
+                heat, per = f"{name}**2", f"{per}**2"
+            by = "" if per == "1" else f"/({per})" if set("/* ") & set(per) else f"/{per}"
+            gain = block.parameter(f"gain_{state}_{name}", "0.0", f"{unit}{by}/s")
+            block.term(f"{name} on {state}", state, f"{gain}*{heat}")
+    return block
+
+
+def usual_inputs(guesses: Mapping[str, Guess], room: str | None) -> list[str]:
+    """Channels that may drive an error: the air, fluids and temperatures, loads, else speeds, and
+    switches.
+    """
     temperatures = [
         name
         for name, one in guesses.items()
         if one.role in ("fluid temperature", "coolant temperature")
-        or (one.role == "other input" and one.unit in ("degC", "K"))
+        or (one.role == "other input" and one.unit in DEGREES)
     ]
-    loads = [name for name, one in guesses.items() if one.role == "heat load"]
-    speeds = [] if loads else [name for name, one in guesses.items() if one.role == "rotation speed"]
-    for name in [*([room] if room else []), *temperatures, *loads, *speeds]:
-        per = "K" if name == room or name in temperatures else _canonical(guesses[name])
-        parameters.append(f'gain_{output}_{name} = {{ start = 0.0, unit = "{unit}/{per}/s" }}')
-        terms.append(_term(f"{name} on {output}", output, f"gain_{output}_{name}*{name}"))
-    return parameters, terms
+    others = [
+        n for n, one in guesses.items() if one.quantity in ("fan", "flow") or one.role == "cooling power"
+    ]
+    return list(dict.fromkeys([*([room] if room else []), *temperatures, *drives(guesses), *others]))
 
 
 def _belonging(output: str, loads: Sequence[str], outputs: Sequence[str]) -> list[str]:
@@ -114,7 +166,7 @@ def _belonging(output: str, loads: Sequence[str], outputs: Sequence[str]) -> lis
     return [load for load in loads if not paired or number[load] == number[output]]
 
 
-def _canonical(one: Guess) -> str:
+def canonical(one: Guess) -> str:
     """The unit that values have once they are loaded."""
     try:
         return conversion(one.unit, one.role).unit
@@ -128,7 +180,3 @@ def _start(unit: str) -> str:
 
 def _first(guesses: Mapping[str, Guess], role: str) -> str | None:
     return next((name for name, one in guesses.items() if one.role == role), None)
-
-
-def _term(name: str, into: str, expression: str) -> str:
-    return f'[[terms]]\nname = "{name}"\ninto = "{into}"\nexpression = "{expression}"\n'

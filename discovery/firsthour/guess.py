@@ -1,4 +1,4 @@
-"""What a column probably is: role and unit from its name and its values, with the reason."""
+"""What the columns of a campaign probably are: role and unit of each, how sure that is, and why."""
 
 from __future__ import annotations
 
@@ -9,65 +9,92 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.firsthour.evidence import OTHER, evidence
+from discovery.firsthour.measures import DEGREES, unit_of
+from discovery.firsthour.odds import likely, probabilities
+from discovery.firsthour.shapes import Shape, shape
 from discovery.firsthour.table import Column
-from discovery.firsthour.words import (
-    A_ROOM,
-    CURRENTS,
-    DEGREES,
-    TEMPERATURES,
-    VOLTAGES,
-    Named,
-    electric,
-    role_of,
-    surroundings,
-    unit_of,
-)
+from discovery.firsthour.unitodds import error_odds, flow_odds, load_odds, speed_odds, temperature_odds, usual
+from discovery.firsthour.vocabulary import fold, words_of
 from discovery.recordings.correction import corrected_by_name
 from discovery.recordings.units import UnitError, conversion
 from discovery.recordings.valuecheck import below_zero
 
 Array = NDArray[np.float64]
+Hints = Mapping[str, Sequence[tuple[str, Mapping[str, float]]]]
+
+SURE = 0.9  # probability below which a guess is asked about
+_SENT = 0.85  # that what a controller sends is what heats
+_NEXT = 0.02  # of an answer worth offering
+TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
+CURRENTS, VOLTAGES = ("A", "mA", "kA"), ("V", "mV", "kV")
 
 
 @dataclass(frozen=True)
 class Guess:
-    """Role and unit of a column, and why; `sure` is False where a person should look."""
+    """Role and unit of a column, why, and the probability of each of both.
+
+    `rivals`: other roles with their probabilities. `corrects`: of an applied correction, its error.
+    `below_zero`: of a heat load, the share of its readings. `said`: a person said so.
+    """
 
     role: str
     unit: str
     why: str
-    sure: bool = True
-    corrects: str | None = None  # of an applied correction
-    below_zero: float = 0.0  # of a heat load: the share of its readings
+    chance: float = 1.0
+    unit_chance: float = 1.0
+    rivals: tuple[tuple[str, float], ...] = ()
+    unit_rivals: tuple[tuple[str, float], ...] = ()
+    corrects: str | None = None
+    below_zero: float = 0.0
+    quantity: str = ""
+    said: bool = False
+
+    @property
+    def sure(self) -> bool:
+        """Whether nobody needs to look."""
+        return self.said or min(self.chance, self.unit_chance) >= SURE
+
+    def doubtful(self, why: str, **changes: object) -> Guess:
+        """This guess with a further reason, for a person to look at."""
+        return replace(self, why=f"{self.why}; {why}", chance=min(self.chance, 0.7), **changes)  # type: ignore[arg-type]
 
 
-_USUAL = {
-    "rotation speed": "rpm",
-    "error": "um",
-    "applied correction": "um",
-    "nozzle height": "mm",
-    "nozzle side": "1",
-}
-_ROOM_F = (55.0, 100.0)  # a machine starts near room temperature: 13 to 38 degC
-
-
-def guess_all(columns: Sequence[Column]) -> dict[str, Guess]:
+def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str, Guess]:
     """Role and unit of each column by name, and which error a correction belongs to."""
-    fahrenheit = _fahrenheit(columns)
-    guesses = {column.name: guess(column, fahrenheit=fahrenheit) for column in columns}
-    stated, on = {c.name: c.unit for c in columns}, {c.name: np.nan_to_num(c.values).any() for c in columns}
-    told = [one.unit for name, one in guesses.items() if _is_load(one) and on[name]]
-    for name, one in guesses.items():  # a load that is never on has the unit of its neighbour
-        if told and _is_load(one) and not stated[name] and not on[name]:
-            guesses[name] = replace(one, unit=told[0], why=f"{one.why}, in {told[0]} as the others")
-    guesses = _signed(columns, _the_fluid(_one_room(_one_unit(columns, guesses))))
-    guesses = _corrections(columns, guesses)
+    hints = hints or {}
+    guesses = {column.name: guess(column, hints.get(column.name, ())) for column in columns}
+    guesses = _one_scale(columns, guesses)
+    guesses = _one_unit(columns, guesses)
+    guesses = _the_fluid(_one_room(columns, guesses))
+    guesses = _corrections(columns, _signed(columns, guesses))
     if any(one.role == "error" for one in guesses.values()) and not _stated(guesses):
         for name, one in guesses.items():
             if one.role == "temperature" and one.unit in DEGREES:
                 why = f"{one.why}; an input of the errors, since nothing else says what heats the machine"
-                guesses[name] = replace(one, role="other input", why=why, sure=False)
+                guesses[name] = replace(one, role=OTHER, why=why)
     return guesses
+
+
+def guess(column: Column, hints: Sequence[tuple[str, Mapping[str, float]]] = ()) -> Guess:
+    """Role and unit of a column by itself."""
+    spelled, named = unit_of(column.unit)
+    unit = named or (spelled if spelled and _known(spelled, OTHER) else None)
+    found = evidence(column.header, column.about, unit, column.values, hints)
+    roles = probabilities(found.roles())
+    role, chance = next(iter(roles.items()))
+    rivals = tuple((other, p) for other, p in roles.items() if other != role and p > _NEXT)
+    why = found.why(role)
+    if found.quantity() == "signal":  # what a controller sends may heat, or not
+        chance = min(chance, _SENT)
+    one = Guess(role, "1", why, chance, rivals=rivals, quantity=found.quantity())
+    if unit is not None:
+        return _with_unit(one, unit, named is not None, column.unit)
+    if spelled:
+        return replace(
+            one, role=OTHER, chance=0.5, why=f"{why}; the header says {column.unit}, no known unit"
+        )
+    return _by_values(one, column)
 
 
 def drives(guesses: Mapping[str, Guess]) -> list[str]:
@@ -75,43 +102,52 @@ def drives(guesses: Mapping[str, Guess]) -> list[str]:
     return _stated(guesses) or [name for name, one in guesses.items() if one.unit in VOLTAGES]
 
 
+def squared(one: Guess) -> bool:
+    """Whether heat goes with the square of a channel: copper warms with that of its current."""
+    return one.unit in (*CURRENTS, *VOLTAGES)
+
+
 def _stated(guesses: Mapping[str, Guess]) -> list[str]:
     loads = [name for name, one in guesses.items() if one.role == "heat load"]
-    likely = [n for n, one in guesses.items() if one.role == "rotation speed" or one.unit in CURRENTS]
-    return loads or likely
+    likely_ones = [n for n, one in guesses.items() if one.role == "rotation speed" or one.unit in CURRENTS]
+    return loads or likely_ones
 
 
-def guess(column: Column, *, fahrenheit: bool = False) -> Guess:
-    """Role and unit of a column. `fahrenheit`: other columns speak for it."""
-    spelled, named = unit_of(column.unit)
-    name = role_of(column.name, named, column.values)
-    role, why = name.role, name.why
-    if named:
-        if role in TEMPERATURES and named not in DEGREES:
-            role, why = "other input", f"the unit {column.unit} is none of a temperature"
-        return Guess(
-            role, named, f"{why}; the header says {column.unit}", name.sure and role != "other input"
-        )
-    if not spelled and role in ("heat load", "other input") and (unit := electric(column.name)):
-        word = {"A": "current", "V": "voltage"}[unit]
-        return Guess(
-            "other input", unit, f"a {word} by its name, taken in {unit}; its square warms", sure=False
-        )
-    if not spelled:
-        return _by_values(name, column.values, fahrenheit=fahrenheit)
-    # a unit that the role cannot have is worth more than the word that suggested the role
-    for likely in dict.fromkeys((role, "other input")):
-        if _known(spelled, likely):
-            return Guess(
-                likely, spelled, f"{why}; the header says {spelled}, which was left as it is", sure=False
-            )
-    return Guess(
-        "other input", "1", f"{why}; the header says {column.unit}, which is no known unit", sure=False
-    )
+def _with_unit(one: Guess, unit: str, listed: bool, written: str) -> Guess:
+    """A role that can have the unit of the header: the likeliest that does."""
+    for role, chance in ((one.role, one.chance), *one.rivals, (OTHER, one.chance)):
+        if _known(unit, role):
+            said = "" if listed and unit == written else f"; the header says {written}"
+            return replace(one, role=role, chance=chance, unit=unit, why=f"{one.why}{said}")
+    return replace(one, role=OTHER, unit="1", chance=0.5, why=f"{one.why}; the header says {written}")
 
 
-def _is_load(one: Guess) -> bool:
-    return one.role in ("heat load", "cooling power")
+def _by_values(one: Guess, column: Column) -> Guess:
+    """The unit of a column that names none."""
+    form = shape(column.values)
+    if form is None:
+        return replace(one, unit_chance=0.5, why=f"{one.why}; it holds no value")
+    if one.quantity in ("current", "voltage") and one.role == OTHER:
+        unit = {"current": "A", "voltage": "V"}[one.quantity]
+        return replace(one, unit=unit, unit_chance=0.8, why=f"{one.why}, taken in {unit}; its square warms")
+    odds = _unit_odds(one, form, column.header)
+    shares = probabilities(odds)
+    unit, chance = likely(odds)
+    rivals = tuple((other, p) for other, p in shares.items() if other != unit and p > _NEXT)
+    why = f"{one.why}; {form.low:.4g} to {form.high:.4g} taken in {unit}" if len(odds) > 1 else one.why
+    return replace(one, unit=unit, unit_chance=chance, unit_rivals=rivals, why=why)
+
+
+def _unit_odds(one: Guess, form: Shape, header: str) -> Mapping[str, float]:
+    if one.role in TEMPERATURES:
+        return temperature_odds([form], air=one.role == TEMPERATURES[0])
+    if one.role in ("error", "applied correction"):
+        return error_odds(form, turns=bool(re.search(r"\be ?[abc]\d", fold(header))))
+    if one.role in ("heat load", "cooling power"):
+        return load_odds(form, signal=one.quantity == "signal")
+    if one.role == "rotation speed":
+        return speed_odds(form)
+    return flow_odds(form) if one.role == "fluid flow" else usual(one.role)
 
 
 def _known(unit: str, role: str) -> bool:
@@ -122,27 +158,93 @@ def _known(unit: str, role: str) -> bool:
     return True
 
 
-def _one_room(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+def _is_load(one: Guess) -> bool:
+    return one.role in ("heat load", "cooling power")
+
+
+def _one_scale(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Temperatures without a unit share one: that of those that name theirs, else the likeliest for all."""
+    found = dict(guesses)
+    heat = [c for c in columns if guesses[c.name].role in TEMPERATURES]
+    named = {guesses[c.name].unit for c in heat if c.unit}
+    bare = [c for c in heat if not c.unit]
+    if not bare:
+        return found
+    forms = {c.name: form for c in bare if (form := shape(c.values)) is not None}
+    rooms = [f for n, f in forms.items() if guesses[n].role == TEMPERATURES[0]]
+    odds = temperature_odds([f for n, f in forms.items() if guesses[n].role != TEMPERATURES[0]])
+    for unit, value in temperature_odds(rooms, air=True).items():
+        odds[unit] += value if rooms else 0.0
+    for unit in named:
+        odds[unit] = odds.get(unit, 0.0) + 3.0
+    shares = probabilities(odds)
+    unit, chance = likely(odds)
+    for name in forms:
+        form, one = forms[name], guesses[name]
+        alone = temperature_odds([form], air=one.role == TEMPERATURES[0])
+        if alone[unit] < max(alone.values()) - 8.0:  # one of several in kelvin
+            continue
+        why = f"{one.why.rpartition('; ')[0] or one.why}; {form.low:.4g} to {form.high:.4g} taken in {unit}"
+        rivals = tuple((u, p) for u, p in shares.items() if u != unit and p > _NEXT)
+        found[name] = replace(one, unit=unit, unit_chance=chance, unit_rivals=rivals, why=why)
+    return found
+
+
+def _one_unit(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Loads that differ in their number alone have one unit, guessed from all their values; so has one
+    that is never on that of its neighbour.
+    """
+    found = dict(guesses)
+    bare = [column for column in columns if _is_load(guesses[column.name]) and not column.unit]
+    for column in bare:
+        alike = [c.values for c in bare if re.sub(r"\d", "", c.name) == re.sub(r"\d", "", column.name)]
+        one, other = guesses[column.name], guess(replace(column, values=np.concatenate(alike)))
+        if other.unit != one.unit and _is_load(other):
+            why = f"{one.why}, but {other.unit} with those of its kind"
+            found[column.name] = replace(one, unit=other.unit, unit_chance=other.unit_chance, why=why)
+    on = {c.name: np.nan_to_num(c.values).any() for c in columns}
+    told = [found[name].unit for name, one in found.items() if _is_load(one) and on[name]]
+    for column in bare:
+        if told and not on[column.name]:
+            one = found[column.name]
+            found[column.name] = replace(one, unit=told[0], why=f"{one.why}, in {told[0]} as the others")
+    return found
+
+
+def _air(column: Column) -> tuple[float, int]:
+    """How clearly a column is the air around a machine, the clearest is the least."""
+    words = words_of(column.header)
+    says = max((word.says.get("air", 0.0) for word in words), default=0.0)
+    more = sum("air" not in word.says and word.gloss != "temp" for word in words)
+    named = sum(len(word.said) for word in words)
+    rest = max(0, len(re.sub(r"[\W\d_]", "", fold(column.header))) - named)
+    return -says, more + (rest > 0)
+
+
+def _one_room(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
     """Of several columns that may be the air around, the clearest is; the other rooms are what is measured.
 
     So are rooms beside which nothing else is measured.
     """
-    air = {name: surroundings(name) for name, one in guesses.items() if one.role == "ambient temperature"}
+    air = {c.name: _air(c) for c in columns if guesses[c.name].role == "ambient temperature"}
     found = dict(guesses)
     if not air:
         return found
+    clear = {name for name, (says, _) in air.items() if says <= -8.0}
     clearest = min(air, key=lambda name: air[name])
     measured = any(one.role in ("temperature", "error") for one in guesses.values())
-    all_alike = len(set(air.values())) == 1
     why = f"{clearest} is the air around"
-    if not measured and all_alike and air[clearest][0] >= A_ROOM:
+    if (not measured and not clear and len(set(air.values())) == 1 and len(air) > 1) or (
+        not measured and not clear and len(air) == 1
+    ):
         clearest, why = "", "nothing else is measured"
-    for name, (rank, more_words) in air.items():
-        one = guesses[name]
-        if name != clearest and rank > 0:
-            found[name] = replace(one, role="temperature", why=f"{one.why}; {why}", sure=False)
-        elif rank > 0:
-            found[name] = replace(one, sure=one.sure and rank >= A_ROOM and not more_words)
+    for name, (_, more) in air.items():
+        if name in clear:
+            continue
+        if name != clearest:
+            found[name] = guesses[name].doubtful(why, role="temperature")
+        elif more:
+            found[name] = guesses[name].doubtful("other words in its name may mean another place")
     return found
 
 
@@ -158,8 +260,8 @@ def _the_fluid(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
     )
     if flows and not fluids and len(coolants) == 1:
         [name] = coolants
-        why = f"{guesses[name].why}; taken for the fluid of {flows[0]}, as the file has no other"
-        found[name] = replace(guesses[name], role="fluid temperature", why=why, sure=False)
+        why = f"taken for the fluid of {flows[0]}, as the file has no other"
+        found[name] = guesses[name].doubtful(why, role="fluid temperature")
     return found
 
 
@@ -171,15 +273,13 @@ def _corrections(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dic
     for name in corrections:
         one, error = guesses[name], corrected_by_name(name, errors, only=len(corrections) == 1)
         if not errors:
-            why = f"{one.why}, but there is no error that it could correct"
-            found[name] = replace(one, role="other input", why=why, sure=False)
+            found[name] = one.doubtful("but there is no error that it could correct", role=OTHER)
         elif error is None:
-            why = f'{one.why}; say which error it corrects: corrects = "{errors[0]}"'
-            found[name] = replace(one, why=why, sure=False)
+            found[name] = one.doubtful(f'say which error it corrects: corrects = "{errors[0]}"')
         else:
-            why = f"{one.why}; it is added to {error} (what was added to the position needs sign = -1)"
+            why = f"it is added to {error} (what was added to the position needs sign = -1)"
             unit = one.unit if stated[name] else guesses[error].unit
-            found[name] = replace(one, unit=unit, why=why, sure=False, corrects=error)
+            found[name] = one.doubtful(why, unit=unit, corrects=error)
     return found
 
 
@@ -189,69 +289,5 @@ def _signed(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str
     for column in columns:
         one, known = guesses[column.name], column.values[np.isfinite(column.values)]
         if one.role == "heat load" and (rows := below_zero(known)).size:
-            share = rows.size / known.size
-            found[column.name] = replace(one, why=f"{one.why}; below zero", sure=False, below_zero=share)
+            found[column.name] = one.doubtful("below zero", below_zero=rows.size / known.size)
     return found
-
-
-def _one_unit(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
-    """Loads that differ in their number alone have one unit, guessed from all their values."""
-    found = dict(guesses)
-    bare = [column for column in columns if _is_load(guesses[column.name]) and not column.unit]
-    for column in bare:
-        alike = [c.values for c in bare if re.sub(r"\d", "", c.name) == re.sub(r"\d", "", column.name)]
-        one, unit = guesses[column.name], guess(replace(column, values=np.concatenate(alike))).unit
-        if unit != one.unit:
-            found[column.name] = replace(one, unit=unit, why=f"{one.why}, but {unit} with those of its kind")
-    return found
-
-
-def _fahrenheit(columns: Sequence[Column]) -> bool:
-    """Whether columns without a unit are in Fahrenheit: another says so, or several start like a room in it.
-
-    One that starts at 60 may as well be an oven in degrees Celsius.
-    """
-    units = {c.name: unit_of(c.unit)[1] for c in columns}
-    if any(unit in DEGREES for unit in units.values()):
-        return "degF" in units.values()
-    bare = [c.values for c in columns if not c.unit and role_of(c.name, None, c.values).role in TEMPERATURES]
-    known = [values[np.isfinite(values)] for values in bare if np.isfinite(values).any()]
-    return sum(map(_may_be_f, known)) > 1 and all(values.min() > _ROOM_F[0] - 5 for values in known)
-
-
-def _may_be_f(known: Array) -> bool:
-    """Whether readings start like a room in Fahrenheit and stay above one."""
-    return bool(known.min() > _ROOM_F[0] - 5 and _ROOM_F[0] <= known[0] <= _ROOM_F[1])
-
-
-def _by_values(name: Named, values: Array, *, fahrenheit: bool) -> Guess:
-    role, why = name.role, name.why
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return Guess(role, _USUAL.get(role, "1"), f"{why}; it holds no value", sure=False)
-    low, high, first = float(known.min()), float(known.max()), float(known[0])
-    span = f"from {low:.4g} to {high:.4g}"
-    if role in TEMPERATURES:
-        if low > 200:
-            return Guess(role, "K", f"{why}; values {span} can only be kelvin")
-        # no air around a machine is at 70 degrees Celsius
-        if _may_be_f(known) and (fahrenheit or role == "ambient temperature"):
-            return Guess(
-                role,
-                "degF",
-                f"{why}; values {span}, starting at {first:.3g}: a room in Fahrenheit",
-                sure=False,
-            )
-        return Guess(role, "degC", f"{why}; values {span} look like degrees Celsius", sure=False)
-    if role in ("heat load", "cooling power"):
-        if low >= -1e-9 and 10 < high <= 100:
-            return Guess(role, "percent", f"{why}; values {span} look like percent", sure=False)
-        if np.isin(known, (0.0, 1.0)).all() or not name.sure:
-            return Guess(role, "1", f"{why}; values {span} taken as steps or a switch", sure=False)
-        return Guess(role, "W", f"{why}; values {span} taken as watts", sure=False)
-    if role == "fluid flow":
-        on_off = bool(np.isin(known, (0.0, 1.0)).all())
-        return Guess(role, "1" if high <= 1 else "l/min", f"{why}; values {span}", sure=on_off)
-    if role in _USUAL:
-        return Guess(role, _USUAL[role], f"{why}; {_USUAL[role]} is usual", sure=False)
-    return Guess(role, "1", why, sure=False)

@@ -1,108 +1,141 @@
-"""Tables in long format: the readings of several sensors below each other, in one column."""
+"""Tables in long format: the readings of several sensors below each other, made a column of each."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from discovery.errors import UserError
-from discovery.firsthour.rows import Sheet, holds_word, is_number
-from discovery.firsthour.words import TEMPERATURES, plain, role_of
+from discovery.firsthour.cells import holds_word, is_empty, is_number, is_stamp, read_numbers
+from discovery.firsthour.sheets import Sheet
+from discovery.firsthour.vocabulary import fold
 
-_MOST = 50  # sensors
+Array = NDArray[np.float64]
+
+_MOST = 200  # sensors
 _TURNS = 3  # of each sensor at least, on average
-_SHARED = 0.7  # stamps a row at most, where sensors share them
-_NAMES = r"(.* )?(id|nr|no|number|address|addr)|node|device|channel|station|sensor"
-_VALUES = r"(.* )?(value|wert|messwert|istwert|reading|measurement|state)"
+_NAMES = r"(.* )?(id|nr|no|number|address|addr)|node|device|channel|station|sensor|kanal|messstelle|ch"
+_UNITS = r"(.* )?(unit|units|einheit|einheiten|単位)"
 
 
-def long_notes(path: Path, sheet: Sheet, clock: Sequence[int]) -> list[str]:
-    """What a person should know of a table whose rows are those of several sensors in turn.
+@dataclass(frozen=True)
+class Long:
+    """`names`: the column that says whose reading a row is; `series` (N,): its words."""
+
+    names: int
+    series: list[str]
+
+
+def find_long(sheet: Sheet) -> Long | None:
+    """Whether the rows of a table are those of several sensors in turn, or one sensor after the other."""
+    known = {k: sheet.cells(k) for k in range(len(sheet.header))}
+    found = [
+        (all(map(_is_name, set(cells))), len(set(cells)), -k)
+        for k, cells in known.items()
+        if _alternate(cells) or _stacked(cells, known, k)
+    ]
+    found = [one for one in found if one[0] or _numbered(sheet.header[-one[2]], known[-one[2]])]
+    if not found:
+        return None
+    names = -max(found)[2]
+    moving = [k for k, cells in known.items() if k != names and _moves(cells, known[names])]
+    return Long(names, known[names]) if moving else None
+
+
+@dataclass(frozen=True)
+class Wide:
+    """`rows` (T,): the row of the long table that gives each stamp; columns: header, unit, values (T,)."""
+
+    rows: NDArray[np.intp]
+    columns: list[tuple[str, str, Array]]
+    note: str
+
+
+def widen(
+    sheet: Sheet,
+    long: Long,
+    seconds: Array,
+    order: NDArray[np.intp],
+    names: Sequence[str],
+    units: Sequence[str],
+    clock: Sequence[int],
+    comma: bool | None,
+) -> Wide:
+    """A column of each sensor and quantity; an empty cell where a sensor has no reading at a stamp.
 
     Args:
-        path: of the file.
-        sheet: its rows.
-        clock: columns that tell the time.
-
-    Raises:
-        UserError: sensors share their stamps, so that no row stands for an instant.
+        seconds: (N,) in the order of time. order: (N,) rows of the table in that order.
+        clock: columns of the stamps.
     """
-    columns = {k: [row[k] for _, row in sheet.body] for k in range(len(sheet.header)) if k not in clock}
-    names = _names(sheet.header, columns)
-    value = None if names is None else _value(sheet.header, columns, names)
-    if names is None or value is None:
-        return []
-    count, of, values = len(set(columns[names])), sheet.header[names], sheet.header[value]
-    stamps = [tuple(row[k] for k in clock) for _, row in sheet.body]
-    shared = len(set(stamps)) <= _SHARED * len(stamps)
-    one_of_each = len(set(zip(stamps, columns[names], strict=True))) > 0.9 * len(stamps)
-    do = f"make a column of each with pandas and take wide.csv: {_pivot(path, sheet, clock, of, values)}"
-    if shared and one_of_each:
-        raise UserError(
-            f"{path}: the table is long: column '{of}' names {count} quantities in turn, and the readings of "
-            f"all stand in '{values}'; {do}"
-        )
-    return [
-        f"column '{of}' takes {count} values in turn: if so many sensors share the column '{values}', {do}"
+    series = np.array(long.series)[order]
+    starts = np.flatnonzero(np.concatenate(([True], np.diff(seconds) > 0)))
+    stamp = np.cumsum(np.concatenate(([0], (np.diff(seconds) > 0).astype(np.intp))))
+    who = list(dict.fromkeys(series.tolist()))
+    unit_column = next((k for k, name in enumerate(names) if re.fullmatch(_UNITS, fold(name))), None)
+    said = dict(zip(long.series, sheet.cells(unit_column), strict=True)) if unit_column is not None else {}
+    columns = []
+    values_of = [
+        k for k in range(len(names)) if k not in (long.names, *clock) and _moves(sheet.cells(k), long.series)
     ]
+    for k in values_of:
+        values = read_numbers(sheet.cells(k), comma).values[order]
+        for one in who:
+            mine = (series == one) & np.isfinite(values)
+            column = np.full(len(starts), np.nan)
+            column[stamp[mine][::-1]] = values[mine][::-1]
+            header = one if len(values_of) == 1 and not one.isdecimal() else f"{names[k]} {one}"
+            if np.isfinite(column).any():
+                columns.append((header, units[k] or said.get(one, ""), column))
+    note = (
+        f"the table is long: column '{sheet.header[long.names]}' names {len(who)} sensors; "
+        f"a column was made of each reading of {', '.join(names[k] for k in values_of)}"
+    )
+    return Wide(order[starts], columns, note)
 
 
-def _names(header: Sequence[str], columns: dict[int, list[str]]) -> int | None:
-    """The column that says whose reading a row is: words before numbers, the most different ones first."""
-    found = [(_is_words(cells), len(set(cells)), -k) for k, cells in columns.items() if _in_turn(cells)]
-    known = [one for one in found if one[0] or _numbered(header[-one[2]], columns[-one[2]])]
-    return -max(known)[2] if known else None
+def _is_name(cell: str) -> bool:
+    return holds_word(cell) and not is_stamp(cell)
 
 
-def _in_turn(cells: Sequence[str]) -> bool:
+def _alternate(cells: Sequence[str]) -> bool:
     """Whether few values alternate: those of a state stay for a while."""
     count = len(set(cells[: _MOST * 20]))
     if not 2 <= count <= _MOST or not 2 <= len(set(cells)) <= min(_MOST, len(cells) / _TURNS):
         return False
-    changes = sum(a != b for a, b in pairwise(cells))
-    return changes > len(cells) / 2
+    return sum(a != b for a, b in pairwise(cells)) > len(cells) / 2
 
 
-def _is_words(cells: Sequence[str]) -> bool:
-    return all(holds_word(cell) for cell in set(cells))
+def _stacked(cells: Sequence[str], known: Mapping[int, Sequence[str]], at: int) -> bool:
+    """Whether each word stands in one block of rows, and stamps begin anew with each block."""
+    if not 2 <= len(set(cells[:20_000])) <= _MOST and len(set(cells)) != len(
+        set(cells[-20_000:]) | {cells[0]}
+    ):
+        return False
+    changes = [k + 1 for k, (a, b) in enumerate(pairwise(cells)) if a != b]
+    if not changes or len(changes) != len(set(cells)) - 1 or not all(map(_is_name, set(cells))):
+        return False
+    first = [0, *changes]
+    return any(
+        len({column[k] for k in first}) == 1 and len(set(column)) > len(first)
+        for k, column in known.items()
+        if k != at
+    )
 
 
 def _numbered(name: str, cells: Sequence[str]) -> bool:
-    return bool(re.fullmatch(_NAMES, plain(name))) and all(cell.isdecimal() for cell in set(cells))
-
-
-def _value(header: Sequence[str], columns: dict[int, list[str]], names: int) -> int | None:
-    """The column of the readings: by its name, else a temperature, else the first that could be one."""
-    could_be = [k for k, cells in columns.items() if k != names and _moves(cells, columns[names])]
-    named = [k for k in could_be if re.fullmatch(_VALUES, plain(header[k]))]
-    hot = [
-        k for k in could_be if role_of(re.sub(r"\W.*", "", header[k]), None, np.empty(0)).role in TEMPERATURES
-    ]
-    return next(iter([*named, *hot, *could_be]), None)
+    return bool(re.fullmatch(_NAMES, fold(name))) and all(cell.isdecimal() for cell in set(cells))
 
 
 def _moves(cells: Sequence[str], names: Sequence[str]) -> bool:
     """Whether a column holds numbers that differ for one name and neither count nor tell the time."""
-    numbers = [float(cell.replace(",", ".")) for cell in cells if is_number(cell)]
-    if len(numbers) < len(cells) / 2 or all(a <= b for a, b in pairwise(numbers)):
+    numbers = [cell for cell in cells if is_number(cell)]
+    if len(numbers) < len(cells) / 2 or any(is_stamp(c) for c in cells[:20] if not is_empty(c)):
+        return False
+    values = read_numbers(cells, None).values
+    if (np.diff(values) >= 0).all():
         return False
     return len(set(zip(names, cells, strict=True))) > len(set(names))
-
-
-def _pivot(path: Path, sheet: Sheet, clock: Sequence[int], names: str, values: str) -> str:
-    """Python that makes the table wide; rows stay in the order of the file, whatever its stamps look like."""
-    index = [sheet.header[k] for k in clock]
-    sep = {",": "", "": r', sep=r"\s+"'}.get(sheet.mark, f", sep={sheet.mark!r}".replace("'", '"'))
-    skip = f", skiprows={sheet.line - 1}" if sheet.line > 1 else ""
-    how = f"index={index}, columns='{names}', values='{values}', aggfunc='first', sort=False"
-    how = how.replace("'", '"')
-    # a header of numbers would be taken for a row
-    numbers = all(row[sheet.header.index(names)].isdecimal() for _, row in sheet.body[:_MOST])
-    prefix = re.sub(r"[^a-zA-Z0-9]+", "_", re.sub(r"[\[(].*", "", values)).strip("_")
-    named = f'.add_prefix("{prefix}_")' if numbers else ""
-    table = f'pd.read_csv("{path.name}"{sep}{skip}).pivot_table({how}){named}'
-    return f'import pandas as pd; {table}.to_csv("wide.csv")'

@@ -1,25 +1,51 @@
-"""`discovery new`: campaign, model and experiment from an engineer's own CSV."""
+"""`discovery new`: campaign, model and experiment from an engineer's own files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from discovery.errors import UserError
-from discovery.files import write_atomic
-from discovery.firsthour.firstmodel import first_model
-from discovery.firsthour.guess import Guess, drives, guess_all
+from discovery.errors import UsageError, UserError
+from discovery.files import read_toml, write_atomic
+from discovery.firsthour.again import rewrite, touched
+from discovery.firsthour.asking import Ask, answered, doubt, questions, read_statements, with_statements
+from discovery.firsthour.guess import Guess, drives
+from discovery.firsthour.joining import join_all
+from discovery.firsthour.measures import DEGREES
+from discovery.firsthour.plan import Plan, plan
 from discovery.firsthour.recorded import Recorded, never_moves, recorded
-from discovery.firsthour.room import Room, guess_room
-from discovery.firsthour.table import Column, OwnTable, read_own
-from discovery.firsthour.texts import campaign_text, csv_text, experiment_text
-from discovery.firsthour.words import DEGREES
+from discovery.firsthour.room import unknown_room
+from discovery.firsthour.table import OwnTable, read_tables
+from discovery.firsthour.texts import campaign_text, clock_doubt, csv_text
+from discovery.progress import Progress, silent
+from discovery.recordings.campaignfile import CampaignForm
+from discovery.runfolder import beside
 
 
-def new(folder: Path, sources: Sequence[Path]) -> list[str]:
-    """Write recordings, ``campaign.toml``, ``model.toml`` and ``experiment.toml`` into a folder.
+def new(
+    folder: Path,
+    sources: Sequence[Path],
+    joins: Sequence[Path] = (),
+    statements: Sequence[str] = (),
+    room: str | None = None,
+    ask: Ask | None = None,
+    progress: Progress = silent,
+    *,
+    again: bool = False,
+    quick: bool = False,
+) -> list[str]:
+    """Write recordings, ``campaign.toml``, models and ``experiment.toml`` into a folder.
 
     Several files are recordings of one machine, the last one kept unseen; of a single file the last third is.
+
+    Args:
+        folder: what is written stands in it at the end, or nothing.
+        sources: own tables. joins: for each of them the table of a second logger.
+        statements: NAME=ROLE,UNIT of columns that a person knows.
+        room: column that stands for the air around the machine.
+        ask: asks a person about doubtful guesses; without, they are marked in the campaign file.
+        again: the folder is there already; what a person wrote in it stays.
+        quick: models are written without comparing them.
 
     Returns:
         Lines that say what was guessed, why, and what comes next.
@@ -27,42 +53,107 @@ def new(folder: Path, sources: Sequence[Path]) -> list[str]:
     Raises:
         UserError: the folder has a campaign already, or a file cannot be read.
     """
-    if (folder / "campaign.toml").exists():
-        raise UserError(f"{folder}: campaign.toml is there already; name another folder, or delete it first")
-    tables = [read_own(Path(source)) for source in sources]
-    found = recorded(tables)
-    guesses = guess_all(found.seen)
-    room = guess_room(found.seen, guesses)
-    outputs = _outputs(found.seen, guesses)
+    there = (folder / "campaign.toml").exists()
+    if there and not again:
+        raise UserError(
+            f"{folder}: campaign.toml is there already; say --again to make model and experiment anew "
+            "(what you "
+            "wrote stays), or name another folder"
+        )
+    if not sources and not (there and again):
+        raise UsageError("say --from FILE: which recording is the campaign made of?")
+    if joins and len(joins) != len(sources):
+        raise UsageError(f"{len(sources)} --from and {len(joins)} --join: say one --join for each --from")
+    if not sources:
+        return _planned_again(folder, progress, quick=quick)
+    said, clock = read_statements(statements)
+    progress("reading the files")
+    tables = [table for source in sources for table in read_tables(Path(source))]
+    if joins:
+        seconds = [table for source in joins for table in read_tables(Path(source))]
+        progress("finding the shift between the loggers")
+        tables = join_all(tables, seconds)
+    found = recorded(tables, clock)
+    guesses = with_statements(found.seen, found.guesses, said, room)
+    if ask is not None:
+        guesses = answered(guesses, questions(found.seen, guesses), ask)
+    outputs = _outputs(found, guesses)
     if not outputs:
         raise UserError(
             f"{sources[0]}: no column looks like a measured temperature or error; "
-            "call it e.g. T_table [degC] or E_Y0C [um]"
+            'say which one is, as in --is "CH1=error,um"'
         )
-    write = {f"{name}.csv": csv_text(table) for name, table in found.recordings.items()}
-    write["campaign.toml"] = campaign_text(folder, guesses, found.recordings, room)
-    write["model.toml"] = first_model(guesses, outputs, has_room=room is not None)
-    write["experiment.toml"] = experiment_text(folder, list(found.recordings), outputs)
-    for name, content in write.items():
-        write_atomic(folder / name, content)
-    return [*_said(tables, found, guesses, room), "", *_next(folder)]
+    runs = list(found.recordings.values())
+    air, about_room = unknown_room(runs[:-1], guesses, outputs)
+    kept = _written(folder) if there else {}
+    names = list(found.recordings)
+    with beside(folder) as temporary:
+        for name, table in found.recordings.items():
+            write_atomic(temporary / f"{name}.csv", csv_text(table))
+        text = campaign_text(folder.resolve().name, found, guesses, air, about_room, kept)
+        write_atomic(temporary / "campaign.toml", text)
+        made = plan(temporary, folder.resolve().name, names, progress, quick=quick)
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in found.recordings:
+            (temporary / f"{name}.csv").replace(folder / f"{name}.csv")
+        write_atomic(folder / "campaign.toml", text)
+        notes = rewrite(folder, made)
+    room_line = [about_room] if about_room else []
+    return [
+        *room_line,
+        *_said(tables, found, guesses),
+        *made.said,
+        *notes,
+        "",
+        *_next(folder, guesses, found),
+    ]
 
 
-def _outputs(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> list[str]:
+def _planned_again(folder: Path, progress: Progress, *, quick: bool) -> list[str]:
+    """Models and experiment of a campaign whose roles a person has corrected."""
+    campaign = read_toml(folder / "campaign.toml", CampaignForm)
+    names = list(campaign.recordings)
+    before = touched(folder)
+    if before is not None:
+        names = [*(n for n in names if n not in before.held_out), *(n for n in names if n in before.held_out)]
+    with beside(folder) as temporary:
+        for recording in campaign.recordings.values():
+            source = (folder / recording.file).resolve()
+            if source.is_file():
+                target = temporary / recording.file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.symlink_to(source)
+        (temporary / "campaign.toml").write_text((folder / "campaign.toml").read_text("utf-8"), "utf-8")
+        made = plan(temporary, folder.resolve().name, names, progress, quick=quick)
+        notes = rewrite(folder, made)
+    return [*made.said, *notes, "", *_next(folder, {}, None)]
+
+
+def _written(folder: Path) -> dict[str, dict[str, object]]:
+    """Channels of the campaign that is there, without those that were guessed and never confirmed."""
+    form = read_toml(folder / "campaign.toml", CampaignForm)
+    return {
+        name: one.model_dump(exclude_defaults=True)
+        for name, one in form.channels.items()
+        if one.guessed is None
+    }
+
+
+def _outputs(found: Recorded, guesses: Mapping[str, Guess]) -> list[str]:
     """The errors, else the temperatures; without those that never move, if any moves."""
-    errors = [column for column in columns if guesses[column.name].role == "error"]
-    found = errors or [column for column in columns if guesses[column.name].role == "temperature"]
-    return [column.name for column in found if not never_moves(column)] or [column.name for column in found]
+    errors = [column for column in found.seen if guesses[column.name].role == "error"]
+    known = errors or [column for column in found.seen if guesses[column.name].role == "temperature"]
+    return [column.name for column in known if not never_moves(column)] or [column.name for column in known]
 
 
-def _said(
-    tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Guess], room: Room | None
-) -> list[str]:
+def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Guess]) -> list[str]:
     lines = []
+    runs = {run.path: run for run in found.recordings.values()}
     for table in tables:
+        run = runs.get(table.path, table)
+        length = sum(float(r.time[-1] - r.time[0]) for r in found.recordings.values() if r.path == table.path)
         lines.append(
-            f"{table.path.name}: {len(table.time)} rows over "
-            f"{_duration(float(table.time[-1]))}; time {table.about_time}"
+            f"{table.path.name}: {len(table.time)} rows over {_duration(length)}; time {run.about_time}"
         )
         lines += [f"  {note}" for note in table.notes]
     lines += found.notes
@@ -72,13 +163,15 @@ def _said(
         for c in found.seen
         for one in [guesses[c.name]]
     ]
-    if room is not None:
-        known = f"{room.degrees:g} degC, known within {room.spread:g} K"
-        rows.append(("", "T_env: ambient temperature, degC", "?", f"{room.why} ({known})"))
     width, inner = (max(len(row[place]) for row in rows) for place in (0, 1))
     lines += [f"  {header:{width}} -> {what:{inner}} {mark:1} {why}" for header, what, mark, why in rows]
+    for quantity, (unit, values) in found.constants.items():
+        lines.append(
+            f"  {quantity} in {unit} from the names of the files: "
+            + ", ".join(f"{v:g}" for v in values.values())
+        )
     warmed = [n for n, one in guesses.items() if one.role == "other input" and one.unit in DEGREES]
-    if not drives(guesses) and not warmed:
+    if not drives(guesses) and not warmed and not found.constants:
         lines.append(
             "no column says what heats the machine: a model can only follow its surroundings; "
             "record a power, current, speed or switch as well"
@@ -104,9 +197,14 @@ def _duration(seconds: float) -> str:
     )
 
 
-def _next(folder: Path) -> list[str]:
-    return [
-        f"written to {folder}: campaign.toml, model.toml, experiment.toml. Next:",
-        f"  discovery check {folder}",
-        f"  discovery run {folder}/experiment.toml",
-    ]
+def _next(folder: Path, guesses: Mapping[str, Guess], found: Recorded | None) -> list[str]:
+    doubtful = [name for name, one in guesses.items() if doubt(one)]
+    clock = found is not None and clock_doubt(found) is not None
+    lines = [f"written to {folder}: campaign.toml, experiment.toml, models. Next:"]
+    if doubtful or clock:
+        what = [*doubtful, *(["the unit of time"] if clock else [])]
+        lines.append(f"  look at {', '.join(what)} in {folder / 'campaign.toml'}: guessed (? above)")
+    return [*lines, f"  discovery check {folder}", f"  discovery run {folder}/experiment.toml"]
+
+
+__all__ = ["Plan", "new"]

@@ -1,53 +1,76 @@
-"""The air around the machine, where nobody measured it."""
+"""The air around the machine, where nobody measured it: an unknown of each recording, never a number."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from discovery.firsthour.guess import Guess
-from discovery.firsthour.table import Array, Column
-from discovery.firsthour.words import DEGREES
+from discovery.firsthour.measures import DEGREES
+from discovery.firsthour.table import OwnTable
 from discovery.recordings.units import conversion
 
-_USUAL = (22.0, 5.0)  # degC and its spread, where nothing hints at a room
-_ROOMS = (5.0, 35.0)  # degC: what people work in; a recording that starts hot shows none
+ROOM = "T_env"
+_USUAL = (22.0, 5.0)  # degC and its spread, where nothing is known: 12 to 32 in 19 of 20 workshops
+_ROOMS = (5.0, 35.0)  # degC: what people work in
+_COLD = 1.5  # K: temperatures that agree so well at the start of a recording are those of the air
+_COLD_SPREAD = 2.0  # K: an air that moves while the machine runs
+_FIRST = 5  # readings
 
 
 @dataclass(frozen=True)
 class Room:
-    """A constant [degC], known within `spread` [K], and why."""
+    """What is believed before a fit: `degrees` [degC], within `spread` [K], in each recording; and why."""
 
     degrees: float
     spread: float
     why: str
 
 
-def guess_room(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> Room | None:
-    """The coolest readings if they can be those of a room, else a usual one; None where one is measured."""
+def unknown_room(
+    runs: Sequence[OwnTable], guesses: Mapping[str, Guess], outputs: Sequence[str]
+) -> tuple[Room | None, str]:
+    """What stands for the air around, and a sentence; no room, and "", where it was measured.
+
+    Temperatures lose heat to the air, so a model of theirs has it as an unknown of each recording. For errors
+    nothing stands in: a constant drives nothing.
+
+    Args:
+        runs: recordings to fit.
+    """
     if any(one.role == "ambient temperature" for one in guesses.values()):
-        return None
-    coolest = math.inf
-    for column in columns:
-        one = guesses[column.name]
-        if one.role == "temperature" or (one.role == "other input" and one.unit in DEGREES):
+        return None, ""
+    if not any(guesses[name].role == "temperature" for name in outputs):
+        return None, (
+            "no room temperature was recorded, and none is made up: what the air does to the errors stays in "
+            "them. Record it, or name a stand-in with --room COLUMN"
+        )
+    cold = [degrees for run in runs for degrees in [_cold_start(run, guesses)] if degrees is not None]
+    if cold and len(cold) == len(runs):
+        degrees, spread = float(np.mean(cold)), float(np.hypot(_COLD_SPREAD, np.std(cold)))
+        why = f"the temperatures agree at the start of each recording, near {degrees:.3g} degC"
+    else:
+        (degrees, spread), why = _USUAL, "nothing shows it"
+    room = Room(round(degrees, 1), round(spread, 1), why)
+    return room, (
+        f"no room temperature was recorded: {ROOM} is an unknown of each recording, believed to be "
+        f"{room.degrees:g} degC within {room.spread:g} K ({why}). A fit estimates it; better record "
+        "it, or name "
+        "a stand-in with --room COLUMN"
+    )
+
+
+def _cold_start(run: OwnTable, guesses: Mapping[str, Guess]) -> float | None:
+    """Mean of the first temperatures [degC] where two or more agree as in a machine that stood overnight."""
+    firsts = []
+    for column in run.columns:
+        one = guesses.get(column.name)
+        known = column.values[np.isfinite(column.values)]
+        if one is not None and known.size and one.unit in DEGREES:
             rule = conversion(one.unit, "temperature")
-            coolest = min(coolest, _coolest(column.values) * rule.factor + rule.offset)
-    if math.isinf(coolest):
-        return Room(*_USUAL, "no ambient temperature: a usual room is taken; write what it was")
-    if not _ROOMS[0] <= coolest <= _ROOMS[1]:
-        why = f"no ambient temperature, and the coolest readings ({coolest:.3g} degC) are no room"
-        return Room(*_USUAL, f"{why}: a usual one is taken; write what it was")
-    why = "no ambient temperature: the coolest readings are taken as the room"
-    return Room(round(coolest, 1), 1.0, why)
-
-
-def _coolest(values: Array) -> float:
-    """The lowest median of five readings in a row: an outlier is no room."""
-    known = values[np.isfinite(values)]
-    if len(known) < 5:
-        return float(known.min()) if len(known) else math.inf
-    return float(np.median(np.lib.stride_tricks.sliding_window_view(known, 5), axis=1).min())
+            firsts.append(float(np.median(known[:_FIRST])) * rule.factor + rule.offset)
+    if len(firsts) < 2 or np.ptp(firsts) > _COLD or not _ROOMS[0] <= np.mean(firsts) <= _ROOMS[1]:
+        return None
+    return float(np.mean(firsts))

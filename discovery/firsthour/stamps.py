@@ -1,218 +1,225 @@
-"""The clock of an engineer's table: seconds, minutes, instants of many spellings, a date and a time apart."""
+"""The clock of an engineer's table: which columns tell the time, and in which unit.
+
+Where nothing says the unit, evidence does: how long thermal recordings last, how often loggers read, how
+quickly temperatures move. What is left open is asked (see `asking`).
+"""
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from datetime import datetime
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.errors import UserError
-from discovery.firsthour.rows import Row, is_number, is_stamp, number
-from discovery.firsthour.words import plain
+from discovery.firsthour.cells import is_empty, is_number, is_stamp, read_numbers
+from discovery.firsthour.instants import is_date, is_time_of_day, read_instants, read_times_of_day
+from discovery.firsthour.measures import CLOCKS, TIME_UNITS, time_unit
+from discovery.firsthour.sheets import Sheet
+from discovery.firsthour.vocabulary import fold
 
 Array = NDArray[np.float64]
 
-_FORMS = (
-    "%d.%m.%Y %H:%M:%S.%f",
-    "%d.%m.%Y %H:%M:%S",
-    "%d.%m.%Y %H:%M",
-    "%d.%m.%y %H:%M:%S",
-    "%Y/%m/%d %H:%M:%S.%f",
-    "%Y/%m/%d %H:%M:%S",
-    "%Y/%m/%d %H:%M",
-    "%d/%m/%Y %H:%M:%S.%f",
-    "%d/%m/%Y %H:%M:%S",
-    "%d/%m/%Y %H:%M",
-    "%m/%d/%Y %H:%M:%S.%f",
-    "%m/%d/%Y %H:%M:%S",
-    "%m/%d/%Y %H:%M",
-    "%m/%d/%Y %I:%M:%S %p",
-    "%m/%d/%Y %I:%M %p",
-    "%m/%d/%y %H:%M:%S",
-    "%m/%d/%y %H:%M",
-    "%m/%d/%y %I:%M:%S %p",
-    "%d-%m-%Y %H:%M:%S",
-    "%d-%m-%Y %H:%M",
-)
-_DATE = r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}"
-_TIME_OF_DAY = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+)?))?")
-# what a clock is called: a plain name before one that only holds the word
-CLOCK_NAMES = (
-    r"(time|zeit|datetime|timestamp|zeitstempel|date|datum|elapsed|seconds|minutes|hours|clock|stamp)\b",
-    r"(\w+ )*(time|zeit|stamp|timestamp|elapsed|seconds)\b",
-    r"t$",
-)
-TIME_UNITS = {
-    "ns": 1e-9,
-    "us": 1e-6,
-    "µs": 1e-6,
-    "μs": 1e-6,
-    "ms": 1e-3,
-    "s": 1.0,
-    "sec": 1.0,
-    "seconds": 1.0,
-    "min": 60.0,
-    "minutes": 60.0,
-    "h": 3600.0,
-    "hr": 3600.0,
-    "hours": 3600.0,
-    "d": 86400.0,
-    "days": 86400.0,
-}
-# seconds since 1970 in finer steps, where no unit says so: the year 2001 and later
-_SINCE_1970 = ((1e18, "ns"), (1e15, "us"), (1e12, "ms"))
-_DAY = 86400.0
 _FEWEST = 5  # different stamps
+_EPOCH = (6e8, 4.2e9)  # s since 1970: 1989 to 2103
+_YEAR = 366.0  # d
+_SERIAL = (30000.0, 80000.0)  # days since 1900, as spreadsheets count: 1982 to 2119
+_HOUR = 3600.0
+_INTERVAL = re.compile(
+    r"(?:interval|abtast|sampling|sample|rate|takt|scan|cycle|周期|間隔|间隔)\D{0,20}?(\d+(?:[.,]\d+)?)\s*([^\W\d]{1,12})",
+    re.IGNORECASE,
+)
 
 
 @dataclass(frozen=True)
 class Clock:
-    """`columns`: where the stamps stand; `seconds` (N,) since the first row; `about`: how they were read."""
+    """`columns`: where the stamps stand; `seconds` (N,) since the first row; `about`: how they were read.
+
+    `order`: the rows as they follow each other in time, None: as they stand. `first`: ISO 8601 of the first
+    row, or "". `counted`: nothing says the unit of its numbers, they are as they stand.
+    """
 
     columns: tuple[int, ...]
     seconds: Array
     about: str
     notes: tuple[str, ...] = ()
+    order: NDArray[np.intp] | None = None
+    first: str = ""
+    counted: bool = False
 
 
-def find_clock(path: Path, names: Sequence[str], units: Sequence[str], body: Sequence[Row]) -> Clock:
+def find_clock(
+    sheet: Sheet, names: Sequence[str], units: Sequence[str], series: Sequence[str] | None = None
+) -> Clock:
     """Which column is time.
+
+    Args:
+        names, units: of the columns, apart.
+        series: (N,) of a table whose rows are those of several sensors: time runs forward in each.
 
     Raises:
         UserError: no column is, or the one that should be does not run forward.
     """
-    words = [plain(name) for name in names]
-    named = list(
-        dict.fromkeys(k for form in CLOCK_NAMES for k in range(len(names)) if re.match(form, words[k]))
-    )
+    named = [k for k, name in enumerate(names) if CLOCKS.search(fold(name))]
+    named.sort(key=lambda k: (not CLOCKS.match(fold(names[k])), k))
     backwards = None
-    for columns, seconds, how in _candidates(path, [*named, 0], names, units, body):
+    order_of_columns = [*named, *(k for k in range(len(names)) if k not in named)]
+    for one in _candidates(sheet, order_of_columns, names, units):
+        sure = one.columns[0] in named
+        about = f"{one.about}, from column '{names[one.columns[0]]}'"
+        about += "" if sure else ", since none is called time"
+        seconds, order, notes = _forward(one.seconds, series)
         steps = np.diff(seconds)
-        sure = columns[0] in named
-        about = f"{how}, from column '{names[columns[0]]}'" + ("" if sure else ", since none is called time")
         if np.isfinite(seconds).all() and (steps >= 0).all() and np.sum(steps > 0) >= _FEWEST:
-            same = int(np.sum(steps == 0))
-            if same and not sure:
+            if (steps == 0).any() and not sure:
                 continue
-            notes = (f"{same} rows bear the stamp of the row before: spread evenly",) if same else ()
-            return Clock(columns, np.round(_spread(seconds), 6), about, notes)
-        if backwards is None and columns[0] in named and (steps < 0).any():
-            backwards = (body[int(np.flatnonzero(steps < 0)[0]) + 1][0], names[columns[0]])
+            return replace(one, seconds=seconds, about=about, order=order, notes=tuple(notes))
+        if backwards is None and sure and (steps < 0).any():
+            backwards = (sheet.at(int(np.flatnonzero(steps < 0)[0]) + 1), names[one.columns[0]])
     if backwards:
         raise UserError(
-            f"{path}, line {backwards[0]}: the time does not run forward in column "
-            f"'{backwards[1]}'; sort the rows"
+            f"{backwards[0]}: the time does not run forward in column '{backwards[1]}'; sort the rows"
         )
     raise UserError(
-        f"{path}: no column of time was found; call one 'time' (seconds, or instants as 2026-03-01T08:00:00)"
-        ", or add one if the file has none"
+        f"{sheet.path}: no column of time was found; call one 'time' (seconds, or instants as "
+        "2026-03-01T08:00:00), or add one if the file has none"
     )
 
 
 def _candidates(
-    path: Path, order: Sequence[int], names: Sequence[str], units: Sequence[str], body: Sequence[Row]
-) -> Iterator[tuple[tuple[int, ...], Array, str]]:
-    for at in dict.fromkeys(order):
-        cells = [row[at] for _, row in body]
-        if is_stamp(cells[0]) and not is_number(cells[0]):
-            yield from _instants(at, cells, order, body)
+    sheet: Sheet, order: Sequence[int], names: Sequence[str], units: Sequence[str]
+) -> Iterator[Clock]:
+    for at in order:
+        head = [cell for cell in sheet.columns[at].slice(0, 50).to_pylist() if not is_empty(cell)]
+        if not head:
             continue
-        try:
-            values = np.array(
-                [number(cell, path, line, names[at]) for cell, (line, _) in zip(cells, body, strict=True)]
+        cells = sheet.cells(at)
+        if is_stamp(head[0]) and not is_number(head[0].replace(" ", "")):
+            yield from _stamped(sheet, at, cells, names, units)
+            continue
+        if not is_number(head[0]):
+            found = (
+                read_instants(cells)
+                if re.match(r"[^\W\d]", head[0]) and any(map(str.isdigit, head[0]))
+                else None
             )
-        except UserError:
+            if found:
+                yield Clock((at,), found.seconds, found.about, first=found.first)
             continue
-        unit = _unit(names[at], units[at], values)
-        yield (at,), (values - values[0]) * TIME_UNITS[unit], f"counted in {unit}"
+        read = read_numbers(cells, None)
+        if read.wrong is None and np.isfinite(read.values).all():
+            yield _counted(at, cells, read.values, names[at], units[at] or read.unit)
 
 
-def _unit(name: str, unit: str, values: Array) -> str:
-    word = unit.strip().lower()
-    if word in TIME_UNITS:
-        return word
-    named = next((u for u in ("minutes", "hours", "days", "ms", "ns") if u in name.lower()), None)
-    return named or next((u for least, u in _SINCE_1970 if values[0] > least), "s")
-
-
-def _instants(
-    at: int, cells: Sequence[str], order: Sequence[int], body: Sequence[Row]
-) -> Iterator[tuple[tuple[int, ...], Array, str]]:
-    """A column of stamps; a column of dates with the one of the time of day."""
-    if re.fullmatch(_DATE, cells[0]):
-        for other in [k for k in dict.fromkeys([*order, at + 1]) if k != at and k < len(body[0][1])]:
-            joined = [f"{cell} {row[other]}" for cell, (_, row) in zip(cells, body, strict=True)]
-            if _TIME_OF_DAY.match(body[0][1][other]) and (found := _parsed(joined)) is not None:
-                yield (at, other), *found
-    if (found := _parsed(cells)) is not None:
-        yield (at,), *found
-    if (seconds := _of_day(cells)) is not None:
-        yield (at,), seconds, "time of day"
-
-
-def _parsed(cells: Sequence[str]) -> tuple[Array, str] | None:
-    """Seconds, and how they were read: by the spelling in which all cells run forward, else by any.
-
-    03/01 is the third of January or the first of March: the spelling with the most even steps counts.
-    """
-    forward: list[tuple[str, Array]] = []
-    backward = None
-    for form in ("", *_FORMS):
-        try:
-            stamps = [
-                datetime.strptime(cell.replace(",", "."), form) if form else datetime.fromisoformat(cell)
-                for cell in cells
-            ]
-            seconds = np.array([(stamp - stamps[0]).total_seconds() for stamp in stamps])
-        except (ValueError, TypeError):
-            continue
-        if (np.diff(seconds) >= 0).all():
-            forward.append((form, seconds))
-        elif backward is None:
-            backward = seconds
-    if not forward:
-        return None if backward is None else (backward, "instants")
-    form, best = min(forward, key=lambda one: _unevenness(one[1]))
-    others = [one for one in forward if not np.array_equal(one[1], best)]
-    if not others:
-        return best, "instants"
-    other = min(others, key=lambda one: _unevenness(one[1]))[0]
-    return best, f"instants (? dates read as {_order(form)}, the most even; {_order(other)} runs forward too)"
-
-
-def _unevenness(seconds: Array) -> float:
-    """Spread of the steps against their mean: 0 where all are alike."""
-    steps = np.diff(seconds)
-    return float(np.std(steps) / np.mean(steps)) if steps.any() else math.inf
-
-
-def _order(form: str) -> str:
-    """Day, month and year of a spelling, as a person writes them."""
-    date = form.split(" ")[0] or "%Y-%m-%d"
-    for mark, word in (("%d", "day"), ("%m", "month"), ("%Y", "year"), ("%y", "year")):
-        date = date.replace(mark, word)
-    return date
-
-
-def _of_day(cells: Sequence[str]) -> Array | None:
-    """Hours and minutes (and seconds) without a date; past midnight the next day begins."""
-    parts = [_TIME_OF_DAY.fullmatch(cell) for cell in cells]
-    if not all(parts):
-        return None
-    seconds = np.array(
-        [int(p[1]) * 3600.0 + int(p[2]) * 60.0 + float((p[3] or "0").replace(",", ".")) for p in parts if p]
+def _stamped(
+    sheet: Sheet, at: int, cells: list[str], names: Sequence[str], units: Sequence[str]
+) -> Iterator[Clock]:
+    """A column of stamps; a column of dates with the one of the time of day; a column of milliseconds."""
+    fine = next(
+        (k for k, name in enumerate(names) if k != at and _are_milliseconds(sheet, k, name, units[k])), None
     )
-    days = np.concatenate(([0], np.cumsum(np.diff(seconds) < -_DAY / 2)))
-    return np.asarray(seconds + _DAY * days - seconds[0], dtype=np.float64)
+    others = [k for k in range(len(names)) if k != at and is_time_of_day(sheet.columns[k][0].as_py())]
+    pairs: list[tuple[tuple[int, ...], list[str]]] = [((at,), cells)]
+    if is_date(cells[0]) and others:
+        time = sheet.cells(others[0])
+        pairs.insert(0, ((at, others[0]), [f"{a} {b}" for a, b in zip(cells, time, strict=True)]))
+    for columns, stamps in pairs:
+        found = read_instants(stamps)
+        if found is None:
+            continue
+        if fine is not None and not np.any(np.mod(found.seconds, 1.0)):
+            milliseconds = read_numbers(sheet.cells(fine), None).values / 1e3
+            whole = found.seconds + milliseconds - milliseconds[0]
+            if (np.diff(whole) >= 0).all():
+                yield Clock((*columns, fine), whole, f"{found.about} and milliseconds", first=found.first)
+        yield Clock(columns, found.seconds, found.about, first=found.first)
+    if (seconds := read_times_of_day(cells)) is not None:
+        yield Clock((at,), seconds, "time of day")
 
 
-def _spread(seconds: Array) -> Array:
+def _are_milliseconds(sheet: Sheet, column: int, name: str, unit: str) -> bool:
+    if time_unit(name) != "ms" and time_unit(unit) != "ms":
+        return False
+    values = read_numbers(sheet.cells(column), None).values
+    return bool(np.isfinite(values).all() and values.min() >= 0 and values.max() < 1000)
+
+
+def _counted(at: int, cells: Sequence[str], values: Array, name: str, unit: str) -> Clock:
+    """A column of numbers as a clock."""
+    first = float(values[0])
+    if re.fullmatch(r"(19|20)\d{12}", cells[0]) and (found := read_instants(cells)):
+        return Clock((at,), found.seconds, found.about, first=found.first)
+    given = time_unit(unit) or named_time_unit(name)
+    if given and _EPOCH[0] < first * TIME_UNITS[given] < _EPOCH[1]:
+        since: str | None = given
+    else:
+        since = next(
+            (u for u in TIME_UNITS if _EPOCH[0] < first * TIME_UNITS[u] < _EPOCH[1] and u in "ns us ms s"),
+            None,
+        )
+    if since and (given is None or first > _EPOCH[0]):
+        return Clock((at,), (values - first) * TIME_UNITS[since], f"counted in {since} since 1970")
+    if given:
+        return Clock((at,), (values - first) * TIME_UNITS[given], f"counted in {given}")
+    days = _SERIAL[0] < first < _SERIAL[1] and values[-1] - first < _YEAR and np.any(np.mod(values, 1.0))
+    if days:
+        return Clock((at,), (values - first) * TIME_UNITS["d"], "days as spreadsheets count them")
+    return Clock((at,), values - first, "counted", counted=True)
+
+
+def named_time_unit(name: str) -> str | None:
+    """The unit of time that the name of a clock holds.
+
+    >>> [named_time_unit(name) for name in ("Minuten", "経過分", "Time", "t_min")]
+    ['min', 'min', None, 'min']
+    """
+    words = fold(name).split()
+    found = [unit for word in words[::-1] if len(word) > 1 and (unit := time_unit(word))]
+    if found and fold(name) != "時間":
+        return found[0]
+    ends = re.search(r"(分|秒|経過時間)$", fold(name))
+    return time_unit(ends[1]) if ends else None
+
+
+def stated_interval(above: Sequence[str]) -> float | None:
+    """The interval of the logger [s] that stands over the table."""
+    for line in above:
+        if (found := _INTERVAL.search(line)) and (unit := time_unit(found[2])):
+            return float(found[1].replace(",", ".")) * TIME_UNITS[unit]
+    return None
+
+
+def _forward(
+    seconds: Array, series: Sequence[str] | None
+) -> tuple[Array, NDArray[np.intp] | None, list[str]]:
+    """Rows in the order of time: a log with its newest row on top, a clock that was put back in autumn,
+    sensors one after the other.
+    """
+    steps = np.diff(seconds)
+    if not np.isfinite(seconds).all() or not (steps < 0).any():
+        return seconds, None, []
+    if (steps <= 0).all():
+        order = np.arange(len(seconds))[::-1]
+        return seconds[::-1] - seconds[-1], order, ["the newest row stood first: the rows were turned round"]
+    if series is not None:
+        order = np.argsort(seconds, kind="stable")
+        return seconds[order] - seconds[order[0]], order, []
+    back = np.flatnonzero(steps < 0)
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    if back.size == 1 and abs(steps[back[0]] + _HOUR - usual) <= max(usual, 1.0):
+        moved = seconds.copy()
+        moved[back[0] + 1 :] += _HOUR
+        return (
+            moved,
+            None,
+            ["the clock was put back by an hour (end of summer time): the hour was added again"],
+        )
+    return seconds, None, []
+
+
+def spread_evenly(seconds: Array) -> Array:
     """Rows of one stamp, evenly up to the next stamp: a clock of whole seconds, a faster logger."""
     starts = np.flatnonzero(np.concatenate(([True], np.diff(seconds) > 0)))
     if len(starts) == len(seconds):

@@ -1,102 +1,217 @@
-"""An engineer's CSV as it is: any separator, decimal commas, a row of units, stamps of many kinds."""
+"""An engineer's table as it is: any encoding, mark and decimal sign, stamps of many kinds, wide or long."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+import unicodedata
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.errors import UserError
+from discovery.firsthour.cells import comma_is_decimal, holds_word, is_number, read_numbers
 from discovery.firsthour.clocks import is_clock
-from discovery.firsthour.longform import long_notes
-from discovery.firsthour.rows import holds_word, number, read_sheet
-from discovery.firsthour.stamps import find_clock
+from discovery.firsthour.longform import find_long, widen
+from discovery.firsthour.measures import unit_in
+from discovery.firsthour.sheets import Sheet, read_sheets
+from discovery.firsthour.stamps import Clock, find_clock, spread_evenly
+from discovery.firsthour.vocabulary import words_of
 from discovery.naming import is_taken, is_word
 
 Array = NDArray[np.float64]
+
+_SAMPLE = 2000  # cells of a column that show how decimals are written
+_UMLAUTS = str.maketrans(
+    {
+        "ä": "ae",
+        "ö": "oe",
+        "ü": "ue",
+        "ß": "ss",
+        "Ä": "Ae",
+        "Ö": "Oe",
+        "Ü": "Ue",
+        "µ": "u",
+        "μ": "u",
+        "Δ": "d",
+        "δ": "d",
+        "θ": "T",
+        "ϑ": "T",
+        "Θ": "T",
+        "λ": "l",
+        "α": "a",
+        "β": "b",
+        "γ": "g",
+        "ε": "e",
+        "σ": "s",
+        "φ": "phi",
+        "ω": "w",
+        "Ω": "Ohm",
+        "ø": "o",
+        "°": "",
+    }
+)
 
 
 @dataclass(frozen=True)
 class Column:
     """`header`: as in the file. `name`: a word that expressions can use. `unit`: as the file names it, or "".
 
-    `values` (N,), NaN where the cell is empty.
+    `values` (N,), NaN where the cell is empty. `about`: words of the file that explain the name. `words`:
+    of a switch that no list knows, the one that stands for 0 first.
     """
 
     header: str
     name: str
     unit: str
     values: Array
+    about: str = ""
+    words: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class OwnTable:
-    """`time` (N,) in s since the first row; `about_time`: how it was read; `notes`: what else was done."""
+    """`time` (N,) in s since the first row; `about_time`: how it was read; `notes`: what else was done.
+
+    `first`: ISO 8601 of the first row, or "". `counted`: nothing says the unit of `time`, it is as it stands;
+    `clock`: name of its column. `above`: lines over the table.
+    """
 
     path: Path
     time: Array
     about_time: str
     columns: tuple[Column, ...]
     notes: tuple[str, ...] = ()
+    first: str = ""
+    counted: bool = False
+    clock: str = ""
+    above: tuple[str, ...] = ()
+    name: str = field(default="")
+
+    def values(self, name: str) -> Array | None:
+        """Values of a column, (N,), or None."""
+        return next((column.values for column in self.columns if column.name == name), None)
 
 
 def read_own(path: Path) -> OwnTable:
-    """Read a CSV (plain or gzip).
+    """Read a CSV (plain or gzip, any encoding), Excel workbook or Parquet file; of several sheets the first.
 
     Columns without any number, and columns that count the rows or tell the time again, are left out.
 
     Raises:
-        UserError: no such file, no header, a ragged row, no column of time, cells that are no numbers, or
-            a long table.
+        UserError: no regular file, no header, a ragged row, no column of time, or cells that are no numbers.
     """
-    sheet = read_sheet(path)
-    parts = [_split(name, unit) for name, unit in zip(sheet.header, sheet.units, strict=True)]
-    clock = find_clock(path, [p[0] for p in parts], [p[1] for p in parts], sheet.body)
-    notes = [*sheet.notes, *clock.notes, *long_notes(path, sheet, clock.columns)]
+    return read_tables(path)[0]
+
+
+def read_tables(path: Path) -> list[OwnTable]:
+    """Read every sheet of a file that has the columns of its largest one. Raises UserError as `read_own`."""
+    return [_table(sheet) for sheet in read_sheets(path)]
+
+
+def _table(sheet: Sheet) -> OwnTable:
+    parts = [unit_in(name) or (name, "") for name in sheet.header]
+    names, units = [p[0] for p in parts], [u or p[1] for p, u in zip(parts, sheet.units, strict=True)]
+    comma = comma_is_decimal(
+        cell for column in sheet.columns for cell in column.slice(0, _SAMPLE).to_pylist() if is_number(cell)
+    )
+    long = find_long(sheet)
+    clock = find_clock(sheet, names, units, long.series if long else None)
+    order = np.arange(sheet.rows) if clock.order is None else clock.order
+    notes = [*sheet.notes, *clock.notes]
     taken: set[str] = {"time"}
-    columns = []
-    for index, (words, unit) in enumerate(parts):
+    if long is not None:
+        wide = widen(sheet, long, clock.seconds, order, names, units, clock.columns, comma)
+        time = clock.seconds[np.searchsorted(clock.seconds, np.unique(clock.seconds))]
+        found = [
+            (header, *(unit_in(header) or (header, "")), values, "", ()) for header, _, values in wide.columns
+        ]
+        stated = [unit for _, unit, _ in wide.columns]
+        columns = [
+            Column(h, identifier(w, taken), s or u, v)
+            for (h, w, u, v, _, _), s in zip(found, stated, strict=True)
+        ]
+        notes.append(wide.note)
+    else:
+        time, said = _spread(clock)
+        columns, more = _columns(sheet, names, units, clock, order, comma, taken)
+        notes += [*said, *more]
+    if not columns:
+        raise UserError(f"{sheet.path}: there is no column of numbers besides time")
+    return OwnTable(
+        sheet.path,
+        np.round(time, 6),
+        clock.about,
+        tuple(columns),
+        tuple(notes),
+        clock.first,
+        clock.counted,
+        sheet.header[clock.columns[0]],
+        sheet.above,
+        sheet.name,
+    )
+
+
+def _spread(clock: Clock) -> tuple[Array, list[str]]:
+    same = int(np.sum(np.diff(clock.seconds) == 0))
+    said = [f"{same} rows bear the stamp of the row before: spread evenly"] if same else []
+    return spread_evenly(clock.seconds), said
+
+
+def _columns(
+    sheet: Sheet,
+    names: list[str],
+    units: list[str],
+    clock: Clock,
+    order: NDArray[np.intp],
+    comma: bool | None,
+    taken: set[str],
+) -> tuple[list[Column], list[str]]:
+    columns, notes = [], []
+    for index, header in enumerate(sheet.header):
         if index in clock.columns:
             continue
-        cells = [row[index] for _, row in sheet.body]
-        header = sheet.header[index]
-        if all(holds_word(cell) for cell in cells if cell) and any(cells):
-            notes.append(f"column '{header}' holds words: left out")
-            continue
-        values = np.array(
-            [number(cell, path, line, header) for cell, (line, _) in zip(cells, sheet.body, strict=True)]
-        )
-        if not np.isfinite(values).any():
+        cells = sheet.cells(index)
+        read = read_numbers(cells, comma)
+        if read.wrong is not None and all(map(holds_word, set(filter(None, cells)))):
+            few = list(dict.fromkeys(filter(None, cells)))
+            do = f" ({', '.join(few)}); write numbers for them if they matter" if 1 < len(few) <= 6 else ""
+            notes.append(f"column '{header}' holds words: left out{do}")
+        elif read.wrong is not None:
+            raise UserError(
+                f"{sheet.at(read.wrong)}, column '{header}': '{cells[read.wrong]}' is not a number; "
+                "empty it or mend it"
+            )
+        elif not np.isfinite(read.values).any():
             notes.append(f"column '{header}' holds nothing: left out")
-        elif is_clock(words, values, clock.seconds):
+        elif is_clock(names[index], read.values[order], clock.seconds):
             notes.append(f"column '{header}' counts rows or tells the time again: left out")
         else:
-            columns.append(Column(header, _identifier(words, taken), unit, values))
-    if not columns:
-        raise UserError(f"{path}: there is no column of numbers besides time")
-    return OwnTable(path, clock.seconds, clock.about, tuple(columns), tuple(notes))
+            about, unit = sheet.groups[index], units[index] or read.unit
+            name = identifier(names[index] or about, taken)
+            columns.append(Column(header, name, unit, read.values[order], about, read.words))
+            if read.words:
+                notes.append(
+                    f"column '{header}': '{read.words[0]}' is taken as 0, '{read.words[1]}' as 1 (?)"
+                )
+    return columns, notes
 
 
-def _split(header: str, unit: str) -> tuple[str, str]:
-    """Name and unit of a header such as ``Bed temp [°F]``, ``P_drive (kW)`` or ``T1_degC``."""
-    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", header) or re.fullmatch(
-        r"(.*?)\s+in\s+(\S+)", header
-    )
-    if found and found[1]:
-        return found[1], unit or found[2].strip()
-    found = re.fullmatch(
-        r"(.*?)[_ ](degF|degC|°F|°C|F|C|K|pct|percent|rpm|W|kW|um|µm|mm|s|min|h|ms|A|V|lpm)", header
-    )
-    if found and found[1]:
-        return found[1], unit or found[2]
-    return header, unit
+def identifier(words: str, taken: set[str]) -> str:
+    """A word that expressions can use, of the words of a header; words of other scripts are translated.
 
-
-def _identifier(words: str, taken: set[str]) -> str:
-    name = re.sub(r"\W+", "_", words.replace("°", ""), flags=re.ASCII).strip("_") or "channel"
+    >>> identifier("Kühlmittel Temp.", set()), identifier("主軸温度1", set()), identifier("T [°C]", set())
+    ('Kuehlmittel_Temp', 'spindle_temp_1', 'T_C')
+    """
+    text = words.translate(_UMLAUTS)
+    if not unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().strip() or any(
+        unicodedata.name(c, "").startswith(("CJK", "HIRAGANA", "KATAKANA", "HANGUL", "CYRILLIC"))
+        for c in text
+    ):
+        text = _translated(text)
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    name = re.sub(r"\W+", "_", plain, flags=re.ASCII).strip("_") or "channel"
     name = f"x_{name}" if name[0].isdigit() else name
     base, count = name, 1
     while name in taken or is_taken(name) or not is_word(name):
@@ -104,3 +219,13 @@ def _identifier(words: str, taken: set[str]) -> str:
         name = f"{base}_{count}"
     taken.add(name)
     return name
+
+
+def _translated(text: str) -> str:
+    text = unicodedata.normalize("NFKC", text)
+    for word in sorted(words_of(text), key=lambda one: -len(one.said)):
+        if not word.said.isascii():
+            text = re.sub(
+                re.escape(word.said), f"_{word.gloss.replace(' ', '_')}_", text, flags=re.IGNORECASE
+            )
+    return re.sub(r"_+", "_", text)

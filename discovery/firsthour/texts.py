@@ -5,66 +5,129 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-
-import numpy as np
 
 from discovery.files import format_toml
+from discovery.firsthour.asking import doubt
 from discovery.firsthour.guess import Guess
-from discovery.firsthour.room import Room
+from discovery.firsthour.measures import DEGREES
+from discovery.firsthour.recorded import Recorded
+from discovery.firsthour.room import ROOM, Room
 from discovery.firsthour.table import OwnTable
-from discovery.firsthour.words import DEGREES
+
+_CONSTANTS = {"speed": "rotation speed", "flow": "fluid flow", "power": "heat load"}
 
 
 def csv_text(table: OwnTable) -> str:
     """A recording as the workbench reads it: seconds since its first row, an empty cell: not measured."""
+    import pandas as pd
+
+    frame = pd.DataFrame({"time": table.time - table.time[0], **{c.name: c.values for c in table.columns}})
     text = io.StringIO()
-    text.write(",".join(["time", *(column.name for column in table.columns)]) + "\n")
-    for index, stamp in enumerate(table.time - table.time[0]):
-        cells = [column.values[index] for column in table.columns]
-        text.write(",".join([f"{stamp:.10g}", *("" if np.isnan(v) else f"{v:.10g}" for v in cells)]) + "\n")
+    frame.to_csv(text, index=False, float_format="%.10g", lineterminator="\n")
     return text.getvalue()
 
 
 def campaign_text(
-    folder: Path, guesses: Mapping[str, Guess], recordings: Mapping[str, OwnTable], room: Room | None
+    title: str,
+    found: Recorded,
+    guesses: Mapping[str, Guess],
+    room: Room | None,
+    about_room: str,
+    kept: Mapping[str, Mapping[str, object]],
 ) -> str:
-    """Text of ``campaign.toml``, with a remark where a person should look."""
-    channels: dict[str, dict[str, object]] = {
-        name: {"role": one.role, "unit": one.unit} for name, one in guesses.items()
-    }
-    for name, guessed in guesses.items():
-        if guessed.corrects:
-            channels[name]["corrects"] = guessed.corrects
-        if guessed.role == "other input" and guessed.unit in DEGREES:
-            channels[name]["between"] = "linear"
-    remarks = {name: one.why for name, one in guesses.items() if not one.sure}
-    given: dict[str, object] = {}
+    """Text of ``campaign.toml``; what nobody has confirmed says so under `guessed`.
+
+    Args:
+        kept: channels as a person wrote them before.
+    """
+    channels: dict[str, dict[str, object]] = {}
+    headers = {column.name: column.header for column in found.seen}
+    for name, one in guesses.items():
+        entry: dict[str, object] = {"role": one.role, "unit": one.unit}
+        if one.corrects:
+            entry["corrects"] = one.corrects
+        if one.role == "other input" and one.unit in DEGREES:
+            entry["between"] = "linear"
+        if question := doubt(one):
+            entry["guessed"] = question
+        channels[name] = dict(kept.get(name, entry))
+    given: dict[str, dict[str, float]] = {name: {} for name in found.recordings}
+    for quantity, (unit, values) in found.constants.items():
+        channels[quantity] = {
+            "role": _CONSTANTS[quantity],
+            "unit": unit,
+            "guessed": "from the names of the files",
+        }
+        for name, value in values.items():
+            given[name][quantity] = value
     if room is not None:
-        # a room that nobody measured is known within its spread; taken as exact, it passes for physics
-        channels["T_env"] = {"role": "ambient temperature", "unit": "degC", "spread": room.spread}
-        given, remarks["T_env"] = {"set": {"T_env": room.degrees}}, room.why
+        channels[ROOM] = {"role": "ambient temperature", "unit": "degC", "spread": room.spread}
+        for name in given:
+            given[name][ROOM] = room.degrees
     entries = {
-        name: {"file": f"{name}.csv", **given, "note": f"from {table.path.name}"}
-        for name, table in recordings.items()
+        name: {
+            "file": f"{name}.csv",
+            **({"set": given[name]} if given[name] else {}),
+            "note": f"from {table.path.name}",
+        }
+        for name, table in found.recordings.items()
     }
-    text = format_toml({"name": folder.resolve().name, "channels": channels, "recordings": entries})
-    head = "# Written by `discovery new`. Look at each role and unit: `discovery list roles` explains them.\n"
+    clock = clock_doubt(found)
+    text = format_toml(
+        {
+            "name": title,
+            **({"guessed": clock} if clock else {}),
+            "channels": channels,
+            "recordings": entries,
+        }
+    )
     lines = text.splitlines()
     for index, line in enumerate(lines):
-        name = line.split(" ")[0]
-        if name in remarks and "role =" in line:
-            lines[index] = f"{line}  # guessed: {remarks[name]}"
-    return head + "\n".join(lines) + "\n"
+        header = headers.get(line.split(" ")[0])
+        if header and "role =" in line and header != line.split(" ")[0]:
+            lines[index] = f"{line}  # {header}"
+    head = [
+        "# Written by `discovery new`. Look at each role and unit (`discovery list roles` explains "
+        "them); where it",
+        "# says guessed, delete those words once you have looked. Roles corrected: `discovery new "
+        "DIR --again`.",
+        *(["# " + about_room.replace("\n", " ")] if about_room else []),
+    ]
+    return "\n".join([*head, *lines]) + "\n"
 
 
-def experiment_text(folder: Path, names: Sequence[str], outputs: Sequence[str]) -> str:
-    """Text of ``experiment.toml``: the last recording is held out."""
+def clock_doubt(found: Recorded) -> str | None:
+    """What stands in the campaign file of a clock whose unit nobody has confirmed."""
+    (unit, chance), *others = (*found.clock.items(), ("", 1.0))
+    if not unit or chance >= 0.9:
+        return None
+    rest = ", ".join(f"{other} {p:.0%}" for other, p in others if other and p > 0.02)
+    return f"time counted in {unit}: {chance:.0%} (or {rest}); another one: new ... --is time={others[0][0]}"
+
+
+def experiment_text(
+    title: str,
+    names: Sequence[str],
+    outputs: Sequence[str],
+    models: Mapping[str, str],
+    mismatch: str | None,
+    remarks: Sequence[str],
+) -> str:
+    """Text of ``experiment.toml``: the last recording is held out.
+
+    Args:
+        names: the last one is held out. models: lines of [models], by name.
+        mismatch: the model to diagnose, if any.
+        remarks: how the models were chosen.
+    """
 
     def listed(words: Sequence[str]) -> str:
         return ", ".join(f'"{word}"' for word in words)
 
-    name = re.sub(r"[^\w .+-]+", "_", folder.resolve().name)
+    name = re.sub(r"[^\w .+-]+", "_", title).lstrip(" .+-") or "experiment"
+    width = max(map(len, models))
+    lines = [f"{model:{width}} = {entry}" for model, entry in models.items()]
+    told = "\n".join(f"# {line}" for line in remarks)
     return f"""# Written by `discovery new`. Fits see the recordings under fit alone.
 name = "{name}"
 campaign = "campaign.toml"
@@ -72,12 +135,7 @@ outputs  = [{listed(outputs)}]
 fit      = [{listed(names[:-1])}]
 held_out = [{listed(names[-1:])}]
 
+{told}
 [models]
-first_order = {{ file = "model.toml" }}
-discovered  = {{ kind = "sindy" }}
-pysindy     = {{ kind = "pysindy" }}       # PySINDy as its users take it
-regression  = {{ kind = "regression" }}    # ridge on the inputs as they are
-
-[mismatch]
-model = "first_order"
-"""
+{chr(10).join(lines)}
+""" + (f'\n[mismatch]\nmodel = "{mismatch}"\n' if mismatch else "")

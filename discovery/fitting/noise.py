@@ -86,7 +86,10 @@ def readings_as_one(residuals: Sequence[Array]) -> float:
     longest = max(len(r) for r in residuals)
     products = np.zeros(longest)
     for j in range(residuals[0].shape[1]):
-        size = np.sqrt(np.nanmean(np.concatenate([r[:, j] for r in residuals]) ** 2))
+        read = np.concatenate([r[np.isfinite(r[:, j]), j] for r in residuals])
+        if not len(read):
+            continue
+        size = np.sqrt(np.mean(read**2))
         for r in residuals:
             z = np.nan_to_num(np.clip(r[:, j] / max(size, 1e-300), -4.0, 4.0))
             products[: len(z)] += np.correlate(z, z, "full")[len(z) - 1 :]

@@ -15,7 +15,7 @@ from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
 
-STRENGTHS = np.geomspace(1e-4, 1e4, 17)  # of the ridge, on standardised inputs
+STRENGTHS = np.geomspace(1e-4, 1e4, 17)  # of the ridge, on standardised inputs, per reading
 PARTS = 5  # that a single recording is cut into; several recordings are left out one by one
 
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from discovery.errors import UserError
-from discovery.files import dotted, locate, read_toml, write_toml
+from discovery.files import dotted, locate, read_text, read_toml, write_toml
 from discovery.models.memory import check_memory, check_start
 from discovery.models.model import TIME_UNITS, Model, Parameter, State, in_time_unit
 from discovery.naming import is_taken, is_word
@@ -88,7 +88,7 @@ def read_model(path: Path) -> Model:
         UserError: a mistake in the file, with file, line and key.
     """
     form = read_toml(path, ModelForm)
-    source = Path(path).read_text(encoding="utf-8-sig")
+    source = read_text(path)
 
     def at(*key: str | int) -> str:
         line = locate(source, key)
@@ -102,13 +102,15 @@ def read_model(path: Path) -> Model:
         for name, entry in form.states.items()
     }
     terms: list[Term] = []
+    taken: set[str] = set()
     for i, entry in enumerate(form.terms):
         term = _term(i, entry, states, at)
-        if term.name in [other.name for other in terms]:
+        if term.name in taken:
             raise UserError(
                 f"{at('terms', i, 'name')}: another term is named '{term.name}'; name it differently"
             )
         check_memory(term.expression, parameters, states, at("terms", i, "expression"))
+        taken.add(term.name)
         terms.append(term)
     outputs = {}
     for name, formula in form.outputs.items():

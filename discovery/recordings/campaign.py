@@ -15,6 +15,7 @@ from discovery.recordings.campaignfile import CampaignForm, ChannelForm, Recordi
 from discovery.recordings.clockcheck import clock_findings
 from discovery.recordings.columns import Columns
 from discovery.recordings.correction import pair_corrections, uncompensated
+from discovery.recordings.oddvalues import impossible_readings
 from discovery.recordings.reading import read_columns
 from discovery.recordings.roles import ROLES, Between, is_input
 from discovery.recordings.units import Conversion, UnitError, conversion
@@ -177,6 +178,10 @@ def _load(
             do = f"{suggest(column, list(columns.header))}; or say set = {{ {channel} = ... }} in {path}"
             raise UserError(f"{file}, line 1: no column '{column}'; {do}")
     values = channel_values(columns, form, channels, conversions)
+    for channel, column in values.items():
+        made = make_channel(channel, channels[channel], conversions[channel])
+        known = np.flatnonzero(np.isfinite(column))
+        column[known[impossible_readings(made, column[known])]] = np.nan  # `check` says so
     return Recording(
         name,
         columns.time - columns.time[0],

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from discovery.naming import is_taken, is_word
+from discovery.recordings.columns import TIME
 from discovery.recordings.roles import CORRECTION, Between, Role, is_input
 from discovery.schema import Strict
 
@@ -28,6 +29,12 @@ def _recording_name(name: str) -> str:
     return name
 
 
+def _column_name(name: str) -> str:
+    if name == TIME:
+        raise ValueError("the column 'time' is the clock of a recording, not a channel; name another column")
+    return name
+
+
 class ChannelForm(Strict):
     """One line of [channels]."""
 
@@ -41,7 +48,9 @@ class ChannelForm(Strict):
         "standard deviation, in the unit (a difference); a fit finds it",
     )
     between: Between | None = Field(None, description="what the value does between stamps")
-    column: str | None = Field(None, description="the header in the files, when it is not the channel's name")
+    column: Annotated[str, AfterValidator(_column_name)] | None = Field(
+        None, description="the header in the files, when it is not the channel's name"
+    )
     corrects: str | None = Field(
         None,
         description="of an applied correction: the error to whose readings it is added; "
@@ -51,6 +60,11 @@ class ChannelForm(Strict):
         1,
         description="of an applied correction: 1 for what was taken off the error, "
         "-1 for what was added to the position, as `discovery compensate` gives it out",
+    )
+
+    guessed: str | None = Field(
+        None,
+        description="what `discovery new` was not sure of; delete it once you have looked",
     )
 
     @model_validator(mode="after")
@@ -87,6 +101,7 @@ class CampaignForm(Strict):
     """The whole file."""
 
     name: str
+    guessed: str | None = Field(None, description="the same, of the clock of the files")
     channels: dict[Annotated[str, AfterValidator(_channel_name)], ChannelForm] = Field(min_length=1)
     recordings: dict[Annotated[str, AfterValidator(_recording_name)], RecordingForm] = Field(min_length=1)
 

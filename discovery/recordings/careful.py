@@ -2,9 +2,12 @@
 
 import codecs
 import csv
+import io
 import math
 import re
-from collections.abc import Collection, Sequence
+from array import array
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
@@ -13,10 +16,11 @@ import numpy as np
 
 from discovery.recordings.clock import is_instant, parse_instant, seconds_between
 from discovery.recordings.columns import EMPTY_CELLS, TIME, Array, Columns
-from discovery.recordings.finding import Finding
+from discovery.recordings.finding import Finding, more
 
 _SEPARATORS = {",": "a comma", ";": "a semicolon", "\t": "a tab", "|": "a bar"}
 _DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+_NAME = re.compile(r"[^\W_][\w .%°/()\[\]-]{0,40}")
 _EXPORT = "export it with a comma between the columns and a point in numbers"
 
 
@@ -26,19 +30,19 @@ class _Troubles:
 
     file: Path
     found: list[Finding] = field(default_factory=list)
-    cells: dict[str, list[Finding]] = field(default_factory=dict)
+    cells: dict[str, Finding] = field(default_factory=dict)
+    counts: Counter[str] = field(default_factory=Counter)
 
     def error(self, line: int | None, what: str, do: str) -> None:
         self.found.append(Finding("error", self.file, line, what, do))
 
     def cell(self, kind: str, line: int, what: str, do: str) -> None:
-        self.cells.setdefault(kind, []).append(Finding("error", self.file, line, what, do))
+        self.counts[kind] += 1
+        if kind not in self.cells:
+            self.cells[kind] = Finding("error", self.file, line, what, do)
 
     def all(self) -> list[Finding]:
-        told = [
-            replace(same[0], what=same[0].what + (f" (and {len(same) - 1} more like it)" if same[1:] else ""))
-            for same in self.cells.values()
-        ]
+        told = [replace(one, what=one.what + more(self.counts[kind])) for kind, one in self.cells.items()]
         return self.found + told
 
 
@@ -50,24 +54,30 @@ def read_careful_csv(
     The columns are None when there is no header with a time column or no row. Never raises.
     """
     troubles = _Troubles(path)
-    text = _decode(data, troubles)
-    rows = _rows(text, troubles)
-    if not rows:
+    rows = _rows(_decode(data, troubles), troubles)
+    line, cells = next(rows, (0, []))
+    if not cells:
         troubles.error(None, "the file is empty", "record again, or take the recording out of the campaign")
         return None, troubles.all()
-    header = tuple(name.strip() for name in rows[0][1])
+    header = tuple(name.strip() for name in cells)
     for name in dict.fromkeys(header):
         if header.count(name) > 1:
-            troubles.error(
-                rows[0][0], f"{header.count(name)} columns are named '{name}'", "rename or delete one"
-            )
+            troubles.error(line, f"{header.count(name)} columns are named '{name}'", "rename or delete one")
     if TIME not in header:
-        do = f"name the column of stamps '{TIME}'; the columns are {', '.join(header)[:200]}"
-        troubles.error(rows[0][0], f"no column '{TIME}'", do)
+        troubles.error(line, f"no column '{TIME}'", f"name the column of stamps '{TIME}'{_named(header)}")
         return None, troubles.all()
-    body = [row for row in rows[1:] if _is_whole(row, header, troubles)]
-    columns = _columns(header, body, [name for name in wanted if name in header], troubles)
+    whole = (row for row in rows if _is_whole(row, header, troubles))
+    columns = _columns(header, whole, [name for name in wanted if name in header], troubles)
     return columns, troubles.all()
+
+
+def _named(header: Sequence[str]) -> str:
+    """The names of the columns; nothing of a file that is no table, since reports are passed on."""
+    if len(header) < 2 or not all(
+        re.fullmatch(r"[^\W_][\w .%°/()\[\]-]{0,40}", name) for name in header[:20]
+    ):
+        return ""
+    return f"; the columns are {', '.join(header)[:200]}"
 
 
 def _decode(data: bytes, troubles: _Troubles) -> str:
@@ -89,19 +99,19 @@ def _decode(data: bytes, troubles: _Troubles) -> str:
         return data.decode("latin-1")
 
 
-def _rows(text: str, troubles: _Troubles) -> list[tuple[int, list[str]]]:
+def _rows(text: str, troubles: _Troubles) -> Iterator[tuple[int, list[str]]]:
     """The lines that hold something, cut into cells, with their numbers."""
-    first = next((line for line in text.splitlines() if line.strip()), "")
+    lines = io.StringIO(text)
+    first = next((line for line in lines if line.strip()), "")
+    lines.seek(0)
     separator = max(_SEPARATORS, key=first.count) if "," not in first else ","
     if separator != "," and first.count(separator):
         troubles.error(1, f"the columns are separated by {_SEPARATORS[separator]}", _EXPORT)
-    reader = csv.reader(text.splitlines(keepends=True), delimiter=separator)
-    rows: list[tuple[int, list[str]]] = []
+    reader = csv.reader(lines, delimiter=separator)
     try:
-        rows.extend((reader.line_num, row) for row in reader if any(cell.strip() for cell in row))
+        yield from ((reader.line_num, row) for row in reader if any(cell.strip() for cell in row))
     except csv.Error as error:
         troubles.error(reader.line_num, f"cannot be cut into cells ({error})", _EXPORT)
-    return rows
 
 
 def _is_whole(row: tuple[int, list[str]], header: Sequence[str], troubles: _Troubles) -> bool:
@@ -116,27 +126,33 @@ def _is_whole(row: tuple[int, list[str]], header: Sequence[str], troubles: _Trou
 
 
 def _columns(
-    header: tuple[str, ...], body: list[tuple[int, list[str]]], wanted: list[str], troubles: _Troubles
+    header: tuple[str, ...], body: Iterable[tuple[int, list[str]]], wanted: list[str], troubles: _Troubles
 ) -> Columns | None:
     place = {name: header.index(name) for name in (TIME, *wanted)}
-    stamps = [(line, cells[place[TIME]].strip(), cells) for line, cells in body]
-    instants = bool(stamps) and is_instant(next((text for _, text, _ in stamps if text), ""))
-    kept = [
-        (line, stamp, cells)
-        for line, text, cells in stamps
-        if (stamp := _stamp(text, line, instants, troubles)) is not None
-    ]
-    if not kept and stamps:
-        return None  # what is wrong with each stamp has been said
-    if not kept:
+    instants: bool | None = None
+    stamps: list[float | datetime] = []
+    lines, values = array("q"), {name: array("d") for name in wanted}
+    empty = True
+    for line, cells in body:
+        empty = False
+        text = cells[place[TIME]].strip()
+        if instants is None and text:
+            instants = is_instant(text)
+        stamp = _stamp(text, line, bool(instants), troubles)
+        if stamp is None:
+            continue
+        stamps.append(stamp)
+        lines.append(line)
+        for name in wanted:
+            values[name].append(_number(cells[place[name]].strip(), name, line, troubles))
+    if empty:
         troubles.error(None, "no row with a stamp", "record again, or take the recording out of the campaign")
-        return None
-    time, origin = _clock([stamp for _, stamp, _ in kept], kept[0][0], troubles)
-    values = {
-        name: np.array([_number(cells[place[name]].strip(), name, line, troubles) for line, _, cells in kept])
-        for name in wanted
-    }
-    return Columns(header, time, values, np.array([line for line, _, _ in kept]), origin)
+    if not stamps:
+        return None  # what is wrong with each stamp has been said
+    time, origin = _clock(stamps, lines[0], troubles)
+    return Columns(
+        header, time, {name: np.array(read) for name, read in values.items()}, np.array(lines), origin
+    )
 
 
 def _stamp(text: str, line: int, instants: bool, troubles: _Troubles) -> float | datetime | None:

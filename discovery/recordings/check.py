@@ -1,10 +1,11 @@
 """Everything that is wrong with a campaign: the campaign file first, then recording by recording."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from discovery.files import Key, check_kind, dotted, locate, parse_toml, read_file
@@ -12,10 +13,12 @@ from discovery.recordings.campaign import Channel, channel_values, make_channel,
 from discovery.recordings.campaignfile import CampaignForm, RecordingForm, campaign_path
 from discovery.recordings.clockcheck import clock_findings
 from discovery.recordings.columns import TIME, Array, Columns
+from discovery.recordings.compare import Seen, compare
 from discovery.recordings.correction import pair_corrections
 from discovery.recordings.correctioncheck import correction_findings
 from discovery.recordings.finding import Finding
 from discovery.recordings.inputcheck import input_findings
+from discovery.recordings.oddvalues import odd_findings, odd_readings
 from discovery.recordings.reading import read_columns
 from discovery.recordings.twins import fingerprint
 from discovery.recordings.units import Conversion, UnitError, conversion
@@ -23,14 +26,15 @@ from discovery.recordings.valuecheck import (
     few_findings,
     frozen_findings,
     load_findings,
-    lone_findings,
     range_findings,
+    small_findings,
 )
 from discovery.schema import sentences, suggest
 
 
-def check_campaign(path: str | os.PathLike[str]) -> list[Finding]:
-    """All findings about the campaign at `path` (the file or its folder), in the order of the files.
+def check_campaign(path: str | os.PathLike[str], only: Collection[str] | None = None) -> list[Finding]:
+    """All findings about the campaign at `path` (the file or its folder), in the order of the files; what
+    compares them last. With `only`, of those recordings.
 
     Raises UserError when the campaign file itself is missing, no text, no TOML, or of another kind.
     """
@@ -50,19 +54,27 @@ def check_campaign(path: str | os.PathLike[str]) -> list[Finding]:
     pairs, wrong = pair_corrections(form.channels, {name: to.unit for name, to in conversions.items()})
     findings.extend(_in_campaign(path, text, key, what) for key, what in wrong)
     seen: dict[str, str] = {}
+    whole: list[Seen] = []
     for name, recording in form.recordings.items():
+        if only is not None and name not in only:
+            continue
         for constant in recording.set:
             if constant not in data["channels"]:
                 what = f"no such channel; {suggest(constant, list(form.channels))}"
                 findings.append(_in_campaign(path, text, ("recordings", name, "set", constant), what))
-        found, readings = _recording_findings(path, form, recording, conversions, pairs)
+        found, readings, one = _recording_findings(path, form, name, conversions, pairs)
         findings.extend(found)
-        if readings is not None and (twin := seen.setdefault(readings, name)) != name:
+        twin = seen.setdefault(readings, name) if readings is not None else name
+        if one is not None and twin == name:
+            whole.append(one)
+        if twin != name:
             line = locate(text, ("recordings", name))
             what = f"recordings.{name} holds the same readings as {twin}"
             findings.append(
-                Finding("warning", path, line, what, "name another file, or take one of them out")
+                Finding("warning", path, line, what, "name another file, or take one of them out", weight=5.0)
             )
+    channels = {name: make_channel(name, form.channels[name], to) for name, to in conversions.items()}
+    findings.extend(compare(path, whole, channels))
     return findings
 
 
@@ -107,16 +119,17 @@ def _in_campaign(path: Path, text: str, key: Key, what: str) -> Finding:
 def _recording_findings(
     path: Path,
     form: CampaignForm,
-    recording: RecordingForm,
+    name: str,
     conversions: Mapping[str, Conversion],
     pairs: Mapping[str, str],
-) -> tuple[list[Finding], str | None]:
-    """Findings, and what tells whether another recording holds the same readings."""
+) -> tuple[list[Finding], str | None, Seen | None]:
+    """Findings, what tells whether another recording holds the same readings, and the recording."""
+    recording = form.recordings[name]
     file = path.parent / recording.file
     wanted = wanted_columns(recording, form.channels)
     columns, findings = read_columns(file, list(wanted.values()))
     if columns is None:
-        return findings, None
+        return findings, None, None
     findings.extend(_header_findings(file, columns, form, recording))
     findings.extend(clock_findings(file, columns))
     channels = {
@@ -127,7 +140,22 @@ def _recording_findings(
     values = channel_values(columns, recording, form.channels, conversions)
     findings.extend(_content_findings(file, columns, channels, recording, values))
     findings.extend(correction_findings(file, columns, values, pairs))
-    return findings, fingerprint(columns.time, [v for name, v in values.items() if channels[name].measured])
+    print_of = fingerprint(columns.time, [v for c, v in values.items() if channels[c].measured])
+    whole = None
+    if columns.runs_forward and len(values) == len(channels):
+        known = {c: _plausible(channels[c], v) for c, v in values.items()}
+        time = columns.time - columns.time[0]
+        whole = Seen(name, file, time, known, columns.lines, frozenset(recording.set))
+    return findings, print_of, whole
+
+
+def _plausible(channel: Channel, values: Array) -> Array:
+    """Values without those that are told one by one: a comparison of recordings is not about them."""
+    known = np.flatnonzero(np.isfinite(values))
+    wrong = known[odd_readings(channel, values[known])]
+    found = np.where(np.isfinite(values), values, np.nan)
+    found[wrong] = np.nan
+    return found
 
 
 def _header_findings(
@@ -141,9 +169,8 @@ def _header_findings(
     for name in dict.fromkeys(columns.header):
         if name not in declared and name != TIME:
             what = f"the column '{name}' is not among the channels"
-            yield Finding(
-                "warning", file, 1, what, "it is not used; declare it in the campaign file if it matters"
-            )
+            do = "it is not used; declare it in the campaign file if it matters"
+            yield Finding("warning", file, 1, what, do, "stray column", name, 0.1)
     for name in recording.set:
         if name in columns.header:
             what = f"'{name}' is a column here and a constant in the campaign file"
@@ -160,9 +187,10 @@ def _content_findings(
     for name, column in values.items():
         yield from range_findings(file, columns.lines, channels[name], column)
         yield from load_findings(file, columns.lines, channels[name], column)
+        yield from small_findings(file, columns.lines, channels[name], column)
         if name not in recording.set:
             yield from frozen_findings(file, columns.lines, channels[name], column)
-            yield from lone_findings(file, columns.lines, channels[name], column)
+            yield from odd_findings(file, columns.lines, channels[name], column)
             if channels[name].measured:
                 yield from few_findings(file, channels[name], column)
     yield from input_findings(file, columns, channels, values)

@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from discovery.limits import check_shape
 from discovery.recordings.clock import is_instant, parse_instant, seconds_between
 from discovery.recordings.columns import EMPTY_CELLS, TIME, Array, Columns
+
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 def read_quick_csv(data: bytes, wanted: Collection[str]) -> Columns | None:
@@ -50,7 +53,8 @@ def read_quick_csv(data: bytes, wanted: Collection[str]) -> Columns | None:
 def read_parquet(path: Path, wanted: Collection[str]) -> Columns:
     """The wanted columns of a Parquet file; one that is missing is left out.
 
-    Raises ValueError with what is wrong: not a Parquet file, no time column, a column of text.
+    Raises ValueError with what is wrong: not a Parquet file, no time column, a column of text;
+    UserError: more rows than a recording has.
     """
     import pyarrow as pa
     from pyarrow import parquet
@@ -59,9 +63,12 @@ def read_parquet(path: Path, wanted: Collection[str]) -> Columns:
         with parquet.ParquetFile(path) as file:
             header = tuple(file.schema_arrow.names)
             present = [name for name in (TIME, *wanted) if name in header]
-            table = file.read(columns=present) if TIME in present else None
-    except (pa.ArrowException, OSError) as error:
-        raise ValueError(f"not a readable Parquet file ({str(error).splitlines()[0]})") from None
+            check_shape(path, file.metadata.num_rows, len(present))
+            table = file.read(columns=present, use_threads=False) if TIME in present else None
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+        raise ValueError(
+            f"not a readable Parquet file ({(str(error) or 'damaged').splitlines()[0]})"
+        ) from None
     if len(set(header)) < len(header):
         doubled = next(name for name in header if header.count(name) > 1)
         raise ValueError(f"two columns are named '{doubled}'")
@@ -89,8 +96,12 @@ def _columns(table: Any, header: tuple[str, ...], first_line_number: int) -> Col
         instants = [_instant(stamp) for stamp in stamps.to_pylist()]
         origin = instants[0].isoformat() if instants else None
         time = seconds_between(instants)
-    else:
+    elif pa.types.is_duration(kind):
+        time = _floats(stamps.cast(pa.int64())) * _SECONDS[kind.unit]
+    elif pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
         time = _floats(stamps)
+    else:
+        raise ValueError(f"column '{TIME}' holds {kind}, neither seconds nor instants")
     values = {name: _floats(table.column(name)) for name in table.column_names if name != TIME}
     lines = np.arange(first_line_number, first_line_number + len(time))
     return Columns(header, time, values, lines, origin)

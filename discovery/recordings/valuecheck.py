@@ -13,13 +13,12 @@ from discovery.recordings.roles import ROLES
 FEW = 20  # readings: fewer carry no model
 _STANDS = 5.0  # a sensor that stands still so many times longer than chance explains
 _NEAR_ZERO = 0.05  # of the largest magnitude of a load: so far below zero is noise
-_LONE = 20.0  # robust standard deviations of a step: a single reading so far from its neighbours is wrong
-_LEAST = {
-    "degC": 30.0,
-    "um": 100.0,
-    "um/m": 100.0,
-}  # and so far: what is nearer may be true, a diagnosis tells
-_AGREE = 0.1  # of that distance: what the neighbours differ by
+# what a channel exceeds somewhere in any recording, and the unit that it has where it does not
+_SMALLEST = {
+    ("error", "um"): (0.3, "mm"),
+    ("heat load", "W"): (2.0, "kW"),
+    ("rotation speed", "rpm"): (2.0, "1000 rpm"),
+}
 _SENSORS = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature", "error")
 
 
@@ -97,27 +96,17 @@ def frozen_findings(file: Path, lines: Lines, channel: Channel, column: Array) -
         )
 
 
-def lone_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
-    """A single reading far from both neighbours, which agree: a loose contact, a lost byte."""
-    known = np.flatnonzero(np.isfinite(column))
-    if channel.role not in _SENSORS or channel.unit not in _LEAST or known.size < FEW:
+def small_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
+    """Values that move, and by less than any of their role does: another unit, most likely."""
+    known = column[np.isfinite(column)]
+    least = _SMALLEST.get((channel.role, channel.unit))
+    if least is None or known.size < FEW:
         return
-    readings = column[known]
-    steps = np.diff(readings)
-    usual = 1.4826 * float(np.median(np.abs(steps)))
-    away = np.minimum(np.abs(steps[:-1]), np.abs(steps[1:]))
-    far = away > max(_LONE * usual, _LEAST[channel.unit])
-    low, high = ROLES[channel.role].ranges[channel.unit].usual  # what lies outside is told already
-    lone = np.flatnonzero(far & (np.abs(readings[2:] - readings[:-2]) < _AGREE * away)) + 1
-    lone = lone[(readings[lone] >= low) & (readings[lone] <= high)]
-    if lone.size:
-        first = int(lone[0])
-        what = (
-            f"'{channel.name}' is {readings[first]:g} {channel.unit} in one reading between "
-            f"{readings[first - 1]:g} and {readings[first + 1]:g}"
-        )
-        do = "leave the cell empty if the sensor failed there"
-        yield Finding("warning", file, int(lines[known[first]]), what + more(lone.size), do)
+    most = float(np.max(np.abs(known)))
+    if 0.0 < most < least[0] and known.min() < known.max():
+        what = f"'{channel.name}' is never more than {most:.2g} {channel.unit}"
+        do = f"no {channel.role} is so small: perhaps it is in {least[1]}"
+        yield Finding("warning", file, int(lines[0]), what, do, "small", channel.name, 5.0)
 
 
 def few_findings(file: Path, channel: Channel, column: Array) -> Iterator[Finding]:

@@ -55,7 +55,7 @@ def with_levels(expression: Expression, name: str) -> tuple[Expression, float] |
     """The expression with the level at which its max(..., 0) begins as a parameter, and that level; None:
     it has none.
 
-    >>> from discovery.terms import text
+    >>> from discovery.terms import parse, text
     >>> found = with_levels(parse("k*sqrt(max(h, 0))"), "c")
     >>> text(found[0]), found[1]
     ('k*sqrt(max(h - c, 0))', 0.0)

@@ -298,7 +298,7 @@ def test_friction_that_ages_is_named_without_a_recorded_power() -> None:
     assert found["verdict"] == "missing physics"
     (wear,) = found["physics"]
     assert (wear["effect"], wear["states"], wear["recording"]) == ("wear", ["motor"], "r2")
-    assert next(iter(wear["parameters"].values()))["value"] == pytest.approx(-60.0, rel=0.2)
+    assert next(iter(wear["parameters"].values()))["value"] == pytest.approx(-60.0 / 180.0, rel=0.2)
 
 
 def test_a_law_that_no_entry_has_is_not_given_a_name() -> None:

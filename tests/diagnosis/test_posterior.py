@@ -19,6 +19,7 @@ from tests.diagnosis.parts import bare, dry, wetted
 
 Array = NDArray[np.float64]
 
+BLOCKS = 12  # of each recording
 FLUID = Hypothesis(catalogue()["fluid_convection"], ("table",), ("h",))
 LAG = Hypothesis(catalogue()["sensor_lag"], (), ("on",), outputs=("E_Y",))
 
@@ -77,8 +78,8 @@ def test_heat_of_unknown_cause_is_not_nothing() -> None:
 
 def test_draws_keep_the_number_of_blocks_of_each_recording() -> None:
     """So evidence that each block adds alike is certain, and evidence of one block is not."""
-    context = cast(Context, type("Two", (), {"recordings": ("a", "b")}))
-    blocks = 2 * thresholds.BLOCKS
+    context = cast(Context, type("Two", (), {"recordings": ("a", "b"), "blocks": BLOCKS}))
+    blocks = 2 * BLOCKS
     even = Known((FLUID,), 2.0, np.full(blocks, 2.0 / blocks))
     lone = Known((LAG,), 2.0, np.where(np.arange(blocks) == 3, 2.0, 0.0))
     found = posterior(context, cast(list[Scored], [even, lone, Known((), 0.0, np.zeros(blocks))]))
@@ -93,7 +94,7 @@ def test_draws_keep_the_number_of_blocks_of_each_recording() -> None:
 
 
 def test_models_that_are_far_off_take_no_part() -> None:
-    context = cast(Context, type("One", (), {"recordings": ("a",)}))
+    context = cast(Context, type("One", (), {"recordings": ("a",), "blocks": BLOCKS}))
     models = [Known((FLUID,), evidence, np.zeros(12)) for evidence in (0.0, -FAR + 1, -FAR - 1)]
     assert len(posterior(context, cast(list[Scored], models)).models) == 2
 
@@ -101,7 +102,7 @@ def test_models_that_are_far_off_take_no_part() -> None:
 def test_each_block_once_is_what_was_scored() -> None:
     """The draw that is no draw gives the level of a fitted model under each noise setting."""
     for one in (bare(), wetted()):
-        blocks = thresholds.BLOCKS * len(dry().recordings)
+        blocks = dry().blocks * len(dry().recordings)
         for k in range(len(one.levels)):
             drawn = one.drawn(k, np.ones((1, blocks)), np.ones(1))
             assert drawn[0] == pytest.approx(one.levels[k], abs=0.01)

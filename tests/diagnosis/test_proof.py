@@ -158,3 +158,8 @@ def test_a_model_that_runs_away_on_other_inputs_is_told() -> None:
     assert found["r1"].after is not None
     assert found["r2"].after is None
     assert free_runs(runs, ["r2"], after, before, noise) == {}  # a baseline that runs away proves nothing
+
+
+@pytest.mark.parametrize(("before", "after", "found"), [(5.0, 4.0, 3.0), (4.0, 5.0, -3.0), (1.0, inf, -inf)])
+def test_what_a_repair_explains_is_what_squares_leave(before: float, after: float, found: float) -> None:
+    assert improved(before, after).explained == pytest.approx(found)

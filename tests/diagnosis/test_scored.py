@@ -35,7 +35,7 @@ def test_an_interval_is_of_95_percent() -> None:
     interval = one.interval(name)
     assert interval is not None
     (index,) = (i for i, u in enumerate(one.fit.problem.unknowns) if u.name == name)
-    gram = one.grams[one.best].without(one.seen.spread[one.seen.form :])
+    gram = one.grams[one.best].without(one.seen.spread[sum(one.seen.form) :])
     _, step, covariance = gram.solved()
     k = int(np.flatnonzero(one.seen.moving == index)[0])
     low, high = norm.interval(0.95, one.fit.theta[index] + step[k], np.sqrt(covariance[k, k]))

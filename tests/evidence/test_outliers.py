@@ -50,7 +50,7 @@ def test_a_jump_a_slope_and_a_slow_start_are_no_wrong_readings() -> None:
     assert found(noise() + 0.4 * np.arange(200)) == []
     assert found(noise() + 30.0 * np.exp(-np.arange(200) / 8.0)) == []
     kicked = noise()
-    kicked[100:] += 20.0 * 0.5 ** np.arange(100)  # a pump goes on, the model has no fluid
+    kicked[100:] += 20.0 * 0.3 ** np.arange(100)  # a pump goes on, the model has no fluid
     assert found(kicked) == []
     late = noise()
     late[0] -= 25.0  # where a recording starts may be far from what the model has settled to

@@ -17,7 +17,7 @@ Row = Callable[[int], str]
 
 def _made(folder: Path, header: str, *files: Row, rows: int = 60) -> tuple[str, Path]:
     """What `discovery new` prints on files of such rows, and the folder that it made."""
-    command = ["new", str(folder / "rig")]
+    command = ["new", str(folder / "rig"), "--quick"]
     for number, row in enumerate(files):
         lines = [header, *(row(k) for k in range(rows))]
         (folder / f"run{number}.csv").write_text("\n".join(lines), "utf-8")
@@ -80,7 +80,7 @@ def test_a_column_in_proportion_to_the_time_is_a_clock(tmp_path: Path, name: str
         ("Step time", lambda k: k % 20, "is a clock that starts anew"),
         ("ticks", lambda k: 3 * k + k % 2, "rises steadily with the time, as a second clock"),
         ("Entry ID", lambda k: 7 + k + k % 2, "numbers rows or devices"),
-        ("NodeID", lambda k: 1 + k * k % 4, "numbers rows or devices"),
+        ("NodeID", lambda k: 1 + k // 9 % 4 // 3, "numbers rows or devices"),
         ("Cycle Index", lambda k: k // 9, "numbers rows or devices"),
         ("Loop Counter #1", lambda k: k // 9, "numbers rows or devices"),
         ("Amp-Hours", lambda k: -(k // 9) / 7, "is a counter that only runs on"),
@@ -114,7 +114,7 @@ def test_what_is_measured_or_acts_keeps_no_books(
     tmp_path: Path, name: str, row: Callable[[int], float]
 ) -> None:
     out, _ = _made(tmp_path, f"time,{name},T1", lambda k: f"{k},{row(k)},{20 + k % 7}")
-    assert "left out" not in out
+    assert ": left out" not in out
 
 
 def test_a_ramp_is_no_clock(tmp_path: Path) -> None:
@@ -149,20 +149,56 @@ def test_other_set_points_stay(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("first", "room", "spread"), [(25.0, 25.0, 1.0), (69.8, 22.0, 5.0), (-4.0, 22.0, 5.0), (34.0, 34.0, 1.0)]
+    ("first", "second", "room", "spread"),
+    [
+        (25.0, 25.4, 25.2, 2.0),  # a machine that stood overnight
+        (25.0, 31.0, 22.0, 5.0),  # one that did not
+        (69.8, 70.0, 22.0, 5.0),
+        (-4.0, -4.2, 22.0, 5.0),
+    ],
 )
-def test_a_recording_that_starts_hot_shows_no_room(
-    tmp_path: Path, first: float, room: float, spread: float
+def test_a_room_that_nobody_measured_is_an_unknown(
+    tmp_path: Path, first: float, second: float, room: float, spread: float
 ) -> None:
-    said, rig = _made(tmp_path, "time,P,T1 [C]", lambda k: f"{k},{k % 3},{first + k // 5}")
+    said, rig = _made(
+        tmp_path, "time,P,T1 [C],T2 [C]", lambda k: f"{k},{k % 3},{first + k // 5},{second + k // 5}"
+    )
     made = _campaign(rig)
     assert made["recordings"]["first_part"]["set"] == {"T_env": room}
+    assert made["recordings"]["last_part"]["set"] == {"T_env": room}
     assert made["channels"]["T_env"]["spread"] == spread
-    [line] = [one for one in said.splitlines() if "T_env" in one]
-    assert "? no ambient temperature" in line
-    assert f"known within {spread:g} K" in line
-    assert ("are no room" in line) is (room != first)
-    assert "# guessed: no ambient temperature" in (rig / "campaign.toml").read_text("utf-8")
+    first_line = next(line for line in said.splitlines() if "room" in line)
+    assert first_line.startswith("no room temperature was recorded: T_env is an unknown of each recording")
+    assert first_line in (rig / "campaign.toml").read_text("utf-8")
+
+
+def test_a_single_sensor_shows_no_room(tmp_path: Path) -> None:
+    _, rig = _made(tmp_path, "time,P,T1 [C]", lambda k: f"{k},{k % 3},{25 + k // 5}")
+    assert _campaign(rig)["channels"]["T_env"]["spread"] == 5.0
+
+
+def test_nothing_stands_for_a_room_that_would_drive_errors(tmp_path: Path) -> None:
+    said, rig = _made(tmp_path, "time,P [W],E_Z [um]", lambda k: f"{k},{k % 3},{k * k / 90:.2f}")
+    assert "none is made up" in said
+    assert "T_env" not in _campaign(rig)["channels"]
+
+
+def test_a_column_may_stand_for_the_room(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text(
+        "\n".join(
+            [
+                "time,P [W],T1 [C],roof [C]",
+                *(f"{k},{k % 3},{25 + k // 5},{12 + k / 30:.1f}" for k in range(60)),
+            ]
+        )
+    )
+    result = CliRunner().invoke(
+        app, ["new", str(tmp_path / "rig"), "--quick", "--room", "roof", "--from", str(tmp_path / "run.csv")]
+    )
+    assert result.exit_code == 0, result.output
+    channels = _campaign(tmp_path / "rig")["channels"]
+    assert channels["roof"]["role"] == "ambient temperature"
+    assert "T_env" not in channels
 
 
 def test_rooms_beside_the_air_outside_are_outputs(tmp_path: Path) -> None:

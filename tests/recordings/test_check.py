@@ -91,11 +91,12 @@ def test_nothing_is_wrong(write: Write) -> None:
         ),
         (
             with_column(1, ["20", "20.1"] * 20 + ["-28"] + ["20.1", "20"] * 10),
-            "warning: fit.csv, line 42: 'T_env' is -28 degC in one reading between 20.1 and 20.1; leave",
+            "warning: fit.csv, line 42: 'T_env' is -28 degC in one reading between 20.1 and 20.1; it "
+            "is left out",
         ),
         (
             with_column(3, ["7", "", "8", ""] * 10 + ["900", ""] + ["7", "", "8", ""] * 5),
-            "warning: fit.csv, line 42: 'E_Y0C' is 900 um in one reading between 8 and 7; leave the cell",
+            "warning: fit.csv, line 42: 'E_Y0C' is 900 um in one reading between 8 and 7; it is left out",
         ),
         (
             "\n".join(rows()).replace(",", ";"),

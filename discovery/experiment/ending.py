@@ -1,0 +1,237 @@
+"""The end of a run in five lines: which model, how sure, what is missing, what is doubtful, what to do
+next.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.report.ranking import astray, cells, ranked, ratio, rms_by_unit
+from discovery.report.run import Run, load_run
+from discovery.runfolder import DIAGNOSIS
+from discovery.terms import names
+
+Array = NDArray[np.float64]
+
+_BLOCKS = 12  # of each recording, drawn anew: neighbouring residuals hang together
+_DRAWS = 1000
+_BETTER = 0.95  # of the rms without a model: less is no improvement
+_MOVES = 0.05  # share of an effect from which a guess matters
+
+
+@dataclass(frozen=True)
+class Lead:
+    """`ratio`: rms of the winner over that of another model (or of none), with its 95 % interval; `sure`:
+    share of the draws in which the winner is better.
+    """
+
+    ratio: float
+    low: float
+    high: float
+    sure: float
+
+
+@dataclass(frozen=True)
+class Ending:
+    """What a run found. `winner`: None where no model is better than none, which is `best`, then."""
+
+    best: str | None
+    winner: str | None
+    against_none: Lead | None
+    runner_up: str | None
+    against_runner_up: Lead | None
+    rms: Mapping[str, float]
+    held_out: Sequence[str]
+    verdict: str | None
+    effects: Sequence[str]
+    findings: Sequence[str]
+    guesses: Mapping[str, str]
+    hangs_on_guesses: Mapping[str, float]
+    next: str
+    report: str
+    seconds: float
+
+    def document(self) -> dict[str, Any]:
+        """For `--json`."""
+        return asdict(self)
+
+    def lines(self) -> list[str]:
+        """Five lines for the terminal."""
+        return [
+            self._winner(),
+            self._sure(),
+            self._verdict(),
+            self._doubts(),
+            f"next: {self.next}; report: {self.report}",
+        ]
+
+    def _winner(self) -> str:
+        where = f"{len(self.held_out)} held-out recording{'s' * (len(self.held_out) != 1)}"
+        where = where if self.held_out else "the recordings that it was fitted to (none is held out)"
+        if self.best is None:
+            return "winner: none, no model could be compared"
+        rms = ", ".join(f"{value:.3g} {unit}".strip() for unit, value in self.rms.items())
+        none = self.against_none
+        if self.winner is None or none is None:
+            share = f"{none.ratio:.0%}" if none else "more than all"
+            return (
+                f"winner: no model; the best, {self.best}, leaves {share} of the rms without any "
+                f"model on {where}: "
+                "do not use it"
+            )
+        return (
+            f"winner: {self.winner} predicts best on {where}: rms {rms}, {1 - none.ratio:.0%} less "
+            "than without a model"
+        )
+
+    def _sure(self) -> str:
+        lead, other = self.against_runner_up, self.runner_up
+        if lead is None or other is None or self.best is None:
+            return "how sure: there is no other model to compare with"
+        said = "less" if lead.ratio < 1 else "more"
+        low, high = sorted((1 - lead.low, 1 - lead.high))
+        close = "" if lead.high < 1 else "; the two cannot be told apart"
+        return (
+            f"how sure: it leaves {abs(1 - lead.ratio):.0%} {said} than {other} (95 %: {low:.0%} to "
+            f"{high:.0%}; "
+            f"better in {lead.sure:.0%} of resampled recordings){close}"
+        )
+
+    def _verdict(self) -> str:
+        if self.verdict is None:
+            return "verdict: not asked ([mismatch] names no model)"
+        effects = f": {', '.join(self.effects)}" if self.effects else ""
+        return f"verdict: {self.verdict}{effects}"
+
+    def _doubts(self) -> str:
+        told = []
+        if self.findings:
+            worst = self.findings[0]
+            rest = f" (and {len(self.findings) - 1} more: discovery check)" if self.findings[1:] else ""
+            told.append(f"{worst}{rest}")
+        if self.guesses:
+            named = [
+                f"{name} ({self.hangs_on_guesses[name]:.0%} of the prediction)"
+                if name in self.hangs_on_guesses
+                else name
+                for name in sorted(self.guesses, key=lambda n: -self.hangs_on_guesses.get(n, 0.0))
+            ]
+            told.append(f"nobody has confirmed what was guessed of {', '.join(named[:4])}")
+        return f"doubts: {'; '.join(told)}" if told else "doubts: none; the recordings are sound"
+
+
+def ending(folder: Path) -> Ending:
+    """What the run in a folder found. Raises UserError where there is none."""
+    run = load_run(folder)
+    order = [model for model in ranked(run) if cells(run, model)]
+    best = order[0] if order else None
+    none = _lead(run, best, None) if best else None
+    helps = none is not None and none.ratio < _BETTER and not (best and astray(run, best))
+    other = order[1] if len(order) > 1 else None
+    diagnosis = run.diagnosis if (folder / DIAGNOSIS).exists() else None
+    guesses = dict(run.results.get("guessed") or {})
+    rms = (
+        {u: float(np.sqrt(np.mean(np.square(v)))) for u, v in rms_by_unit(run, best).items()} if best else {}
+    )
+    return Ending(
+        best,
+        best if helps else None,
+        none,
+        other,
+        _lead(run, best, other) if best and other else None,
+        rms,
+        list(run.held_out),
+        str(diagnosis["verdict"]) if diagnosis else None,
+        [_effect(one) for one in (diagnosis or {}).get("physics") or []],
+        list(run.results.get("findings") or []),
+        guesses,
+        hanging(run, best, guesses) if best else {},
+        _next(run, best, helps, diagnosis, guesses),
+        str(folder / "report.html"),
+        float(run.results.get("seconds") or 0.0),
+    )
+
+
+def _effect(one: Mapping[str, Any]) -> str:
+    where = ", ".join(one.get("moved") or one.get("states") or [])
+    sure = f" ({one['probability']:.0%})" if one.get("probability") is not None else ""
+    return f"{one['effect']}{f' at {where}' if where else ''}{sure}"
+
+
+def _next(
+    run: Run, best: str | None, helps: bool, diagnosis: Mapping[str, Any] | None, guesses: Mapping[str, str]
+) -> str:
+    """The one thing that helps most now."""
+    if guesses and (not helps or (diagnosis or {}).get("verdict") in ("unexplained", None)):
+        which = ", ".join(list(guesses)[:3])
+        return f"confirm or correct {which} in the campaign file, then `discovery new DIR --again`"
+    if not run.held_out:
+        return "hold a recording out: only that shows how well a model predicts"
+    if diagnosis and diagnosis.get("next_experiment"):
+        return str(diagnosis["next_experiment"]).rstrip(".")
+    if not helps:
+        return "record what drives the machine, each input moving on its own"
+    export = f"`discovery export {run.folder} --model {best} --to json`"
+    return f'{export}, or diagnose it ([mismatch] model = "{best}")'
+
+
+def hanging(run: Run, model: str, guesses: Mapping[str, str]) -> dict[str, float]:
+    """How much of what a model predicts each guessed channel carries: its share of the terms that hold it;
+    1 for an output, which is all that is predicted.
+    """
+    shares = run.results["models"][model].get("shares") or {}
+    terms = run.models[model].terms if model in run.models else ()
+    found = {}
+    for name in guesses:
+        carried = sum(float(shares.get(term.name) or 0.0) for term in terms if name in names(term.expression))
+        carried = 1.0 if name in run.outputs else carried
+        if carried >= _MOVES:
+            found[name] = min(1.0, carried)
+    return found
+
+
+def _lead(run: Run, model: str, other: str | None) -> Lead | None:
+    """rms of a model against another one (None: no model) on what no fit saw, blocks of it drawn anew."""
+    middle = ratio(run, model, other)
+    if not math.isfinite(middle):
+        return None
+    pairs = []  # of each recording and output: sums of squares by block, of the two
+    for recording, output in cells(run, model):
+        predictions = run.predictions.get(recording)
+        if predictions is None or output not in predictions.models.get(model, {}):
+            continue
+        mine = predictions.left_over(model, output)
+        if other is None:
+            theirs = _without(run, predictions.readings[output], output)
+        elif output in predictions.models.get(other, {}):
+            theirs = predictions.left_over(other, output)
+        else:
+            continue
+        both = np.isfinite(mine) & np.isfinite(theirs)
+        if both.sum() >= _BLOCKS:
+            pieces = np.array_split(np.flatnonzero(both), _BLOCKS)
+            pairs.append(np.array([[np.sum(mine[p] ** 2), np.sum(theirs[p] ** 2)] for p in pieces]))
+    if not pairs:
+        return Lead(middle, middle, middle, float(middle < 1))
+    rng = np.random.default_rng(0)
+    logs = np.zeros(_DRAWS)
+    for blocks in pairs:
+        drawn = blocks[rng.integers(0, len(blocks), (_DRAWS, len(blocks)))].sum(axis=1)
+        logs += 0.5 * np.log(np.maximum(drawn[:, 0], 1e-300) / np.maximum(drawn[:, 1], 1e-300)) / len(pairs)
+    found = np.exp(logs)
+    low, high = np.percentile(found, [2.5, 97.5])
+    return Lead(middle, float(low), float(high), float(np.mean(found < 1)))
+
+
+def _without(run: Run, readings: Array, output: str) -> Array:
+    """What is left without a model: errors themselves, temperatures from the first reading on."""
+    known = readings[np.isfinite(readings)]
+    first = known[0] if known.size and run.unit(output) in ("°C", "K", "°F", "degC") else 0.0
+    return np.asarray(readings - first)

@@ -1,0 +1,176 @@
+"""Which first model: the kinds that exist, each judged on parts of the recordings that its fit did not see.
+
+A kind joins by a line in `CANDIDATES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics.system import predict
+from discovery.errors import UserError
+from discovery.evaluation.crossvalidation import Fold, folds, masked
+from discovery.experiment import Experiment
+from discovery.experiment.form import ModelEntry
+from discovery.experiment.pipeline import fit_of
+from discovery.fitting import predict_recording
+from discovery.models import Model
+from discovery.progress import Progress, silent
+from discovery.recordings import Campaign, Recording
+
+Array = NDArray[np.float64]
+
+NO_MODEL = "no model"
+BETTER = 0.95  # of the error without a model: less is no improvement worth the name
+_SIMPLER = 1.03  # a simpler kind that is so near wins
+_POINTS = 600  # instants of a recording: enough to choose by
+_ROUNDS = 20  # of Levenberg-Marquardt
+_LOST = 10.0  # times the error without a model: what is said of a model that runs away
+
+# simplest first: name -> entry of an experiment file; INPUTS stands for the channels that drive the outputs
+CANDIDATES = {
+    "regression": '{ kind = "regression", inputs = [INPUTS] }',
+    "reduced": '{ kind = "reduced", inputs = [INPUTS] }',
+    "first_order": '{ file = "model.toml" }',
+    "two_masses": '{ file = "two_masses.toml" }',
+    "discovered": '{ kind = "sindy", bootstraps = 0 }',
+}
+
+
+@dataclass(frozen=True)
+class Score:
+    """`ratio`: rms left over on what a fit did not see, over that without any model, pooled over the outputs;
+    `folds`: the same in each part that was left out.
+    """
+
+    name: str
+    ratio: float
+    folds: tuple[float, ...]
+
+    @property
+    def helps(self) -> bool:
+        """Whether the model is better than none, and not by one lucky part."""
+        return self.ratio < BETTER and np.mean([one < 1.0 for one in self.folds]) > 0.5
+
+
+def choose(experiment: Experiment, progress: Progress = silent) -> list[Score]:
+    """The models of an experiment, which stand there simplest first, best first; one that runs away comes
+    last.
+
+    Each is found and fitted anew without each recording (or third of a single one) and predicts it freely.
+    Only the recordings to fit are looked at.
+    """
+    thin = replace(experiment, campaign=thinned(experiment.fitting))
+    parts = [one for one in folds(thin.campaign, thin.fit) if len(thin.fit) < 2 or one.windows is None]
+    scores = []
+    for name, entry in experiment.form.models.items():
+        squares: list[tuple[Array, Array]] = []
+        for k, fold in enumerate(parts, start=1):
+            progress(f"trying {name}, part {k} of {len(parts)} left out")
+            squares.append(_left_out(thin, name, entry, fold))
+        pooled = sum(left for left, _ in squares) / sum(of for _, of in squares)
+        each = tuple(float(np.sqrt(np.mean(left / of))) for left, of in squares)
+        scores.append(Score(name, float(np.sqrt(np.mean(pooled))), each))
+    order = sorted(scores, key=lambda one: one.ratio)
+    best = order[0].ratio
+    for name in experiment.form.models:  # simplest first
+        found = next(one for one in scores if one.name == name)
+        if found.helps and found.ratio < _SIMPLER * best:
+            return [found, *(one for one in order if one is not found)]
+    return order
+
+
+def _left_out(experiment: Experiment, name: str, entry: ModelEntry, fold: Fold) -> tuple[Array, Array]:
+    """Sums of squares left over, and without a model, on what a fit did not see: each (outputs,)."""
+    whole, outputs = experiment.campaign, experiment.outputs_of(entry)
+    kept = [r for r in experiment.fit if r not in fold.recordings]
+    seen = {
+        r: masked(whole.recordings[r], outputs, fold.windows[r]) if fold.windows else whole.recordings[r]
+        for r in kept
+    }
+    inner = replace(
+        experiment,
+        campaign=replace(whole, recordings=seen),
+        form=experiment.form.model_copy(update={"fit": kept}),
+    )
+    reference = np.array([_spread(whole, r, outputs, fold) for r in fold.recordings or kept])
+    try:
+        fit = fit_of(inner, name, entry, max_rounds=_ROUNDS)[2]
+        left = np.array(
+            [_residual(fit.model, whole, r, outputs, fit.noise.white, fold) for r in fold.recordings or kept]
+        )
+    except UserError:
+        left = _LOST**2 * reference
+    of = reference.sum(axis=0)
+    found = np.minimum(np.nan_to_num(left, nan=np.inf).sum(axis=0), _LOST**2 * of)
+    return found, np.maximum(of, 1e-12)
+
+
+def _residual(
+    model: Model,
+    campaign: Campaign,
+    recording: str,
+    outputs: Sequence[str],
+    noise: Sequence[float],
+    fold: Fold,
+) -> Array:
+    trajectory = predict_recording(model, campaign, recording, outputs, noise)
+
+    grid = trajectory.system.grid
+    rows = grid.readings - predict(trajectory)
+    return np.nansum(
+        np.where(_inside(grid.time[grid.read], fold, recording)[:, None], rows, np.nan) ** 2, axis=0
+    )
+
+
+def _spread(campaign: Campaign, recording: str, outputs: Sequence[str], fold: Fold) -> Array:
+    """Sum of squares of what is read without a model: errors themselves, temperatures from the first one."""
+    found = []
+    one = campaign.recordings[recording]
+    inside = _inside(one.time, fold, recording)
+    for name in outputs:
+        values = one.values[name]
+        known = values[np.isfinite(values)]
+        zero = known[0] if campaign.channels[name].role == "temperature" and known.size else 0.0
+        found.append(float(np.nansum((values[inside] - zero) ** 2)))
+    return np.array(found)
+
+
+def _inside(time: Array, fold: Fold, recording: str) -> NDArray[np.bool_]:
+    if fold.windows is None:
+        return np.ones(len(time), dtype=np.bool_)
+    low, high = fold.windows[recording]
+    return np.asarray((time >= low) & (time < high))
+
+
+def thinned(campaign: Campaign, points: int = _POINTS) -> Campaign:
+    """The campaign with at most so many instants a recording: inputs as means in between, single readings."""
+    recordings = {name: _thin(one, campaign, points) for name, one in campaign.recordings.items()}
+    return replace(campaign, recordings=recordings)
+
+
+def _thin(recording: Recording, campaign: Campaign, points: int) -> Recording:
+    count = len(recording.time)
+    if count <= points:
+        return recording
+    edges = np.linspace(0, count, points + 1).astype(int)
+    values = {}
+    for name, series in recording.values.items():
+        pieces = list(_pieces(series, edges))
+        if campaign.channels[name].is_input:
+            values[name] = np.array([np.nanmean(p) if np.isfinite(p).any() else np.nan for p in pieces])
+        else:
+            values[name] = np.array(
+                [p[np.isfinite(p)][0] if np.isfinite(p).any() else np.nan for p in pieces]
+            )
+    return replace(recording, time=recording.time[edges[:-1]], values=values)
+
+
+def _pieces(series: Array, edges: NDArray[np.int_]) -> Iterator[Array]:
+    for a, b in pairwise(edges):
+        yield series[a:b]

@@ -1,0 +1,212 @@
+"""Units as loggers and spreadsheets write them, and which quantities have them."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping
+
+from discovery.firsthour.vocabulary import fold, words_of
+from discovery.recordings.units import parse_unit
+
+# spelled as here once folded (small letters, signs of degrees alike) -> as pint knows it
+_SPELLED = {
+    "degC": "°c c degc celsius degcelsius deg.c deg_c grad gradc gradcelsius °celsius 度 摂氏 oc ℃",
+    "degF": "°f f degf fahrenheit deg.f °fahrenheit 華氏",
+    "K": "k kelvin °k",
+    "delta_degC": "deltak dk",
+    "percent": "% pct percent prozent proz. パーセント %pwm %rh %r.h. %rf vh",
+    "rpm": "rpm 1/min u/min u/min. umin upm r/min rev/min min-1 min^-1 min⁻¹ /min tr/min giri/min "
+    "ob/min 回転/分 r.p.m.",
+    "1/s": "1/s s-1 s^-1 s⁻¹ rps rev/s",
+    "W": "w watt watts ワット",
+    "kW": "kw kilowatt",
+    "mW": "mw",
+    "hp": "hp ps cv",
+    "um": "um µm μm micron microns micrometer mikrometer mkm ミクロン マイクロメートル",
+    "mm": "mm millimeter millimetre ミリ",
+    "nm": "nm",
+    "m": "m meter metre",
+    "inch": "in inch inches",
+    "mil": "mil mils thou",
+    "um/m": "um/m µm/m μm/m µrad μrad urad microrad",
+    "mm/m": "mm/m mrad",
+    "l/min": "l/min lpm l/m liter/min litre/min lit/min l/min. l·min-1 l/分 slpm",
+    "l/h": "l/h lph liter/h l/hr",
+    "m**3/h": "m3/h m^3/h m³/h cbm/h",
+    "m**3/s": "m3/s m³/s",
+    "gal/min": "gpm gal/min",
+    "A": "a amp amps ampere amperes アンペア",
+    "mA": "ma",
+    "V": "v volt volts ボルト",
+    "mV": "mv",
+    "N*m": "nm. n·m n*m n-m newtonmeter",
+    "N": "n newton",
+    "bar": "bar",
+    "mbar": "mbar",
+    "Pa": "pa",
+    "kPa": "kpa",
+    "MPa": "mpa",
+    "psi": "psi",
+    "Hz": "hz",
+    "m/s": "m/s",
+    "mm/min": "mm/min",
+    "kWh": "kwh",
+    "Wh": "wh",
+    "A*h": "ah",
+    "1": "- 1 – — [-] -/- bool",
+}
+_KNOWN = {word: unit for unit, words in _SPELLED.items() for word in words.split()}
+TIME_UNITS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+_TIMES = {
+    "ns": "ns nsec nanoseconds nanosekunden",
+    "us": "us µs μs usec microseconds mikrosekunden",
+    "ms": "ms msec msecs millis milliseconds millisecond millisekunden millisek ミリ秒 毫秒",
+    "s": "s sec secs seconds second sek sekunde sekunden secondes secondi segundos 秒 秒数 秒間 초 сек sec.",
+    "min": "min mins minute minutes minuten min. minuti minutos 分 分鐘 分钟 분 мин",
+    "h": "h hr hrs hour hours std std. stunde stunden heure heures ora ore hora horas "
+    "時間 小时 小時 시간 час часы",
+    "d": "d day days tag tage jour jours giorno giorni dia dias 日 天 일",
+}
+_TIME = {word: unit for unit, words in _TIMES.items() for word in words.split()}
+# what a clock is called
+CLOCKS = re.compile(
+    r"\b(time|zeit|datetime|timestamp|zeitstempel|date|datum|elapsed|seconds|minutes|hours|clock|stamp|uhrzeit|"
+    r"sekunden|minuten|stunden|laufzeit|messzeit|heure|temps|fecha|tiempo|tempo|ora|data|orario|tijd|t)\b|"
+    r"(time|zeit|stamp)\b|zeit\b|時刻|時間|日時|日付|経過|时间|日期|시간|время|дата"
+)
+DEGREES = ("degC", "degF", "K")
+_SUPERSCRIPTS = str.maketrans("²³⁻¹", "23-1")
+
+
+def _folded(written: str) -> str:
+    text = written.strip().replace("º", "°").replace("˚", "°").replace("℃", "°C").replace("℉", "°F")
+    return re.sub(r"\s+", "", unicodedata.normalize("NFKC", text)).casefold().strip("[]()")
+
+
+def known_unit(written: str) -> str | None:
+    """The unit of a list that a text spells, or None.
+
+    >>> known_unit("℃"), known_unit("U/min"), known_unit("min⁻¹"), known_unit("quux")
+    ('degC', 'rpm', 'rpm', None)
+    """
+    return _KNOWN.get(_folded(written))
+
+
+def time_unit(written: str) -> str | None:
+    """A unit of time that a text spells, or None.
+
+    >>> time_unit("Min."), time_unit("経過時間") is None, time_unit("分"), time_unit("sek")
+    ('min', True, 'min', 's')
+    """
+    return _TIME.get(_folded(written)) or _TIME.get(_folded(written).rstrip("."))
+
+
+def unit_of(written: str) -> tuple[str, str | None]:
+    """A unit as it is written, mended where loggers leave out a sign (W/m2), and as one of the list, or
+    None.
+    """
+    spelled = re.sub(
+        r"(?<=[a-zA-Z])(?=[2-4](?!\w))", "**", written.strip().replace("º", "°").replace("˚", "°")
+    )
+    return spelled, known_unit(written)
+
+
+def unit_in(header: str) -> tuple[str, str] | None:
+    """Name and unit of a header such as ``Bed temp [°F]``, ``P_drive (kW)``, ``Zeit in s``, ``T1_degC``,
+    or None.
+
+    >>> unit_in("Bed temp [°F]"), unit_in("T1_degC"), unit_in("主軸温度（℃）"), unit_in("x [table]")
+    (('Bed temp', '°F'), ('T1', 'degC'), ('主軸温度', '℃'), None)
+    """
+    for form in _WITH_UNIT:
+        found = form.fullmatch(header)
+        if not found or not found[1].strip():
+            continue
+        name, unit = found[1].strip(), found[2].strip()
+        if _is_unit(unit, form is _WITH_UNIT[0]) and (form is _WITH_UNIT[0] or _belongs(name, unit)):
+            return name, unit
+    return None
+
+
+def _belongs(name: str, unit: str) -> bool:
+    """Whether a single letter behind a name is its unit: T1_C is a temperature, Heater A is one of two."""
+    if len(unit) > 1 or unit in "%°":
+        return True
+    has = dimension_of(known_unit(unit) or "")
+    says = {quantity for word in words_of(name) for quantity, odds in word.says.items() if odds > 1.5}
+    return bool(has.keys() & says) or (time_unit(unit) is not None and bool(CLOCKS.search(fold(name))))
+
+
+_WITH_UNIT = (
+    re.compile(r"(.*?)\s*[\[(（［【<]([^\])）］】>]*)[\])）］】>]\s*\.?"),
+    re.compile(r"(.*?)\s+in\s+(\S+)"),
+    re.compile(r"(.*?)\s*[,/:]\s*(\S+)"),
+    re.compile(r"(.*?)[_ ]([^\s_]+(?:/[^\s_]+)?)"),
+)
+
+
+def _is_unit(written: str, bracketed: bool) -> bool:
+    """Whether a text is a unit; in brackets it may be one that pint knows, or is meant to be one."""
+    written = written.strip()
+    if known_unit(written) or time_unit(written):
+        return bracketed or _folded(written) not in ("1", "-", "m", "n", "h", "d")
+    if not bracketed:
+        return False
+    try:
+        parse_unit(unit_of(written)[0])
+    except ValueError:
+        return bool(re.search(r"[/°%]|\d$", written)) and not re.search(r"\s", written)
+    return True
+
+
+def dimension_of(unit: str) -> Mapping[str, float]:
+    """Log odds of the quantities that have a unit, as pint knows it; empty for one that says nothing."""
+    if unit in _ODDS:
+        return _ODDS[unit]
+    try:
+        given = parse_unit(unit)
+    except ValueError:
+        return {}
+    for like, odds in _ODDS.items():
+        try:
+            if like not in ("1", "percent") and given.is_compatible_with(parse_unit(like)):
+                return odds
+        except ValueError:
+            continue
+    return {} if given.dimensionless else {"other": 9, "torque": 4, "position": 3}
+
+
+_T, _W, _A, _V = {"temperature": 12}, {"power": 12}, {"current": 12}, {"voltage": 12}
+_ODDS: dict[str, Mapping[str, float]] = {
+    "degC": _T,
+    "degF": _T,
+    "K": _T,
+    "W": _W,
+    "A": _A,
+    "V": _V,
+    "rpm": {"speed": 12},
+    "1/s": {"speed": 6, "other": 6},
+    "um": {"displacement": 9, "correction": 7, "position": 3},
+    "mm": {"displacement": 5, "correction": 4, "nozzle height": 4, "position": 6},
+    "um/m": {"displacement": 9, "correction": 7},
+    "l/min": {"flow": 12},
+    "percent": {
+        "signal": 3,
+        "flow": 1.5,
+        "power": 2.5,
+        "other": 1,
+        "torque": 2,
+        "speed": 0,
+        "temperature": -9,
+        "displacement": -9,
+        "current": -3,
+        "voltage": -3,
+    },
+    "N*m": {"torque": 12},
+    "N": {"torque": 10},
+    "bar": {"other": 12},
+    "m/s": {"position": 8, "other": 7},
+    "1": {"temperature": -3, "displacement": -4, "current": -3, "voltage": -3},
+    "W/m**2": {"other": 12},
+}

@@ -1,0 +1,349 @@
+"""Tables as they come: text of any encoding and mark, Excel, Parquet; what stands above the header, units."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from discovery.errors import UserError
+from discovery.firsthour.cells import holds_word, is_empty, is_number, is_stamp, is_switch
+from discovery.firsthour.encodings import decode
+from discovery.firsthour.measures import known_unit, time_unit, unit_in
+from discovery.firsthour.workbooks import is_workbook, read_workbook
+from discovery.limits import check_shape, read_table
+from discovery.recordings.columns import Lines
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Row = tuple[int, list[str]]
+"""Number of the line, and its cells."""
+
+FEWEST = 10  # rows of a recording
+_HEAD = 400  # lines in which the first reading has to stand
+_TAIL = 50
+_CHUNK = 20_000  # rows that are words in memory at once
+_MARKS = (";", "\t", ",", "|", "  ", "")  # "  ": two blanks or more; "": any blanks
+_TRAILER = 12  # lines below the readings that hold something else, at most
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table cut into cells.
+
+    `header`, `units` (or ""), `groups` (words that stand over a name, or explain it further up), each (C,);
+    `columns`: C columns of words. `lines` (N,): where each row stands. `above`: the lines over the header.
+    `name`: of a worksheet. `line`: of the header. `mark`: between its cells, "" for blanks.
+    """
+
+    path: Path
+    name: str
+    header: tuple[str, ...]
+    units: tuple[str, ...]
+    groups: tuple[str, ...]
+    columns: tuple[pa.ChunkedArray, ...]
+    lines: Lines
+    above: tuple[str, ...]
+    notes: tuple[str, ...]
+    line: int
+    mark: str
+
+    @property
+    def rows(self) -> int:
+        """How many rows of readings there are."""
+        return len(self.lines)
+
+    def cells(self, column: int) -> list[str]:
+        """The words of a column, (N,)."""
+        found: list[str] = self.columns[column].to_pylist()
+        return found
+
+    def at(self, row: int) -> str:
+        """File and line of a row, for messages."""
+        return f"{self.path}, line {self.lines[row]}"
+
+
+def read_sheets(path: Path) -> list[Sheet]:
+    """The tables of a file: one of a text, one for each worksheet of the same columns.
+
+    Raises:
+        UserError: no regular file, no text, no header, fewer than ten rows, or a ragged row.
+    """
+    if is_workbook(path):
+        return _worksheets(path)
+    text, notes = decode(read_table(path), path)
+    lines = [
+        (k, line.rstrip()) for k, line in enumerate(io.StringIO(text), start=1) if line.strip(" \t;,\r\n")
+    ]
+    remarks = [line.lstrip("# ") for _, line in lines if line.lstrip().startswith("#")]
+    kept = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
+    if len(kept) < 2:
+        raise UserError(f"{path}: a header and rows of numbers are expected")
+    mark = _mark([line for _, line in kept])
+    first = _split(kept[0][1], mark)
+    if remarks and _is_data(first) and len(_split(remarks[-1], mark)) == len(first):
+        kept.insert(0, (kept[0][0] - 1, remarks[-1]))  # the header is a remark
+    return [_sheet(path, "", _Lines(kept, mark), mark, tuple(remarks), notes)]
+
+
+def _worksheets(path: Path) -> list[Sheet]:
+    found, refused = [], []
+    for name, rows in read_workbook(path).items():
+        try:
+            found.append(_sheet(path, name, _Lines(rows, None), "", (), ()))
+        except UserError as error:
+            refused.append(error)
+    if not found:
+        raise refused[0] if refused else UserError(f"{path}: no worksheet holds anything")
+    largest = max(found, key=lambda sheet: sheet.rows)
+    return [sheet for sheet in found if sheet.header == largest.header]
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """Lines of a table, cut into cells when they are asked for; `mark` None: they are cut already."""
+
+    lines: Sequence[tuple[int, Any]]
+    mark: str | None
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def cut(self, first: int, last: int | None = None) -> Iterator[Row]:
+        """The rows from one up to another."""
+        for number, line in islice(self.lines, first, last):
+            yield number, line if self.mark is None else _split(line, self.mark)
+
+
+def _mark(lines: Sequence[str]) -> str:
+    """What separates the cells: with it most lines have as many cells, and most of these can be read."""
+    sample = lines[len(lines) // 2 :][:_TAIL] + lines[-_TAIL:]
+
+    def score(mark: str) -> tuple[float, int]:
+        rows = [_split(line, mark) for line in sample]
+        width, same = Counter(map(len, rows)).most_common(1)[0]
+        cells = [cell for row in rows for cell in row]
+        readable = sum(map(_plain, cells)) / max(1, len(cells))
+        share = round(same / len(rows), 1) * (0.2 + round(readable, 1))
+        return (share if width > 1 else 0.0), -_MARKS.index(mark)
+
+    best = max(_MARKS, key=score)
+    return best if score(best)[0] > 0 else ","
+
+
+def _plain(cell: str) -> bool:
+    """Whether a cell is a number without blanks inside, a stamp, a switch or nothing."""
+    if is_number(cell):
+        return not re.search(r"\d\s+\d", cell)
+    return is_stamp(cell) or is_switch(cell) or is_empty(cell)
+
+
+def _split(line: str, mark: str) -> list[str]:
+    if mark.strip() or mark == "\t":
+        cells = line.split(mark)
+        if '"' in line:
+            with suppress(csv.Error):  # quotes that do not match are letters
+                cells = next(csv.reader([line], delimiter=mark), [])
+        return [cell.strip() for cell in cells]
+    return re.split(r"\s{2,}|\t", line.strip()) if mark else line.split()
+
+
+def _sheet(
+    path: Path, name: str, lines: _Lines, mark: str, remarks: tuple[str, ...], notes: tuple[str, ...]
+) -> Sheet:
+    head = list(lines.cut(0, _HEAD))
+    middle = list(lines.cut(len(lines) // 2, len(lines) // 2 + _HEAD))
+    width, spare = _width(head, middle)
+    first = next((k for k, (_, c) in enumerate(head) if len(c) in (width, spare) and _is_data(c)), None)
+    at, units, groups = _header(path, head, first, width)
+    body = first if first is not None else at + 1
+    columns, numbers, left = _body(path, lines, body, width, spare, head[at][1])
+    rows = len(numbers)
+    if rows < FEWEST:
+        raise UserError(
+            f"{path}: only {rows} rows of data below the header; a recording needs at least {FEWEST}"
+        )
+    check_shape(path, rows, width)
+    header = (*head[at][1], *[""] * width)[:width]
+    above = (*remarks, *("  ".join(filter(None, cells)) for _, cells in head[:at]))
+    said = (*notes, *([f"{at} lines above the header were passed over"] if at else ()), *left)
+    groups = [group or _explained(word, head[:at]) for group, word in zip(groups, header, strict=True)]
+    return Sheet(
+        path,
+        name,
+        tuple(header),
+        tuple(units),
+        tuple(groups),
+        columns,
+        numbers,
+        above,
+        said,
+        head[at][0],
+        mark,
+    )
+
+
+def _width(head: Sequence[Row], middle: Sequence[Row]) -> tuple[int, int]:
+    """Cells of most rows, and how many a row with a mark too many at its end has.
+
+    A mark behind the last number alone, or behind the last name alone, ends no column.
+    """
+    width = Counter(len(cells) for _, cells in middle).most_common(1)[0][0]
+    ended = not any(cells[-1] for _, cells in middle if len(cells) == width)
+    names = any(len(c) == width - 1 and len(c) > 1 and all(map(holds_word, c)) for _, c in head)
+    return (width - 1, width) if ended and names else (width, width + 1)
+
+
+def _header(
+    path: Path, head: Sequence[Row], first: int | None, width: int
+) -> tuple[int, list[str], list[str]]:
+    """Where the names stand, the units below or above them, and what stands over a group of names."""
+    if first == 0:
+        raise UserError(
+            f"{path}, line {head[0][0]}: numbers where the names of the columns should stand; "
+            f"put a line of {width} names above them, such as time,heater,T1"
+        )
+    end = len(head) if first is None else first
+    rows = [(k, _fitted(head[k][1], width)) for k in range(end)]
+    full = [(k, cells) for k, cells in rows if cells is not None]
+    if not full:
+        _compare(path, head[:end], width)
+        raise UserError(
+            f"{path}: no header above the rows of {width} cells; write {width} names, starting with time"
+        )
+    if first is None:  # nothing can be read as data: the fullest row is the header
+        at = max(full, key=lambda one: (sum(map(bool, one[1])), -one[0]))[0]
+        return at, [""] * width, [""] * width
+    units = [""] * width
+    at, names = full[-1]
+    others = [one for one in full[:-1] if one[0] >= at - 3]
+    if others and _are_units(names):
+        units, (at, names) = names, others[-1]
+        others = others[:-1]
+    elif others and _are_units(others[-1][1]):
+        units, others = others[-1][1], others[:-1]
+    above = others[-1][1] if others and others[-1][0] == at - 1 else [""] * width
+    groups = _spread_out(above) if sum(map(bool, above)) > 1 else [""] * width
+    return at, [u if u == "-" or not is_empty(u) else "" for u in units], groups
+
+
+def _fitted(cells: list[str], width: int) -> list[str] | None:
+    """A line of names or units with as many cells as there are columns, or None."""
+    if len(cells) == width:
+        return cells
+    return cells[:width] if len(cells) == width + 1 and not cells[-1] else None
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Whether a row names units: most of its cells are such, or a "-"."""
+    known = [cell for cell in cells if cell]
+    named = [known_unit(cell) or time_unit(cell) or unit_in(f"x [{cell.strip('[]()')}]") for cell in known]
+    return sum(map(bool, named)) >= max(1, len(known) / 2)
+
+
+def _spread_out(cells: Sequence[str]) -> list[str]:
+    """A word over a group of columns stands over the first of them alone."""
+    found: list[str] = []
+    for cell in cells:
+        found.append(cell or (found[-1] if found else ""))
+    return found
+
+
+def _explained(name: str, above: Sequence[Row]) -> str:
+    """What a list of channels over the table says of a name such as CH1, or ""."""
+    rows = [
+        cells for _, cells in above if cells and cells[0].casefold() == name.casefold() and len(cells) > 1
+    ]
+    return next((cell for row in rows for cell in row[1:2] if holds_word(cell)), "")
+
+
+def _body(
+    path: Path, lines: _Lines, first: int, width: int, spare: int, header: list[str]
+) -> tuple[tuple[pa.ChunkedArray, ...], Lines, tuple[str, ...]]:
+    """Columns of words, the line of each row, and what was left out: a header once more, what stands
+    below.
+    """
+    import pyarrow as pa
+
+    chunks: list[list[pa.Array]] = [[] for _ in range(width)]
+    numbers: list[int] = []
+    kept: list[list[str]] = []
+    again = 0
+    ragged: tuple[int, int] | None = None
+    trailer: list[int] = []
+
+    def store() -> None:
+        for column, cells in zip(chunks, zip(*kept, strict=True), strict=True):
+            column.append(pa.array(cells, type=pa.string()))
+        kept.clear()
+
+    for index, (line, cells) in enumerate(lines.cut(first), start=first):
+        if len(cells) == spare and (spare < width or not cells[-1]):
+            cells = cells[:width] if spare > width else [*cells, ""]
+        last = len(lines) - index <= _TRAILER and index > first + FEWEST
+        if len(cells) != width or (last and not _is_data(cells) and holds_word(cells[0])):
+            cut_off = index == len(lines) - 1 and len(cells) < width
+            if cells[:width] == header[:width]:
+                again += 1
+            elif last and (cut_off or not _is_data(cells)):
+                trailer.append(line)
+            elif ragged is None:
+                ragged = line, len(cells)
+            continue
+        if cells == header:
+            again += 1
+            continue
+        if trailer and ragged is None:  # readings go on: what was taken for the end is a broken row
+            ragged = trailer[0], -1
+        kept.append(cells)
+        numbers.append(line)
+        if len(kept) == _CHUNK:
+            store()
+    if ragged is not None:
+        count = (
+            f"{ragged[1]} cells where the header has {width}"
+            if ragged[1] >= 0
+            else "cells that are no readings"
+        )
+        raise UserError(f"{path}, line {ragged[0]}: {count}; mend the row")
+    if kept:
+        store()
+    notes = [f"{again} rows repeat the header: left out"] if again else []
+    if trailer:
+        rest = f" and {len(trailer) - 1} more" if trailer[1:] else ""
+        notes.append(f"line {trailer[0]}{rest} below the readings: left out")
+    return (
+        tuple(map(pa.chunked_array, chunks)) if numbers else (),
+        np.array(numbers, dtype=np.int64),
+        tuple(notes),
+    )
+
+
+def _compare(path: Path, above: Sequence[Row], width: int) -> None:
+    """Raise a UserError where the line above the rows is a header with more or fewer names than they have."""
+    line, names = above[-1] if above else (0, [])
+    if len(names) > 1 and all(holds_word(name) for name in names):
+        raise UserError(
+            f"{path}, line {line}: the header has {len(names)} names, the rows {width} cells; "
+            f"{'add the missing names' if len(names) < width else 'a name too many or a column is missing'}"
+        )
+
+
+def _is_data(cells: Sequence[str]) -> bool:
+    """More numbers, stamps and switches than words; a header or a row of units has none.
+
+    Words for "not measured" count for neither: a logger often has nothing yet in its first row.
+    """
+    known = [cell for cell in cells if not is_empty(cell)]
+    readable = [c for c in known if is_number(c) or is_stamp(c) or is_switch(c)]
+    return len(readable) > len(known) / 2

@@ -1,0 +1,119 @@
+"""Recordings and channels that are copies of each other, with noise added, cut, scaled or shifted.
+
+The noise of readings is drawn anew each time. Two series whose second differences hang together share their
+noise: one is a copy of the other, whatever was done to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from discovery.recordings.campaign import Campaign, Channel
+from discovery.recordings.columns import Array
+from discovery.recordings.compare.seen import Seen
+from discovery.recordings.finding import Finding
+
+_FEWEST = 60  # readings in common
+_ALIKE = 0.8  # correlation of second differences
+_TOGETHER = 0.99  # correlation of the readings of a channel and its copy
+_JUMPS = 0.1  # of the second differences, at most
+_TAIL = 3.0  # robust standard deviations beyond which a second difference is a jump, no noise
+
+
+def copied_channels(one: Seen, channels: Mapping[str, Channel]) -> Iterator[Finding]:
+    """Errors that stand once more among the inputs, and channels recorded twice."""
+    names = [
+        n
+        for n, c in channels.items()
+        if n in one.values and n not in one.constant and c.role != "applied correction"
+    ]
+    for k, a in enumerate(names):
+        for b in names[k + 1 :]:
+            if not (channels[a].measured or channels[b].measured):
+                continue
+            both = np.isfinite(one.values[a]) & np.isfinite(one.values[b])
+            if both.sum() < _FEWEST:
+                continue
+            found = share_noise(one.values[a][both], one.values[b][both])
+            if not found:
+                continue
+            output, other = (a, b) if channels[a].measured else (b, a)
+            if channels[other].is_input:
+                what = f"the input '{other}' is a copy of '{output}'"
+                do = "take it out: a model would read its own answer"
+                yield Finding("error", one.file, None, what, do, "leak", other, 5.0)
+            elif channels[a].role == channels[b].role:
+                what, do = f"'{other}' and '{output}' are the same readings", "take one of the two out"
+                yield Finding("warning", one.file, None, what, do, "copy", other, 1.0)
+
+
+def near_copies(
+    recordings: Sequence[Seen], channels: Mapping[str, Channel]
+) -> Iterator[tuple[str, str, str]]:
+    """Pairs of recordings that share their noise: names, and the channel that shows it."""
+    measured = [n for n, c in channels.items() if c.measured]
+    series = {
+        (one.name, name): _second(one.known(name)[1])
+        for one in recordings
+        for name in measured
+        if name in one.values and one.known(name)[1].size >= _FEWEST
+    }
+    for k, a in enumerate(recordings):
+        for b in recordings[k + 1 :]:
+            for name in measured:
+                left, right = series.get((a.name, name)), series.get((b.name, name))
+                if left is not None and right is not None and _overlap(left, right):
+                    yield a.name, b.name, name
+                    break
+
+
+def copies(campaign: Campaign, some: Collection[str], others: Collection[str]) -> Iterator[tuple[str, str]]:
+    """Each of some recordings that is a near copy of one of the others."""
+    wanted = {*some, *others}
+    seen = [
+        Seen(name, campaign.path, one.time, one.values, np.arange(len(one.time)))
+        for name, one in campaign.recordings.items()
+        if name in wanted
+    ]
+    for a, b, _ in near_copies(seen, campaign.channels):
+        for one, other in ((a, b), (b, a)):
+            if one in some and other in others:
+                yield one, other
+
+
+def share_noise(a: Array, b: Array) -> bool:
+    """Whether two series of the same stamps share their noise, and what they move."""
+    return _alike(_second(a), _second(b)) and abs(float(np.corrcoef(a, b)[0, 1])) > _TOGETHER
+
+
+def _second(readings: Array) -> Array:
+    """Second differences without what is no noise: jumps are cut to a few standard deviations."""
+    second = np.diff(readings, 2)
+    scale = 1.4826 * float(np.median(np.abs(second - np.median(second))))
+    if scale <= 0 or np.mean(np.abs(second) > _TAIL * scale) > _JUMPS:
+        return np.zeros(0)  # a series of jumps has no noise that could be shared
+    return np.asarray(np.clip(second / scale, -_TAIL, _TAIL))
+
+
+def _alike(a: Array, b: Array) -> bool:
+    if a.size < _FEWEST or a.size != b.size:
+        return False
+    return abs(float(np.corrcoef(a, b)[0, 1])) > _ALIKE
+
+
+def _overlap(a: Array, b: Array) -> bool:
+    """Whether one series hangs together with the other at any shift."""
+    if a.size < _FEWEST or b.size < _FEWEST:
+        return False
+    from scipy.signal import correlate, correlation_lags
+
+    together = correlate(a, b, method="fft")
+    lags = correlation_lags(a.size, b.size)
+    count = np.minimum(a.size, b.size + lags) - np.maximum(0, lags)
+    enough = count >= max(_FEWEST, 0.25 * min(a.size, b.size))
+    if not enough.any():
+        return False
+    norm = float(np.sqrt(np.mean(a**2) * np.mean(b**2)))
+    return bool(np.max(np.abs(together[enough] / count[enough])) > _ALIKE * norm)

@@ -1,0 +1,221 @@
+"""Values that no sensor means: a logger's words for "nothing", zeros for missing readings, lone readings,
+steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from discovery.recordings.columns import Array, Lines
+from discovery.recordings.finding import Finding, more
+from discovery.recordings.roles import ROLES
+
+if TYPE_CHECKING:
+    from discovery.recordings.campaign import Channel
+
+FEW = 20  # readings: fewer carry no model
+# what loggers write where they have nothing: limits of number formats, broken thermocouples, power-on values
+_WORDS = (
+    -999.0,
+    -9999.0,
+    -99999.0,
+    999.0,
+    9999.0,
+    99999.0,
+    999.9,
+    -999.9,
+    9999.9,
+    999.99,
+    9999.99,
+    -99.9,
+    -127.0,
+    32767.0,
+    -32768.0,
+    3276.7,
+    -3276.8,
+    65535.0,
+    6553.5,
+    1e6,
+    999999.0,
+    2147483647.0,
+    -2147483648.0,
+    4294967295.0,
+)
+_LARGEST = 1e15  # no quantity of a machine is so large in any unit
+_APART = 3.0  # times the span of the other readings
+_LONE = 20.0  # median steps: a single reading so far from both neighbours is wrong
+_USUAL = 6.0  # times the steps that one in ten exceeds
+_AGREE = 0.3  # of that distance: what the neighbours differ by
+# so far away that nothing but a fault explains it: such a reading is left out on loading
+_IMPOSSIBLE = {"degC": 30.0, "um": 100.0, "um/m": 100.0}
+_SOME = 3  # readings that are none: no slip any more
+_MANY, _MANY_SHARE = 5, 0.01  # so many lone readings, or such a share of all, pull at a fit
+_ZERO = 15.0  # median steps that a reading falls to be exactly zero
+_STEP = 12.0  # times the largest of the steps around it: a jump, not a response
+_SENSORS = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature", "error")
+
+
+def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
+    """All of these. `column` (T,): canonical unit."""
+    known = np.flatnonzero(np.isfinite(column))
+    read = column[known]
+    if not known.size:
+        return
+    words = _logger_words(read)
+    limits = ROLES[channel.role].ranges.get(channel.unit)
+    told = np.zeros(0, dtype=np.intp)  # what lies outside its range is told already
+    if limits is not None:
+        told = np.flatnonzero((read < limits.usual[0]) | (read > limits.usual[1]))
+    words = np.setdiff1d(words, told)
+    yield from _told(
+        file,
+        lines[known],
+        channel,
+        read,
+        words,
+        "no reading but a logger's word for nothing",
+        "empty these cells",
+        "sentinel",
+        weight=5.0,
+    )
+    if channel.role not in _SENSORS or known.size < FEW:
+        return
+    zeros = np.setdiff1d(_zeros(read), words)
+    yield from _told(
+        file,
+        lines[known],
+        channel,
+        read,
+        zeros,
+        "exactly zero between readings far from it",
+        "empty the cells where nothing was measured",
+        "zeros",
+        weight=4.0,
+    )
+    lone = np.setdiff1d(lone_readings(read), [*words, *zeros, *told])
+    left_out = np.intersect1d(lone, impossible_readings(channel, read)).size
+    if left_out or lone.size >= max(_MANY, _MANY_SHARE * read.size):
+        first = int(lone[0])
+        what = (
+            f"'{channel.name}' is {read[first]:g} {channel.unit} in one reading between "
+            f"{read[first - 1]:g} and {read[first + 1]:g}"
+        )
+        do = "it is left out" if left_out else "leave the cell empty if the sensor failed there"
+        line = int(lines[known[first]])
+        yield Finding("warning", file, line, what + more(lone.size), do, "outlier", channel.name, 2.0)
+    if not channel.measured:  # the air may jump: a door
+        return
+    for row in _steps(read, np.unique(np.concatenate((words, zeros, lone, told)))):
+        what = (
+            f"'{channel.name}' jumps from {read[row]:g} to {read[row + 1]:g} {channel.unit} and stays there"
+        )
+        do = "a sensor that moved, or a new zero: split the recording there"
+        yield Finding("warning", file, int(lines[known[row + 1]]), what, do, "step", channel.name, 2.0)
+
+
+def odd_readings(channel: Channel, read: Array) -> Lines:
+    """Rows of readings (R,) that are words for nothing, zeros for missing readings, or stand alone."""
+    words = _logger_words(read)
+    if channel.role not in _SENSORS or read.size < FEW:
+        return words
+    return np.unique(np.concatenate((words, _zeros(read), lone_readings(read))))
+
+
+def impossible_readings(channel: Channel, read: Array) -> Lines:
+    """Rows of readings (R,) that stand alone so far from their neighbours that only a fault explains them."""
+    least = _IMPOSSIBLE.get(channel.unit)
+    if channel.role not in _SENSORS or least is None or read.size < FEW:
+        return np.zeros(0, dtype=np.intp)
+    return lone_readings(read, least)
+
+
+def lone_readings(read: Array, least: float = 0.0) -> Lines:
+    """Rows of single readings (R,) far from both neighbours, which agree."""
+    steps = np.diff(read)
+    if steps.size < 3 or not steps.any():
+        return np.zeros(0, dtype=np.intp)
+    sizes = np.abs(steps)
+    usual = 1.4826 * float(np.median(sizes))
+    far = max(_LONE * usual, _USUAL * float(np.percentile(sizes, 90)), least)
+    if usual == 0.0 and far == 0.0:
+        return np.zeros(0, dtype=np.intp)
+    away = np.minimum(sizes[:-1], sizes[1:])
+    turns = np.sign(steps[:-1]) != np.sign(steps[1:])
+    agree = np.abs(read[2:] - read[:-2]) < _AGREE * away
+    return np.flatnonzero((away > far) & turns & agree) + 1
+
+
+def _logger_words(read: Array) -> Lines:
+    """Rows that hold a known word for nothing, far from all other readings."""
+    found = [np.flatnonzero(np.abs(read) > _LARGEST)]
+    for word in _WORDS:
+        rows = np.flatnonzero(read == word)
+        if not rows.size or rows.size > 0.5 * read.size:
+            continue
+        rest = np.delete(read, rows)
+        rest = rest[~np.isin(rest, _WORDS)]
+        if rest.size and min(abs(word - rest.min()), abs(word - rest.max())) > _APART * max(
+            float(np.ptp(rest)), 1.0
+        ):
+            found.append(rows)
+    return np.unique(np.concatenate(found))
+
+
+def _zeros(read: Array) -> Lines:
+    """Rows of exact zeros where the last and the next other reading are far from zero."""
+    rows = np.flatnonzero(read == 0.0)
+    others = np.flatnonzero(read != 0.0)
+    if not rows.size or others.size < FEW or rows.size > 0.4 * read.size:
+        return np.zeros(0, dtype=np.intp)
+    usual = 1.4826 * float(np.median(np.abs(np.diff(read[others])))) or 1e-12
+    place = np.searchsorted(others, rows)
+    before, after = others[np.maximum(place - 1, 0)], others[np.minimum(place, others.size - 1)]
+    near = np.minimum(np.abs(read[before]), np.abs(read[after]))
+    between = np.sign(read[before]) == np.sign(read[after])
+    return np.asarray(rows[(near > _ZERO * usual) & between])
+
+
+def _steps(read: Array, wrong: Lines) -> Iterator[int]:
+    """Rows after which readings jump and stay: a step far larger than all steps around it."""
+    kept = np.delete(np.arange(read.size), wrong.astype(np.intp))
+    steps = np.abs(np.diff(read[kept]))
+    usual = 1.4826 * float(np.median(steps)) if steps.size else 0.0
+    if usual == 0.0 or steps.size < FEW:
+        return
+    for row in np.flatnonzero(steps > 2 * _STEP * usual):
+        around = np.concatenate((steps[max(0, row - 6) : row], steps[row + 1 : row + 7]))
+        if around.size < 8 or steps[row] < _STEP * around.max():
+            continue
+        before, after = read[kept][max(0, row - 5) : row + 1], read[kept][row + 1 : row + 7]
+        if abs(np.median(after) - np.median(before)) > 0.7 * steps[row]:
+            yield int(kept[row])
+
+
+def _told(
+    file: Path,
+    lines: Lines,
+    channel: Channel,
+    read: Array,
+    rows: Lines,
+    why: str,
+    do: str,
+    kind: str,
+    *,
+    weight: float,
+) -> Iterator[Finding]:
+    if rows.size:
+        what = f"'{channel.name}' is {read[rows[0]]:g}, {why}"
+        yield Finding(
+            "error" if rows.size >= _SOME else "warning",
+            file,
+            int(lines[rows[0]]),
+            what + more(rows.size),
+            do,
+            kind,
+            channel.name,
+            weight,
+        )
