@@ -51,14 +51,11 @@ def _signature(name: str, thing: Any) -> str:
         parameters = list(inspect.signature(thing).parameters.values())
     except (TypeError, ValueError):
         return name
-    shown = [str(p.replace(annotation=_plain(p.annotation))) for p in parameters if p.name != "self"]
+    shown = [
+        re.sub(r"=<.*>$", "=...", str(p.replace(annotation=p.empty))) for p in parameters if p.name != "self"
+    ]
     line = f"{name}({', '.join(shown)})"
     return line if len(line) < 90 else f"{name}(\n    " + ",\n    ".join(shown) + ",\n)"
-
-
-def _plain(annotation: Any) -> Any:
-    """Annotations are left to the type checker; the docstring says what an argument is."""
-    return inspect.Parameter.empty if annotation is not inspect.Parameter.empty else annotation
 
 
 def _docstring(thing: Any) -> list[str]:
