@@ -24,7 +24,7 @@ coverage: $(STAMP)
 # The documentation site, built without a network; a broken link or a warning stops it
 site: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir build/site
-	@echo "The site: build/site/index.html"
+	@echo "The site: build/site/index.html (for its search: $(BIN)/python -m http.server --directory build/site)"
 
 # The reports of both demonstrations in a real browser; needs chromium, chromium-driver and npm
 AXE := build/browser/node_modules/axe-core/axe.min.js

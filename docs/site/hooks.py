@@ -73,6 +73,11 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     return _linked(markdown, f"docs/{source}", source)
 
 
+def on_post_page(output: str, **_: Any) -> str:
+    """Nothing is loaded from elsewhere. Without this script, search works over http, pages open from files."""
+    return re.sub(r'<script src="https://unpkg\.com/[^"]*"></script>', "", output)
+
+
 def _linked(text: str, source: str, page: str) -> str:
     """Links as they stand in the file `source` of the repository, turned into links of the page `page`."""
 
