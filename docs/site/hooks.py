@@ -74,7 +74,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 
 def on_post_page(output: str, **_: Any) -> str:
-    """Nothing is loaded from elsewhere. Without this script, search works over http, pages open from files."""
+    """Nothing is loaded from elsewhere. Without this script search works over http; pages open from files."""
     return re.sub(r'<script src="https://unpkg\.com/[^"]*"></script>', "", output)
 
 
