@@ -15,7 +15,7 @@ import discovery
 ROOT = Path(discovery.__file__).parent
 ORDER = (
     "__version__ errors naming printed progress threads",
-    "schema extras",
+    "schema extras limits",
     "files targets",
     "runfolder terms",
     "recordings",
