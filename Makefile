@@ -1,10 +1,14 @@
 # Everything is set up once in .venv from the project's own files; stamps keep it from being done twice.
 
-PYTHON ?= python3.11
 BIN    := .venv/bin
 STAMP  := .venv/installed.stamp
 
-.PHONY: demo test browser-test outside lint types lock audit licences fuzz clean
+# The first Python from 3.11 to 3.13 that runs; `make PYTHON=/path/to/python` takes another one.
+FITS   := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
+PYTHON ?= $(shell for one in python3.11 python3.12 python3.13 python3 python; do \
+	"$$one" -c '$(FITS)' >/dev/null 2>&1 && echo "$$one" && break; done)
+
+.PHONY: demo test coverage site browser-test outside lint types lock audit licences fuzz clean
 
 demo: $(STAMP)
 	$(BIN)/discovery run experiments/nmv5000.toml
@@ -12,6 +16,15 @@ demo: $(STAMP)
 
 test: $(STAMP)
 	$(BIN)/pytest -n auto
+
+# Lines and branches of discovery/ that the tests reach; the page is build/coverage/index.html
+coverage: $(STAMP)
+	$(BIN)/pytest -n auto --cov=discovery --cov-report=term:skip-covered --cov-report=html:build/coverage
+
+# The documentation site, built without a network; a broken link or a warning stops it
+site: $(STAMP)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir build/site
+	@echo "The site: build/site/index.html (for its search: $(BIN)/python -m http.server --directory build/site)"
 
 # The reports of both demonstrations in a real browser; needs chromium, chromium-driver and npm
 AXE := build/browser/node_modules/axe-core/axe.min.js
@@ -70,7 +83,11 @@ clean:
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache
 
 .venv/created.stamp:
-	$(PYTHON) -m venv .venv
+	@test -n "$(PYTHON)" || { echo "error: no Python from 3.11 to 3.13 was found. Install one" \
+	    "(Debian, Ubuntu: apt install python3 python3-venv), or name it: make PYTHON=/path/to/python3.12" >&2; exit 1; }
+	@"$(PYTHON)" -c '$(FITS)' || { echo "error: $(PYTHON) is no Python from 3.11 to 3.13 with venv and ensurepip." \
+	    "Install one (Debian, Ubuntu: apt install python3 python3-venv), or name it: make PYTHON=/path/to/python3.12" >&2; exit 1; }
+	"$(PYTHON)" -m venv .venv
 	@touch $@
 
 $(STAMP): .venv/created.stamp requirements.lock pyproject.toml

@@ -20,14 +20,15 @@ if TYPE_CHECKING:
     from discovery.diagnosis import diagnose
     from discovery.errors import UserError
     from discovery.estimator import SparseDiscovery, discover
-    from discovery.experiment import run
     from discovery.fitting import fit_model
     from discovery.frames import campaign_from_frames, prediction_frame, recording_frame
     from discovery.models import read_model, write_model
+    from discovery.notebook import RunResults, run
     from discovery.recordings import load_campaign
     from discovery.report import write_report
 
 _HOME = {
+    "RunResults": "notebook",
     "SparseDiscovery": "estimator",
     "UserError": "errors",
     "campaign_from_frames": "frames",
@@ -38,12 +39,13 @@ _HOME = {
     "prediction_frame": "frames",
     "read_model": "models",
     "recording_frame": "frames",
-    "run": "experiment",
+    "run": "notebook",
     "write_model": "models",
     "write_report": "report",
 }
 
 __all__ = [
+    "RunResults",
     "SparseDiscovery",
     "UserError",
     "campaign_from_frames",
@@ -60,7 +62,15 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    return sorted({*__all__, "__version__"})
+
+
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
-        raise AttributeError(f"module 'discovery' has no attribute '{name}'")
+        if name.startswith("_"):
+            raise AttributeError(f"module 'discovery' has no attribute '{name}'")
+        from discovery.schema import suggest
+
+        raise AttributeError(f"module 'discovery' has no attribute '{name}'; {suggest(name, __all__)}")
     return getattr(import_module(f"discovery.{_HOME[name]}"), name)

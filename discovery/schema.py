@@ -1,11 +1,14 @@
 """What pydantic says about a file, as one sentence a person can act on."""
 
 import types
+from collections.abc import Mapping
 from difflib import get_close_matches
-from typing import Any, Union, get_args, get_origin
+from typing import Any, NoReturn, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
+
+from discovery.errors import UserError
 
 Key = tuple[str | int, ...]
 _TABLE, _LIST = "a table, as { key = value }", 'a list, as ["a", "b"]'
@@ -20,6 +23,26 @@ class Strict(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, strict=True, allow_inf_nan=False
     )
+
+
+class Named(dict[str, Any]):
+    """Things by name; a wrong name is a sentence with the nearest right one.
+
+    >>> Named("recording", {"monday": 1})["mondy"]
+    Traceback (most recent call last):
+    ...
+    discovery.errors.UserError: no recording 'mondy'; did you mean 'monday'? Allowed are: monday
+    """
+
+    def __init__(self, kind: str, things: Mapping[str, Any]) -> None:
+        super().__init__(things)
+        self.kind = kind
+
+    def __missing__(self, name: str) -> NoReturn:
+        raise UserError(f"no {self.kind} '{name}'; {suggest(str(name), list(self))}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Named, (self.kind, dict(self))
 
 
 def sentences(schema: type[BaseModel], data: Any, error: ValidationError) -> list[tuple[Key, str]]:

@@ -15,7 +15,7 @@ import discovery
 ROOT = Path(discovery.__file__).parent
 ORDER = (
     "__version__ errors naming printed progress threads",
-    "schema extras",
+    "schema extras limits",
     "files targets",
     "runfolder terms",
     "recordings",
@@ -26,7 +26,7 @@ ORDER = (
     "diagnosis",
     "design report export",
     "experiment runtime",
-    "challenge firsthour estimator",
+    "challenge firsthour estimator notebook",
     "commands",
     "cli",
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,9 @@ from discovery.recordings import Campaign
 from discovery.threads import one_thread
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
     from discovery.diagnosis.document import DiagnosisDocument
 
 ANOTHER_NOISE = 0.05  # relative change of a channel's reading noise that calls for another search
@@ -87,6 +91,28 @@ class Diagnosis:
         from discovery.diagnosis.document import document
 
         return document(self)
+
+    def summary(self) -> str:
+        """What the command prints: verdict, effects with sizes, rivals, proof, next experiment."""
+        from discovery.diagnosis.summary import lines_of
+
+        return "\n".join(lines_of(self.document().model_dump()))
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row for each parameter of each named effect, with its 95 % interval."""
+        from discovery.diagnosis.shown import to_frame
+
+        return to_frame(self.document())
+
+    def plot(self) -> Figure:
+        """rms of free runs before and after the repair, for fitted and held-out recordings."""
+        from discovery.diagnosis.shown import plot
+
+        return plot(self.document())
+
+    def _repr_html_(self) -> str:
+        table = self.to_frame().to_html(index=False, float_format="{:.4g}".format)
+        return f"<pre>{escape(self.summary())}</pre>{table}"
 
 
 @one_thread

@@ -12,7 +12,11 @@ from discovery.runfolder import read_diagnosis
 
 def summary(folder: Path) -> list[str]:
     """Lines that say what the diagnosis.json of a folder says."""
-    d = read_diagnosis(folder)
+    return lines_of(read_diagnosis(folder))
+
+
+def lines_of(d: dict[str, Any]) -> list[str]:
+    """Lines that say what the content of a diagnosis.json says."""
     lines = [f"{d['verdict']} in '{d['model']}'"]
     for p in d["physics"]:
         sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q, p))

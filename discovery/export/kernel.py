@@ -23,7 +23,7 @@ LARGEST_SUBSTEPS = 4096  # stiffer than this is no thermal model
 
 
 @njit(cache=True, error_model="numpy")
-def run(table, value, r, u, x, d, p, t):  # type: ignore[no-untyped-def]
+def run(table, value, r, u, x, d, p, t):  # type: ignore[no-untyped-def]  # noqa: C901 - a line an operation
     """Fill the numbers r (I,) of a program: table (I, 5) of operation, three arguments, index; value (I,)."""
     for k in range(table.shape[0]):
         op = table[k, 0]

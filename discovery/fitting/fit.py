@@ -7,6 +7,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,10 @@ from discovery.fitting.solve import Loss, Solution, solve
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.threads import one_thread
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -65,6 +70,27 @@ class Fit:
             if u.is_offset and u.recording is not None:
                 found.setdefault(u.name, {})[u.recording] = (float(value), float(error))
         return found
+
+    def summary(self) -> str:
+        """Parameters with 95 % intervals, rms of the residual by recording, what is not determined."""
+        from discovery.fitting.shown import summary
+
+        return summary(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row for each parameter: value, low and high (95 % interval), unit, fixed."""
+        from discovery.fitting.shown import to_frame
+
+        return to_frame(self)
+
+    def plot(self) -> Figure:
+        """Readings and model of each fitted recording (columns) and output (rows)."""
+        from discovery.fitting.shown import plot
+
+        return plot(self)
+
+    def _repr_html_(self) -> str:
+        return self.to_frame().to_html(float_format="{:.4g}".format)
 
 
 @one_thread

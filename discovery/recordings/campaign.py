@@ -19,7 +19,7 @@ from discovery.recordings.oddvalues import impossible_readings
 from discovery.recordings.reading import read_columns
 from discovery.recordings.roles import ROLES, Between, is_input
 from discovery.recordings.units import Conversion, UnitError, conversion
-from discovery.schema import suggest
+from discovery.schema import Named, suggest
 
 Array = NDArray[np.float64]
 
@@ -75,6 +75,10 @@ class Campaign:
     recordings: Mapping[str, Recording]
     path: Path = field(default=Path())
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", Named("channel", self.channels))
+        object.__setattr__(self, "recordings", Named("recording", self.recordings))
+
     def unread(self, recordings: Collection[str], outputs: Collection[str]) -> str:
         """What to say where no recording holds a reading of any of the outputs; empty where one does."""
         values = (self.recordings[r].values.get(y, np.empty(0)) for r in recordings for y in outputs)
@@ -108,7 +112,7 @@ def load_campaign(path: str | os.PathLike[str], only: Collection[str] | None = N
         for name, one in form.recordings.items()
         if only is None or name in only
     }
-    return Campaign(form.name, MappingProxyType(channels), MappingProxyType(recordings), path)
+    return Campaign(form.name, channels, recordings, path)
 
 
 def make_channel(name: str, form: ChannelForm, to: Conversion) -> Channel:

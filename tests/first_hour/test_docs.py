@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -13,6 +15,11 @@ from discovery.cli import app
 
 ROOT = Path(__file__).parents[2]
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
+PAGES = sorted(
+    str(path.relative_to(ROOT))
+    for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"))
+    if "CHANGELOG" not in path.name
+)
 CLOSE = 0.15  # figures of the tutorial: within 15 %
 
 
@@ -53,6 +60,29 @@ def test_the_tutorial_prints_what_it_says(place: Path) -> None:
     assert commands == 6
     assert (place / "runs" / "heaters" / "report.html").exists()
     assert list((place / "runs" / "heaters" / "figures").glob("*.pdf"))
+    _the_readme_agrees_with(json.loads((place / "runs" / "heaters" / "results.json").read_text("utf-8")))
+
+
+def _the_readme_agrees_with(results: dict[str, Any]) -> None:
+    """The caption of the picture: what the simple and the repaired model leave at sensor 2."""
+    text = " ".join((ROOT / "README.md").read_text("utf-8").split())
+    peak, lag, rms = (
+        re.search(pattern, text)
+        for pattern in (
+            r"error at sensor 2 reaches (\d+) K",
+            r"sensor lag of (\d+) s",
+            r"rms is below (\d+) K",
+        )
+    )
+    assert peak
+    assert lag
+    assert rms
+    at = {name: one["recordings"]["step_h1_up_090"]["T2"] for name, one in results["models"].items()}
+    assert at["first_order"]["peak"] == pytest.approx(float(peak[1]), rel=CLOSE)
+    assert at["repaired"]["rms"] < float(rms[1])
+    lags = [p["value"] for n, p in results["models"]["repaired"]["values"].items() if n.startswith("t_lag")]
+    assert lags
+    assert lags == pytest.approx([float(lag[1])] * len(lags), rel=CLOSE)
 
 
 @pytest.mark.usefixtures("place")
@@ -65,12 +95,40 @@ def test_the_lines_for_a_notebook_run(capsys: pytest.CaptureFixture[str]) -> Non
     assert "('conduction_path', ['T1', 'T2'])" in printed
 
 
-def test_the_files_that_the_readme_names_are_there() -> None:
-    for page in ("README.md", "docs/tutorial.md", "docs/python.md"):
-        text = (ROOT / page).read_text("utf-8")
-        for target in re.findall(r"\]\(([^)#]+)\)", text):
-            if "://" not in target:
-                assert ((ROOT / page).parent / target).exists(), f"{page}: {target}"
+@pytest.mark.parametrize("page", PAGES)
+def test_the_files_that_a_page_names_are_there(page: str) -> None:
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", (ROOT / page).read_text("utf-8")):
+        if "://" not in target:
+            assert ((ROOT / page).parent / target).exists(), f"{page}: {target}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_option_that_a_page_names_exists(page: str) -> None:
+    from typer.main import get_command
+
+    verbs: dict[str, Any] = dict(get_command(app).commands)  # type: ignore[attr-defined]
+    text = (ROOT / page).read_text("utf-8").replace("\\\n", " ")
+    for verb, rest in re.findall(r"(?<![\w./-])(?:\.venv/bin/)?discovery ([a-z]+)\b([^\n`#]*)", text):
+        if verb not in verbs:
+            assert f"`discovery {verb}" not in text, f"{page}: there is no command '{verb}'"
+            continue
+        command, words = verbs[verb], rest.split()
+        if hasattr(command, "commands") and words:
+            assert words[0].split("|")[0] in command.commands, f"{page}: discovery {verb} {words[0]}"
+            command = command.commands[words[0].split("|")[0]]
+        known = {option for parameter in command.params for option in parameter.opts} | {"--help", "-h"}
+        named = {word.strip("),.;:").split("=")[0] for word in words if word.startswith("--")}
+        assert named <= known, f"{page}: discovery {verb} has no {', '.join(named - known)}"
+
+
+def test_the_style_page_quotes_twenty_pairs_and_none_of_the_old_sentences_came_back() -> None:
+    rows = re.findall(r"^\| (.+?) \| (.+?) \|$", (ROOT / "docs/style.md").read_text("utf-8"), re.M)
+    before = [row[0] for row in rows if row[0] not in ("before", "---")]
+    assert len(before) == 20
+    for page in set(PAGES) - {"docs/style.md"}:
+        text = " ".join((ROOT / page).read_text("utf-8").split())
+        for sentence in before:
+            assert sentence not in text, f"{page}: {sentence}"
 
 
 def test_every_command_that_the_readme_names_exists() -> None:
