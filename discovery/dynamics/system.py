@@ -72,8 +72,7 @@ class Trajectory:
 
 def make_system(model: Model, grid: Grid) -> System:
     """Bind a model to a grid."""
-    seen = np.atleast_1d(grid.measured.any(axis=0))
-    taken = [name for name, read in zip(grid.outputs, seen, strict=True) if read]
+    taken = [name for y, name in enumerate(grid.outputs) if grid.measured[:, y].any()]
     model = read_at_start(expanded(model, {*grid.samples, *grid.outputs}), taken)
     states = tuple(model.states)
     index = {name: i for i, name in enumerate(states)}

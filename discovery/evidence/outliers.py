@@ -75,7 +75,7 @@ def _returns(r: Array, middle: Array, limit: Array, suspect: NDArray[np.bool_]) 
     for k in np.flatnonzero(suspect):
         before, after = k - 1, k + 1
         row = (
-            suspect & (size > 0.5 * size[k]) & (size < 2 * size[k])
+            suspect & (size > 0.4 * size[k]) & (size < 2.5 * size[k])
         )  # what fades is a response, not a row of wrong readings
         while before > 0 and row[before] and after - before <= MOST:
             before -= 1

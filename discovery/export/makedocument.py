@@ -17,6 +17,7 @@ from discovery.export.knowledge import Knowledge, knowledge
 from discovery.export.ranges import OutputRange, input_range, output_ranges
 from discovery.export.stepper import INTEGRATOR
 from discovery.models import Model, Parameter, State, expanded
+from discovery.models.model import with_settled_memories
 from discovery.recordings import Campaign
 from discovery.terms import Expression, Name, Number, Term, names, substitute, text
 
@@ -33,7 +34,7 @@ def exportable(model: Model, campaign: Campaign) -> Model:
     Raises:
         UserError: no output is a channel, or a measured body and no room temperature.
     """
-    model = expanded(model, campaign.channels)
+    model = with_settled_memories(expanded(model, campaign.channels))
     own = {
         name: Name(name) for name in model.states if name in campaign.channels and name not in model.outputs
     }

@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count
 
-from discovery.terms import Apply, Expression, Name, Number, Term, names
-from discovery.terms.expression import rewrite
+from discovery.terms import Apply, Expression, Name, Number, Term, names, substitute
+from discovery.terms.expression import MEMORY, rewrite
 
 TIME_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
@@ -213,3 +213,22 @@ def expanded(model: Model, channels: Collection[str] = ()) -> Model:
         states[name] = State(name, "", start_sd=0.0, memory=True)
         extra.append(Term(f"{name} follows", name, Apply("/", (Apply("-", (inner, Name(name))), tau))))
     return replace(model, states=states, terms=terms + tuple(extra), outputs=outputs)
+
+
+def with_settled_memories(model: Model) -> Model:
+    """An expanded model whose memories start with what they are fed with, as expressions: what has no solver
+    for balances (a controller) starts there, too.
+    """
+    states = dict(model.states)
+    for name in [n for n, state in states.items() if state.memory and state.start is None]:
+        starts = {s: state.start for s, state in states.items() if state.start is not None}
+        followed = next((t.expression for t in model.terms if t.into == name), None)
+        match followed:
+            case Apply("/", (Apply("-", (inner, _)), _)):
+                states[name] = replace(states[name], start=rewrite(substitute(inner, starts), _settled))
+    return replace(model, states=states)
+
+
+def _settled(apply: Apply) -> Expression | None:
+    """At the first instant nothing has moved yet: what remembers shows what it is fed with."""
+    return apply.arguments[0] if apply.function in MEMORY else None

@@ -85,7 +85,8 @@ def choose(errors: Array, tolerance: float) -> int:
         errors: (sizes, B) mean squared error of each left-out block, sparsest model first.
     """
     best = int(np.argmin(errors.mean(axis=1)))
-    scales = (np.log(errors), errors)
+    least = max(1e-12 * float(errors.max()), 1e-300)  # a block without readings has no error
+    scales = (np.log(np.maximum(errors, least)), errors)
     for row in range(best):
         if all(_within(scale[row] - scale[best], tolerance) for scale in scales):
             return row
