@@ -256,7 +256,7 @@ def test_files_mixed_up_are_called_by_their_kind(
         ('fit = ["a", "b"]', 'fits = ["a", "b"]', ["line 4", "unknown key", "did you mean 'fit'"]),
         ('kind = "reduced"', 'kind = "redced"', ["line 8", "is not known", "mean 'reduced'"]),
         ('kind = "reduced"', "", ["line 8", 'say file = "my_model.toml", or kind = one of reduced, superp']),
-        ('kind = "reduced"', 'kind = "x"', ["line 8", "are: reduced, superposition, sindy", "or file = "]),
+        ('kind = "reduced"', 'kind = "x"', ["line 8", "are: reduced, superposition, ", "or file = "]),
         ('kind = "reduced"', 'fiel = "x"', ["line 8", "did you mean 'file'"]),
         ('kind = "reduced"', 'kind = "reduced", file = "x"', ["line 8", "unknown key"]),
         ('kind = "reduced"', 'kind = "sindy", file = "x"', ["line 8", "kind, inputs, baseline"]),

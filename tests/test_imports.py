@@ -19,19 +19,23 @@ ORDER = (
     "files targets",
     "runfolder terms",
     "recordings",
-    "models virtual",
+    "models",
     "dynamics",
-    "fitting effects",
+    "fitting effects virtual",
     "evidence evaluation frames sparse",
     "diagnosis",
     "design report export",
     "experiment runtime",
+    "paper",
     "challenge firsthour estimator notebook",
     "commands",
     "cli",
 )
 LAYER = {name: k for k, names in enumerate(ORDER) for name in names.split()}
-LAST = {("diagnosis/diagnose.py", "design")}  # a diagnosis ends with a question about what it found
+LAST = {
+    ("diagnosis/diagnose.py", "design"),  # a diagnosis ends with a question about what it found
+    ("experiment/pipeline.py", "paper"),  # a run of the paper's experiment ends with its page
+}
 
 
 def imported(file: Path) -> Iterator[str]:

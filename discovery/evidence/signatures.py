@@ -24,7 +24,9 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
     run = system.grid.recording
     total = sum(len(h.amplitudes) for h in hypotheses)
     ends = trajectory.at_ends()
-    nodes: dict[str, Array | float] | None = None
+    first = np.minimum(
+        2 * system.grid.read, 2 * len(system.grid.step) - 1
+    )  # of the step that a reading begins
     columns: list[Column] = []
     direct: list[tuple[int, int, Array]] = []
     owner = 0
@@ -40,14 +42,12 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
             )
             columns.append(Column(mine, term.into, np.asarray(series, dtype=float), term.source))
         if h.shown:
-            nodes = nodes if nodes is not None else trajectory.at_nodes()
             for k, (name, expression) in enumerate(h.shows(system.model).items()):
                 column = owner + (k if len(h.amplitudes) > 1 else 0)
-                series = evaluate(expression, {**nodes, **values}, memory=system.nodes).value
-                at_reading = np.broadcast_to(np.asarray(series, dtype=float), system.grid.time.shape)[
-                    system.grid.read
-                ]
-                direct.append((column, system.grid.outputs.index(name), at_reading))
+                # along the ends of the steps: what is held is held there, also for a memory of it
+                series = evaluate(expression, {**ends, **values}, memory=system.ends).value
+                whole = np.broadcast_to(np.asarray(series, dtype=float), (2 * len(system.grid.step),))
+                direct.append((column, system.grid.outputs.index(name), whole[first]))
         owner += len(h.amplitudes)
     out = sensitivities(trajectory, (), (), columns, count=total)
     for column, y, series in direct:

@@ -81,7 +81,7 @@ _SUPERSCRIPTS = str.maketrans("²³⁻¹", "23-1")
 
 def _folded(written: str) -> str:
     text = written.strip().replace("º", "°").replace("˚", "°").replace("℃", "°C").replace("℉", "°F")
-    return re.sub(r"\s+", "", unicodedata.normalize("NFKC", text)).casefold().strip("[]()")
+    return re.sub(r"\s+", "", unicodedata.normalize("NFKC", text)).replace("−", "-").casefold().strip("[]()")
 
 
 def known_unit(written: str) -> str | None:

@@ -51,7 +51,6 @@ def test_a_difference_takes_the_factor_alone() -> None:
     ("unit", "role", "said"),
     [
         ("C", "temperature", "did you mean 'degC'?"),
-        ("degC", "error", "allowed is um or um/m"),
         ("delta_degC", "temperature", "cannot be that"),
         ("A", "heat load", "allowed is W or percent, or what converts to it"),
         ("foo", "other input", "not known"),
