@@ -77,9 +77,8 @@ def _thin(columns: Mapping[str, Array], every: int) -> Frame:
     """Inputs every few rows; all readings."""
     read = np.isfinite(columns["E_Y0C"])
     read[::every] = True
-    return {
-        name: np.asarray(values, dtype=float)[read] for name, values in columns.items() if name != "h_nozzle"
-    }
+    kept = ("time", *CHANNELS["machine"])
+    return {name: np.asarray(columns[name], dtype=float)[read] for name in kept}
 
 
 def write(folder: Path, base: str, frames: Mapping[str, Frame]) -> Path:
