@@ -103,7 +103,7 @@ def bounded(S, b, low, high):  # type: ignore[no-untyped-def]
         for i in range(n):
             x[i, 0] = b[i] / np.sqrt(S[i, i])
             for j in range(n):
-                a[i, j] = S[i, j] / np.sqrt(S[i, i] * S[j, j])
+                a[i, j] = S[i, j] / (np.sqrt(S[i, i]) * np.sqrt(S[j, j]))
                 if at[j] != 0:
                     x[i, 0] -= a[i, j] * (low[j] if at[j] < 0 else high[j]) * np.sqrt(S[j, j])
             a[i, i] += _RIDGE
@@ -171,7 +171,7 @@ def _scaled(S, a):  # type: ignore[no-untyped-def]
     n = S.shape[0]
     for i in range(n):
         for j in range(n):
-            a[i, j] = S[i, j] / np.sqrt(S[i, i] * S[j, j])
+            a[i, j] = S[i, j] / (np.sqrt(S[i, i]) * np.sqrt(S[j, j]))
         a[i, i] += _RIDGE
 
 
