@@ -33,8 +33,9 @@ def summary(fit: Fit) -> str:
     lines = [f"Model '{fit.model.name}', {len(fit.model.free)} free parameters", ""]
     width = max(map(len, fit.model.parameters), default=0)
     for name, p in fit.model.parameters.items():
-        known = p.low is not None and p.high is not None
-        interval = f"({printed(p.low, 4)} to {printed(p.high, 4)})" if known else "fixed" if p.fixed else ""
+        interval = "fixed" if p.fixed else ""
+        if p.low is not None and p.high is not None:
+            interval = f"({printed(p.low, 4)} to {printed(p.high, 4)})"
         unit = "" if p.unit == "1" else f" {p.unit}"
         lines.append(f"  {name:<{width}} = {printed(p.value, 4)}{unit} {interval}".rstrip())
     lines += ["", "rms of the residual"]

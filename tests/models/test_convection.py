@@ -105,7 +105,7 @@ def test_the_law_in_the_model_is_the_law_of_the_functions() -> None:
     from discovery.terms import evaluate, parse
 
     for variant in ("none", "printed", "1.5"):
-        model = thermobalance(variant=variant)  # type: ignore[arg-type]
+        model = thermobalance(variant=variant)
         values = {name: p.value for name, p in model.parameters.items()} | {"h_nozzle": 100.0}
         for speed in (0.0, 100.0, 600.0, 751.0, 1200.0):
             found = evaluate(parse(film(variant)), values | {"speed": speed}).value
