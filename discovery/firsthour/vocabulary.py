@@ -209,7 +209,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "~schlitten "
         "saddle ram frame ~rahmen ~gestell palier tavola mesa bancada ~立柱 extruder nozzle nut guide "
         "~fuehrung ~motor "
-        "~モータ ~电机 node wall wand",
+        "~モータ ~电机 wall wand",
     ),
 )
 
