@@ -172,7 +172,8 @@ def diagnose(
     verdict = decide(context, found, chances, _gain(context, found.best, model, seen, before))
     after = None
     if named := [n.hypothesis for n in verdict.named]:
-        after = _repaired(context, verdict.answer, named, model, seen, before)
+        alone = found.tried.get(frozenset(h.key for h in named), verdict.answer)
+        after = _repaired(context, alone, named, model, seen)
     noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     runs = free_runs(campaign, [*fit, *read], before, after or before, noise)
@@ -223,7 +224,7 @@ def _unknown(context: Context, found: Search) -> list[Scored]:
 
 
 def _repaired(
-    context: Context, answer: Scored, chosen: Sequence[Hypothesis], model: Model, seen: Campaign, before: Fit
+    context: Context, answer: Scored, chosen: Sequence[Hypothesis], model: Model, seen: Campaign
 ) -> Fit:
     """The model with effects of an answer, fitted as the baseline of the proof is."""
     grown = with_effects(model, chosen)
@@ -237,7 +238,7 @@ def _repaired(
         context.outputs,
         priors=priors,
         guess=start,
-        begin=before,
+        begin=answer.fit,
         max_rounds=25,
     )
 
@@ -247,7 +248,7 @@ def _gain(context: Context, answer: Scored, model: Model, seen: Campaign, before
     if not answer.hypotheses:
         return inf  # what is left has no name, if anything is
     try:
-        after = _repaired(context, answer, answer.hypotheses, model, seen, before)
+        after = _repaired(context, answer, answer.hypotheses, model, seen)
     except RunsAwayError:
         return inf  # it cannot run from the starts of a free run: nothing is known
     runs = free_runs(seen, context.recordings, before, after, answer.noise)

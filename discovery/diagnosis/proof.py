@@ -141,7 +141,14 @@ def explained(found: Mapping[str, Improvement]) -> float | None:
 def _run(fit: Fit, campaign: Campaign, run: str) -> Trajectory | None:
     """None where the model, or an output of it, does not stay finite."""
     try:
-        trajectory = predict_recording(fit.model, campaign, run, fit.problem.outputs, fit.noise.white)
+        trajectory = predict_recording(
+            fit.model,
+            campaign,
+            run,
+            fit.problem.outputs,
+            fit.noise.white,
+            known=fit.offset_in(run),
+        )
         predict(trajectory)
     except RunsAwayError:
         return None

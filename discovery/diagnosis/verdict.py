@@ -73,7 +73,11 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     more = posterior.best.evidence - found.baseline.evidence
     if posterior.nothing > 1 - thresholds.DETECTED or more < thresholds.SHORT or gain < thresholds.MATTERS:
         return _nothing(context, found.baseline, answer, candidates)
-    sure = [n for n in candidates if n.probability >= thresholds.NAMED]
+    sure = [
+        n
+        for n in candidates
+        if n.probability >= thresholds.NAMED and _added(found, answer, n.hypothesis) >= thresholds.SHORT
+    ]
     refused = {n.hypothesis.key: text for n in sure if (text := _refused(context, answer, n.hypothesis))}
     reasons = list(refused.values())
     named = tuple(n for n in sure if n.hypothesis.key not in refused)
@@ -111,8 +115,9 @@ def _short(
 ) -> float:
     """Log evidence by which the model of named effects alone is short of the best of all."""
     keys = frozenset(h.key for h in named)
-    alone = found.tried.get(keys) or score(context, named, answer.noise, answer.fit)
-    return posterior.best.evidence - alone.evidence if alone is not None else inf
+    if keys not in found.tried and (alone := score(context, named, answer.noise, answer.fit)) is not None:
+        found.keep(alone)
+    return posterior.best.evidence - found.tried[keys].evidence if keys in found.tried else inf
 
 
 def idle(verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:

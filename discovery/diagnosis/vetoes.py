@@ -24,10 +24,10 @@ def one_recording(context: Context, _: Scored, h: Hypothesis) -> str | None:
 
 def every_clock(context: Context, answer: Scored, h: Hypothesis) -> str | None:
     """Clocks that are wrong in every recording are as well a dead time of the machine."""
-    shifted = {o.recording for o in answer.hypotheses if o.effect.place == "inputs of a recording"}
-    if h.recording not in shifted or h.effect.place != "inputs of a recording":
+    if h.effect.place != "inputs of a recording":
         return None
-    if not shifted >= set(context.recordings):
+    shifted = {o.recording for o in answer.hypotheses if o.effect.place == h.effect.place}
+    if h.recording is not None and not shifted >= set(context.recordings):
         return None
     return (
         "every recording would need its clock shifted; a dead time between what drives the machine and what "

@@ -180,7 +180,12 @@ def shifted(system: System, offset: Mapping[str, float], late: Mapping[str, floa
 
 
 def inputs_of(model: Model, campaign: Campaign, outputs: Collection[str]) -> list[str]:
-    """Channels that an expanded model needs of a recording, start values included, beside its outputs."""
+    """Channels that an expanded model needs of a recording, start values included, besides its outputs.
+
+    Raises:
+        UserError: an output that is no channel.
+    """
+    outputs = [name for name in outputs if campaign.channels[name]]
     starting = model.start_names & set(campaign.channels)
     return sorted({*model.inputs, *starting} - set(outputs))
 

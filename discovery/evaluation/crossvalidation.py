@@ -100,7 +100,9 @@ def _left_over(
     fit = refit(replace(campaign, recordings=hidden), recordings)
     for trajectory in fit.trajectories:
         name = trajectory.system.grid.recording
-        whole = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)
+        whole = predict_recording(
+            fit.model, campaign, name, outputs, fit.noise.white, known=fit.offset_in(name)
+        )
         rows = fit.problem.residual(whole)
         time = whole.system.grid.time[whole.system.grid.read]
         low, high = fold.windows[name]

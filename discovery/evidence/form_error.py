@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from discovery.dynamics import Column, Trajectory, sensitivities
 from discovery.dynamics.system import predict
 from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.signatures import signatures
 from discovery.fitting import Fit
 from discovery.terms import Term, evaluate
 
@@ -93,10 +94,11 @@ def _stacked(trajectories: Sequence[Trajectory], columns: Sequence[Array], white
 
 def effect_form(trajectories: Sequence[Trajectory], hypotheses: Sequence[Hypothesis]) -> list[Array]:
     """By recording, what the readings (R, Y, M) show more where the flow of each effect is off by its own
-    size, once for each psi.
+    size, once for each psi; and where a sensor is not quite what an effect without a size makes of it.
     """
     scales = _scales(trajectories)
     lasting = [h for h in hypotheses if h.terms and not h.effect.is_event and h.effect.is_physics]
+    sensors = [h for h in hypotheses if h.shown and not h.recording and h.effect.amplitude.fixed is not None]
     found = []
     for k, run in enumerate(trajectories):
         pieces, count = [], 0
@@ -105,7 +107,8 @@ def effect_form(trajectories: Sequence[Trajectory], hypotheses: Sequence[Hypothe
             for term in h.terms:
                 pieces += _pieces(run, term, points, count)
             count += len(points)
-        found.append(sensitivities(run, (), (), pieces, count=count))
+        flows = sensitivities(run, (), (), pieces, count=count)
+        found.append(np.concatenate([flows, signatures(run, sensors)], axis=2))
     return found
 
 

@@ -174,7 +174,14 @@ def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
 def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
     """Free run with the fitted model, zeroed on the first reading as on a controller."""
     outputs = fit.problem.outputs
-    trajectory = predict_recording(fit.model, experiment.campaign, recording, outputs, fit.noise.white)
+    trajectory = predict_recording(
+        fit.model,
+        experiment.campaign,
+        recording,
+        outputs,
+        fit.noise.white,
+        known=fit.offset_in(recording),
+    )
     grid = trajectory.system.grid
     reference = np.zeros(len(outputs))
     for y, name in enumerate(outputs):

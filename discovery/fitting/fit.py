@@ -71,6 +71,10 @@ class Fit:
                 found.setdefault(u.name, {})[u.recording] = (float(value), float(error))
         return found
 
+    def offset_in(self, recording: str) -> dict[str, float]:
+        """By channel known only within a spread: what it is off by in a recording that the fit has seen."""
+        return {name: found[recording][0] for name, found in self.offsets.items() if recording in found}
+
     def summary(self) -> str:
         """Parameters with 95 % intervals, rms of the residual by recording, what is not determined."""
         from discovery.fitting.shown import summary
@@ -141,7 +145,7 @@ def fit_model(
     theta = _beginning(problem, guess or {}, begin)
     readings = [system.grid.readings for system in problem.systems]
     least = resolution(readings)
-    current = noise or white_noise(problem.outputs, stated, readings, least)
+    current = noise or _first_noise(problem, theta, stated, least)
     nuisance = any(u.is_nuisance for u in problem.unknowns)
     problem = problem.spread(current, _first_spreads(problem, theta))
     together = 1.0
@@ -207,6 +211,21 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
         covariance=fit.covariance[np.ix_(index, index)],
         trajectories=tuple(problem.run(s, theta) for s in problem.systems),
     )
+
+
+def _first_noise(
+    problem: Problem, theta: Array, stated: Mapping[str, float | None], least: Sequence[float]
+) -> Noise:
+    """The noise to begin with: what the model leaves where the fit begins, and no more than the readings.
+
+    With too much noise the first round forgets where it began: only the priors count.
+    """
+    readings = [system.grid.readings for system in problem.systems]
+    most = white_noise(problem.outputs, stated, readings, least)
+    left = [problem.residual(problem.run(s, theta)) for s in problem.systems]
+    begun = white_noise(problem.outputs, stated, left, least)
+    white = [min(a, b) if np.isfinite(a) else b for a, b in zip(begun.white, most.white, strict=True)]
+    return replace(most, white=tuple(white))
 
 
 def _first_spreads(problem: Problem, theta: Array) -> dict[str, float]:

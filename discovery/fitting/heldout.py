@@ -32,6 +32,7 @@ def predict_recording(
     outputs: Sequence[str],
     white: Sequence[float] | None = None,
     grid: Grid | None = None,
+    known: Mapping[str, float] | None = None,
 ) -> Trajectory:
     """Free run of a model on a recording, zeroed on its first reading as a controller would be.
 
@@ -42,10 +43,13 @@ def predict_recording(
     Args:
         outputs: measured channels.
         white: (Y,) reading noise that weighs the first reading against the declared start; default 1 um each.
+        known: what a fit found inputs off by in this recording (`Fit.offset_in`); the first reading corrects
+            only the others.
     """
     model = expanded(model, campaign.channels)
     grid = grid or make_grid(campaign, recording, inputs_of(model, campaign, outputs), outputs)
-    system = make_system(model, grid)
+    known = known or {}
+    system = shifted(make_system(model, grid), known)
     values = model.values(recording)
     noise = white if white is not None else np.ones(len(outputs))
     spreads = {
@@ -53,7 +57,7 @@ def predict_recording(
         for name, state in system.model.states.items()
         if (sd := _spread(system, state, dict(zip(outputs, noise, strict=True)))) > 0
     }
-    inputs = uncertain(system)
+    inputs = tuple(name for name in uncertain(system) if name not in known)
     trajectory = simulate(system, values)
     if not (spreads or inputs) or not len(grid.read):
         return trajectory

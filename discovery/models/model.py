@@ -165,20 +165,58 @@ def shown_states(model: Model, outputs: Collection[str]) -> dict[str, str]:
 
 def read_at_start(model: Model, outputs: Collection[str]) -> Model:
     """An expanded model with the start of each state that is read, and has no spread of its own, at its first
-    reading; one that is read through a lag starts there, too.
+    reading; one that is read through something that settles (a lag) or adds up starts near it, with a spread.
     """
     shown, states = shown_states(model, outputs), dict(model.states)
     for name, output in shown.items():
         if states[name].start_sd is None or states[name].memory:
             states[name] = replace(states[name], start=Name(output), start_sd=None, read_as=output)
-        if not states[name].memory:
+    for output in sorted(outputs):
+        body = _read_in(model, model.outputs.get(output, Name(output)))
+        if body is None or body in shown:
             continue
-        followed = next((t.expression for t in model.terms if t.into == name), None)
-        match followed:
-            case Apply("/", (Apply("-", (Name(body), _)), _)) if body in states and body not in shown:
-                if states[body].start_sd is None:
-                    states[body] = replace(states[body], start=Name(output))
+        if states[body].start is None or states[body].start_sd is None:
+            states[body] = replace(states[body], start=Name(output))
     return replace(model, states=states)
+
+
+def _read_in(model: Model, expression: Expression) -> str | None:
+    """The state that an output shows once everything that remembers has settled, apart from what no state
+    changes; None where there is none or more than one.
+    """
+    followed = {t.into: t.expression for t in model.terms if t.into in model.states}
+    memories: dict[str, Expression] = {}
+    for name, state in model.states.items():
+        match followed.get(name):
+            case Apply("/", (Apply("-", (inner, _)), _)) if state.memory:
+                memories[name] = inner
+    while memories.keys() & names(expression):
+        expression = substitute(expression, memories)
+    parts = _addends(rewrite(rewrite(expression, _settled), _short))
+    bodies = [part.id for part in parts if isinstance(part, Name) and part.id in model.states]
+    held = [part for part in parts if names(part) & model.states.keys()]
+    return bodies[0] if len(bodies) == len(held) == 1 else None
+
+
+def _addends(expression: Expression) -> list[Expression]:
+    match expression:
+        case Apply("+", (a, b)):
+            return [*_addends(a), *_addends(b)]
+        case Apply("-", (a, b)):
+            return [*_addends(a), Apply("-", (Number(0.0), b))]
+    return [expression]
+
+
+def _short(apply: Apply) -> Expression | None:
+    """Without what cancels."""
+    match apply:
+        case Apply("-", (a, b)) if a == b:
+            return Number(0.0)
+        case Apply("*", (Number(0.0), _)) | Apply("*", (_, Number(0.0))):
+            return Number(0.0)
+        case Apply("+", (a, Number(0.0))) | Apply("+", (Number(0.0), a)) | Apply("-", (a, Number(0.0))):
+            return a
+    return None
 
 
 def expanded(model: Model, channels: Collection[str] = ()) -> Model:

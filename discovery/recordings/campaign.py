@@ -4,7 +4,6 @@ import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,7 +184,7 @@ def _load(
     return Recording(
         name,
         columns.time - columns.time[0],
-        MappingProxyType(uncompensated(str(file), columns.time, values, channels, pairs)),
+        Named("channel", uncompensated(str(file), columns.time, values, channels, pairs)),
         form.note,
         columns.origin,
         float(columns.time[0]),

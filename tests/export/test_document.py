@@ -20,6 +20,7 @@ from discovery.export.ranges import sampled_inputs
 from discovery.export.seal import Seal, open_seal, private_key, public_key, require_trusted
 from discovery.export.stepper import Stepper
 from discovery.models import Model, Parameter, State, expanded
+from discovery.models.model import with_settled_memories
 from discovery.recordings import Campaign
 from discovery.terms import Term, parse
 
@@ -36,7 +37,7 @@ def test_what_is_written_is_read_back_and_steps_the_same(
     back = read_document(tmp_path / "model.json")
     u = sampled_inputs(campaign, "fit", back.compiled.inputs, 10.0)
     runs = []
-    for compiled in (compile_model(expanded(model), 10.0), back.compiled):
+    for compiled in (compile_model(with_settled_memories(expanded(model)), 10.0), back.compiled):
         stepper = Stepper(compiled)
         stepper.start(u[0])
         runs.append(stepper.run(u))

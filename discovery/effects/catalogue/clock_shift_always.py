@@ -1,0 +1,18 @@
+"""The readings of every recording come late (or early) by the same time.
+
+    every input u(t) becomes u(t - t_shift)
+
+As `clock_shift`, in all recordings: either clock may be wrong, or heat takes as long to arrive. Recordings of
+one logger cannot say which. Source: two loggers with clocks of their own. Limits: as `clock_shift`.
+"""
+
+from dataclasses import replace
+
+from discovery.effects.catalogue import clock_shift
+
+EFFECT = replace(
+    clock_shift.EFFECT,
+    title="Shifted clock or dead time in every recording",
+    acts="always",
+    signature="every error of every recording is late (or early) by the same time",
+)
