@@ -34,7 +34,6 @@ JUMP_FACTOR = 4.0
 
 # --- what is said -----------------------------------------------------------------------------------------
 SUREST = 0.98  # probability that is never exceeded: causes that nobody thought of
-DETECTED = 0.75  # probability of any mismatch from which one is reported
 NAMED = 0.7  # probability from which an effect is named
 MATTERS = 0.15  # reading noises, rms: what explains less of free runs (1 % of their rms) has no name
 SHORT = 11.0  # log evidence that a name has to add, and by which nothing at all may be short of the best

@@ -71,8 +71,8 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
         )
     )
     more = posterior.best.evidence - found.baseline.evidence
-    if posterior.nothing > 1 - thresholds.DETECTED or more < thresholds.SHORT or gain < thresholds.MATTERS:
-        return _nothing(context, found.baseline, answer, candidates)
+    if more < thresholds.SHORT or gain < thresholds.MATTERS:
+        return _nothing(context, found, answer, candidates)
     sure = [
         n
         for n in candidates
@@ -89,7 +89,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
         named = ()
     if not named and not reasons:
         reasons.append(f"no effect reaches a probability of {thresholds.NAMED:g}")
-    reasons += _apart(candidates, (*named, *sure))
+    reasons += _apart(found, answer, candidates, (*named, *sure))
     if not named:
         return Verdict(UNEXPLAINED, answer, (), candidates, tuple(reasons))
     kinds = {n.hypothesis.effect.is_physics for n in named}
@@ -160,9 +160,9 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     )
 
 
-def _nothing(context: Context, baseline: Scored, answer: Scored, candidates: tuple[Named, ...]) -> Verdict:
+def _nothing(context: Context, found: Search, answer: Scored, candidates: tuple[Named, ...]) -> Verdict:
     """Nothing is missing, unless the model is so coarse that process noise explains whatever there is."""
-    share = max(baseline.noise.share, baseline.noise.form)
+    share = max(found.baseline.noise.share, found.baseline.noise.form)
     if share > thresholds.SHARE:
         reason = (
             f"the flows of the model are off by about {100 * share:.0f} %, more than is usual for a lumped "
@@ -172,13 +172,17 @@ def _nothing(context: Context, baseline: Scored, answer: Scored, candidates: tup
     if context.outliers:
         reason = f"{len(context.outliers)} single wrong readings, nothing else"
         return Verdict(FAULT, answer, (), (), (reason,))
-    return Verdict(NO_MISMATCH, answer, (), (), _apart(candidates, ()))
+    return Verdict(NO_MISMATCH, answer, (), (), _apart(found, answer, candidates, ()))
 
 
-def _apart(candidates: Sequence[Named], named: Sequence[Named]) -> tuple[str, ...]:
+def _apart(
+    found: Search, answer: Scored, candidates: Sequence[Named], named: Sequence[Named]
+) -> tuple[str, ...]:
     """A sentence for each effect of the answer that is not sure enough to be named."""
+
     return tuple(
-        f"{n.hypothesis.effect.word} at {n.hypothesis.where} may act, too (probability {n.probability:.2f})"
+        f"{n.hypothesis.effect.word} at {n.hypothesis.where} may act, too (probability {n.probability:.2f}, "
+        f"log evidence {_added(found, answer, n.hypothesis):.0f})"
         for n in candidates
         if n not in named
     )

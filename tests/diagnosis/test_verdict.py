@@ -85,7 +85,6 @@ class Believed:
 
     words: dict[str, float]
     best: Model
-    nothing: float = 0.0
 
     def of_claim(self, h: Hypothesis) -> float:
         return self.words[h.effect.word]
@@ -110,9 +109,8 @@ def said(
     world: World | None = None,
     unknown: Model | None = None,
     gain: float = 10.0,
-    **more: Any,
 ) -> Verdict:
-    chances = Believed(words, unknown or found.best, **more)
+    chances = Believed(words, unknown or found.best)
     return decide(cast(Context, world or World()), cast(Search, found), cast(Posterior, chances), gain)
 
 
@@ -132,19 +130,34 @@ def test_a_name_needs_its_probability(probability: float, word: str) -> None:
     assert found.word == word
     if word == "unexplained":
         assert found.candidates[0].hypothesis is FLUID
-        assert any("may act, too (probability 0.69)" in text for text in found.reasons)
+        assert any("may act, too (probability 0.69, log evidence 100)" in text for text in found.reasons)
     else:
         assert found.named[0].probability == pytest.approx(min(probability, 0.98))
         assert found.reasons == ()
 
 
-@pytest.mark.parametrize(("nothing", "word"), [(0.24, "missing physics"), (0.26, "no mismatch")])
-def test_what_is_not_there_is_not_named(nothing: float, word: str) -> None:
-    assert said(WET, {"fluid_convection": 0.9}, nothing=nothing).word == word
+@pytest.mark.parametrize(("by", "word"), [(0.1, "missing physics"), (-0.1, "no mismatch")])
+def test_what_is_not_there_is_not_named(by: float, word: str) -> None:
+    found = Tried([Model((FLUID,), SHORT + by), Model((), 0.0)])
+    assert said(found, {"fluid_convection": 0.9}).word == word
+
+
+def test_a_name_needs_evidence_of_its_own() -> None:
+    """However probable: its rivals may be less probable for want of evidence, not for what they are."""
+    both = pair(FLUID, FRICTION, 100.0 + SHORT - 0.1, 100.0, 30.0)
+    found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
+    assert [n.hypothesis for n in found.named] == [FLUID]
+    assert found.reasons == (
+        f"friction_speed at {FRICTION.where} may act, too (probability 0.95, log evidence 11)",
+    )
+    both = pair(FLUID, FRICTION, 100.0 + SHORT + 0.1, 100.0, 30.0)
+    found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
+    assert [n.hypothesis for n in found.named] == [FLUID, FRICTION]
 
 
 def test_single_wrong_readings_are_all_that_is_wrong() -> None:
-    found = said(WET, {"fluid_convection": 0.1}, World(outliers=("one", "two")), nothing=0.5)
+    dry = Tried([Model((FLUID,), 1.0), Model((), 0.0)])
+    found = said(dry, {"fluid_convection": 0.1}, World(outliers=("one", "two")))
     assert found.word == "measurement fault"
     assert found.reasons == ("2 single wrong readings, nothing else",)
 
@@ -161,8 +174,8 @@ def test_a_fault_is_told_from_physics() -> None:
     [
         (100.0, 99.9 * (1 + SMALL), "missing physics"),  # a share of what there is to explain
         (100.0, 100.1 * (1 + SMALL), "unexplained"),
-        (10.0, 9.9 + SHORT, "missing physics"),  # or so much
-        (10.0, 10.1 + SHORT, "unexplained"),
+        (12.0, 11.9 + SHORT, "missing physics"),  # or so much
+        (12.0, 12.1 + SHORT, "unexplained"),
     ],
 )
 def test_what_has_no_name_may_not_explain_much_more(gain: float, unknown: float, word: str) -> None:
@@ -187,7 +200,7 @@ def test_what_is_left_unnamed_may_not_carry_the_answer() -> None:
 
 
 def test_what_would_be_missed_most_is_named_first() -> None:
-    both = pair(FRICTION, FLUID, 160.0, 30.0, 150.0)
+    both = pair(FRICTION, FLUID, 180.0, 30.0, 150.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
     assert [n.hypothesis for n in found.named] == [FLUID, FRICTION]
 
