@@ -73,15 +73,11 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     more = posterior.best.evidence - found.baseline.evidence
     if more < thresholds.SHORT or gain < thresholds.MATTERS:
         return _nothing(context, found, answer, candidates)
-    sure = [
-        n
-        for n in candidates
-        if n.probability >= thresholds.NAMED and _added(found, answer, n.hypothesis) >= thresholds.SHORT
-    ]
+    sure = _needed(context, found, answer, [n for n in candidates if n.probability >= thresholds.NAMED])
     refused = {n.hypothesis.key: text for n in sure if (text := _refused(context, answer, n.hypothesis))}
     reasons = list(refused.values())
     named = tuple(n for n in sure if n.hypothesis.key not in refused)
-    short = _short(context, found, posterior, answer, [n.hypothesis for n in named])
+    short = posterior.best.evidence - _alone(context, found, answer, named)
     if short > max(thresholds.SHORT, thresholds.SMALL * found.gain):
         if unknown := posterior.best.forced:
             reasons.append(f"heat of unknown cause at {unknown} explains more than what can be named")
@@ -110,14 +106,26 @@ def _refused(context: Context, answer: Scored, h: Hypothesis) -> str | None:
     )
 
 
-def _short(
-    context: Context, found: Search, posterior: Posterior, answer: Scored, named: Sequence[Hypothesis]
-) -> float:
-    """Log evidence by which the model of named effects alone is short of the best of all."""
-    keys = frozenset(h.key for h in named)
-    if keys not in found.tried and (alone := score(context, named, answer.noise, answer.fit)) is not None:
-        found.keep(alone)
-    return posterior.best.evidence - found.tried[keys].evidence if keys in found.tried else inf
+def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> list[Named]:
+    """Those without which a model of them alone would be short: each one has to add evidence of its own."""
+    kept = list(chosen)
+    while kept:
+        fewer = [[o for o in kept if o is not n] for n in kept]
+        best = max(fewer, key=lambda others: _alone(context, found, answer, others))
+        if not _alone(context, found, answer, kept) - _alone(context, found, answer, best) < thresholds.SHORT:
+            break
+        kept = best
+    return kept
+
+
+def _alone(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> float:
+    """Log evidence of a model with these effects and no other."""
+    keys = frozenset(n.hypothesis.key for n in chosen)
+    if keys not in found.tried:
+        one = score(context, [n.hypothesis for n in chosen], answer.noise, answer.fit)
+        if one is not None:
+            found.keep(one)
+    return found.tried[keys].evidence if keys in found.tried else -inf
 
 
 def idle(verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:
