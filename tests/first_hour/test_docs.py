@@ -64,12 +64,15 @@ def test_the_tutorial_prints_what_it_says(place: Path) -> None:
 
 
 def _the_readme_agrees_with(results: dict[str, Any]) -> None:
-    """The caption of the picture: what the simple model leaves at sensor 2."""
+    """The caption of the picture: what the simple and the repaired model leave at sensor 2."""
     text = " ".join((ROOT / "README.md").read_text("utf-8").split())
-    peak = re.search(r"error at sensor 2 reaches (\d+) K", text)
-    assert peak
+    patterns = (r"rms at sensor 2 is (\d+) K", r"rms on this step is below (\d+) K")
+    before, rms = (re.search(pattern, text) for pattern in patterns)
+    assert before
+    assert rms
     at = {name: one["recordings"]["step_h1_up_090"]["T2"] for name, one in results["models"].items()}
-    assert at["first_order"]["peak"] == pytest.approx(float(peak[1]), rel=CLOSE)
+    assert at["first_order"]["rms"] == pytest.approx(float(before[1]), rel=CLOSE)
+    assert at["repaired"]["rms"] < float(rms[1])
 
 
 @pytest.mark.usefixtures("place")
@@ -78,7 +81,8 @@ def test_the_lines_for_a_notebook_run(capsys: pytest.CaptureFixture[str]) -> Non
     for block in _blocks("docs/python.md", "python"):
         exec(compile(block, "docs/python.md", "exec"), names)
     printed = capsys.readouterr().out
-    assert "unexplained" in printed
+    assert "missing physics" in printed
+    assert "('conduction_path', ['T1', 'T2'])" in printed
 
 
 @pytest.mark.parametrize("page", PAGES)
