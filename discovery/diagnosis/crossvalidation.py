@@ -49,7 +49,9 @@ def _residuals(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -
         seen = replace(context.campaign, recordings={r: context.campaign.recordings[r] for r in kept})
         grids = {r: context.grids[r] for r in kept}
         try:
-            fit = fit_model(model, seen, kept, context.outputs, grids=grids, belief=context.belief)
+            fit = fit_model(
+                model, seen, kept, context.outputs, grids=grids, belief=context.belief, begin=answer.fit
+            )
             for name in fold.recordings:
                 run = predict_recording(
                     fit.model,

@@ -18,7 +18,7 @@ from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.scored import Scored, score
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.vetoes import vetoed
-from discovery.effects.hypothesis import Hypothesis
+from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.printed import printed
 
 NO_MISMATCH, MISSING, FAULT, UNEXPLAINED = (
@@ -73,8 +73,11 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     more = posterior.best.evidence - found.baseline.evidence
     if more < thresholds.SHORT or gain < thresholds.MATTERS:
         return _nothing(context, found, answer, candidates)
-    sure = _needed(context, found, answer, [n for n in candidates if n.probability >= thresholds.NAMED])
-    refused = {n.hypothesis.key: text for n in sure if (text := _refused(context, answer, n.hypothesis))}
+    probable = [n for n in candidates if n.probability >= thresholds.NAMED]
+    refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
+    sure = _needed(context, found, answer, [n for n in probable if n.hypothesis.key not in refused])
+    whole = found.tried.get(_keys(sure), answer)
+    refused |= {n.hypothesis.key: text for n in sure if (text := _idle_outside(context, whole, n.hypothesis))}
     reasons = list(refused.values())
     named = tuple(n for n in sure if n.hypothesis.key not in refused)
     short = posterior.best.evidence - _alone(context, found, answer, named)
@@ -85,18 +88,17 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
         named = ()
     if not named and not reasons:
         reasons.append(f"no effect reaches a probability of {thresholds.NAMED:g}")
-    reasons += _apart(found, answer, candidates, (*named, *sure))
+    rest = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
+    reasons += _apart(found, answer, rest)
     if not named:
         return Verdict(UNEXPLAINED, answer, (), candidates, tuple(reasons))
     kinds = {n.hypothesis.effect.is_physics for n in named}
     return Verdict(MISSING if True in kinds else FAULT, answer, named, (), tuple(reasons))
 
 
-def _refused(context: Context, answer: Scored, h: Hypothesis) -> str | None:
-    """Why an effect that is probable is not named; None where it may be."""
-    if veto := vetoed(context, answer, h):
-        return veto
-    outside = left_out(context, answer, h)
+def _idle_outside(context: Context, whole: Scored, h: Hypothesis) -> str | None:
+    """Why an effect of a model is not named for what is left out of the fit; None where it may be."""
+    outside = left_out(context, whole, h)
     if outside is None or outside.explained >= thresholds.MATTERS:
         return None
     rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
@@ -120,12 +122,16 @@ def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Na
 
 def _alone(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> float:
     """Log evidence of a model with these effects and no other."""
-    keys = frozenset(n.hypothesis.key for n in chosen)
+    keys = _keys(chosen)
     if keys not in found.tried:
         one = score(context, [n.hypothesis for n in chosen], answer.noise, answer.fit)
         if one is not None:
             found.keep(one)
     return found.tried[keys].evidence if keys in found.tried else -inf
+
+
+def _keys(chosen: Sequence[Named]) -> frozenset[Key]:
+    return frozenset(n.hypothesis.key for n in chosen)
 
 
 def idle(verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:
@@ -180,19 +186,15 @@ def _nothing(context: Context, found: Search, answer: Scored, candidates: tuple[
     if context.outliers:
         reason = f"{len(context.outliers)} single wrong readings, nothing else"
         return Verdict(FAULT, answer, (), (), (reason,))
-    return Verdict(NO_MISMATCH, answer, (), (), _apart(found, answer, candidates, ()))
+    return Verdict(NO_MISMATCH, answer, (), (), _apart(found, answer, candidates))
 
 
-def _apart(
-    found: Search, answer: Scored, candidates: Sequence[Named], named: Sequence[Named]
-) -> tuple[str, ...]:
+def _apart(found: Search, answer: Scored, rest: Sequence[Named]) -> tuple[str, ...]:
     """A sentence for each effect of the answer that is not sure enough to be named."""
-
     return tuple(
         f"{n.hypothesis.effect.word} at {n.hypothesis.where} may act, too (probability {n.probability:.2f}, "
         f"log evidence {_added(found, answer, n.hypothesis):.0f})"
-        for n in candidates
-        if n not in named
+        for n in rest
     )
 
 
