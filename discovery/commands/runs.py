@@ -5,12 +5,27 @@ from typing import Annotated
 
 import typer
 
+from discovery.threads import use_jobs
+
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs",
+        "-j",
+        min=1,
+        help="Fits at a time: models, folds and refits run side by side, each on one core. More than the "
+        "cores of the machine gain nothing; 1 leaves the others free. The results are the same with any "
+        "number. [every core; or the environment variable DISCOVERY_JOBS]",
+    ),
+]
+
 
 def run(
     experiment: Annotated[
         Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, e.g. experiments/nmv5000.toml.")
     ],
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the results [runs/NAME].")] = None,
+    jobs: Jobs = None,
     force: Annotated[
         bool, typer.Option("--force", help="Run although the recordings cannot be used as they are.")
     ] = False,
@@ -30,6 +45,7 @@ def run(
     """
     import json
 
+    use_jobs(jobs)
     from discovery.experiment import run as run_experiment
     from discovery.experiment.ending import ending
     from discovery.experiment.summary import summary
@@ -61,6 +77,7 @@ def diagnose(
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results; default runs/<experiment name>.")
     ] = None,
+    jobs: Jobs = None,
 ) -> None:
     """Find what the model of [mismatch] leaves out: where, which physics, how sure, and how much better the
     repair fits.
@@ -69,6 +86,7 @@ def diagnose(
     left in the folder stay. "no mismatch" and "unexplained" are answers too: nothing is named that the
     recordings cannot tell apart.
     """
+    use_jobs(jobs)
     from discovery.diagnosis.summary import summary
     from discovery.experiment import diagnose as find
     from discovery.experiment.summary import remarks
