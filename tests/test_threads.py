@@ -1,4 +1,4 @@
-"""Fits side by side, and threads of the linear algebra: one while the workbench computes, afterwards as before."""
+"""Fits side by side; threads of the linear algebra: one while the workbench computes, then as before."""
 
 from __future__ import annotations
 

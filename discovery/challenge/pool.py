@@ -86,7 +86,7 @@ def _answers(out: Path, methods: Sequence[str]) -> Iterator[Path]:
 
 
 def _single_thread() -> dict[str, str]:
-    """The environment with one fit at a time, one thread for linear algebra and the package found where it is found now."""
+    """The environment: one fit and one thread at a time, and the package where it is found now."""
     import discovery
 
     home = str(Path(discovery.__file__).parent.parent)

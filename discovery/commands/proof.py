@@ -25,7 +25,7 @@ def challenge(
             "--jobs",
             "-j",
             min=1,
-            help="Cases at a time, each in a process with one core. The answers are the same with any number. "
+            help="Cases at a time, each in a process on one core. The answers are the same with any number. "
             "[every core; or the environment variable DISCOVERY_JOBS]",
         ),
     ] = None,
