@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -91,7 +93,7 @@ def test_a_worker_that_dies_loses_nothing(folder: Path, tmp_path: Path, cluster:
         if not killed:
             worker = next(iter(cluster.workers.values()))
             killed.append(worker.pid)
-            worker.process.process._process.kill()
+            os.kill(worker.pid, signal.SIGKILL)
 
     done = run_many(folder, tmp_path / "out", cluster.scheduler_address, kill)
     assert killed

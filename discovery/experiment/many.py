@@ -159,7 +159,7 @@ def _on(address: str, tasks: Sequence[Task]) -> Iterator[Result]:
             client.submit(_on_one_core, *task, pure=False, key=f"{Path(task[1]).name}-{k}"): k
             for k, task in enumerate(tasks)
         }
-        for future in distributed.as_completed(futures):
+        for future in distributed.as_completed(futures, loop=client.loop):
             error = future.exception()
             yield futures[future], future.result() if error is None else ((), _reason(error))
 
