@@ -94,7 +94,9 @@ def fit() -> Pair:
             heat = held[np.searchsorted(stamps, t, side="right") - 1]
             return np.asarray((x[0] * (np.interp(t, data.time, room) - y) + x[1] * heat) / 60e3)
 
-        run = solve_ivp(rate, (0.0, data.time[-1]), [room[0] + x[2]], t_eval=data.time, max_step=300.0)
+        run = solve_ivp(
+            rate, (0.0, data.time[-1]), [room[0] + x[2]], t_eval=data.time, max_step=300.0, rtol=1e-6
+        )
         left = [(data.values[n][read[n]] - levers[n] * (run.y[0][read[n]] - 22.0)) / 0.3 for n in outputs]
         return np.concatenate(left)
 

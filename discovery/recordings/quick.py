@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -29,15 +30,15 @@ class Layout:
     def options(self, wanted: Collection[str]) -> dict[str, Any]:
         """For pyarrow's readers."""
         import pyarrow as pa
-        from pyarrow import csv
+        from pyarrow import csv as pyarrow_csv
 
         types = dict.fromkeys(wanted, pa.float64()) | {TIME: pa.string() if self.instants else pa.float64()}
         return {
-            "read_options": csv.ReadOptions(
+            "read_options": pyarrow_csv.ReadOptions(
                 column_names=list(self.names), skip_rows=1, use_threads=False, block_size=_BLOCK
             ),
-            "parse_options": csv.ParseOptions(ignore_empty_lines=False),
-            "convert_options": csv.ConvertOptions(
+            "parse_options": pyarrow_csv.ParseOptions(ignore_empty_lines=False),
+            "convert_options": pyarrow_csv.ConvertOptions(
                 column_types=types,
                 include_columns=[TIME, *wanted],
                 null_values=list(EMPTY_CELLS),
@@ -50,10 +51,13 @@ def layout(head: bytes, wanted: Collection[str]) -> Layout | None:
     """Layout of a CSV file by what it begins with (UTF-8, commas, decimal points); None when it is not so."""
     first_line = head[:65536].partition(b"\n")[0]
     try:
-        names = [name.strip() for name in first_line.decode("utf-8-sig").rstrip("\r").split(",")]
+        header = first_line.decode("utf-8-sig").rstrip("\r")
     except UnicodeDecodeError:
         return None
-    doubtful = any('"' in name for name in names) or len(set(names)) < len(names)
+    names = [name.strip() for name in next(csv.reader([header]), [])]
+    doubtful = (
+        header.count('"') % 2 == 1 or any('"' in name for name in names) or len(set(names)) < len(names)
+    )
     if doubtful or not {TIME, *wanted} <= set(names):
         return None
     second_line = head[len(first_line) + 1 : len(first_line) + 4096].decode("utf-8", "replace").split("\n")[0]
@@ -64,13 +68,13 @@ def layout(head: bytes, wanted: Collection[str]) -> Layout | None:
 def read_quick_csv(data: bytes, wanted: Collection[str]) -> Columns | None:
     """The wanted columns of a CSV text in order; None when it is not as `layout` wants it."""
     import pyarrow as pa
-    from pyarrow import csv
+    from pyarrow import csv as pyarrow_csv
 
     form = layout(data, wanted)
     if form is None:
         return None
     try:
-        table = csv.read_csv(pa.BufferReader(data), **form.options(wanted))
+        table = pyarrow_csv.read_csv(pa.BufferReader(data), **form.options(wanted))
         return _columns(table, form.names, first_line_number=2)
     except (pa.ArrowInvalid, ValueError):
         return None
@@ -79,7 +83,7 @@ def read_quick_csv(data: bytes, wanted: Collection[str]) -> Columns | None:
 def read_long_csv(path: Path, head: bytes, wanted: Collection[str], how: How) -> Columns | None:
     """As `read_quick_csv`, piece by piece, of a file of any length (plain or gzip)."""
     import pyarrow as pa
-    from pyarrow import csv
+    from pyarrow import csv as pyarrow_csv
 
     form = layout(head, wanted)
     if form is None:
@@ -87,7 +91,7 @@ def read_long_csv(path: Path, head: bytes, wanted: Collection[str], how: How) ->
     try:
         with (
             pa.input_stream(str(path), compression="detect" if path.suffix == ".gz" else None) as stream,
-            csv.open_csv(stream, **form.options(wanted)) as batches,
+            pyarrow_csv.open_csv(stream, **form.options(wanted)) as batches,
         ):
             return _reduced(batches, form.names, 2, wanted, how)
     except (pa.ArrowInvalid, ValueError):
