@@ -81,8 +81,8 @@ def read_table(path: str | os.PathLike[str]) -> bytes:
             raise UserError(f"{path}: a line is longer than {_size(MOST_LINE)}; this is no text table")
         if rows > MOST_ROWS:
             raise UserError(
-                f"{path}: more than {MOST_ROWS:,} rows; write it as plain CSV (UTF-8, commas, decimal points) "
-                "or as Parquet, which are read piece by piece"
+                f"{path}: more than {MOST_ROWS:,} rows; write it as plain CSV (UTF-8, commas, decimal "
+                "points) or as Parquet, which are read piece by piece"
             )
         if size > MOST_UNPACKED:
             raise UserError(
