@@ -8,7 +8,7 @@ FITS   := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[
 PYTHON ?= $(shell for one in python3.11 python3.12 python3.13 python3 python; do \
 	"$$one" -c '$(FITS)' >/dev/null 2>&1 && echo "$$one" && break; done)
 
-.PHONY: demo test coverage site browser-test outside lint types lock audit licences fuzz clean
+.PHONY: demo test benchmarks coverage site browser-test outside lint types lock audit licences fuzz clean
 
 demo: $(STAMP)
 	$(BIN)/discovery run experiments/nmv5000.toml
@@ -16,6 +16,11 @@ demo: $(STAMP)
 
 test: $(STAMP)
 	$(BIN)/pytest -n auto
+
+# Beside PySINDy, solve_ivp and least_squares; stops where a job has become slower by half
+benchmarks: $(STAMP)
+	$(BIN)/python -m benchmarks.side_by_side
+	$(BIN)/python -m benchmarks.compare
 
 # Lines and branches of discovery/ that the tests reach; the page is build/coverage/index.html
 coverage: $(STAMP)

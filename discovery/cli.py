@@ -1,5 +1,6 @@
 """The command line: which verbs there are (each stands in `commands`), and how a failure is said."""
 
+import os
 import signal
 import sys
 import threading
@@ -13,7 +14,7 @@ from typer.core import TyperGroup
 from discovery import __version__
 from discovery.commands import machine, proof, recordings, runs, words
 from discovery.errors import UsageError, UserError
-from discovery.threads import say_one_thread
+from discovery.threads import FIT, say_one_thread
 
 say_one_thread()  # nothing above imports numpy
 
@@ -33,6 +34,14 @@ def _terminated_like_interrupted() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _leave_fits_behind() -> None:
+    """End the process at once where fits are under way in threads: Python would wait for them."""
+    if any(thread.name.startswith(FIT) for thread in threading.enumerate()):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(130)
 
 
 def _interrupted(error: BaseException | None) -> bool:
@@ -58,6 +67,7 @@ class _Sentences(TyperGroup):
             if not _interrupted(error):
                 raise
             typer.echo("\nstopped; nothing half-written is left, the command can be run again", err=True)
+            _leave_fits_behind()
             raise typer.Exit(130) from None
         except OSError as error:
             if error.filename is None:

@@ -17,8 +17,10 @@ from discovery.errors import UserError
 
 MOST_TEXT = 64 * 2**20  # bytes of a TOML or JSON file
 MOST_UNPACKED = 2**30  # bytes of a table, unpacked: 30 columns at 10 Hz for four days
+LARGE = 64 * 2**20  # bytes of a table above which it is read piece by piece
+MOST_PIECEWISE = 64 * 2**30  # bytes of a table that is read piece by piece: a block of rows becomes a mean
 MOST_LINE = 2**20  # bytes of one line
-MOST_ROWS = 5_000_000  # 10 Hz for six days
+MOST_ROWS = 5_000_000  # in memory: 10 Hz for six days
 MOST_COLUMNS = 4_000
 MOST_CELLS = 100_000_000
 _BLOCK = 2**20
@@ -79,7 +81,8 @@ def read_table(path: str | os.PathLike[str]) -> bytes:
             raise UserError(f"{path}: a line is longer than {_size(MOST_LINE)}; this is no text table")
         if rows > MOST_ROWS:
             raise UserError(
-                f"{path}: more than {MOST_ROWS:,} rows; record more slowly, or split or thin out the file"
+                f"{path}: more than {MOST_ROWS:,} rows; write it as plain CSV (UTF-8, commas, decimal "
+                "points) or as Parquet, which are read piece by piece"
             )
         if size > MOST_UNPACKED:
             raise UserError(
@@ -87,6 +90,21 @@ def read_table(path: str | os.PathLike[str]) -> bytes:
             )
         blocks.append(block)
     return b"".join(blocks)
+
+
+def long_head(path: str | os.PathLike[str]) -> bytes:
+    """The first bytes, unpacked, of a table that is large enough to be read piece by piece; nothing of a
+    smaller one.
+
+    Raises:
+        UserError: as `regular`; a damaged archive; larger than any recording.
+    """
+    path = regular(path)
+    size = path.stat().st_size
+    packed = path.suffix == ".gz"
+    if size > (MOST_PIECEWISE // 20 if packed else MOST_PIECEWISE):
+        raise UserError(f"{path}: larger than {_size(MOST_PIECEWISE)}; split the file, or write Parquet")
+    return next(_blocks(path), b"") if size > (LARGE // 10 if packed else LARGE) else b""
 
 
 def check_shape(path: str | os.PathLike[str], rows: int, columns: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from threading import Lock
 
 Progress = Callable[[str], None]  # told what begins
 
@@ -22,19 +23,21 @@ class Steps:
     def __init__(
         self, progress: Progress, weights: Sequence[float], clock: Callable[[], float] = time.perf_counter
     ) -> None:
-        self._progress, self._weights, self._clock = progress, list(weights), clock
-        self._began, self._step, self._whole = clock(), -1, 0.0
+        self._progress, self._all, self._clock = progress, sum(weights) or 1.0, clock
+        self._began, self._done, self._whole = clock(), 0.0, 0.0
+        self._lock = Lock()  # steps may run side by side
 
-    def begin(self) -> None:
-        """The next step begins: what has passed says how long the whole takes."""
-        self._step += 1
-        done = sum(self._weights[: self._step]) / (sum(self._weights) or 1.0)
-        passed = self._clock() - self._began
-        self._whole = passed / done if done >= _SHARE and passed >= _TOO_SOON else 0.0
+    def end(self, weight: float) -> None:
+        """A step of this weight is done: what has passed says how long the whole takes."""
+        with self._lock:
+            self._done += weight
+            share, passed = self._done / self._all, self._clock() - self._began
+            self._whole = passed / share if share >= _SHARE and passed >= _TOO_SOON else 0.0
 
     def __call__(self, what: str) -> None:
-        left = self._whole - (self._clock() - self._began)
-        self._progress(f"{what} (about {_duration(left)} left)" if left > 0 else what)
+        with self._lock:
+            left = self._whole - (self._clock() - self._began)
+            self._progress(f"{what} (about {_duration(left)} left)" if left > 0 else what)
 
 
 def _duration(seconds: float) -> str:

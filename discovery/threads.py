@@ -21,7 +21,9 @@ _LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "VECLIB")
 NAMES = tuple(f"{library}_NUM_THREADS" for library in _LIBRARIES)
 
 
-JOBS = "DISCOVERY_JOBS"  # environment variable: fits at a time
+JOBS = "DISCOVERY_JOBS"  # environment variable: fits at a time; `--jobs` sets it
+
+FIT = "fit"  # names of the threads of fits begin so
 
 
 def jobs() -> int:
@@ -32,15 +34,27 @@ def jobs() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def use_jobs(count: int | None) -> None:
+    """For this process and its children: so many fits at a time; None leaves it as it is."""
+    if count is not None:
+        os.environ[JOBS] = str(count)
+
+
 def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """`work` on each item, in their order; the same results with any number of jobs."""
+    """`work` on each item, in their order; the same results with any number of jobs.
+
+    What goes wrong first, in the order of the items, is raised; what has not begun by then does not begin.
+    """
     count = min(jobs(), len(items))
     if count < 2:
         return [work(item) for item in items]
     from concurrent.futures import ThreadPoolExecutor
 
-    with ThreadPoolExecutor(count) as pool:
+    pool = ThreadPoolExecutor(count, thread_name_prefix=FIT)
+    try:
         return list(pool.map(work, items))
+    finally:  # nobody waits for what is under way: an interrupt ends the command at once
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def say_one_thread() -> None:

@@ -1,12 +1,21 @@
-"""Threads of the linear algebra: one while the workbench computes, afterwards as before."""
+"""Fits side by side; threads of the linear algebra: one while the workbench computes, then as before."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
+import time
+from pathlib import Path
+from typing import Any
 
 import pytest
+from typer.testing import CliRunner
+
+from discovery.cli import app
+from discovery.threads import JOBS, side_by_side
+from tests.small import EXPERIMENT, write_small
 
 SCRIPT = """
 import numpy
@@ -42,3 +51,46 @@ def test_what_computes_for_long_is_pinned_and_keeps_its_signature() -> None:
     for work in (fit_model, diagnose, discover):
         assert "campaign" in signature(work).parameters
         assert work.__code__.co_name == "pinned"
+
+
+def test_a_run_is_the_same_on_one_two_and_four_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bit for bit: models, predictions, diagnosis and folds of the roles; only the seconds differ."""
+    monkeypatch.setenv(JOBS, "1")  # put back at the end
+    write_small(tmp_path)
+    text = EXPERIMENT.replace(
+        'held_out = ["c"]', 'held_out = []\nroles = { warm = ["a"], cold = ["b", "c"] }'
+    )
+    (tmp_path / "experiment.toml").write_text(text + '\n[mismatch]\nmodel = "one_body"\n')
+    written = {}
+    for jobs in ("1", "2", "4"):
+        out = tmp_path / f"out{jobs}"
+        command = ["run", str(tmp_path / "experiment.toml"), "--out", str(out), "--jobs", jobs, "--quiet"]
+        result = CliRunner().invoke(app, command)
+        assert result.exit_code == 0, result.output
+        files = {p.relative_to(out): p for p in out.rglob("*") if p.suffix in (".toml", ".csv", ".json")}
+        written[jobs] = {
+            name: without_seconds(json.loads(p.read_text())) if p.suffix == ".json" else p.read_bytes()
+            for name, p in files.items()
+        }
+        assert len(written[jobs]) > 5
+    assert written["1"] == written["2"] == written["4"]
+
+
+def without_seconds(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: without_seconds(item) for key, item in value.items() if key != "seconds"}
+    return [without_seconds(item) for item in value] if isinstance(value, list) else value
+
+
+def test_the_first_failure_in_the_order_of_the_items_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(JOBS, "3")
+    begun = []
+
+    def work(item: int) -> int:
+        begun.append(item)
+        time.sleep(0.01)
+        raise ValueError(item)
+
+    with pytest.raises(ValueError, match="0"):
+        side_by_side(work, range(1000))
+    assert len(begun) < 1000

@@ -15,7 +15,7 @@ from pathlib import Path
 from discovery.challenge.seal import CASES
 from discovery.files import write_atomic
 from discovery.progress import Progress
-from discovery.threads import NAMES
+from discovery.threads import JOBS, NAMES
 
 SOLVED = "solved"
 PATIENCE_S = 1800.0  # for all methods on one case
@@ -86,12 +86,12 @@ def _answers(out: Path, methods: Sequence[str]) -> Iterator[Path]:
 
 
 def _single_thread() -> dict[str, str]:
-    """The environment with one thread for linear algebra and the package found where it is found now."""
+    """The environment: one fit and one thread at a time, and the package where it is found now."""
     import discovery
 
     home = str(Path(discovery.__file__).parent.parent)
     paths = [home, *(p for p in [os.environ.get("PYTHONPATH")] if p)]
-    return {**os.environ, **dict.fromkeys(NAMES, "1"), "PYTHONPATH": os.pathsep.join(paths)}
+    return {**os.environ, **dict.fromkeys(NAMES, "1"), JOBS: "1", "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def _span(seconds: float) -> str:

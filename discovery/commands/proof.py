@@ -5,6 +5,9 @@ from typing import Annotated
 
 import typer
 
+from discovery.threads import jobs as at_a_time
+from discovery.threads import use_jobs
+
 
 def challenge(
     family: Annotated[
@@ -16,7 +19,16 @@ def challenge(
         int | None, typer.Option(min=0, help="Everything random comes from it [drawn now].")
     ] = None,
     out: Annotated[Path, typer.Option("--out", help="Folder of the challenge.")] = Path("runs/challenge"),
-    jobs: Annotated[int, typer.Option(min=1, help="Processes at a time.")] = 2,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs",
+            "-j",
+            min=1,
+            help="Cases at a time, each in a process on one core. The answers are the same with any number. "
+            "[every core; or the environment variable DISCOVERY_JOBS]",
+        ),
+    ] = None,
     baselines: Annotated[bool, typer.Option(help="Solve with the other methods, too.")] = True,
     cases_from: Annotated[
         Path | None, typer.Option(help="Take the cases of this folder, with keys.json or answers.json.")
@@ -39,14 +51,15 @@ def challenge(
     from discovery.challenge.run import family_list, practice
     from discovery.progress import shown
 
+    use_jobs(jobs)
     if family and "help" in family:
         typer.echo(family_list())
         return
     with shown() as progress:
         if write is not None:
-            typer.echo(practice(write, family or [], cases, seed, jobs, progress))
+            typer.echo(practice(write, family or [], cases, seed, at_a_time(), progress))
             return
-        outcome = run_challenge(out, family or [], cases, seed, jobs, baselines, cases_from, progress)
+        outcome = run_challenge(out, family or [], cases, seed, at_a_time(), baselines, cases_from, progress)
     for line in outcome.lines:
         typer.echo(line)
     typer.echo(f"report: {outcome.folder / 'report.html'}")

@@ -5,12 +5,41 @@ from typing import Annotated
 
 import typer
 
+from discovery.errors import UsageError, UserError
+from discovery.threads import use_jobs
+
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs",
+        "-j",
+        min=1,
+        help="Fits at a time: models, folds and refits run side by side, each on one core. More than the "
+        "cores of the machine gain nothing; 1 leaves the others free. The results are the same with any "
+        "number. [every core; or the environment variable DISCOVERY_JOBS]",
+    ),
+]
+
 
 def run(
     experiment: Annotated[
-        Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, e.g. experiments/nmv5000.toml.")
+        Path,
+        typer.Argument(
+            metavar="EXPERIMENT",
+            help="An experiment file, e.g. experiments/nmv5000.toml; or a folder of them.",
+        ),
     ],
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the results [runs/NAME].")] = None,
+    jobs: Jobs = None,
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            "--dask",
+            metavar="ADDRESS",
+            help="Run the experiments of a folder on the workers of this Dask scheduler, e.g. "
+            "tcp://10.0.0.5:8786. The workers need the same files at the same place.",
+        ),
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Run although the recordings cannot be used as they are.")
     ] = False,
@@ -27,9 +56,17 @@ def run(
     how sure that is, what is missing, what is doubtful, what to do next. The results in the folder are
     replaced as a
     whole at the end: an interrupted run leaves nothing behind. Exports, figures and notes in it stay.
+
+    Of a folder every experiment is run that is not finished yet: start it again to go on where it stopped.
     """
     import json
 
+    use_jobs(jobs)
+    if experiment.is_dir():
+        _run_folder(experiment, out, dask, force=force, quiet=quiet, as_json=as_json)
+        return
+    if dask is not None:
+        raise UsageError(f"--dask runs the experiments of a folder; {experiment} is no folder")
     from discovery.experiment import run as run_experiment
     from discovery.experiment.ending import ending
     from discovery.experiment.summary import summary
@@ -54,6 +91,37 @@ def run(
         typer.echo(line)
 
 
+def _run_folder(
+    folder: Path, out: Path | None, address: str | None, *, force: bool, quiet: bool, as_json: bool
+) -> None:
+    """Run the experiments in a folder; status 1 where one could not be done."""
+    import json
+
+    from discovery.experiment.many import run_many
+    from discovery.progress import shown
+
+    with shown(quiet=quiet or as_json) as progress:
+        done = run_many(folder, out, address, progress, force=force)
+    if as_json:
+        found = [
+            {"experiment": d.experiment, "folder": str(d.folder), "lines": d.lines, "failure": d.failure}
+            for d in done
+        ]
+        typer.echo(json.dumps(found, indent=1, ensure_ascii=False))
+    else:
+        for one in done:
+            head = f"{one.experiment}{' (finished before)' if one.skipped else ''}"
+            typer.echo(f"{head}: error: {one.failure}" if one.failure else f"{head}: {one.folder}")
+            for line in one.lines[:3]:
+                typer.echo(f"  {line}")
+    failed = sum(bool(one.failure) for one in done)
+    if failed:
+        raise UserError(
+            f"{failed} of {len(done)} experiments could not be done; the others are kept. "
+            "Correct their files and run the folder again"
+        )
+
+
 def diagnose(
     experiment: Annotated[
         Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, experiments/*.toml.")
@@ -61,6 +129,7 @@ def diagnose(
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results; default runs/<experiment name>.")
     ] = None,
+    jobs: Jobs = None,
 ) -> None:
     """Find what the model of [mismatch] leaves out: where, which physics, how sure, and how much better the
     repair fits.
@@ -69,6 +138,7 @@ def diagnose(
     left in the folder stay. "no mismatch" and "unexplained" are answers too: nothing is named that the
     recordings cannot tell apart.
     """
+    use_jobs(jobs)
     from discovery.diagnosis.summary import summary
     from discovery.experiment import diagnose as find
     from discovery.experiment.summary import remarks

@@ -225,7 +225,7 @@ def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:
     Sensors that are read every second say little more than every few seconds: slow noise limits a diagnosis.
     """
     every = -(-sum(len(g.read) for g in grids.values()) // MOST_READINGS)
-    return {r: replace(g, read=g.read[::every], readings=g.readings[::every]) for r, g in grids.items()}
+    return {r: g.part(slice(None, None, every)) for r, g in grids.items()}
 
 
 def _inputs(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> list[str]:

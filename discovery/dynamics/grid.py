@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -10,15 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import series
+from discovery.dynamics.averaging import Means, as_readings_show, averaged, independent, some_of
 from discovery.errors import UserError
 from discovery.recordings import Campaign
+from discovery.recordings.blocks import block_means
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 MOST_NODES = 30_000  # of a recording as it is; beyond, it is coarsened
 COARSE_NODES = 8_000  # of a coarsened one, about; as many at most for its inputs' switches
-MOVED = 0.1  # of its span: a held input that moves so far within an interval of a coarsened grid divides it
+_SAME = 1e-6  # of its span: means of a held input that differ by less are one
+MOVED = 0.1  # of its span: a held input that moves so far within a block of a coarsened grid divides it
 
 
 @dataclass(frozen=True)
@@ -44,9 +47,12 @@ class Samples:
         last = 0.5 * (self.value[index] + self.at(time)) if self.linear else self.value[index]
         return np.asarray(sums[index] + last * (time - self.time[index]))
 
-    def averaged(self, nodes: Array) -> Samples:
+    def averaged(self, nodes: Array, shown: Callable[[Samples], Array] | None = None) -> Samples:
         """The channel by its means: over each interval between nodes (T,) where it is held, around each node
         where it runs straight. One that runs straight between fewer stamps than nodes is left as it is.
+
+        Args:
+            shown: the integral (T,) at the nodes as readings show it; default as it is.
         """
         if self.linear:
             if len(self.time) <= len(nodes):
@@ -54,7 +60,11 @@ class Samples:
             return Samples(
                 nodes, self.means(np.r_[nodes[0], 0.5 * (nodes[1:] + nodes[:-1]), nodes[-1]]), True
             )
-        return Samples(nodes[:-1], self.means(nodes), False)
+        mean = self.means(nodes)
+        if shown is not None:
+            seen = np.clip(np.diff(shown(self)) / np.diff(nodes), self.value.min(), self.value.max())
+            mean = np.where(np.abs(seen - mean) < _SAME * np.ptp(self.value), mean, seen)
+        return Samples(nodes[:-1], mean, False)
 
     def means(self, edges: Array) -> Array:
         """Mean between each two edges; exactly the value where it stays one, so that what is constant in the
@@ -88,12 +98,25 @@ class Grid:
     late: Mapping[str, float] = field(default_factory=dict)  # s, which `ends` has them earlier than stamped
     instants: int = 0  # nodes that there were before it was coarsened; 0: it was not
     logged: Mapping[str, float] = field(default_factory=dict)  # s, median distance of the stamps of a channel
+    means: Means | None = None  # where readings are means of several
 
     def shifted(self, offset: Mapping[str, float], late: Mapping[str, float] | None = None) -> Grid:
         """The grid with channels moved by constants from what was recorded, in value and, held ones, in time
         (whatever moved them before).
         """
         return replace(self, offset=dict(offset), late=dict(late or {}))
+
+    def part(self, rows: slice = slice(None), outputs: Sequence[str] | None = None) -> Grid:
+        """The grid with some of its readings, those of some outputs alone."""
+        kept = self.outputs if outputs is None else tuple(outputs)
+        columns = [self.outputs.index(name) for name in kept]
+        return replace(
+            self,
+            outputs=kept,
+            read=self.read[rows],
+            readings=self.readings[rows][:, columns],
+            means=self.means.part(rows, columns) if self.means else None,
+        )
 
     @cached_property
     def step(self) -> Array:
@@ -121,6 +144,41 @@ class Grid:
     def _moved(self, values: dict[str, Array]) -> dict[str, Array]:
         return values | {name: values[name] + by for name, by in self.offset.items()}
 
+    @property
+    def single(self) -> Array:
+        """Single readings (N, Y), to see the steps of their numbers."""
+        return self.means.single if self.means else self.readings
+
+    def sd(self, white: Sequence[float]) -> Array:
+        """Standard deviations (R, Y) of the readings, where single ones have `white` (Y,)."""
+        return np.broadcast_to(np.array(white), self.readings.shape) / self.per_reading
+
+    @cached_property
+    def per_reading(self) -> Array:
+        """Of each reading (R, Y), the noise of a single one over its own: 1 where it is a single one."""
+        if self.means is None:
+            return np.ones(self.readings.shape)
+        return np.sqrt(np.maximum(self.means.counts, 1.0))
+
+    @cached_property
+    def looked_at(self) -> Ints:
+        """Nodes (N,) that the readings show something of, ascending."""
+        if self.means is None:
+            return self.read
+        last = len(self.time) - 1
+        return np.unique(np.concatenate([np.clip(self.read + k, 0, last) for k in (-1, 0, 1)]))
+
+    def at_readings(self, shown: Array) -> Array:
+        """Outputs at the readings, (R, Y, ...), of what they are at the nodes `looked_at`, (N, Y, ...)."""
+        if self.means is None:
+            return shown
+        last = len(self.time) - 1
+        before, here, behind = (
+            shown[np.searchsorted(self.looked_at, np.clip(self.read + k, 0, last))] for k in (-1, 0, 1)
+        )
+        left, right = self.means.beside.reshape(2, *here.shape[:2], *[1] * (here.ndim - 2))
+        return np.asarray(here + left * (before - here) + right * (behind - here))
+
     @cached_property
     def measured(self) -> NDArray[np.bool_]:
         """Which readings exist (R, Y)."""
@@ -130,7 +188,7 @@ class Grid:
 def first_interval(grid: Grid) -> Grid:
     """The grid cut down to its first interval, for what is asked of the first instant alone."""
     none = np.full((0, len(grid.outputs)), np.nan)
-    return replace(grid, time=grid.time[:2], read=np.zeros(0, dtype=np.intp), readings=none)
+    return replace(grid, time=grid.time[:2], read=np.zeros(0, dtype=np.intp), readings=none, means=None)
 
 
 def interleaved(left: Array, right: Array) -> Array:
@@ -152,15 +210,15 @@ def make_grid(
     """Grid of a recording: every stamp of an input or a reading is a node, long intervals are divided.
 
     With more than `most` nodes it is coarsened: a body of minutes or hours answers to the mean of what
-    came within seconds. Every so many-th reading is taken, as a single reading still, so that stated
-    noise, steps of quantised numbers and wrong readings keep their meaning; nodes are these, every so
-    many-th stamp, and the stamps at which a held input has switched. Inputs are their means in between.
+    came within seconds. Stamps are taken together in blocks, which end where a held input switches. All
+    readings count: they are their means over a block, at the mean of their stamps. Nodes are these instants,
+    the switches, and the bounds of blocks without a reading. Inputs are their means in between.
 
     Args:
         inputs: channels that the model uses.
         outputs: channels that were measured and are to be compared with the model.
         max_step: longest interval [s]; linear terms are exact whatever it is.
-        coarse: nodes, about, where there are more than `most`.
+        coarse: blocks, about, where there are more nodes than `most`.
         most: nodes of a grid that is left as it is.
 
     Raises:
@@ -180,21 +238,50 @@ def make_grid(
     taken = np.isfinite(table).any(axis=1)
     stamps |= taken
     stamps[[0, -1]] = True
-    read = np.flatnonzero(taken)
     rows = np.flatnonzero(stamps)
-    instants = len(rows) if len(rows) > most else 0
-    if instants:
-        read = read[:: _every(len(read), coarse, most)]
-        base = np.isin(rows, np.concatenate([rows[:: _every(len(rows), coarse, most)], rows[-1:], read]))
-        rows = _coarse_rows(rows, base, data.time, samples.values(), coarse)
-    time = _divided(data.time[rows], max_step)
     logged = {n: float(np.median(np.diff(s.time))) for n, s in samples.items() if len(s.time) > 1}
-    if instants:
-        samples = {name: s.averaged(time) for name, s in samples.items()}
     spread = {name: s for name in samples if (s := campaign.channels[name].spread) > 0}
-    index = np.searchsorted(time, data.time[read])
+    counts = [data.counts.get(name) for name in outputs]
+    if len(rows) <= most:
+        time, read = _divided(data.time[rows], max_step), data.time[taken]
+        index = np.searchsorted(time, read)
+        means = None
+        if data.counts:
+            number = np.column_stack([np.ones(len(taken)) if n is None else n for n in counts])[taken]
+            means = Means(number, np.zeros((2, *number.shape)), table[taken])
+        return Grid(
+            recording, time, samples, outputs, index, table[taken], spread, logged=logged, means=means
+        )
+    base = np.isin(rows, np.append(rows[:: -(-len(rows) // coarse)], rows[-1]))
+    switched = _switches(rows, base, samples.values(), data.time, coarse)
+    first = rows[base | switched]
+    read = np.where(taken, 0.0, np.nan)  # as one more output, read whenever any is
+    found = averaged(data.time, np.column_stack([table, read]), first, [*(counts or [None]), None])
+    empty = ~np.isin(np.arange(len(first)), found.blocks)
+    bound = switched[base | switched] | empty | np.append(True, empty[:-1])
+    bound[-1] = True
+    time = _divided(np.union1d(data.time[first[bound]], found.time), max_step)
+    index = np.searchsorted(time, found.time)
+    beside = found.weights(time, index)
+
+    def shown(one: Samples) -> Array:
+        means = block_means(data.time, one.integral(data.time) + read, np.append(first, len(taken)))
+        return as_readings_show(time, one.integral(time), index, means.mean[found.blocks], beside[:, :, -1])
+
+    single = some_of(table[taken])
+    number = found.counts[:, :-1]
+    number = number if data.counts else independent(number, single)
     return Grid(
-        recording, time, samples, outputs, index, table[read], spread, instants=instants, logged=logged
+        recording,
+        time,
+        {name: s.averaged(time, shown) for name, s in samples.items()},
+        outputs,
+        index,
+        found.readings[:, :-1],
+        spread,
+        instants=len(rows),
+        logged=logged,
+        means=Means(number, beside[:, :, :-1], single),
     )
 
 
@@ -224,24 +311,19 @@ def _divided(time: Array, max_step: float) -> Array:
     return np.sort(np.concatenate([time, *extra])) if extra else time
 
 
-def _every(count: int, coarse: int, most: int) -> int:
-    """Of so many, every which one is taken in a grid coarsened to about `coarse` nodes."""
-    return -(-count // coarse) if count > most else 1
-
-
-def _coarse_rows(
-    rows: Ints, base: NDArray[np.bool_], stamps: Array, samples: Iterable[Samples], coarse: int
-) -> Ints:
-    """Rows of the stamps (N,) that stay nodes: those of `base`, and those at which a held input is far from
-    what it was at the node before.
+def _switches(
+    rows: Ints, base: NDArray[np.bool_], samples: Iterable[Samples], stamps: Array, coarse: int
+) -> NDArray[np.bool_]:
+    """Which rows of the stamps (N,) bound a block because a held input is far from what it was at the last
+    bound; all of `base` are bounds.
 
     What switches more often than the nodes allow (a heater on a pulsed supply) is averaged.
     """
     held = [s.at(stamps[rows]) for s in samples if not s.linear and np.ptp(s.value) > 0]
     if not held:
-        return rows[base]
+        return np.zeros(len(rows), dtype=bool)
     share = np.column_stack([values / np.ptp(values) for values in held])
     far = MOVED
-    while (kept := series.moved(share, base, far)).sum() > base.sum() + coarse:
+    while ((found := series.moved(share, base, far)) & ~base).sum() > coarse:
         far *= 2
-    return np.asarray(rows[kept])
+    return np.asarray(found)

@@ -70,6 +70,7 @@ def sensitivities(
     steps = len(system.grid.step)
     series = [np.broadcast_to(piece.series, (2 * steps,)) for piece in pieces]
     stacked = np.array(series).reshape(len(series), steps, 2)
+    nodes = system.grid.looked_at
     s = kernel.columns(
         trajectory.which,
         trajectory.e,
@@ -83,15 +84,13 @@ def sensitivities(
         system.scale[source],
         np.ascontiguousarray(stacked[:, :, 0].T),
         np.ascontiguousarray(stacked[:, :, 1].T),
-        system.grid.read.astype(np.int64),
+        nodes.astype(np.int64),
     )
-    dy: Array = np.einsum("ryn,rnm->rym", output_matrix(trajectory), s)
+    dy: Array = np.einsum("ryn,rnm->rym", output_matrix(trajectory, nodes), s)
     for y, dual in enumerate(outputs(trajectory, frozenset(parameters)) if parameters else []):
         for name, partial in dual.partials.items():
-            dy[:, y, parameters.index(name)] += np.broadcast_to(partial, (len(system.grid.time),))[
-                system.grid.read
-            ]
-    return dy
+            dy[:, y, parameters.index(name)] += np.broadcast_to(partial, (len(system.grid.time),))[nodes]
+    return system.grid.at_readings(dy)
 
 
 def moved_in_time(trajectory: Trajectory, late: Sequence[str]) -> list[Column]:

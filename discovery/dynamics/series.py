@@ -1,4 +1,4 @@
-"""Compiled recursions along one series: play, lag, and which instants of a long one to keep."""
+"""Compiled recursions along one series: play, lag, and where a long one has moved."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def moved(values, base, far):  # type: ignore[no-untyped-def]
-    """Which instants (T,) are kept: those of `base` (T,), and those at which any of the values (T, C) is
-    farther than `far` from what it was at the last one kept.
+    """At which instants (T,) any of the values (T, C) is farther than `far` from what it was at the last one
+    that was such an instant or one of `base` (T,).
     """
-    kept = base.copy()
+    found = np.zeros(values.shape[0], np.bool_)
     last = values[0].copy()
     for k in range(values.shape[0]):
         for c in range(values.shape[1]):
             if abs(values[k, c] - last[c]) > far:
-                kept[k] = True
-        if kept[k]:
+                found[k] = True
+        if found[k] or base[k]:
             last[:] = values[k]
-    return kept
+    return found
 
 
 @njit(cache=True, nogil=True)

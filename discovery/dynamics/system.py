@@ -18,6 +18,7 @@ from discovery.recordings import Campaign
 from discovery.terms import Dual, Program, compiled, degree, evaluate
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
 Value = float | Array
 
 _FAR = 1e50  # in any unit: beyond it a model has run away, before its squares overflow
@@ -320,7 +321,8 @@ def predict(trajectory: Trajectory) -> Array:
     """
     grid = trajectory.system.grid
     count = len(grid.time)
-    columns = [np.broadcast_to(dual.value, (count,))[grid.read] for dual in outputs(trajectory)]
+    shown = [np.broadcast_to(dual.value, (count,))[grid.looked_at] for dual in outputs(trajectory)]
+    columns = grid.at_readings(np.column_stack(shown)).T
     for name, column, seen in zip(grid.outputs, columns, grid.measured.T, strict=True):
         lost = seen & ~np.isfinite(column)
         if lost.any():
@@ -332,10 +334,10 @@ def predict(trajectory: Trajectory) -> Array:
     return np.column_stack(columns)
 
 
-def output_matrix(trajectory: Trajectory) -> Array:
-    """dy/dx at the reading instants, (R, Y, n)."""
+def output_matrix(trajectory: Trajectory, nodes: Ints | None = None) -> Array:
+    """dy/dx at the reading instants, or other nodes (R,): (R, Y, n)."""
     system = trajectory.system
-    read, count = system.grid.read, len(system.grid.time)
+    read, count = system.grid.read if nodes is None else nodes, len(system.grid.time)
     out = np.zeros((len(read), len(system.grid.outputs), len(system.states)))
     for y, dual in enumerate(outputs(trajectory, frozenset(system.states))):
         for name, partial in dual.partials.items():

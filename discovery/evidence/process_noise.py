@@ -135,7 +135,7 @@ def reading_noise(
     start = Noise(outputs, tuple(fit.noise.white), (), None, slow_time=times[0], heat_time=times[1])
     best, lowest = np.array(fit.noise.white), np.inf
     if not known.all():
-        seen, least = Whitened(fit, 1), np.array(resolution([s.grid.readings for s in fit.problem.systems]))
+        seen, least = Whitened(fit, 1), np.array(resolution([s.grid.single for s in fit.problem.systems]))
         for slow in prior.slow:
             for level in _TRIED:
                 white, cost = _white_with(seen, start, known, least, floor, prior, level, slow)

@@ -133,9 +133,10 @@ def coarse_notes(fit: Fit) -> list[str]:
         return []
     largest = max(grids, key=lambda grid: grid.instants)
     names = ", ".join(grid.recording for grid in grids)
+    readings = int(max(largest.means.counts.max(), 1)) if largest.means else 1
     return [
-        f"{names}: up to {largest.instants} instants, finer than needed; "
-        f"taken are {len(largest.read)} single readings and inputs as means over "
+        f"{names}: up to {largest.instants} instants, finer than needed; readings are compared as "
+        f"{len(largest.read)} means of up to {readings}, and so are their rms; inputs are means over "
         f"{float(np.median(largest.step)):.3g} s, their large steps where they are"
     ]
 

@@ -35,4 +35,8 @@ def recording_files(experiment: Experiment) -> dict[str, Path]:
 
 def hashes(files: Mapping[str, Path]) -> dict[str, str]:
     """SHA-256 of each file."""
-    return {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
+    found = {}
+    for name, path in files.items():
+        with path.open("rb") as file:
+            found[name] = hashlib.file_digest(file, "sha256").hexdigest()
+    return found

@@ -45,12 +45,14 @@ from discovery.report import write_report
 from discovery.runfolder import default_folder, staged
 from discovery.sparse.options import SparseOptions
 from discovery.targets import check_targets
+from discovery.threads import one_thread, side_by_side
 
 if TYPE_CHECKING:
     from discovery.diagnosis import Diagnosis
     from discovery.experiment.roles import Fold
 
 
+@one_thread
 def run(
     path: Path,
     out: Path | None = None,
@@ -87,18 +89,13 @@ def run(
         refuse(findings)
     for line in folded(findings):
         tell(line)
-    steps = Steps(progress, [*(_weight(entry) for entry in experiment.form.models.values()), *_DIAGNOSIS])
-    progress = steps
+    progress = steps = Steps(progress, [*map(_weight, experiment.form.models.values()), _DIAGNOSIS])
     folder = out or default_folder(experiment.name)
     if experiment.form.export:
         check_targets(experiment.form.export.to)
     with staged(folder) as temporary:
-        fitted: dict[str, Fitted] = {}
         begun = begin_roles(experiment)
-        for name, entry in experiment.form.models.items():
-            steps.begin()
-            fitted[name] = fit_entry(experiment, name, entry, progress)
-        steps.begin()
+        fitted = fit_all(experiment, steps)
         found = diagnosis(experiment, progress, fitted)
         if found is not None and found.repaired is not None:
             name = _free_name("repaired", fitted)
@@ -116,12 +113,28 @@ def run(
     return folder
 
 
-_DIAGNOSIS = (4.0,)  # how long it takes beside a model that is only fitted
+_DIAGNOSIS = 4.0  # how long it takes beside a model that is only fitted
 
 
 def _weight(entry: ModelEntry) -> float:
     """How long a model takes beside one that is only fitted."""
     return 3.0 if isinstance(entry, SparseOptions) else 1.0
+
+
+def fit_all(experiment: Experiment, steps: Steps) -> dict[str, Fitted]:
+    """Every model of the experiment, in the order of its file. Models know nothing of each other, so they are
+    fitted side by side, the longest first.
+    """
+    models = experiment.form.models
+
+    def fitted(name: str) -> Fitted:
+        one = fit_entry(experiment, name, models[name], steps)
+        steps.end(_weight(models[name]))
+        return one
+
+    order = sorted(models, key=lambda name: -_weight(models[name]))
+    found = dict(zip(order, side_by_side(fitted, order), strict=True))
+    return {name: found[name] for name in models}
 
 
 def begin_roles(experiment: Experiment) -> Iterator[Fold] | None:

@@ -23,6 +23,7 @@ from discovery.experiment.pipeline import fit_entry
 from discovery.models import Model
 from discovery.progress import Progress, silent
 from discovery.terms import names
+from discovery.threads import jobs
 
 Roles = Mapping[str, Sequence[str]]
 
@@ -41,11 +42,12 @@ class Fold:
 
 
 def begin_folds(experiment: Experiment) -> Iterator[Fold]:
-    """Begin to find every model without each role, on as many cores as there are, in the background.
+    """Begin to find every model without each role, as many at a time as `threads.jobs` says, in the
+    background; one at a time, each is found when it is asked for.
 
     The folds come in the order in which they are done.
     """
-    from joblib import Parallel, cpu_count, delayed
+    from joblib import Parallel, delayed
 
     models = experiment.form.models
     # the longest first, so that no core waits at the end
@@ -53,8 +55,7 @@ def begin_folds(experiment: Experiment) -> Iterator[Fold]:
         ((m, r) for r in experiment.form.roles or {} for m in models),
         key=lambda t: models[t[0]].kind != "sindy",
     )
-    jobs = max(1, min(cpu_count(), len(tasks)))
-    work = Parallel(n_jobs=jobs, return_as="generator_unordered")
+    work = Parallel(n_jobs=max(1, min(jobs(), len(tasks))), return_as="generator_unordered")
     found: Iterator[Fold] = work(delayed(fold_of)(experiment, name, role) for name, role in tasks)
     return found
 

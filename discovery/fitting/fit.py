@@ -143,8 +143,7 @@ def fit_model(
     problem = make_problem(model, campaign, recordings, outputs, grids, priors, belief)
     stated = {name: campaign.channels[name].noise for name in problem.outputs}
     theta = _beginning(problem, guess or {}, begin)
-    readings = [system.grid.readings for system in problem.systems]
-    least = resolution(readings)
+    least = resolution([system.grid.single for system in problem.systems])
     current = noise or _first_noise(problem, theta, stated, least)
     nuisance = any(u.is_nuisance for u in problem.unknowns)
     problem = problem.spread(current, _first_spreads(problem, theta))
@@ -161,7 +160,8 @@ def fit_model(
         left = [problem.residual(t) for t in solution.trajectories]
         settled = True
         if noise is None:
-            updated = white_noise(problem.outputs, stated, left, least)
+            alone = [r * s.grid.per_reading for r, s in zip(left, problem.systems, strict=True)]
+            updated = white_noise(problem.outputs, stated, alone, least)
             change = max(abs(np.log(a / b)) for a, b in zip(updated.white, current.white, strict=True))
             settled, current = change < 0.02, updated
         if nuisance:

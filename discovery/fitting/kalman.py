@@ -86,7 +86,7 @@ def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, jumps):
             for j in range(n):
                 for i in range(size):
                     ph[i] += h[r, y, j] * p[j, i]
-            s = white[y] ** 2 + (ph[own] if nv else 0.0)
+            s = white[r, y] ** 2 + (ph[own] if nv else 0.0)
             for j in range(n):
                 s += h[r, y, j] * ph[j]
             roots[r, y] = np.sqrt(s)
@@ -158,7 +158,8 @@ class Filter:
         """
         if "gains" not in self.last or self.last["gains"][0] != noise:
             heat, slow, response, decays = self._parts(noise)
-            white, jumps = np.array(noise.white), self.jumps if noise.jitter else self.jumps[:0]
+            white = self.trajectory.system.grid.sd(noise.white)
+            jumps = self.jumps if noise.jitter else self.jumps[:0]
             found = _gains(
                 self.f, response, self.h, self.measured, white, slow, heat, *decays, noise.jitter**2 * jumps
             )
@@ -198,7 +199,7 @@ class Filter:
         """
         clean = np.where(self.measured[:, :, None], data, 0.0)
         if noise.is_white:
-            white = np.broadcast_to(np.array(noise.white), self.measured.shape)[self.measured]
+            white = self.trajectory.system.grid.sd(noise.white)[self.measured]
             return clean[self.measured] / white[:, None], np.log(white)
         _, slow, response, decays = self._parts(noise)
         gains, roots = self.gains(noise)
@@ -257,10 +258,8 @@ def whiten(trajectory: Trajectory, noise: Noise, data: Array, part: Filter | Non
     was made before.
     """
     if noise.is_white:
-        measured = trajectory.system.grid.measured
-        return np.asarray(
-            (np.where(measured[:, :, None], data, 0.0) / np.array(noise.white)[None, :, None])[measured]
-        )
+        grid = trajectory.system.grid
+        return np.asarray(data[grid.measured] / grid.sd(noise.white)[grid.measured][:, None])
     return (part or make_filter(trajectory)).whitened(noise, data)[0]
 
 

@@ -138,7 +138,7 @@ class _Bank:
             terms = (Term("follow", "x", parse(f"({u} - x)/tau")),)
             system = make_system(
                 Model("filter", {"tau": Parameter(1.0)}, states, terms, {}),
-                replace(grid, outputs=(), readings=grid.readings[:, :0]),
+                grid.part(outputs=()),
             )
             filtered[u] = np.array([simulate(system, {"tau": tau}).x[grid.read, 0] for tau in taus])
         since = grid.time[grid.read] - grid.time[0]

@@ -14,6 +14,7 @@ from discovery.recordings.campaignfile import CampaignForm, ChannelForm, Recordi
 from discovery.recordings.clockcheck import clock_findings
 from discovery.recordings.columns import Columns
 from discovery.recordings.correction import pair_corrections, uncompensated
+from discovery.recordings.longfile import How
 from discovery.recordings.oddvalues import impossible_readings
 from discovery.recordings.reading import read_columns
 from discovery.recordings.roles import ROLES, Between, is_input
@@ -54,7 +55,8 @@ class Recording:
     as they were without compensation, whatever correction the machine applied.
 
     `origin`: ISO 8601 instant of time 0 when the file had instants. `start`: seconds of time 0 on the file's
-    clock, so that a stamp in the file is start + time.
+    clock, so that a stamp in the file is start + time. `counts`: of a recording so long that its readings are
+    means, how many (T,) each is the mean of, by measured channel.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Recording:
     note: str = ""
     origin: str | None = None
     start: float = 0.0
+    counts: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -141,6 +144,23 @@ def channel_values(
     }
 
 
+def how_to_read(
+    form: RecordingForm,
+    channels: Mapping[str, ChannelForm],
+    to: Mapping[str, Conversion],
+    pairs: Mapping[str, str],
+) -> How:
+    """What the columns of a recording's file are, where it is so long that rows become means."""
+    wanted = wanted_columns(form, channels)
+    made = {c: make_channel(c, channels[c], to[c]) for c in wanted if c in to}
+    sensors: dict[str, list[tuple[Channel, float, float]]] = {}
+    for name, one in made.items():
+        sensors.setdefault(wanted[name], []).append((one, to[name].factor, to[name].offset))
+    beside = {wanted[c]: wanted[error] for c, error in pairs.items() if c in made and error in made}
+    held = {wanted[c] for c, one in made.items() if one.between == "held" and not one.measured}
+    return How(frozenset(held - beside.keys()), beside, sensors)
+
+
 def _conversion(path: Path, name: str, form: ChannelForm) -> Conversion:
     try:
         return conversion(form.unit, form.role)
@@ -164,7 +184,9 @@ def _load(
         key = ("recordings", name, "set", unknown)
         hint = f"no such channel; {suggest(unknown, list(channels))}"
         raise UserError(f"{path}, line {locate(read_text(path), key)}: {dotted(key)}: {hint}")
-    columns, findings = read_columns(file, list(wanted.values()))
+    columns, findings = read_columns(
+        file, list(wanted.values()), how_to_read(form, channels, conversions, pairs)
+    )
     if columns is not None:
         findings = findings + clock_findings(file, columns)
     for finding in findings:
@@ -177,7 +199,10 @@ def _load(
             do = f"{suggest(column, list(columns.header))}; or say set = {{ {channel} = ... }} in {path}"
             raise UserError(f"{file}, line 1: no column '{column}'; {do}")
     values = channel_values(columns, form, channels, conversions)
+    measured = {c: make_channel(c, channels[c], conversions[c]).measured for c in wanted}
     for channel, series in values.items():
+        if columns.counts:  # taken out row by row
+            break
         made = make_channel(channel, channels[channel], conversions[channel])
         known = np.flatnonzero(np.isfinite(series))
         series[known[impossible_readings(made, series[known])]] = np.nan  # `check` says so
@@ -188,4 +213,5 @@ def _load(
         form.note,
         columns.origin,
         float(columns.time[0]),
+        {c: columns.counts[to] for c, to in wanted.items() if to in columns.counts and measured[c]},
     )

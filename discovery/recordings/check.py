@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from discovery.files import Key, check_kind, dotted, locate, parse_toml, read_file
-from discovery.recordings.campaign import Channel, channel_values, make_channel, wanted_columns
+from discovery.recordings.campaign import Channel, channel_values, how_to_read, make_channel, wanted_columns
 from discovery.recordings.campaignfile import CampaignForm, RecordingForm, campaign_path
 from discovery.recordings.clockcheck import clock_findings
 from discovery.recordings.columns import TIME, Array, Columns
@@ -127,9 +127,14 @@ def _recording_findings(
     recording = form.recordings[name]
     file = path.parent / recording.file
     wanted = wanted_columns(recording, form.channels)
-    columns, findings = read_columns(file, list(wanted.values()))
+    known = {c: one for c, one in form.channels.items() if c in conversions}
+    how = how_to_read(recording, known, conversions, pairs)
+    columns, findings = read_columns(file, list(wanted.values()), how)
     if columns is None:
         return findings, None, None
+    for name, count in columns.left_out.items():
+        what = f"{count} lone values of '{name}' are far from all around them"
+        findings.append(Finding("warning", file, None, what, "they are not used; look at the sensor"))
     findings.extend(_header_findings(file, columns, form, recording))
     findings.extend(clock_findings(file, columns))
     channels = {

@@ -1,7 +1,7 @@
 """What a file of a recording holds, before roles and units: columns of numbers and their lines."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,9 @@ class Columns:
     """`header`: all names in the file. `time` (T,): seconds on the file's clock, in the order of the file.
 
     `values`: the wanted columns, each (T,), NaN where not measured. `lines` (T,): where each row stands.
-    `origin`: the instant at which `time` is 0, when the file has instants.
+    `origin`: the instant at which `time` is 0, when the file has instants. Of a long file that was reduced to
+    means: `counts`, readings (T,) in each mean by column; `rows` of the file; `left_out`, by column, lone
+    readings that only a fault explains.
     """
 
     header: tuple[str, ...]
@@ -26,6 +28,9 @@ class Columns:
     values: Mapping[str, Array]
     lines: Lines
     origin: str | None = None
+    counts: Mapping[str, Array] = field(default_factory=dict)
+    rows: int = 0
+    left_out: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def runs_forward(self) -> bool:

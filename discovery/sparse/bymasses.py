@@ -48,11 +48,7 @@ def discover_masses(
     import pysindy
 
     options = matched(options, data.drives.expressions, campaign.path)
-    column = data.grids[recordings[0]].outputs.index(output)
-    grids = {
-        r: replace(data.grids[r], outputs=(output,), readings=data.grids[r].readings[:, [column]])
-        for r in recordings
-    }
+    grids = {r: data.grids[r].part(outputs=[output]) for r in recordings}
     readings = [grids[r].readings[:, 0] for r in recordings]
     noise = campaign.channels[output].noise or rough_noise(readings)
     library = FilteredInputs(

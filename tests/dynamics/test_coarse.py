@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from discovery.dynamics import make_grid, make_system, simulate
+from discovery.dynamics import make_grid, make_system, sensitivities, simulate
+from discovery.dynamics.averaging import independent
 from discovery.dynamics.grid import COARSE_NODES, MOST_NODES, Samples
 from discovery.dynamics.system import predict
 from discovery.fitting import fit_model
@@ -54,19 +55,18 @@ def model(drive: str = "u") -> Model:
 
 
 def missed(u: Array, drive: str = "u", expected: Array | None = None) -> float:
-    """Largest difference at any reading that the coarse grid takes."""
-    grid = make_grid(campaign(u), "r", ["u"], ["y"])
+    """Largest difference of the model and any mean of readings that follow its equation exactly."""
+    grid = make_grid(campaign(u, expected), "r", ["u"], ["y"])
     assert grid.instants == ROWS
     assert len(grid.time) <= 2 * COARSE_NODES + 100
-    at = np.searchsorted(STEP * np.arange(ROWS), grid.time[grid.read])
-    found = predict(simulate(make_system(model(drive), grid), model().values()))[:, 0]
-    return float(np.max(np.abs(found - (response(u) if expected is None else expected)[at])))
+    found = predict(simulate(make_system(model(drive), grid), model().values()))
+    return float(np.max(np.abs(found - grid.readings)))
 
 
 def test_switches_keep_their_instants_and_ripple_its_mean() -> None:
     """30 K of response are met to a hundredth of a sensor's 0.1 K, however noisy the meter."""
     assert missed(switched(1)) < 1e-3
-    assert missed(switched(1, 0.0)) < 1e-9  # nodes at all switches: the very same steps
+    assert missed(switched(1, 0.0)) < 1e-5  # nodes at all switches: only a parabola between nodes is left
 
 
 def test_a_pulsed_heater_is_averaged() -> None:
@@ -80,19 +80,62 @@ def test_a_pulsed_heater_is_averaged() -> None:
 def test_a_delayed_switch_stays_where_it_is() -> None:
     u = switched(2, 0.0)
     late = np.concatenate([np.full(600, u[0]), u[:-600]])
-    assert (
-        missed(u, "delay(u, 300)", response(late)) < 2e-2
-    )  # intervals of 7.5 s: 30 K (7.5/400)^2 / 8 and less
+    bend = GAIN * 600.0 / TAU * 7.5 / 8  # of a mean over 7.5 s with the switch in its middle
+    assert missed(u, "delay(u, 300)", response(late)) < bend
 
 
-def test_readings_stay_single_ones() -> None:
+def test_every_reading_counts_once() -> None:
     u, rng = switched(3), np.random.default_rng(0)
     y = response(u) + rng.normal(0.0, 0.2, ROWS)
     grid = make_grid(campaign(u, y), "r", ["u"], ["y"])
-    at = np.searchsorted(STEP * np.arange(ROWS), grid.time[grid.read])
-    assert np.array_equal(grid.readings[:, 0], y[at])
-    assert len(at) == -(-ROWS // 15)
-    assert at[0] == 0
+    assert grid.means is not None
+    assert grid.means.counts.sum() == ROWS
+    assert np.sum(grid.means.counts * grid.readings) == pytest.approx(y.sum())
+    assert len(grid.read) <= COARSE_NODES + 100
+    free = predict(simulate(make_system(model(), grid), model().values()))
+    left = (grid.readings - free) / grid.sd([0.2])
+    assert np.std(left) == pytest.approx(1.0, abs=0.03)  # the noise of a mean is that of one over the root
+    assert np.mean(left) == pytest.approx(0.0, abs=0.04)
+
+
+def test_outputs_that_are_read_at_other_stamps_are_compared_where_they_were_read() -> None:
+    """One every row, one every 11 rows, one now and then: each against the same exact response."""
+    u = switched(8, 0.0)
+    y, rng = response(u), np.random.default_rng(1)
+    values = {
+        "u": u,
+        "y": y,
+        "z": np.where(np.arange(ROWS) % 11 == 3, y, np.nan),
+        "rare": np.where(rng.random(ROWS) < 0.003, y, np.nan),
+    }
+    channels = CHANNELS | {name: replace(CHANNELS["y"], name=name) for name in ("z", "rare")}
+    data = Campaign("c", channels, {"r": Recording("r", np.arange(ROWS) * STEP, values)})
+    grid = make_grid(data, "r", ["u"], ["y", "z", "rare"])
+    several = replace(model(), outputs={"z": parse("y"), "rare": parse("y")})
+    found = predict(simulate(make_system(several, grid), several.values()))
+    assert np.nanmax(np.abs(found - grid.readings)) < 1e-4  # of 30 K
+    numbers = [f"{name}" for name in ("tau", "gain")]
+    trajectory = simulate(make_system(several, grid), several.values())
+    slopes = sensitivities(trajectory, numbers)
+    for k, name in enumerate(numbers):
+        sides = [
+            predict(simulate(trajectory.system, several.values() | {name: several.values()[name] * by}))
+            for by in (1 + 1e-5, 1 - 1e-5)
+        ]
+        by_differences = (sides[0] - sides[1]) / (2e-5 * several.values()[name])
+        assert slopes[:, :, k] == pytest.approx(by_differences, rel=1e-4, abs=1e-6 * np.abs(slopes).max())
+
+
+def test_a_sensor_of_whole_steps_is_no_better_for_being_read_more_often() -> None:
+    """Steps of 1 K: the error of a mean of 100 readings, against simulated sensors of any noise."""
+    rng = np.random.default_rng(5)
+    for noise in (0.02, 0.2, 0.4, 1.0):
+        true = 20.0 + 0.3 * rng.random(2000).cumsum()
+        shown = np.round(true[:, None] + rng.normal(0.0, noise, (2000, 100)))
+        error = np.std(shown.mean(axis=1) - true)
+        single = np.sqrt(noise**2 + 1 / 12)
+        worth = float(independent(np.full((1, 1), 100.0), shown.reshape(-1, 1)[:40000])[0, 0])
+        assert single / np.sqrt(worth) == pytest.approx(error, rel=0.35), noise
 
 
 @pytest.mark.parametrize("rows", [500, MOST_NODES])
