@@ -28,7 +28,7 @@ from discovery.sparse.options import SparseOptions
 from discovery.sparse.ratedata import RateData, rough_noise
 from discovery.sparse.rates import refit, with_candidates
 from discovery.sparse.search import Search, plain
-from discovery.sparse.structures import WORDS, Structure, own, rate, started, upstream
+from discovery.sparse.structures import FLOWS, WORDS, Structure, balanced, own, rate, started, upstream
 from discovery.sparse.weak import half_width, weak_rows
 from discovery.terms import Number
 
@@ -52,26 +52,31 @@ def discover_states(
     unit = "h" if roles <= THERMAL_ROLES else time_unit(data.scale)
     found = []
     for kind in hidden:
-        progress(f"terms of {', '.join(data.outputs)}, {kind}")
-        try:
-            found.append(_discovered(data, kind, words, unit, options))
-        except RunsAwayError:
-            continue
-        except UnknownTermError:  # a term that this form does not have: another one may
-            if options.form != "auto" and len(hidden) == 1:
-                raise
+        flows = [w for w in FLOWS if w in words] or ["linear"] if kind == "upstream" else [""]
+        for flow in flows:
+            progress(f"terms of {', '.join(data.outputs)}, {kind} {flow}".rstrip())
+            try:
+                found.append(_discovered(data, kind, flow, words, unit, options))
+            except RunsAwayError:
+                continue
+            except UnknownTermError:  # a term that this form does not have: another one may
+                if options.form != "auto" and len(hidden) == 1 and flow == flows[-1] and not found:
+                    raise
     return found
 
 
 def _discovered(
-    data: RateData, kind: str, words: Sequence[str], unit: str, options: SparseOptions
+    data: RateData, kind: str, flow: str, words: Sequence[str], unit: str, options: SparseOptions
 ) -> Discovery:
     """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free
     runs.
+
+    Args:
+        flow: law of the chain from which a hidden body upstream begins.
     """
     y = data.outputs[0]
     if kind == "upstream":
-        structure, options = _allowed(data, _chain(data, y, words, unit), options)
+        structure, options = _allowed(data, _chain(data, y, flow, words, unit), options)
         entered = {i for i, c in enumerate(structure.candidates) if c.start != 0.0}
     else:
         bare = (
@@ -180,19 +185,18 @@ def _criterion(g: Gram, effective: float, gain: float, size: int, library: int) 
     return float(effective * np.log(left / g.count) + size * (np.log(effective) + 2 * np.log(library)))
 
 
-def _chain(data: RateData, output: str, words: Sequence[str], unit: str) -> Structure:
-    """A hidden body upstream, begun as a chain of two linear ones that fits the readings best."""
-    scale = data.scale / TIME_UNITS[unit]
-    linear = upstream(data, output, ["linear"], unit)
-    h = f"{output}_up"
-    inputs = [c.label for c in linear.candidates if c.into == h and c.label != "1"]
+def _chain(data: RateData, output: str, flow: str, words: Sequence[str], unit: str) -> Structure:
+    """A hidden body upstream, begun as the chain of two bodies with one law of flow that fits the readings
+    best.
+
+    Args:
+        flow: word of the law, as "sqrt".
+    """
+    bare = upstream(data, output, [flow], unit)
     fits = []
     for first, then in product(_CHAIN, _CHAIN):
-        guess = {h: 1 / (first * scale), output: -1 / (then * scale)} | dict.fromkeys(
-            inputs, 0.1 / (first * scale)
-        )
-        coefficients = {i: guess.get(c.label, 0.0) for i, c in enumerate(linear.candidates)}
-        model, _ = with_candidates(linear.model, started(linear, coefficients).candidates)
+        guess = balanced(data, bare, first * data.scale, then * data.scale)
+        model, _ = with_candidates(bare.model, started(bare, guess).candidates)
         try:
             fits.append(_fit(data, model, {}, _FIRST))
         except RunsAwayError:
@@ -200,15 +204,15 @@ def _chain(data: RateData, output: str, words: Sequence[str], unit: str) -> Stru
     if not fits:
         raise RunsAwayError(f"no chain of two bodies stays finite on the readings of {output}")
     fit = min(fits, key=lambda one: one.cost)
-    column = list(fit.problem.model.states).index(h)
+    column = list(fit.problem.model.states).index(f"{output}_up")
     level = np.concatenate([t.x[:, column] for t in fit.trajectories])
     full = upstream(data, output, words, unit, level)
-    _, labels = with_candidates(linear.model, linear.candidates)
-    found = dict(zip([(c.into, c.label) for c in linear.candidates], labels, strict=True))
+    _, labels = with_candidates(bare.model, bare.candidates)
+    found = dict(zip([(c.into, c.source, c.label) for c in bare.candidates], labels, strict=True))
     values = {
-        i: fit.model.parameters[found[c.into, c.label]].value
+        i: fit.model.parameters[found[c.into, c.source, c.label]].value
         for i, c in enumerate(full.candidates)
-        if (c.into, c.label) in found
+        if (c.into, c.source, c.label) in found
     }
     return started(full, values)
 
