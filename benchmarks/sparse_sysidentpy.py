@@ -1,7 +1,7 @@
 """SysIdentPy on the systems of `sparse_systems.py`: NARX models whose terms FROLS chooses.
 
     python benchmarks/sparse_systems.py write 100 FOLDER
-    python benchmarks/sparse_sysidentpy.py FOLDER       # in an environment of its own: it wants an older numpy
+    python benchmarks/sparse_sysidentpy.py FOLDER   # in an environment of its own: it wants an older numpy
 
 A user of SysIdentPy would put the readings on equal steps (10 min here), try 1 to 3 lags and two criteria for
 the number of terms, and take what predicts the second recording best in a free run.
@@ -99,8 +99,8 @@ def main(folder: Path) -> None:
                 float(np.sqrt(np.mean((read - np.interp(read.index.to_numpy(), time, predicted)) ** 2)))
             )
         print(
-            f"{int(path.stem) + 1} systems: same inputs in {same} of {outputs} outputs, {terms / outputs:.1f} "
-            f"terms an output, median rms unseen {np.median(left):.2f} um, "
+            f"{int(path.stem) + 1} systems: same inputs in {same} of {outputs} outputs, "
+            f"{terms / outputs:.1f} terms an output, median rms unseen {np.median(left):.2f} um, "
             f"{(clock.process_time() - began) / outputs:.1f} s an output",
             flush=True,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from discovery import terms
 from discovery.dynamics import Grid
 from discovery.errors import RunsAwayError
-from discovery.fitting import Fit
+from discovery.fitting import Fit, fit_model
+from discovery.fitting.noise import readings_as_one
 from discovery.models import Model, Parameter
 from discovery.models.model import TIME_UNITS
 from discovery.progress import Progress
+from discovery.recordings import Campaign
 from discovery.sparse.byrates import discover_rates
 from discovery.sparse.constraints import UnknownTermError, matched
 from discovery.sparse.discovery import Discovery
@@ -40,29 +42,32 @@ _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
 _MOVED = 0.02  # share by which a level moves that makes the set grow anew
 _FIRST = 12  # of a fit of a linear chain from one of its starts
+_WHITE = 1.5  # readings that say the same once: less is noise
 _CHAIN = (0.3, 1.0, 3.0)  # times the time scale of the readings: time constants that a chain starts from
 
 
 def discover_states(
     data: RateData, options: SparseOptions, hidden: Sequence[str], progress: Progress
-) -> list[Discovery]:
-    """A discovery for each kind of hidden state that was asked for and does not run away."""
+) -> Iterator[Discovery]:
+    """A discovery for each kind of hidden state that was asked for and does not run away, made when it is
+    asked for.
+    """
     words = options.library or WORDS
     roles = {data.campaign.channels[y].role for y in data.outputs}
     unit = "h" if roles <= THERMAL_ROLES else time_unit(data.scale)
-    found = []
+    some = False
     for kind in hidden:
         flows = [w for w in FLOWS if w in words] or ["linear"] if kind == "upstream" else [""]
         for flow in flows:
             progress(f"terms of {', '.join(data.outputs)}, {kind} {flow}".rstrip())
             try:
-                found.append(_discovered(data, kind, flow, words, unit, options))
+                yield _discovered(data, kind, flow, words, unit, options)
+                some = True
             except RunsAwayError:
                 continue
             except UnknownTermError:  # a term that this form does not have: another one may
-                if options.form != "auto" and len(hidden) == 1 and flow == flows[-1] and not found:
+                if options.form != "auto" and len(hidden) == 1 and flow == flows[-1] and not some:
                     raise
-    return found
 
 
 def _discovered(
@@ -241,6 +246,12 @@ def with_free_levels(data: RateData, model: Model) -> Model:
     if not count:
         return model
     return _fit(data, replace(model, parameters=parameters, terms=tuple(found)), {}, _LAST).model
+
+
+def leaves_noise(campaign: Campaign, recordings: Sequence[str], model: Model, outputs: Sequence[str]) -> bool:
+    """Whether what a model leaves of all its readings is white: a further state has nothing to explain."""
+    fit = fit_model(model, campaign, recordings, outputs, max_rounds=_ROUNDS)
+    return readings_as_one(list(fit.residuals().values())) < _WHITE
 
 
 def left_out_of(data: RateData, model: Model) -> Array:
