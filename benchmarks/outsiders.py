@@ -58,10 +58,8 @@ def lathe(rng: np.random.Generator, hours: float) -> pd.DataFrame:
                 "Ball screw nut": s[5],
                 "Coolant": coolant[k],
                 "Ambient": room[k],
-                "X": 4.2 * np.mean(b["head"] - 20)
-                + 9.0 * np.mean((b["column"] - 20) * z)
-                - 3.0 * np.mean(b["bed"] - 20),
-                "Z": 5.5 * np.mean(b["head"] - 20) - 6.0 * np.mean(s - 20) + 2.0 * np.mean(b["bed"] - 20),
+                "X": 4.2 * head + 9.0 * np.mean((b["column"] - 20) * z) - 3.0 * bed,
+                "Z": 5.5 * head - 6.0 * np.mean(s - 20) + 2.0 * bed,
             }
         )
         for _ in range(fine):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -28,10 +28,10 @@ from discovery.sparse.growth import Growth, grown
 from discovery.sparse.laws import with_levels
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.ratedata import RateData, rough_noise
-from discovery.sparse.rates import refit, with_candidates
+from discovery.sparse.rates import refit, with_candidates, without
 from discovery.sparse.search import Search, plain
 from discovery.sparse.structures import FLOWS, WORDS, Structure, balanced, own, rate, started, upstream
-from discovery.sparse.weak import half_width, weak_rows
+from discovery.sparse.weak import half_widths, weak_rows
 from discovery.terms import Number
 
 Array = NDArray[np.float64]
@@ -42,55 +42,89 @@ _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
 _MOVED = 0.02  # share by which a level moves that makes the set grow anew
 _FIRST = 12  # of a fit of a linear chain from one of its starts
+_FAR = 3.0  # times the rms of another form at its start
 _WHITE = 1.5  # readings that say the same once: less is noise
 _CHAIN = (0.3, 1.0, 3.0)  # times the time scale of the readings: time constants that a chain starts from
+
+
+@dataclass(frozen=True)
+class Start:
+    """A structure with start values, the candidates that are in it from the start, the options as they match
+    its terms, and the cost of a short fit.
+    """
+
+    structure: Structure
+    entered: set[int]
+    options: SparseOptions
+    cost: float = 0.0
 
 
 def discover_states(
     data: RateData, options: SparseOptions, hidden: Sequence[str], progress: Progress
 ) -> Iterator[Discovery]:
     """A discovery for each kind of hidden state that was asked for and does not run away, made when it is
-    asked for.
+    asked for; none for a kind that begins far from the readings where another one begins near.
     """
     words = options.library or WORDS
     roles = {data.campaign.channels[y].role for y in data.outputs}
     unit = "h" if roles <= THERMAL_ROLES else time_unit(data.scale)
-    some = False
-    for kind in hidden:
-        flows = [w for w in FLOWS if w in words] or ["linear"] if kind == "upstream" else [""]
-        for flow in flows:
-            progress(f"terms of {', '.join(data.outputs)}, {kind} {flow}".rstrip())
+    flows = [word for word in FLOWS if word in words] or ["linear"]
+    kinds = [k for kind in hidden for k in ([f"{kind} {f}" for f in flows] if kind == "upstream" else [kind])]
+    nearest = np.inf
+    lacking: UnknownTermError | None = None
+    starts: dict[str, Start] = {}
+
+    def begin(kind: str) -> None:
+        nonlocal nearest, lacking
+        try:
+            starts[kind] = _start(data, kind, words, unit, options)
+            nearest = min(nearest, starts[kind].cost)
+        except RunsAwayError:
+            pass
+        except UnknownTermError as error:  # a term that this form does not have: another one may
+            lacking = error
+
+    for kind in kinds:
+        if not kind.startswith("upstream"):  # quick to begin: which is near is known before one grows
+            begin(kind)
+    for kind in kinds:
+        progress(f"terms of {', '.join(data.outputs)}, {kind}")
+        if kind not in starts and kind.startswith("upstream"):
+            begin(kind)
+        if kind in starts and starts[kind].cost <= _FAR**2 * nearest:
             try:
-                yield _discovered(data, kind, flow, words, unit, options)
-                some = True
+                yield _discovered(data, kind.split()[0], starts[kind])
             except RunsAwayError:
                 continue
-            except UnknownTermError:  # a term that this form does not have: another one may
-                if options.form != "auto" and len(hidden) == 1 and flow == flows[-1] and not some:
-                    raise
+    if lacking is not None and not starts and options.form != "auto" and len(hidden) == 1:
+        raise lacking
 
 
-def _discovered(
-    data: RateData, kind: str, flow: str, words: Sequence[str], unit: str, options: SparseOptions
-) -> Discovery:
-    """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free
-    runs.
-
-    Args:
-        flow: law of the chain from which a hidden body upstream begins.
+def _start(data: RateData, kind: str, words: Sequence[str], unit: str, options: SparseOptions) -> Start:
+    """Where a kind of hidden state begins: by the weak form, or as a chain of two bodies ("upstream sqrt": of
+    the law of its flow).
     """
     y = data.outputs[0]
-    if kind == "upstream":
-        structure, options = _allowed(data, _chain(data, y, flow, words, unit), options)
+    if kind.startswith("upstream"):
+        full, cost = _chain(data, y, kind.split()[1], words, unit)
+        structure, options = _allowed(data, full, options)
         entered = {i for i, c in enumerate(structure.candidates) if c.start != 0.0}
-    else:
-        bare = (
-            own(data, data.outputs, words, unit, options.stable)
-            if kind == "own"
-            else rate(data, y, words, unit, options.stable)
-        )
-        bare, options = _allowed(data, bare, options)
-        structure, entered = _weakly(data, bare)
+        return Start(structure, entered, options, cost)
+    bare = (
+        own(data, data.outputs, words, unit, options.stable)
+        if kind == "own"
+        else rate(data, y, words, unit, options.stable)
+    )
+    bare, options = _allowed(data, bare, options)
+    structure, entered, cost = _begun(data, bare)
+    return Start(structure, entered, options, cost)
+
+
+def _discovered(data: RateData, kind: str, start: Start) -> Discovery:
+    """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free
+    runs.
+    """
+    structure, entered, options = start.structure, start.entered, start.options
     stay = {i for i, c in enumerate(structure.candidates) if c.label in options.keep}
     for _ in range(_GROWTHS):
         before = entered
@@ -156,8 +190,29 @@ def _allowed(data: RateData, structure: Structure, options: SparseOptions) -> tu
     return replace(structure, candidates=tuple(kept)), options
 
 
-def _weakly(data: RateData, structure: Structure) -> tuple[Structure, set[int]]:
-    """Start values of the candidates and the set to begin with, by the weak form of the readings."""
+def _begun(data: RateData, bare: Structure) -> tuple[Structure, set[int], float]:
+    """Start values of the candidates and the set to begin with: of several widths of the weak form the one
+    from which a short fit of free runs comes nearest; and its cost.
+    """
+    noise = rough_noise(data).white
+    grids = [data.grids[r] for r in data.recordings]
+    widths = [half_widths(grids, y, s, bare.order) for y, s in zip(data.outputs, noise, strict=True)]
+    begun = []
+    for k in range(max(map(len, widths))):
+        structure, entered = _weakly(data, bare, [one[min(k, len(one) - 1)] for one in widths])
+        model, labels = with_candidates(structure.model, structure.candidates)
+        small = without(model, [name for i, name in enumerate(labels) if i not in entered])
+        try:
+            begun.append((structure, entered, _fit(data, small, {}, _FIRST).cost))
+        except RunsAwayError:
+            begun.append((structure, entered, np.inf))
+    return min(begun, key=lambda one: one[2])
+
+
+def _weakly(data: RateData, structure: Structure, widths: Sequence[float]) -> tuple[Structure, set[int]]:
+    """Start values of the candidates and the set to begin with, by the weak form of the readings with windows
+    of a half width [s] for each output.
+    """
     second = TIME_UNITS[structure.model.time_unit]
     values: dict[int, float] = {}
     chosen: set[int] = set()
@@ -166,9 +221,8 @@ def _weakly(data: RateData, structure: Structure) -> tuple[Structure, set[int]]:
         mine = [i for i, c in enumerate(structure.candidates) if c.into == into]
         library = [structure.candidates[i].expression for i in mine]
         grids = [data.grids[r] for r in data.recordings]
-        half = half_width(grids, output, rough_noise(data).white[k], structure.order)
         rows = [
-            weak_rows(g, output, library, None, None, structure.order, half, structure.rate, second)
+            weak_rows(g, output, library, None, None, structure.order, widths[k], structure.rate, second)
             for g in grids
         ]
         g = total([one.gram for one in rows])
@@ -190,9 +244,11 @@ def _criterion(g: Gram, effective: float, gain: float, size: int, library: int) 
     return float(effective * np.log(left / g.count) + size * (np.log(effective) + 2 * np.log(library)))
 
 
-def _chain(data: RateData, output: str, flow: str, words: Sequence[str], unit: str) -> Structure:
+def _chain(
+    data: RateData, output: str, flow: str, words: Sequence[str], unit: str
+) -> tuple[Structure, float]:
     """A hidden body upstream, begun as the chain of two bodies with one law of flow that fits the readings
-    best.
+    best; and its cost.
 
     Args:
         flow: word of the law, as "sqrt".
@@ -219,7 +275,7 @@ def _chain(data: RateData, output: str, flow: str, words: Sequence[str], unit: s
         for i, c in enumerate(full.candidates)
         if (c.into, c.source, c.label) in found
     }
-    return started(full, values)
+    return started(full, values), fit.cost
 
 
 def _fit(data: RateData, model: Model, values: Mapping[str, float], rounds: int) -> Fit:
