@@ -4,6 +4,8 @@ through PySINDy.
     python benchmarks/sparse_systems.py two 1e5          # the two-output case
     python benchmarks/sparse_systems.py random 100       # random systems of two outputs, seeds 0 to 99
     python benchmarks/sparse_systems.py random 20 100    # seeds 100 to 119
+    python benchmarks/sparse_systems.py random 20 0 --pysindy        # PySINDy on the same data, too
+    python benchmarks/sparse_systems.py write 100 FOLDER # as CSV, for benchmarks/sparse_sysidentpy.py
 
 Each random system: 3 to 6 inputs (one of them the air), two outputs, 1 to 3 masses each, time constants of
 15 min to 8 h, 0.3 to 1 um noise, readings every 5 to 15 min, two recordings of 72 h to fit and one unseen.
@@ -11,9 +13,11 @@ Each random system: 3 to 6 inputs (one of them the air), two outputs, 1 to 3 mas
 
 from __future__ import annotations
 
+import json
 import sys
 import time as clock
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -233,9 +237,26 @@ def report_random(count: int, first: int) -> None:
         )
 
 
+def write(count: int, folder: Path) -> None:
+    """The recordings and the true masses of the first systems: SEED_a.csv, SEED_b.csv, SEED_unseen.csv,
+    SEED.json.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for seed in range(count):
+        campaign, truth = random_system(seed)
+        for name, one in campaign.recordings.items():
+            pd.DataFrame(one.values, index=pd.Index(one.time, name="time")).to_csv(
+                folder / f"{seed}_{name}.csv"
+            )
+        masses = {y: [asdict(m) for m in some] for y, some in truth.items()}
+        (folder / f"{seed}.json").write_text(json.dumps(masses))
+
+
 if __name__ == "__main__":
     if sys.argv[1] == "two":
         report_two(int(float(sys.argv[2])))
+    elif sys.argv[1] == "write":
+        write(int(sys.argv[2]), Path(sys.argv[3]))
     else:
         numbers = [int(a) for a in sys.argv[2:] if a.isdigit()]
         report_random(numbers[0], numbers[1] if len(numbers) > 1 else 0)

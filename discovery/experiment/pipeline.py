@@ -256,6 +256,13 @@ def fit_of(
     if isinstance(entry, RegressionEntry):  # its strength is found, not only its numbers
         fit = fit_ridge(campaign, recordings, outputs, experiment.inputs(entry))
         return replace(fit.problem.model, name=name), {}, fit
+    if isinstance(entry, PysindyEntry):
+        from discovery.sparse.plain import fit_plain, settings
+
+        fit, _, said = fit_plain(
+            campaign, recordings, outputs, experiment.inputs(entry), settings(entry.form)
+        )
+        return replace(fit.model, name=name), said, fit
     model, report = starting_model(experiment, name, entry, progress)
     given = [y for y in outputs if y in model.outputs or y in model.states]
     if not given:

@@ -22,13 +22,15 @@ from discovery.fitting import predict_recording
 from discovery.models import Model
 from discovery.progress import Progress, silent
 from discovery.recordings import Campaign, Recording
+from discovery.sparse.ratedata import time_scale
 
 Array = NDArray[np.float64]
 
 NO_MODEL = "no model"
 BETTER = 0.95  # of the error without a model: less is no improvement worth the name
 _SIMPLER = 1.03  # a simpler kind that is so near wins
-_POINTS = 600  # instants of a recording: enough to choose by
+_FEWEST, _MOST = 600, 6000  # instants of a recording: enough to choose by
+_IN_TIME_SCALE = 10  # instants in the time in which readings forget half of what they were
 _ROUNDS = 20  # of Levenberg-Marquardt
 _LOST = 10.0  # times the error without a model: what is said of a model that runs away
 
@@ -65,7 +67,7 @@ def choose(experiment: Experiment, progress: Progress = silent) -> list[Score]:
     Each is found and fitted anew without each recording (or third of a single one) and predicts it freely.
     Only the recordings to fit are looked at.
     """
-    thin = replace(experiment, campaign=thinned(experiment.fitting))
+    thin = replace(experiment, campaign=thinned(experiment.fitting, _points(experiment)))
     parts = [one for one in folds(thin.campaign, thin.fit) if len(thin.fit) < 2 or one.windows is None]
     scores = []
     for name, entry in experiment.form.models.items():
@@ -130,14 +132,14 @@ def _residual(
 
 
 def _spread(campaign: Campaign, recording: str, outputs: Sequence[str], fold: Fold) -> Array:
-    """Sum of squares of what is read without a model: errors themselves, temperatures from the first one."""
+    """Sum of squares of what is read without a model: errors themselves, others from the first one."""
     found = []
     one = campaign.recordings[recording]
     inside = _inside(one.time, fold, recording)
     for name in outputs:
         values = one.values[name]
         known = values[np.isfinite(values)]
-        zero = known[0] if campaign.channels[name].role == "temperature" and known.size else 0.0
+        zero = known[0] if campaign.channels[name].role != "error" and known.size else 0.0
         found.append(float(np.nansum((values[inside] - zero) ** 2)))
     return np.array(found)
 
@@ -149,7 +151,15 @@ def _inside(time: Array, fold: Fold, recording: str) -> NDArray[np.bool_]:
     return np.asarray((time >= low) & (time < high))
 
 
-def thinned(campaign: Campaign, points: int = _POINTS) -> Campaign:
+def _points(experiment: Experiment) -> int:
+    """Instants of a recording: more where the outputs move quickly."""
+    campaign, fit = experiment.fitting, experiment.fit
+    scale = min(time_scale(campaign, fit, [y]) for y in experiment.outputs)
+    longest = max(float(campaign.recordings[r].time[-1]) for r in fit)
+    return int(np.clip(_IN_TIME_SCALE * longest / scale, _FEWEST, _MOST))
+
+
+def thinned(campaign: Campaign, points: int = _FEWEST) -> Campaign:
     """The campaign with at most so many instants a recording: inputs as means in between, single readings."""
     recordings = {name: _thin(one, campaign, points) for name, one in campaign.recordings.items()}
     return replace(campaign, recordings=recordings)

@@ -138,9 +138,9 @@ def _error(output: str, guesses: Mapping[str, Guess], inputs: Sequence[str], mas
     return block
 
 
-def usual_inputs(guesses: Mapping[str, Guess], room: str | None) -> list[str]:
+def usual_inputs(guesses: Mapping[str, Guess], room: str | None, *, thermal: bool = True) -> list[str]:
     """Channels that may drive an error: the air, fluids and temperatures, loads, else speeds, and
-    switches.
+    switches; of other outputs every input.
     """
     temperatures = [
         name
@@ -149,7 +149,11 @@ def usual_inputs(guesses: Mapping[str, Guess], room: str | None) -> list[str]:
         or (one.role == "other input" and one.unit in DEGREES)
     ]
     others = [
-        n for n, one in guesses.items() if one.quantity in ("fan", "flow") or one.role == "cooling power"
+        n
+        for n, one in guesses.items()
+        if one.quantity in ("fan", "flow")
+        or one.role == "cooling power"
+        or (not thermal and one.role == "other input")
     ]
     return list(dict.fromkeys([*([room] if room else []), *temperatures, *drives(guesses), *others]))
 

@@ -25,6 +25,7 @@ Hints = Mapping[str, Sequence[tuple[str, Mapping[str, float]]]]
 
 SURE = 0.9  # probability below which a guess is asked about
 _SENT = 0.85  # that what a controller sends is what heats
+_HELD = 0.5  # share of readings that repeat the one before: what is set, not measured
 _NEXT = 0.02  # of an answer worth offering
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
 CURRENTS, VOLTAGES = ("A", "mA", "kA"), ("V", "mV", "kV")
@@ -67,7 +68,7 @@ def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str
     guesses = _one_scale(columns, guesses)
     guesses = _one_unit(columns, guesses)
     guesses = _the_fluid(_one_room(columns, guesses))
-    guesses = _corrections(columns, _signed(columns, guesses))
+    guesses = _corrections(columns, _signed(columns, _answers(columns, guesses)))
     if any(one.role == "error" for one in guesses.values()) and not _stated(guesses):
         for name, one in guesses.items():
             if one.role == "temperature" and one.unit in DEGREES:
@@ -209,6 +210,31 @@ def _one_unit(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[s
             one = found[column.name]
             found[column.name] = replace(one, unit=told[0], why=f"{one.why}, in {told[0]} as the others")
     return found
+
+
+def _answers(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Where no error and no temperature is measured: what never holds its value answers to what somebody
+    sets.
+    """
+    found = dict(guesses)
+    if any(one.role in TEMPERATURES or one.role == "error" for one in guesses.values()):
+        return found
+    holds = {c.name: _held(c.values) for c in columns if found[c.name].role not in ("applied correction",)}
+    if True not in holds.values():
+        return found
+    for name, held in holds.items():
+        if held is False and found[name].role == OTHER:
+            why = "it never holds its value, as what somebody sets does; nothing else is measured"
+            found[name] = found[name].doubtful(why, role="other output")
+    return found
+
+
+def _held(values: Array) -> bool | None:
+    """Whether most readings repeat the one before them; None where nothing moves."""
+    known = values[np.isfinite(values)]
+    if not known.size or known.min() == known.max():
+        return None
+    return bool(np.mean(np.diff(known) == 0) > _HELD)
 
 
 def _air(column: Column) -> tuple[float, int]:

@@ -80,8 +80,8 @@ def new(
     outputs = _outputs(found, guesses)
     if not outputs:
         raise UserError(
-            f"{sources[0]}: no column looks like a measured temperature or error; "
-            'say which one is, as in --is "CH1=error,um"'
+            f"{sources[0]}: no column looks like a measured temperature or error; say which one is to be "
+            f'predicted, as in --is "{found.seen[-1].header}=other output,V" or --is "CH1=error,um"'
         )
     runs = list(found.recordings.values())
     air, about_room = unknown_room(runs[:-1], guesses, outputs)
@@ -140,9 +140,9 @@ def _written(folder: Path) -> dict[str, dict[str, object]]:
 
 
 def _outputs(found: Recorded, guesses: Mapping[str, Guess]) -> list[str]:
-    """The errors, else the temperatures; without those that never move, if any moves."""
-    errors = [column for column in found.seen if guesses[column.name].role == "error"]
-    known = errors or [column for column in found.seen if guesses[column.name].role == "temperature"]
+    """The errors and other outputs, else the temperatures; without those that never move, if any moves."""
+    stated = [column for column in found.seen if guesses[column.name].role in ("error", "other output")]
+    known = stated or [column for column in found.seen if guesses[column.name].role == "temperature"]
     return [column.name for column in known if not never_moves(column)] or [column.name for column in known]
 
 

@@ -23,6 +23,7 @@ from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, ChannelForm
 from discovery.recordings.valuecheck import below_zero
 
+COMPARED = ("regression",)  # what a user would pick: it stands in every experiment
 HAND_BUILT = {"first_order": ("model.toml", 1), "two_masses": ("two_masses.toml", 2)}
 _FEW = 20  # readings of an output: fewer carry no model
 _QUIET = 3.0  # times its noise: an output that moves less says nothing
@@ -61,10 +62,12 @@ def plan(
     room = next((n for n, one in guesses.items() if one.role == "ambient temperature"), None)
     progress("looking for what drives the outputs")
     # a constant drives no error
-    drivers = strongest(campaign, fit, outputs, usual_inputs(guesses, room))
+    thermal = all(guesses[name].role != "other output" for name in outputs)
+    drivers = strongest(campaign, fit, outputs, usual_inputs(guesses, room, thermal=thermal))
     files = {
         file: first_model(guesses, outputs, room, drivers, masses=masses)
         for file, masses in HAND_BUILT.values()
+        if thermal
     }
     for file, text in files.items():
         write_atomic(folder / file, text)
@@ -72,7 +75,7 @@ def plan(
     lines = {
         name: entry.replace("INPUTS", listed)
         for name, entry in CANDIDATES.items()
-        if drivers or "INPUTS" not in entry
+        if (drivers or "INPUTS" not in entry) and (thermal or name not in HAND_BUILT)
     }
     trial = experiment_text(title, [*fit, ""], outputs, lines, None, ()).replace(
         'held_out = [""]', "held_out = []"
@@ -84,9 +87,9 @@ def plan(
 
 
 def measured(campaign: Campaign, fit: Sequence[str]) -> list[str]:
-    """The errors, else the temperatures; without those that never move, if any moves."""
-    for role in ("error", "temperature"):
-        found = [c.name for c in campaign.channels.values() if c.role == role]
+    """The errors and other outputs, else the temperatures; without those that never move, if any moves."""
+    for roles in (("error", "other output"), ("temperature",)):
+        found = [c.name for c in campaign.channels.values() if c.role in roles]
         moving = [name for name in found if _moves(campaign, fit, name)]
         if found:
             return moving or found
@@ -133,7 +136,8 @@ def _decided(
     ]
     mismatch = next((name for name in HAND_BUILT if name in helping), None)
     if helping:
-        chosen = list(dict.fromkeys([helping[0], *([mismatch] if mismatch else []), *helping[:3]]))
+        beside = [name for name in COMPARED if name in lines]
+        chosen = list(dict.fromkeys([helping[0], *([mismatch] if mismatch else []), *helping[:3], *beside]))
         said = [
             f"first model: {helping[0]}; it leaves {scores[0].ratio:.0%} of the error without a model "
             f"on {how} "
@@ -149,7 +153,7 @@ def _decided(
     models = {name: lines[name].replace(", bootstraps = 0", "") for name in chosen}
     kept = {
         file: text for name, (file, _) in HAND_BUILT.items() if name in chosen for text in [files[file]]
-    } or {"model.toml": files["model.toml"]}
+    } or {file: text for file, text in files.items() if file == "model.toml"}
     head = "# Written by `discovery new`.\n"
     content = {file: head + text for file, text in kept.items()}
     content["experiment.toml"] = experiment_text(title, names, outputs, models, mismatch, remarks)
@@ -164,13 +168,13 @@ def _unchosen(
     files: Mapping[str, str],
 ) -> Plan:
     """The simple model and a discovered one, not compared."""
-    models = {name: lines[name].replace(", bootstraps = 0", "") for name in ("first_order", "discovered")}
+    simple = "first_order" if files else next(iter(lines))
+    models = {name: lines[name].replace(", bootstraps = 0", "") for name in (simple, "discovered")}
     remarks = ["Not compared (--quick): `discovery new DIR --again` chooses by what each predicts."]
-    content = {
-        "model.toml": "# Written by `discovery new`.\n" + files["model.toml"],
-        "experiment.toml": experiment_text(title, names, outputs, models, "first_order", remarks),
-    }
-    return Plan(content, (), (), models, "first_order")
+    mismatch = simple if files else None
+    content = {f: "# Written by `discovery new`.\n" + text for f, text in files.items() if f == "model.toml"}
+    content["experiment.toml"] = experiment_text(title, names, outputs, models, mismatch, remarks)
+    return Plan(content, (), (), models, mismatch)
 
 
 def missing(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from discovery import terms
 from discovery.dynamics import Grid
 from discovery.errors import RunsAwayError
-from discovery.fitting import Fit
+from discovery.fitting import Fit, fit_model
+from discovery.fitting.noise import readings_as_one
 from discovery.models import Model, Parameter
 from discovery.models.model import TIME_UNITS
 from discovery.progress import Progress
+from discovery.recordings import Campaign
 from discovery.sparse.byrates import discover_rates
 from discovery.sparse.constraints import UnknownTermError, matched
 from discovery.sparse.discovery import Discovery
@@ -26,10 +28,10 @@ from discovery.sparse.growth import Growth, grown
 from discovery.sparse.laws import with_levels
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.ratedata import RateData, rough_noise
-from discovery.sparse.rates import refit, with_candidates
+from discovery.sparse.rates import refit, with_candidates, without
 from discovery.sparse.search import Search, plain
-from discovery.sparse.structures import WORDS, Structure, own, rate, started, upstream
-from discovery.sparse.weak import half_width, weak_rows
+from discovery.sparse.structures import FLOWS, WORDS, Structure, balanced, own, rate, started, upstream
+from discovery.sparse.weak import half_widths, weak_rows
 from discovery.terms import Number
 
 Array = NDArray[np.float64]
@@ -40,47 +42,89 @@ _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
 _MOVED = 0.02  # share by which a level moves that makes the set grow anew
 _FIRST = 12  # of a fit of a linear chain from one of its starts
+_FAR = 3.0  # times the rms of another form at its start
+_WHITE = 1.5  # readings that say the same once: less is noise
 _CHAIN = (0.3, 1.0, 3.0)  # times the time scale of the readings: time constants that a chain starts from
+
+
+@dataclass(frozen=True)
+class Start:
+    """A structure with start values, the candidates that are in it from the start, the options as they match
+    its terms, and the cost of a short fit.
+    """
+
+    structure: Structure
+    entered: set[int]
+    options: SparseOptions
+    cost: float = 0.0
 
 
 def discover_states(
     data: RateData, options: SparseOptions, hidden: Sequence[str], progress: Progress
-) -> list[Discovery]:
-    """A discovery for each kind of hidden state that was asked for and does not run away."""
+) -> Iterator[Discovery]:
+    """A discovery for each kind of hidden state that was asked for and does not run away, made when it is
+    asked for; none for a kind that begins far from the readings where another one begins near.
+    """
     words = options.library or WORDS
     roles = {data.campaign.channels[y].role for y in data.outputs}
     unit = "h" if roles <= THERMAL_ROLES else time_unit(data.scale)
-    found = []
-    for kind in hidden:
-        progress(f"terms of {', '.join(data.outputs)}, {kind}")
+    flows = [word for word in FLOWS if word in words] or ["linear"]
+    kinds = [k for kind in hidden for k in ([f"{kind} {f}" for f in flows] if kind == "upstream" else [kind])]
+    nearest = np.inf
+    lacking: UnknownTermError | None = None
+    starts: dict[str, Start] = {}
+
+    def begin(kind: str) -> None:
+        nonlocal nearest, lacking
         try:
-            found.append(_discovered(data, kind, words, unit, options))
+            starts[kind] = _start(data, kind, words, unit, options)
+            nearest = min(nearest, starts[kind].cost)
         except RunsAwayError:
-            continue
-        except UnknownTermError:  # a term that this form does not have: another one may
-            if options.form != "auto" and len(hidden) == 1:
-                raise
-    return found
+            pass
+        except UnknownTermError as error:  # a term that this form does not have: another one may
+            lacking = error
+
+    for kind in kinds:
+        if not kind.startswith("upstream"):  # quick to begin: which is near is known before one grows
+            begin(kind)
+    for kind in kinds:
+        progress(f"terms of {', '.join(data.outputs)}, {kind}")
+        if kind not in starts and kind.startswith("upstream"):
+            begin(kind)
+        if kind in starts and starts[kind].cost <= _FAR**2 * nearest:
+            try:
+                yield _discovered(data, kind.split()[0], starts[kind])
+            except RunsAwayError:
+                continue
+    if lacking is not None and not starts and options.form != "auto" and len(hidden) == 1:
+        raise lacking
 
 
-def _discovered(
-    data: RateData, kind: str, words: Sequence[str], unit: str, options: SparseOptions
-) -> Discovery:
+def _start(data: RateData, kind: str, words: Sequence[str], unit: str, options: SparseOptions) -> Start:
+    """Where a kind of hidden state begins: by the weak form, or as a chain of two bodies ("upstream sqrt": of
+    the law of its flow).
+    """
+    y = data.outputs[0]
+    if kind.startswith("upstream"):
+        full, cost = _chain(data, y, kind.split()[1], words, unit)
+        structure, options = _allowed(data, full, options)
+        entered = {i for i, c in enumerate(structure.candidates) if c.start != 0.0}
+        return Start(structure, entered, options, cost)
+    bare = (
+        own(data, data.outputs, words, unit, options.stable)
+        if kind == "own"
+        else rate(data, y, words, unit, options.stable)
+    )
+    bare, options = _allowed(data, bare, options)
+    structure, entered, cost = _begun(data, bare)
+    return Start(structure, entered, options, cost)
+
+
+def _discovered(data: RateData, kind: str, start: Start) -> Discovery:
     """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free
     runs.
     """
-    y = data.outputs[0]
-    if kind == "upstream":
-        structure, options = _allowed(data, _chain(data, y, words, unit), options)
-        entered = {i for i, c in enumerate(structure.candidates) if c.start != 0.0}
-    else:
-        bare = (
-            own(data, data.outputs, words, unit, options.stable)
-            if kind == "own"
-            else rate(data, y, words, unit, options.stable)
-        )
-        bare, options = _allowed(data, bare, options)
-        structure, entered = _weakly(data, bare)
+    structure, entered, options = start.structure, start.entered, start.options
     stay = {i for i, c in enumerate(structure.candidates) if c.label in options.keep}
     for _ in range(_GROWTHS):
         before = entered
@@ -146,8 +190,29 @@ def _allowed(data: RateData, structure: Structure, options: SparseOptions) -> tu
     return replace(structure, candidates=tuple(kept)), options
 
 
-def _weakly(data: RateData, structure: Structure) -> tuple[Structure, set[int]]:
-    """Start values of the candidates and the set to begin with, by the weak form of the readings."""
+def _begun(data: RateData, bare: Structure) -> tuple[Structure, set[int], float]:
+    """Start values of the candidates and the set to begin with: of several widths of the weak form the one
+    from which a short fit of free runs comes nearest; and its cost.
+    """
+    noise = rough_noise(data).white
+    grids = [data.grids[r] for r in data.recordings]
+    widths = [half_widths(grids, y, s, bare.order) for y, s in zip(data.outputs, noise, strict=True)]
+    begun = []
+    for k in range(max(map(len, widths))):
+        structure, entered = _weakly(data, bare, [one[min(k, len(one) - 1)] for one in widths])
+        model, labels = with_candidates(structure.model, structure.candidates)
+        small = without(model, [name for i, name in enumerate(labels) if i not in entered])
+        try:
+            begun.append((structure, entered, _fit(data, small, {}, _FIRST).cost))
+        except RunsAwayError:
+            begun.append((structure, entered, np.inf))
+    return min(begun, key=lambda one: one[2])
+
+
+def _weakly(data: RateData, structure: Structure, widths: Sequence[float]) -> tuple[Structure, set[int]]:
+    """Start values of the candidates and the set to begin with, by the weak form of the readings with windows
+    of a half width [s] for each output.
+    """
     second = TIME_UNITS[structure.model.time_unit]
     values: dict[int, float] = {}
     chosen: set[int] = set()
@@ -156,9 +221,8 @@ def _weakly(data: RateData, structure: Structure) -> tuple[Structure, set[int]]:
         mine = [i for i, c in enumerate(structure.candidates) if c.into == into]
         library = [structure.candidates[i].expression for i in mine]
         grids = [data.grids[r] for r in data.recordings]
-        half = half_width(grids, output, rough_noise(data).white[k], structure.order)
         rows = [
-            weak_rows(g, output, library, None, None, structure.order, half, structure.rate, second)
+            weak_rows(g, output, library, None, None, structure.order, widths[k], structure.rate, second)
             for g in grids
         ]
         g = total([one.gram for one in rows])
@@ -180,19 +244,20 @@ def _criterion(g: Gram, effective: float, gain: float, size: int, library: int) 
     return float(effective * np.log(left / g.count) + size * (np.log(effective) + 2 * np.log(library)))
 
 
-def _chain(data: RateData, output: str, words: Sequence[str], unit: str) -> Structure:
-    """A hidden body upstream, begun as a chain of two linear ones that fits the readings best."""
-    scale = data.scale / TIME_UNITS[unit]
-    linear = upstream(data, output, ["linear"], unit)
-    h = f"{output}_up"
-    inputs = [c.label for c in linear.candidates if c.into == h and c.label != "1"]
+def _chain(
+    data: RateData, output: str, flow: str, words: Sequence[str], unit: str
+) -> tuple[Structure, float]:
+    """A hidden body upstream, begun as the chain of two bodies with one law of flow that fits the readings
+    best; and its cost.
+
+    Args:
+        flow: word of the law, as "sqrt".
+    """
+    bare = upstream(data, output, [flow], unit)
     fits = []
     for first, then in product(_CHAIN, _CHAIN):
-        guess = {h: 1 / (first * scale), output: -1 / (then * scale)} | dict.fromkeys(
-            inputs, 0.1 / (first * scale)
-        )
-        coefficients = {i: guess.get(c.label, 0.0) for i, c in enumerate(linear.candidates)}
-        model, _ = with_candidates(linear.model, started(linear, coefficients).candidates)
+        guess = balanced(data, bare, first * data.scale, then * data.scale)
+        model, _ = with_candidates(bare.model, started(bare, guess).candidates)
         try:
             fits.append(_fit(data, model, {}, _FIRST))
         except RunsAwayError:
@@ -200,17 +265,17 @@ def _chain(data: RateData, output: str, words: Sequence[str], unit: str) -> Stru
     if not fits:
         raise RunsAwayError(f"no chain of two bodies stays finite on the readings of {output}")
     fit = min(fits, key=lambda one: one.cost)
-    column = list(fit.problem.model.states).index(h)
+    column = list(fit.problem.model.states).index(f"{output}_up")
     level = np.concatenate([t.x[:, column] for t in fit.trajectories])
     full = upstream(data, output, words, unit, level)
-    _, labels = with_candidates(linear.model, linear.candidates)
-    found = dict(zip([(c.into, c.label) for c in linear.candidates], labels, strict=True))
+    _, labels = with_candidates(bare.model, bare.candidates)
+    found = dict(zip([(c.into, c.source, c.label) for c in bare.candidates], labels, strict=True))
     values = {
-        i: fit.model.parameters[found[c.into, c.label]].value
+        i: fit.model.parameters[found[c.into, c.source, c.label]].value
         for i, c in enumerate(full.candidates)
-        if (c.into, c.label) in found
+        if (c.into, c.source, c.label) in found
     }
-    return started(full, values)
+    return started(full, values), fit.cost
 
 
 def _fit(data: RateData, model: Model, values: Mapping[str, float], rounds: int) -> Fit:
@@ -237,6 +302,12 @@ def with_free_levels(data: RateData, model: Model) -> Model:
     if not count:
         return model
     return _fit(data, replace(model, parameters=parameters, terms=tuple(found)), {}, _LAST).model
+
+
+def leaves_noise(campaign: Campaign, recordings: Sequence[str], model: Model, outputs: Sequence[str]) -> bool:
+    """Whether what a model leaves of all its readings is white: a further state has nothing to explain."""
+    fit = fit_model(model, campaign, recordings, outputs, max_rounds=_ROUNDS)
+    return readings_as_one(list(fit.residuals().values())) < _WHITE
 
 
 def left_out_of(data: RateData, model: Model) -> Array:

@@ -17,7 +17,7 @@ from discovery.progress import Progress, silent
 from discovery.recordings import Campaign
 from discovery.sparse.bymasses import MassData, discover_masses
 from discovery.sparse.byrates import discover_rates
-from discovery.sparse.bystates import discover_states, left_out_of
+from discovery.sparse.bystates import discover_states, leaves_noise, left_out_of
 from discovery.sparse.constraints import UnknownTermError, kept
 from discovery.sparse.discovery import Discovery, joined
 from discovery.sparse.drives import Inputs, make_drives, make_inputs
@@ -101,14 +101,18 @@ def _best(
     options: SparseOptions,
     progress: Progress,
 ) -> Discovery:
-    """The plainest form whose free runs on what was left out are within the tolerance of the best."""
+    """The plainest form whose free runs on what was left out are within the tolerance of the best.
+
+    Forms are tried from the plainest on, until one leaves nothing but white noise.
+    """
     found: list[Discovery] = []
     if "masses" in forms:
         progress(f"filtered inputs of {', '.join(outputs)}")
         grids = {r: make_grid(campaign, r, inputs.names, outputs) for r in recordings}
         data = MassData(make_drives(inputs, campaign, options.library), grids)
         try:
-            found += [discover_masses(data, campaign, recordings, name, options) for name in outputs]
+            masses = [discover_masses(data, campaign, recordings, name, options) for name in outputs]
+            found.append(masses[0] if len(masses) == 1 else joined("masses", masses, 0.0))
         except UnknownTermError:
             if len(forms) == 1:
                 raise
@@ -116,7 +120,11 @@ def _best(
     if not states:
         return found[0]
     rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
-    found += discover_states(rates, options, states, progress)
+    if not (found and leaves_noise(campaign, recordings, found[0].model, outputs)):
+        for one in discover_states(rates, options, states, progress):
+            found.append(one)
+            if leaves_noise(campaign, recordings, one.model, outputs):
+                break
     if not found:
         raise UserError(
             f"{campaign.path}: no model of {', '.join(outputs)} in the form asked for stays finite on "

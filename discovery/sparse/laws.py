@@ -23,19 +23,25 @@ LAWS = {
 QUANTILES = (0.5, 0.7, 0.85, 0.97)  # of a variable, where a threshold may stand
 
 
-def laws(words: Sequence[str], variable: str, seen: NDArray[np.float64] | None = None) -> list[str]:
+def laws(
+    words: Sequence[str], variable: str, seen: NDArray[np.float64] | None = None, hidden: bool = False
+) -> list[str]:
     """Expressions of a variable by the words of a library.
 
     Args:
         seen: (N,) values of the variable, where they are known: thresholds stand at their quantiles, and a
-        root is
-            offered to what is nowhere negative alone.
+            root is offered to what is nowhere negative alone.
+        hidden: nothing says where the variable counts from: a root begins at its least value.
 
     >>> laws(["linear", "cubic"], "y")
     ['y', 'y**3']
+    >>> laws(["sqrt"], "h", np.array([-1.5, 3.0]), hidden=True)
+    ['sqrt(max(h - -1.5, 0))']
     """
-    negative = seen is not None and bool(np.min(seen) < 0)
-    found = [LAWS[w].format(variable) for w in words if w in LAWS and not (w == "sqrt" and negative)]
+    least = 0.0 if seen is None else float(np.min(seen))
+    root = least < 0 and hidden
+    found = [LAWS[w].format(variable) for w in words if w in LAWS and not (w == "sqrt" and least < 0)]
+    found += [LAWS["sqrt"].format(f"{variable} - {least:.3g}")] * ("sqrt" in words and root)
     if "threshold" in words and seen is not None:
         levels = dict.fromkeys(float(f"{q:.3g}") for q in np.quantile(seen, QUANTILES))
         found += [f"max({variable} - {level:g}, 0)" for level in levels if np.min(seen) < level]

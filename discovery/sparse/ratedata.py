@@ -18,6 +18,8 @@ from discovery.sparse.folds import Blocks, make_blocks
 _READINGS = 250  # of one output in one recording: more say little that is new about what moves slowly
 _IN_TIME_SCALE = 5  # readings in the time in which the readings forget half of what they were
 _MOST = 4000  # readings of one output in one recording
+_NOISE_GROWS = 1.15  # mean square between two noisy readings: 3/2 in their middle, 5/3 on average
+_MISSED = 0.03  # share of the spread of readings that thinning may lose
 _RASTER = 4096  # points on which this time is looked for
 _FAR = 3.0  # times the rms: start values that are no use
 
@@ -47,7 +49,8 @@ def make_rate_data(
     """Grids of the recordings with all inputs that any candidate may use, dense readings thinned."""
     scale = min(time_scale(campaign, recordings, [y]) for y in outputs)
     longest = max(float(campaign.recordings[r].time[-1]) for r in recordings)
-    most = int(np.clip(_IN_TIME_SCALE * longest / scale, _READINGS, _MOST))
+    wanted = max(_IN_TIME_SCALE * longest / scale, readings_that_show(campaign, recordings, outputs))
+    most = int(np.clip(wanted, _READINGS, _MOST))
     campaign = thinned(campaign, recordings, outputs, inputs, most)
     grids = {r: make_grid(campaign, r, inputs, outputs, coarse=8 * most) for r in recordings}
     times = [grids[r].time[grids[r].read] for r in recordings]
@@ -74,6 +77,28 @@ def time_scale(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[
         below = np.flatnonzero(rho[1:] < 0.5 * rho[1])
         found.append((below[0] + 1 if len(below) else len(x)) * (raster[1] - raster[0]))
     return float(np.median(found)) if found else 1.0
+
+
+def readings_that_show(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> int:
+    """Number of readings of a recording between which straight lines miss little more of an output than
+    between all of them: a ringing spring needs more than the time in which it forgets says.
+    """
+    most = 0
+    for name, output in ((r, y) for r in recordings for y in outputs):
+        recording = campaign.recordings[name]
+        known = np.isfinite(recording.values[output])
+        time, series = recording.time[known], recording.values[output][known]
+        noise, every = 0.0, 2
+        while 8 * every < len(series):
+            left_out = np.arange(len(series)) % every != 0
+            off = np.interp(time, time[::every], series[::every])[left_out] - series[left_out]
+            missed = float(np.mean(off**2))
+            noise = missed if every == 2 else noise
+            if missed > _NOISE_GROWS * noise + (_MISSED * float(np.std(series))) ** 2:
+                break
+            every *= 2
+        most = max(most, 2 * len(series) // every)
+    return most
 
 
 def thinned(

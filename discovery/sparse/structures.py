@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 
 from discovery.models import Model, Parameter, State
 from discovery.models.model import TIME_UNITS
-from discovery.sparse.laws import laws, products
+from discovery.sparse.laws import LAWS, laws, products
 from discovery.sparse.ratedata import RateData
 from discovery.sparse.rates import Candidate
-from discovery.terms import Number, Term, parse
+from discovery.terms import Number, Term, evaluate, names, parse
 
 Array = NDArray[np.float64]
 
+FLOWS = ("linear", "sqrt")  # laws from which a chain of two bodies begins
 WORDS = ("linear", "square", "cubic", "drag", "sqrt")
 FREE, UP, DOWN = (-np.inf, np.inf), (0.0, np.inf), (-np.inf, 0.0)
 FINER = 10.0  # times the distance of two readings: quicker rates are not told from steps
@@ -51,8 +52,8 @@ def own(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str,
     for y in outputs:
         others = [o for o in outputs if o != y and "coupling" in words]
         seen = _seen(data, y)
-        found += [Candidate(y, parse("1"))] * ("linear" in words)
-        found += [Candidate(y, parse(u)) for u in (*inputs, *others) if "linear" in words]
+        found += _driven(data, y, outputs, words)
+        found += [Candidate(y, parse(u)) for u in others if "linear" in words]
         found += [_law(y, y, one, stable) for one in laws(words, y, seen)]
         found += [Candidate(y, parse(one)) for one in products(words, [y, *others, *inputs])]
         found += _expressions(words, y, {"y": y})
@@ -71,7 +72,7 @@ def rate(data: RateData, output: str, words: Sequence[str], unit: str, stable: b
     }
     terms = (Term(f"{v} moves {output}", output, parse(v)),)
     inputs = _inputs(data, [output])
-    found = [Candidate(v, parse(u)) for u in ("1", *inputs) if "linear" in words]
+    found = _driven(data, v, [output], words)
     found += [_law(v, output, one, stable) for one in laws(words, output, _seen(data, output))]
     found += [_law(v, v, one, stable) for one in laws([w for w in words if w not in ("sqrt", "square")], v)]
     found += [Candidate(v, parse(one)) for one in products(words, [output, v, *inputs])]
@@ -82,7 +83,7 @@ def rate(data: RateData, output: str, words: Sequence[str], unit: str, stable: b
 def upstream(
     data: RateData, output: str, words: Sequence[str], unit: str, level: Array | None = None
 ) -> Structure:
-    """Flows out of a hidden body into an output, and out of the output.
+    """Flows out of a hidden body into an output, and out of the output; each may overflow beyond a level.
 
     Args:
         level: values that the hidden state takes, where a first fit knows them.
@@ -94,24 +95,55 @@ def upstream(
         output: measured,
         h: State(h, measured.unit, None, parse(start), REST * float(np.std(seen)), 1.0 / TIME_UNITS[unit]),
     }
-    known = (
-        seen if level is None else level
-    )  # where none of the readings tells the start, it is one of its values
-    parameters = {start: Parameter(float(known[0]), measured.unit, float(known.min()), float(known.max()))}
-    inputs = _inputs(data, [output])
-    found = [Candidate(h, parse(u)) for u in ("1", *inputs) if "linear" in words]
+    known = seen if level is None else level
+    wide = float(np.ptp(known))  # where none of the readings tells the start, it is near its values
+    low, high = float(known.min()) - wide, float(known.max()) + wide
+    parameters = {start: Parameter(float(known[0]), measured.unit, low, high)}
+    found = _driven(data, h, [output], words)
     most = quickest(data, unit)
-    found += [_flow(output, one, most, h) for one in laws(words, h, level)]
+    found += [_flow(output, one, most, h) for one in laws(words, h, level, hidden=True)]
     found += [_flow(output, one, most) for one in laws(words, output, seen)]
     found += [_flow(h, one, most) for one in laws([w for w in words if w == "threshold"], h, level)]
     found += _expressions(words, output, {"y": output, "up": h})
     return Structure("upstream", Model("upstream", parameters, states, (), {}, unit), tuple(found))
 
 
+def balanced(data: RateData, chain: Structure, first: float, then: float) -> dict[int, float]:
+    """Coefficients of a chain of one law by the time constants [s] of its two bodies.
+
+    A law f has the slope 1/tau over the spread of the readings; all inputs together move what flows out by as
+    much as the readings move it.
+    """
+    y = data.outputs[0]
+    unit = TIME_UNITS[chain.model.time_unit]
+    seen = _seen(data, y)
+    spread = float(np.std(seen)) or 1.0
+    samples = {n: s.value for g in data.grids.values() for n, s in g.samples.items()}
+    inputs = _inputs(data, [y])
+    found = {}
+    for i, c in enumerate(chain.candidates):
+        if c.label in inputs:
+            moved = float(np.std(samples[c.label])) or 1.0
+            found[i] = spread * unit / then / moved / len(inputs)
+        elif c.label != "1":
+            used = next(iter(names(c.expression)))
+            law = np.broadcast_to(evaluate(c.expression, {used: seen}).value, seen.shape)
+            slope = float(np.std(law)) / spread or 1.0
+            found[i] = unit / first / slope if c.source else -unit / then / slope
+    return found
+
+
 def quickest(data: RateData, unit: str) -> float:
     """Greatest rate constant [1/unit] that readings can show: a tenth of their distance."""
     steps = [float(np.median(np.diff(g.time[g.read]))) for g in data.grids.values() if len(g.read) > 1]
     return FINER * TIME_UNITS[unit] / min(steps)
+
+
+def _driven(data: RateData, into: str, outputs: Sequence[str], words: Sequence[str]) -> list[Candidate]:
+    """The inputs and a constant, which a library that names any law of a state offers as well."""
+    if not any(w in LAWS or w == "threshold" for w in words):
+        return []
+    return [Candidate(into, parse(u)) for u in ("1", *_inputs(data, outputs))]
 
 
 def _flow(into: str, law: str, most: float, source: str | None = None) -> Candidate:

@@ -28,6 +28,7 @@ _POWER = {1: 2, 2: 3}  # by order
 _OVERLAP = 8  # windows per half width
 _POINTS = 40_000  # of the raster of one recording at most
 _SMOOTHER = 0.25  # of the half width: of the windows that smooth y and its rate
+_WORTH, _TRIED = 0.02, 4  # share of the most information that a width needs to be tried, number of trials
 _FINEST, _COARSEST, _STEP = 4, 4, 1.5  # half widths tried: readings, share of the recording (1/4), ratio
 
 
@@ -69,17 +70,19 @@ class Window:
         return Window(step * base**power, step * slope, step * bend)
 
 
-def half_width(grids: Sequence[Grid], output: str, noise: float, order: int = 1) -> float:
-    """Half width [s] of the windows with the most information on the rate: (signal/noise)^2 times their
-    number.
+def half_widths(grids: Sequence[Grid], output: str, noise: float, order: int = 1) -> list[float]:
+    """Half widths [s] of windows with information on the rate, the one with the most first: (signal/noise)^2
+    times their number.
 
-    White noise of a reading every d seconds makes noise^2 d int w'^2 (w''^2) of the target.
+    White noise of a reading every d seconds makes noise^2 d int w'^2 (w''^2) of the target. Held inputs put
+    as much information into wide windows, which balance the laws alone, as ringing puts into narrow ones,
+    which tell the inertia: a few of those that have a share of the most are worth a trial.
     """
     spans = [float(g.time[-1] - g.time[0]) for g in grids]
     reading = min(float(np.median(np.diff(g.time[g.read]))) for g in grids if len(g.read) > 1)
     longest = max(spans)
     tried = np.arange(np.log(_FINEST * reading), np.log(max(longest / _COARSEST, 5 * reading)), np.log(_STEP))
-    best, most = _READINGS * reading, 0.0
+    found: dict[float, float] = {}
     for half in np.exp(tried):
         information = 0.0
         for grid, span in zip(grids, spans, strict=True):
@@ -91,9 +94,13 @@ def half_width(grids: Sequence[Grid], output: str, noise: float, order: int = 1)
             shape = (window.slope if order == 1 else window.bend) / step
             made = noise**2 * reading * float(shape @ shape) * step
             information += max(float(np.mean(rows.target**2)) / made - 1.0, 0.0) * span / half
-        if information > most:
-            best, most = float(half), information
-    return best
+        found[float(half)] = information
+    most = max(found.values(), default=0.0)
+    if most == 0.0:
+        return [_READINGS * reading]
+    worth = [half for half, information in found.items() if information > _WORTH * most]
+    few = worth[:: max(1, len(worth) // _TRIED)]
+    return list(dict.fromkeys([max(found, key=lambda half: found[half]), *few]))
 
 
 def weak_rows(

@@ -324,3 +324,12 @@ def test_a_date_that_reads_one_way_is_not_asked_about(tmp_path: Path) -> None:
 )
 def test_a_name_is_quoted_as_it_is_spelled(name: str, why: str) -> None:
     assert why in guess(Column(name, name, "", np.linspace(20, 30, 50))).why
+
+
+def test_what_never_holds_its_value_is_an_output_where_nothing_thermal_is_measured() -> None:
+    set_by_hand = np.repeat([0.0, 2.0, 5.0, 1.0], 50)
+    answer = np.convolve(set_by_hand, np.exp(-np.arange(60) / 20))[:200] + np.linspace(0, 1e-3, 200)
+    columns = [Column("U [V]", "U", "V", answer), Column("I [A]", "I", "A", set_by_hand)]
+    assert [one.role for one in guess_all(columns).values()] == ["other output", "other input"]
+    warm = Column("T bearing", "T_bearing", "degC", 20 + answer)
+    assert guess_all([*columns, warm])["U"].role == "other input"

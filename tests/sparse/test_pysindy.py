@@ -10,7 +10,9 @@ import pysindy
 import pytest
 from numpy.typing import NDArray
 
+from discovery.experiment import load_experiment
 from discovery.experiment.form import ExperimentForm
+from discovery.experiment.pipeline import starting_model
 from discovery.files import read_toml
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.sparse import SparseOptions, discover
@@ -103,6 +105,32 @@ def test_the_demonstrations_reach_it() -> None:
         if path.name in ("nmv5000.toml", "tclab.toml", "tanks.toml"):
             kinds = [entry.kind for entry in read_toml(path, ExperimentForm).models.values()]
             assert {"sindy", "pysindy", "regression"} <= set(kinds)
+
+
+@pytest.mark.parametrize(
+    ("name", "term"), [("black_box", "lag(P_drive, "), ("discovered", "pump*(T_fluid - table)")]
+)
+def test_what_the_demonstration_discovers_comes_out_of_pysindy(
+    monkeypatch: pytest.MonkeyPatch, name: str, term: str
+) -> None:
+    coefficients: list[Array] = []
+    original = pysindy.SINDy.fit
+
+    def spied(self: Any, *given: Any, **named: Any) -> Any:
+        fitted = original(self, *given, **named)
+        coefficients.append(np.asarray(self.coefficients()))
+        return fitted
+
+    monkeypatch.setattr(pysindy.SINDy, "fit", spied)
+    experiment = load_experiment(Path("experiments/nmv5000.toml"))
+    entry = experiment.form.models[name].model_copy(update={"bootstraps": 0})
+    _, report = starting_model(experiment.seen_by(entry), name, entry)
+    assert report is not None
+    groups = report["groups"]
+    assert any(term in kept for group in groups for kept in group["kept"])
+    last = coefficients[-len(groups) :]  # of each output, or of the one model that ends the growth
+    for found, group in zip(last, groups, strict=True):
+        assert np.count_nonzero(found) >= len(group["kept"])
 
 
 def test_constraints_are_lines_of_the_experiment() -> None:

@@ -7,7 +7,13 @@ import pytest
 from numpy.typing import NDArray
 
 from discovery.recordings import Campaign, Channel, Recording, sample_input
-from discovery.sparse.ratedata import has_reading, make_rate_data, rough_noise, thinned
+from discovery.sparse.ratedata import (
+    has_reading,
+    make_rate_data,
+    readings_that_show,
+    rough_noise,
+    thinned,
+)
 
 Array = NDArray[np.float64]
 CHANNELS = {
@@ -57,3 +63,10 @@ def test_a_block_has_a_reading_where_one_was_taken() -> None:
     data = make_rate_data(campaign(400, readings), ["r"], ["E"], ["P", "air"], 4)
     found = [has_reading(data, block) for block in range(data.blocks.count)]
     assert found == [True] * 4 + [False] * 2 + [True] * 2
+
+
+def test_what_rings_keeps_eight_readings_a_period_and_noise_keeps_none() -> None:
+    noise = 0.3 * np.random.default_rng(0).standard_normal(10_000)
+    ringing, slow = (np.sin(2 * np.pi * np.arange(10_000) / period) for period in (40, 2_500))
+    assert readings_that_show(campaign(10_000, ringing), ["r"], ["E"]) >= 8 * 10_000 / 40
+    assert readings_that_show(campaign(10_000, slow + noise), ["r"], ["E"]) <= 1_000
