@@ -8,7 +8,8 @@ import typer
 
 def run(
     experiment: Annotated[
-        Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, e.g. experiments/nmv5000.toml.")
+        Path,
+        typer.Argument(metavar="EXPERIMENT", help="An experiment file, e.g. experiments/demonstration.toml."),
     ],
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the results [runs/NAME].")] = None,
     force: Annotated[

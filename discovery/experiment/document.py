@@ -135,6 +135,7 @@ class ResultsDocument(Strict):
     command: str
     campaign: str
     campaign_file: str
+    simulated: bool | None = Field(None, description="whether the recordings come from a simulation")
     fit: list[str]
     held_out: list[str]
     outputs: list[str]

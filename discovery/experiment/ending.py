@@ -4,38 +4,21 @@ next.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from discovery.report.ranking import astray, cells, ranked, ratio, rms_by_unit
+from discovery.report.lead import Lead, lead_over
+from discovery.report.ranking import astray, cells, ranked, rms_by_unit
 from discovery.report.run import Run, load_run
 from discovery.runfolder import DIAGNOSIS
 from discovery.terms import names
 
-Array = NDArray[np.float64]
-
-_BLOCKS = 12  # of each recording, drawn anew: neighbouring residuals hang together
-_DRAWS = 1000
 _BETTER = 0.95  # of the rms without a model: less is no improvement
 _MOVES = 0.05  # share of an effect from which a guess matters
-
-
-@dataclass(frozen=True)
-class Lead:
-    """`ratio`: rms of the winner over that of another model (or of none), with its 95 % interval; `sure`:
-    share of the draws in which the winner is better.
-    """
-
-    ratio: float
-    low: float
-    high: float
-    sure: float
 
 
 @dataclass(frozen=True)
@@ -132,7 +115,7 @@ def ending(folder: Path) -> Ending:
     run = load_run(folder)
     order = [model for model in ranked(run) if cells(run, model)]
     best = order[0] if order else None
-    none = _lead(run, best, None) if best else None
+    none = lead_over(run, best, None) if best else None
     helps = none is not None and none.ratio < _BETTER and not (best and astray(run, best))
     other = order[1] if len(order) > 1 else None
     diagnosis = run.diagnosis if (folder / DIAGNOSIS).exists() else None
@@ -145,7 +128,7 @@ def ending(folder: Path) -> Ending:
         best if helps else None,
         none,
         other,
-        _lead(run, best, other) if best and other else None,
+        lead_over(run, best, other) if best and other else None,
         rms,
         list(run.held_out),
         str(diagnosis["verdict"]) if diagnosis else None,
@@ -195,43 +178,3 @@ def hanging(run: Run, model: str, guesses: Mapping[str, str]) -> dict[str, float
         if carried >= _MOVES:
             found[name] = min(1.0, carried)
     return found
-
-
-def _lead(run: Run, model: str, other: str | None) -> Lead | None:
-    """rms of a model against another one (None: no model) on what no fit saw, blocks of it drawn anew."""
-    middle = ratio(run, model, other)
-    if not math.isfinite(middle):
-        return None
-    pairs = []  # of each recording and output: sums of squares by block, of the two
-    for recording, output in cells(run, model):
-        predictions = run.predictions.get(recording)
-        if predictions is None or output not in predictions.models.get(model, {}):
-            continue
-        mine = predictions.left_over(model, output)
-        if other is None:
-            theirs = _without(run, predictions.readings[output], output)
-        elif output in predictions.models.get(other, {}):
-            theirs = predictions.left_over(other, output)
-        else:
-            continue
-        both = np.isfinite(mine) & np.isfinite(theirs)
-        if both.sum() >= _BLOCKS:
-            pieces = np.array_split(np.flatnonzero(both), _BLOCKS)
-            pairs.append(np.array([[np.sum(mine[p] ** 2), np.sum(theirs[p] ** 2)] for p in pieces]))
-    if not pairs:
-        return Lead(middle, middle, middle, float(middle < 1))
-    rng = np.random.default_rng(0)
-    logs = np.zeros(_DRAWS)
-    for blocks in pairs:
-        drawn = blocks[rng.integers(0, len(blocks), (_DRAWS, len(blocks)))].sum(axis=1)
-        logs += 0.5 * np.log(np.maximum(drawn[:, 0], 1e-300) / np.maximum(drawn[:, 1], 1e-300)) / len(pairs)
-    found = np.exp(logs)
-    low, high = np.percentile(found, [2.5, 97.5])
-    return Lead(middle, float(low), float(high), float(np.mean(found < 1)))
-
-
-def _without(run: Run, readings: Array, output: str) -> Array:
-    """What is left without a model: errors themselves, temperatures from the first reading on."""
-    known = readings[np.isfinite(readings)]
-    first = known[0] if known.size and run.unit(output) in ("°C", "K", "°F", "degC") else 0.0
-    return np.asarray(readings - first)
