@@ -89,14 +89,14 @@ def test_terms_and_parameters_over_the_folds() -> None:
     folds = [
         Fold("m", "a", {"E": {"a": 3.0, "b": 1.0}}, {"loss": {"k": 1.0}, "gap": {"g": 9.0}}),
         Fold("m", "b", {"E": {"a": 1.0, "b": 5.0}}, {"loss": {"k": 3.0}}),
-        Fold("m", "c", {}, {}, ("runs away",)),
+        Fold("m", "c", {}, {}, ("diverges",)),
     ]
     found = summary(folds, ["a", "b"])
     assert found["terms"]["loss"]["share"] == 1.0
     assert found["terms"]["gap"]["share"] == 0.5
     assert found["terms"]["loss"]["parameters"]["k"]["mean"] == 2.0
     assert found["terms"]["loss"]["parameters"]["k"]["sd"] == pytest.approx(math.sqrt(2.0))
-    assert found["lost"] == ["without c: runs away"]
+    assert found["lost"] == ["without c: diverges"]
     roles = {"recordings": {"a": ["x"], "b": ["y"]}, "models": {"m": found}}
     assert matrix(roles, "E").rows == (("m", "without a", "(3)", "1"), ("m", "without b", "1", "(5)"))
     assert left_out(roles, {"E": "um"}).rows == (("m", "E [um]", 3.0, 5.0, 1.0),)

@@ -57,17 +57,16 @@ class Ending:
 
     def _winner(self) -> str:
         where = f"{len(self.held_out)} held-out recording{'s' * (len(self.held_out) != 1)}"
-        where = where if self.held_out else "the recordings that it was fitted to (none is held out)"
+        where = where if self.held_out else "the recordings of the fit (none is held out)"
         if self.best is None:
             return "winner: none, no model could be compared"
         rms = ", ".join(f"{value:.3g} {unit}".strip() for unit, value in self.rms.items())
         none = self.against_none
         if self.winner is None or none is None:
-            share = f"{none.ratio:.0%}" if none else "more than all"
+            share = f"{none.ratio:.0%}" if none else "more than 100%"
             return (
-                f"winner: no model; the best, {self.best}, leaves {share} of the rms without any "
-                f"model on {where}: "
-                "do not use it"
+                f"winner: no model; the best one, {self.best}, has {share} of the rms without a model "
+                f"on {where}: do not use it"
             )
         return (
             f"winner: {self.winner} predicts best on {where}: rms {rms}, {1 - none.ratio:.0%} less "
@@ -78,11 +77,11 @@ class Ending:
         lead, other = self.against_runner_up, self.runner_up
         if lead is None or other is None or self.best is None:
             return "how sure: there is no other model to compare with"
-        said = "less" if lead.ratio < 1 else "more"
+        said = "smaller" if lead.ratio < 1 else "larger"
         low, high = sorted((1 - lead.low, 1 - lead.high))
-        close = "" if lead.high < 1 else "; the two cannot be told apart"
+        close = "" if lead.high < 1 else "; the recordings do not separate the two"
         return (
-            f"how sure: it leaves {abs(1 - lead.ratio):.0%} {said} than {other} (95 %: {low:.0%} to "
+            f"how sure: its rms is {abs(1 - lead.ratio):.0%} {said} than that of {other} (95 %: {low:.0%} to "
             f"{high:.0%}; "
             f"better in {lead.sure:.0%} of resampled recordings){close}"
         )
@@ -106,7 +105,7 @@ class Ending:
                 else name
                 for name in sorted(self.guesses, key=lambda n: -self.hangs_on_guesses.get(n, 0.0))
             ]
-            told.append(f"nobody has confirmed what was guessed of {', '.join(named[:4])}")
+            told.append(f"the guesses for {', '.join(named[:4])} are not confirmed")
         return f"doubts: {'; '.join(told)}" if told else "doubts: none; the recordings are sound"
 
 
@@ -156,11 +155,11 @@ def _next(
         which = ", ".join(list(guesses)[:3])
         return f"confirm or correct {which} in the campaign file, then `discovery new DIR --again`"
     if not run.held_out:
-        return "hold a recording out: only that shows how well a model predicts"
+        return "hold out a recording: only that shows how well a model predicts"
     if diagnosis and diagnosis.get("next_experiment"):
         return str(diagnosis["next_experiment"]).rstrip(".")
     if not helps:
-        return "record what drives the machine, each input moving on its own"
+        return "record the inputs that drive the machine, and let each one move on its own"
     export = f"`discovery export {run.folder} --model {best} --to json`"
     return f'{export}, or diagnose it ([mismatch] model = "{best}")'
 

@@ -100,7 +100,7 @@ def fold_of(experiment: Experiment, name: str, without: str) -> Fold:
         fitted = fit_entry(seen, name, entry)
     except (RunsAwayError, UserError) as error:
         return Fold(name, without, {}, {}, (str(error),))
-    lost = tuple(note for note in fitted.notes if "runs away" in note)
+    lost = tuple(note for note in fitted.notes if "diverges" in note)
     return Fold(name, without, _rms(fitted, experiment.form.roles or {}), terms_of(fitted.model), lost)
 
 

@@ -183,7 +183,7 @@ def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Gue
         if one.below_zero
     ]
     names = list(found.recordings)
-    lines.append(f"recordings: fit {', '.join(names[:-1])}; unseen {names[-1]}")
+    lines.append(f"recordings: fit {', '.join(names[:-1])}; held out {names[-1]}")
     return lines
 
 

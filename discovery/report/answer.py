@@ -196,7 +196,7 @@ def _missing(diagnosis: Mapping[str, Any] | None) -> Part:
     p_value = diagnosis.get("detection", {}).get("p_value")
     if p_value is not None and verdict != "no mismatch":
         chance = "less than 1 in 1000" if p_value < 1e-3 else percent(p_value)
-        points.append(f"Chance of such a mismatch if nothing were missing: {chance}.")
+        points.append(f"Probability that nothing is missing: {chance}.")
     rivals = [one for one in diagnosis.get("alternatives") or [] if one["log_evidence_below_best"] <= NEAR]
     if rivals:
         points.append(

@@ -47,6 +47,7 @@ class Chart:
     shades: tuple[tuple[float, float, str], ...] = ()  # from, to, why
     group: str = ""  # charts of a group zoom together
     marks: Mapping[str, float] = field(default_factory=dict)  # named vertical lines
+    solid: bool = False  # thin solid curves, without the dashes that distinguish models
     own_key: bool = True  # names its curves below; otherwise the legend of the section does
 
     @property

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from discovery.report.chart import Chart, Panel, Series
 from discovery.report.ranking import rms_unit
 from discovery.report.run import Run, pretty_unit
-from discovery.report.text import listed, number, with_unit
+from discovery.report.text import number, with_unit
 
 Array = NDArray[np.float64]
 
@@ -53,12 +53,14 @@ def _input_charts(run: Run, recording: str) -> list[Chart]:
         by_unit.setdefault(pretty_unit(str(units.get(name, ""))), []).append(series)
     panels = tuple(
         Panel(
-            with_unit(listed([s.name for s in series], "and") if len(series) < 3 else "inputs", unit),
+            with_unit(series[0].name if len(series) == 1 else "inputs", unit),
             tuple(series),
         )
         for unit, series in by_unit.items()
     )
-    return [Chart(f"{recording}-inputs", f"Inputs of {recording}", label, panels, group=recording)]
+    return [
+        Chart(f"{recording}-inputs", f"Inputs of {recording}", label, panels, group=recording, solid=True)
+    ]
 
 
 def _prediction_chart(run: Run, recording: str, output: str, models: Sequence[str]) -> Chart:
