@@ -293,6 +293,30 @@
     }
     caption.append(tools);
   }
+  const ranking = document.querySelector("tr[data-score]")?.closest("table");
+  if (ranking && ranking.querySelectorAll("tr[data-score]").length > 1) {
+    const rows = [...ranking.tBodies[0].rows], column = [...ranking.tHead.rows[0].cells].findIndex((c) => c.textContent === "rms against the best");
+    const name = (row) => row.cells[0].textContent, first = rows.map((row) => row.cells[column].textContent);
+    const tools = ranking.caption.querySelector(".tools"), label = document.createElement("label"), choice = document.createElement("select");
+    label.className = "find"; label.append("Compare with ", choice);
+    for (const row of rows.filter((one) => one.dataset.score)) choice.add(new Option(name(row), name(row)));
+    choice.addEventListener("change", () => {
+      const aim = rows.find((row) => name(row) === choice.value), best = choice.selectedIndex === 0;
+      ranking.tHead.rows[0].cells[column].textContent = best ? "rms against the best" : `rms against ${choice.value}`;
+      rows.forEach((row, k) => {
+        const more = 100 * (Math.exp(row.dataset.score - aim.dataset.score) - 1);
+        const said = row === aim ? "reference" : !row.dataset.score ? "–" : `${more < 0 ? "−" : "+"}${Math.abs(more).toFixed(0)} %`;
+        row.cells[column].textContent = best ? first[k] : said;
+      });
+    });
+    tools.prepend(label);
+    if (rows.length > 8) {
+      const search = document.createElement("label"), text = document.createElement("input");
+      text.type = "search"; search.className = "find"; search.append("Find a model ", text);
+      text.addEventListener("input", () => rows.forEach((row) => { row.hidden = !row.textContent.toLowerCase().includes(text.value.trim().toLowerCase()); }));
+      tools.prepend(search);
+    }
+  }
   const theme = document.getElementById("theme");
   if (theme) theme.addEventListener("click", () => {
     const chosen = document.documentElement.dataset.theme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");

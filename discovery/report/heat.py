@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from discovery.models import Model
+from discovery.models.units import differences
 from discovery.report.chart import Array, Chart, Panel, Series
 from discovery.report.network import drawing
 from discovery.report.run import Run, pretty_unit
@@ -99,7 +100,7 @@ def heat_unit(run: Run) -> str:
     model = diagnosed(run)
     if model is None or any(state.capacity for state in model.states.values()):
         return "W"
-    units = {pretty_unit(state.unit) for state in model.states.values() if state.unit}
+    units = {pretty_unit(differences(state.unit)) for state in model.states.values() if state.unit}
     return f"{units.pop()}/{model.time_unit}" if len(units) == 1 else f"unit of the state/{model.time_unit}"
 
 

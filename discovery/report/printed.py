@@ -12,6 +12,7 @@ from discovery.report.ranking import (
     is_error,
     kind,
     mean_improvement,
+    mean_log_rms,
     mean_rms,
     origin,
     ranked,
@@ -31,6 +32,7 @@ class Line:
     cells: tuple[str, ...]
     look: str = ""
     repeated: str = ""  # the first cell, where it is printed only once for several rows
+    score: float | None = None  # of a model: mean logarithm of its rms, to compare with any other row
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ def summary(run: Run) -> Printed | None:
     if not order:
         return None
     recordings = list(dict.fromkeys(r for model in order for r, _ in cells(run, model)))
+    shared = set.intersection(*(set(cells(run, model)) for model in order))
     shown = recordings[:_MOST_RECORDINGS]
     removed = is_error(run)
     units = rms_units(run)
@@ -78,9 +81,8 @@ def summary(run: Run) -> Printed | None:
         size = [number(entry.get("terms")), number(entry.get("parameters"))]
         times = "best" if model == order[0] else _behind(lead_over(run, order[0], model))
         look = "best" if model == order[0] else ""
-        rows.append(
-            Line((model, ", ".join(made), *size, *figures, times, number(entry.get("seconds"), 2)), look)
-        )
+        line = (model, ", ".join(made), *size, *figures, times, number(entry.get("seconds"), 2))
+        rows.append(Line(line, look, score=mean_log_rms(run, model, shared)))
     title = f"{what}, {'mean over all errors' if removed else 'over all outputs of a unit'}"
     return Printed(title[0].upper() + title[1:] if removed else title, header, tuple(rows), frozenset({1}))
 

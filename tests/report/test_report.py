@@ -154,6 +154,32 @@ def test_kelvins_and_micrometres_are_not_mixed(tmp_path: Path, together: bool) -
     assert "dZ [µm]" in page
 
 
+def test_every_model_can_be_the_reference(folder: Path, page: str) -> None:
+    run = load_run(folder)
+    scores = [float(text) for text in re.findall(r'data-score="([^"]+)"', page)]
+    assert len(scores) == len(run.results["models"])
+    assert scores == sorted(scores)  # best first
+    more = np.exp(scores[-1] - scores[0])
+    assert more == pytest.approx(1 / ratio(run, "discovered", "superposition"), rel=1e-4)
+
+
+def test_a_simulated_machine_is_said_first_and_inputs_are_drawn(tmp_path: Path) -> None:
+    folder = sample.write_sample(tmp_path / "run")
+    results = json.loads((folder / "results.json").read_text())
+    (folder / "results.json").write_text(
+        json.dumps(results | {"simulated": True, "input_units": {"pump": "1"}})
+    )
+    inputs = {"validation": {"pump": {"time": [0, 3600], "value": [0, 1]}}}
+    (folder / "inputs.json").write_text(json.dumps(inputs))
+    page = write_report(folder).read_text("utf-8")
+    assert re.search(r'class="eyebrow">Simulated machine · ', page)
+    (chart,) = (one for one in _data(page)["charts"] if one["key"] == "validation-inputs")
+    assert chart["panels"][0]["label"] == "pump [-]"
+    (folder / "inputs.json").write_text('{"validation": {"pump": [1]}}')
+    with pytest.raises(UserError, match=r"inputs\.json: cannot be read"):
+        write_report(folder)
+
+
 def test_the_tables_beside_the_papers_name_units(page: str) -> None:
     tables = page[page.index("Comparison of the models") :]
     assert re.search(r"E_Y0C \[µm\]\s*</t[hd]>", tables)
