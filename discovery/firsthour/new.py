@@ -56,7 +56,7 @@ def new(
     there = (folder / "campaign.toml").exists()
     if there and not again:
         raise UserError(
-            f"{folder}: campaign.toml is there already; say --again to make model and experiment anew "
+            f"{folder}: campaign.toml is there already; use --again to make model and experiment again "
             "(what you "
             "wrote stays), or name another folder"
         )

@@ -196,6 +196,8 @@ def _legend(run: Run, order: Sequence[str], curves: Sequence[Chart]) -> list[dic
     first = set(pair) if len(pair) > 1 else {*order[:1], *other[:1]}
     items = [{"name": "measured", "color": "measured", "on": True}]
     items += [{"name": name, "color": str(index), "on": name in first} for index, name in enumerate(order)]
+    names = {one.name for chart in curves for panel in chart.panels for one in panel.series}
+    items += [{"name": series.BAND, "color": "band", "on": order[0] in first}] if series.BAND in names else []
     return items + ([{"name": "reading noise, ±2σ", "color": "noise", "on": True}] if noise else [])
 
 

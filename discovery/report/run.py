@@ -92,6 +92,14 @@ class Run:
         value = detection.get("noise", {}).get(output, self.results.get("noise", {}).get(output))
         return float(value) if value else None
 
+    def band(self, model: str, output: str) -> float | None:
+        """Half width of the 95 % prediction band of a model: 1.96 times its rms in cross-validation; with
+        recordings left out where there are several, else with blocks of time.
+        """
+        found = self.results.get("models", {}).get(model, {}).get("cross_validation") or {}
+        rms = (found.get("recordings") or found.get("blocks") or {}).get(output)
+        return 1.96 * float(rms) if rms else None
+
 
 def load_run(folder: Path) -> Run:
     """Read a run folder; what is not there is left out.

@@ -138,7 +138,7 @@ def residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
     rows = series.residual_table(run, model, recording)
     if not rows:
         return None
-    keys = ("rms", "ratio", "mean", "memory", "largest", "beyond", "count")
+    keys = ("rms", "ratio", "mean", "memory", "largest", "beyond", "inside", "count")
     lines = tuple(
         Line((f"{row['output']} [{row['unit'] or '-'}]", *(number(row[k]) for k in keys))) for row in rows
     )
@@ -150,6 +150,7 @@ def residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
         "correlation of neighbours",
         "largest",
         "beyond 3σ [%]",
+        "inside the 95 % band [%]",
         "readings",
     )
     return {

@@ -15,6 +15,7 @@ from discovery.report.text import number, with_unit
 
 Array = NDArray[np.float64]
 
+BAND = "95 % band of the best model"
 FEWEST = 12  # residuals from which an autocorrelation is computed
 _COLORS = 8  # of curves in the style sheet
 
@@ -76,6 +77,13 @@ def _prediction_chart(run: Run, recording: str, output: str, models: Sequence[st
         below.append(
             Series("reading noise, ±2σ", read, flat, "band", "noise", flat - 2 * noise, flat + 2 * noise)
         )
+    for model in models[:1]:
+        half = run.band(model, output)
+        if half is not None and output in data.models.get(model, {}):
+            middle = data.models[model][output]
+            known = np.isfinite(middle)
+            ends = middle[known] - half, middle[known] + half
+            above.insert(0, Series(BAND, x[known], middle[known], "band", "0", *ends))
     for index, model in enumerate(models):
         if output in data.models.get(model, {}):
             above.append(Series(model, x, data.models[model][output], "line", str(index)))
@@ -153,6 +161,7 @@ def residual_table(run: Run, model: str, recording: str) -> list[dict[str, Any]]
     for output, left in _left_over(run, model, recording):
         spread = float(np.std(left)) or 1.0
         rms, noise = float(np.sqrt(np.mean(left**2))), run.noise(output)
+        half = run.band(model, output)
         rows.append(
             {
                 "output": output,
@@ -163,6 +172,7 @@ def residual_table(run: Run, model: str, recording: str) -> list[dict[str, Any]]
                 "memory": float(autocorrelation(left, 1)[0]),
                 "largest": float(np.abs(left).max()),
                 "beyond": 100 * float(np.mean(np.abs(left - left.mean()) > 3 * spread)),
+                "inside": 100 * float(np.mean(np.abs(left) <= half)) if half else None,
                 "count": len(left),
             }
         )
