@@ -81,6 +81,7 @@ def test_a_run_writes_what_the_contract_says(folder: Path) -> None:
     models = ("reduced", "superposition", "one_body")
     assert names >= {
         "results.json",
+        "inputs.json",
         "report.html",
         *(f"models/{m}.toml" for m in models),
         *(f"predictions/{r}.csv" for r in "abc"),
