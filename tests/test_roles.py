@@ -108,7 +108,7 @@ def test_a_run_writes_the_matrix_into_results_and_report(path: Path) -> None:
     results = load_run(out).results
     assert set(results["role_matrix"]["models"]) == {"reduced", "one_body", "apart"}
     page = (out / "report.html").read_text()
-    assert "Each role left out in turn" in page
+    assert "Cross-validation over roles" in page
     assert "Heat and fluid of each recording" in page
     budget = results["models"]["one_body"]["budgets"]["a"]
     assert abs(budget["gap"]) < 1e-3 * sum(abs(v) for v in budget["entering"].values())

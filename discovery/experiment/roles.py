@@ -9,6 +9,7 @@ diagonal stands what nobody has seen.
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -45,6 +46,7 @@ def begin_folds(experiment: Experiment) -> Iterator[Fold]:
 
     The folds come in the order in which they are done.
     """
+    import cloudpickle
     from joblib import Parallel, cpu_count, delayed
 
     models = experiment.form.models
@@ -55,8 +57,14 @@ def begin_folds(experiment: Experiment) -> Iterator[Fold]:
     )
     jobs = max(1, min(cpu_count(), len(tasks)))
     work = Parallel(n_jobs=jobs, return_as="generator_unordered")
-    found: Iterator[Fold] = work(delayed(fold_of)(experiment, name, role) for name, role in tasks)
+    # Pickled now: joblib would pickle it later, in its own thread, while the fits fill its caches.
+    frozen = cloudpickle.dumps(experiment)
+    found: Iterator[Fold] = work(delayed(_fold_of_pickled)(frozen, name, role) for name, role in tasks)
     return found
+
+
+def _fold_of_pickled(experiment: bytes, name: str, role: str) -> Fold:
+    return fold_of(pickle.loads(experiment), name, role)
 
 
 def leave_roles_out(
