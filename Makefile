@@ -11,8 +11,8 @@ PYTHON ?= $(shell for one in python3.11 python3.12 python3.13 python3 python; do
 .PHONY: demo test benchmarks coverage site browser-test outside lint types lock audit licences fuzz clean
 
 demo: $(STAMP)
-	$(BIN)/discovery run experiments/nmv5000.toml
-	@echo "The report: runs/$$($(BIN)/python -c 'import tomllib; print(tomllib.load(open("experiments/nmv5000.toml", "rb"))["name"])')/report.html"
+	$(BIN)/discovery run experiments/demonstration.toml
+	@echo "The report: runs/demonstration/report.html"
 
 test: $(STAMP)
 	$(BIN)/pytest -n auto
@@ -33,7 +33,7 @@ site: $(STAMP)
 
 # The reports of both demonstrations in a real browser; needs chromium, chromium-driver and npm
 AXE := build/browser/node_modules/axe-core/axe.min.js
-REPORTS := runs/nmv5000/report.html runs/tclab/report.html
+REPORTS := runs/demonstration/report.html runs/tclab/report.html
 
 browser-test: $(STAMP) $(AXE) $(REPORTS)
 	$(BIN)/python -m tests.browser.check $(AXE) $(REPORTS) --pictures build/browser/pictures

@@ -1,6 +1,6 @@
 """The two demonstrations of what a model leaves out: what is named, rms of free runs on unseen recordings.
 
-python benchmarks/repaired.py [paper_rediscovered] [tclab_mismatch]
+python benchmarks/repaired.py [demonstration] [tclab_mismatch]
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from discovery.experiment import diagnose, load_experiment
 
 EXPERIMENTS = Path(__file__).parents[1] / "experiments"
 GROUPS = {
-    "paper_rediscovered": {"validation": ["validation"], "left_nozzle": ["left_nozzle"]},
+    "demonstration": {"validation": ["validation"], "left_nozzle": ["left_nozzle"]},
     "tclab_mismatch": {
         "random both": ["random"],
         "steps up": ["step"],

@@ -83,10 +83,10 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="A first hour: `discovery new DIR --from FILE` makes campaign, model and experiment of your "
-    "recordings, `discovery check DIR` looks at them, `discovery run DIR/experiment.toml` answers. "
-    "Every verb explains itself: `discovery VERB --help`. "
-    "Exit status: 0 done, 1 the work could not be done (the message says why), 2 wrong usage.",
+    epilog="Begin with three commands: `discovery new DIR --from FILE` makes campaign, model and experiment "
+    "from your recordings, `discovery check DIR` checks them, `discovery run DIR/experiment.toml` compares "
+    "and diagnoses models. Details: `discovery COMMAND --help`. "
+    "Exit status: 0 done, 1 not possible (the message says why), 2 wrong usage.",
 )
 
 
@@ -102,7 +102,7 @@ def main(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and stop.")
     ] = False,
 ) -> None:
-    """Models of a machine tool's thermal errors, from recordings: fitted, discovered, compared, diagnosed."""
+    """Fit, discover, compare and diagnose models of the thermal errors of a machine tool."""
 
 
 # In the order in which `discovery --help` lists them.

@@ -16,8 +16,8 @@ from typing import Any
 from discovery.errors import UserError
 from discovery.files import read_text
 
-RESULTS, DIAGNOSIS = "results.json", "diagnosis.json"
-OWNED = frozenset({RESULTS, DIAGNOSIS, "report.html", "paper.html", "models", "predictions"})
+RESULTS, DIAGNOSIS, INPUTS = "results.json", "diagnosis.json", "inputs.json"
+OWNED = frozenset({RESULTS, DIAGNOSIS, INPUTS, "report.html", "paper.html", "models", "predictions"})
 _KEYS: dict[str, dict[str, type]] = {
     RESULTS: {"experiment": str, "fit": list, "held_out": list, "models": dict},
     DIAGNOSIS: {"model": str, "verdict": str, "physics": list},

@@ -81,6 +81,7 @@ def test_a_run_writes_what_the_contract_says(folder: Path) -> None:
     models = ("reduced", "superposition", "one_body")
     assert names >= {
         "results.json",
+        "inputs.json",
         "report.html",
         *(f"models/{m}.toml" for m in models),
         *(f"predictions/{r}.csv" for r in "abc"),
@@ -130,12 +131,14 @@ def test_a_model_that_runs_away_on_an_unseen_recording_is_told_and_last(folder: 
     out = run(folder / "experiment.toml", folder / "out")
     entries = results_of(out)["models"]
     assert set(entries["wild"]["recordings"]) == {"a", "b"}
-    assert "runs away on recording 'c'" in " ".join(entries["wild"]["notes"])
+    assert "diverges on recording 'c'" in " ".join(entries["wild"]["notes"])
     assert set(entries["one_body"]["recordings"]) == {"a", "b", "c"}
     assert (out / "predictions" / "c.csv").read_text().splitlines()[0].count("|") == 4
     loaded = load_run(out)
     assert ranked(loaded) == ["one_body", "reduced", "wild"]
-    assert "“wild” runs away on the unseen recording “c”." in (out / "report.html").read_text()
+    assert (
+        "The free run of “wild” diverges on the held-out recording “c”." in (out / "report.html").read_text()
+    )
 
 
 def test_predictions_are_readings_and_models_side_by_side(folder: Path) -> None:
@@ -216,7 +219,7 @@ def test_a_model_may_be_fitted_to_more_than_the_others(folder: Path) -> None:
         assert got["one_body"][key] == both["one_body"][key] != one["one_body"][key]
         assert got["reduced"][key] == one["reduced"][key] != both["reduced"][key]
     assert found["more"]["fit"] == ["a"]
-    assert got["one_body"]["notes"][0] == "is fitted to b besides"
+    assert got["one_body"]["notes"][0] == "also fitted to b"
     assert set(got["reduced"]["recordings"]) == {"a", "c"}
 
 
@@ -446,11 +449,11 @@ def test_a_model_that_runs_away_in_cross_validation_is_told_and_kept(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def explode(*_: object) -> None:
-        raise RunsAwayError("model 'x' runs away on recording 'a'")
+        raise RunsAwayError("model 'x' diverges on recording 'a'")
 
     monkeypatch.setattr("discovery.experiment.fitted.cross_validate", explode)
     out = run(folder / "experiment.toml", folder / "out")
     for name, entry in results_of(out)["models"].items():
         assert entry["cross_validation"] == {}
-        assert f"the fit of {name} runs away" in entry["notes"][0]
+        assert f"the fit of {name} diverges" in entry["notes"][0]
         assert set(entry["recordings"]) == {"a", "b", "c"}

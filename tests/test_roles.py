@@ -89,14 +89,14 @@ def test_terms_and_parameters_over_the_folds() -> None:
     folds = [
         Fold("m", "a", {"E": {"a": 3.0, "b": 1.0}}, {"loss": {"k": 1.0}, "gap": {"g": 9.0}}),
         Fold("m", "b", {"E": {"a": 1.0, "b": 5.0}}, {"loss": {"k": 3.0}}),
-        Fold("m", "c", {}, {}, ("runs away",)),
+        Fold("m", "c", {}, {}, ("diverges",)),
     ]
     found = summary(folds, ["a", "b"])
     assert found["terms"]["loss"]["share"] == 1.0
     assert found["terms"]["gap"]["share"] == 0.5
     assert found["terms"]["loss"]["parameters"]["k"]["mean"] == 2.0
     assert found["terms"]["loss"]["parameters"]["k"]["sd"] == pytest.approx(math.sqrt(2.0))
-    assert found["lost"] == ["without c: runs away"]
+    assert found["lost"] == ["without c: diverges"]
     roles = {"recordings": {"a": ["x"], "b": ["y"]}, "models": {"m": found}}
     assert matrix(roles, "E").rows == (("m", "without a", "(3)", "1"), ("m", "without b", "1", "(5)"))
     assert left_out(roles, {"E": "um"}).rows == (("m", "E [um]", 3.0, 5.0, 1.0),)
@@ -108,7 +108,7 @@ def test_a_run_writes_the_matrix_into_results_and_report(path: Path) -> None:
     results = load_run(out).results
     assert set(results["role_matrix"]["models"]) == {"reduced", "one_body", "apart"}
     page = (out / "report.html").read_text()
-    assert "Each role left out in turn" in page
+    assert "Cross-validation over roles" in page
     assert "Heat and fluid of each recording" in page
     budget = results["models"]["one_body"]["budgets"]["a"]
     assert abs(budget["gap"]) < 1e-3 * sum(abs(v) for v in budget["entering"].values())

@@ -49,7 +49,7 @@ def test_a_run_ends_in_five_lines(folder: Path) -> None:
     lines = quiet.splitlines()
     assert [line.partition(":")[0] for line in lines] == ["winner", "how sure", "verdict", "doubts", "next"]
     assert lines[0].startswith("winner: one_body predicts best on 1 held-out recording: rms")
-    assert "than regression" in lines[1]
+    assert "than that of regression" in lines[1]
     assert lines[3] == "doubts: none; the recordings are sound"
 
 

@@ -19,13 +19,12 @@ def export(
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the files [RUN/export/MODEL].")] = None,
     campaign: Annotated[Path | None, typer.Option(help="Campaign file [the one of the run].")] = None,
     step: Annotated[float, typer.Option(help="Fixed internal step, s.")] = 10.0,
-    states: Annotated[int | None, typer.Option(help="Reduce the model to so many states first.")] = None,
+    states: Annotated[int | None, typer.Option(help="First reduce the model to so many states.")] = None,
     sign: Annotated[
-        Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs; made when there is none yet.")
+        Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs; created if missing.")
     ] = None,
 ) -> None:
-    """Export a fitted model for the compensation runtime, proved equal to the Python model before it is
-    written.
+    """Export a fitted model for the compensation. Each export is first checked against the Python model.
 
     \b
     discovery export "runs/cutting fluid" --model thermobalance --to c --to fmu
@@ -38,9 +37,7 @@ def export(
     key = private_key(sign) if sign else None
     if run.suffix == ".json" and run.is_file():
         if model or campaign or states:
-            raise UsageError(
-                "an exported model is exported as it is; leave --model, --campaign and --states out"
-            )
+            raise UsageError("an exported model cannot be changed; omit --model, --campaign and --states")
         for line in export_document(run, to, out, key=key).lines():
             typer.echo(line)
         return
@@ -72,20 +69,18 @@ def compensate(
     shadow_hours: Annotated[float, typer.Option(help="Length of a shadow run.")] = 24.0,
     shadow_um: Annotated[
         float | None,
-        typer.Option(help="A new model may take over without measured errors if it differs by so little."),
+        typer.Option(help="Difference, um, up to which a new model needs no measured errors."),
     ] = None,
     acknowledge: Annotated[
         bool,
-        typer.Option("--acknowledge", help="An operator has looked: end a FAULT, accept steps that wait."),
+        typer.Option("--acknowledge", help="Operator's acknowledgement: end a FAULT, accept waiting steps."),
     ] = False,
-    back: Annotated[
-        bool, typer.Option("--back", help="One step back to the model before, in --state.")
-    ] = False,
+    back: Annotated[bool, typer.Option("--back", help="Go back to the previous model in --state.")] = False,
     opcua: Annotated[Path | None, typer.Option(help="TOML file of an OPC UA connection.")] = None,
     opcua_demo: Annotated[
         bool, typer.Option("--opcua-demo", help="Start a simulated machine server and compensate it.")
     ] = False,
-    seconds: Annotated[float | None, typer.Option(help="Stop OPC UA after so long.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop OPC UA after this time, s.")] = None,
     learn: Annotated[
         Path | None,
         typer.Option(
@@ -94,7 +89,7 @@ def compensate(
         ),
     ] = None,
 ) -> None:
-    """Run an exported model: readings in, offsets [um, um/m] with status word and heartbeat out.
+    """Run an exported model: reads inputs, gives offsets [um, um/m] with status word and heartbeat.
 
     \b
     discovery compensate model.json --trust machine.pem.pub --inputs in.csv --out offsets.csv --state memory

@@ -14,10 +14,8 @@ def challenge(
         list[str] | None,
         typer.Option(help="Family of machines, may be repeated; `help` lists them [all]."),
     ] = None,
-    cases: Annotated[int | None, typer.Option(min=1, help="How many cases are written [200].")] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Everything random comes from it [drawn now].")
-    ] = None,
+    cases: Annotated[int | None, typer.Option(min=1, help="Number of cases [200].")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything random [drawn now].")] = None,
     out: Annotated[Path, typer.Option("--out", help="Folder of the challenge.")] = Path("runs/challenge"),
     jobs: Annotated[
         int | None,
@@ -29,23 +27,24 @@ def challenge(
             "[every core; or the environment variable DISCOVERY_JOBS]",
         ),
     ] = None,
-    baselines: Annotated[bool, typer.Option(help="Solve with the other methods, too.")] = True,
+    baselines: Annotated[bool, typer.Option(help="Also solve with other methods.")] = True,
     cases_from: Annotated[
-        Path | None, typer.Option(help="Take the cases of this folder, with keys.json or answers.json.")
+        Path | None, typer.Option(help="Use the cases of this folder, with keys.json or answers.json.")
     ] = None,
     write: Annotated[
         Path | None, typer.Option(help="Write cases and keys.json into this folder, and stop.")
     ] = None,
 ) -> None:
-    """Conceal effects in many cases, seal the answers, solve the cases, score what was found.
+    """Conceal effects in many simulated cases, seal the answers, solve the cases and score the diagnosis.
 
-    With --write the cases are written to practise on, with their keys beside them, and nothing is solved.
+    --write only writes cases for practice, with their keys. It solves nothing.
 
     \b
     discovery challenge --family headstock --cases 40 --seed 7 --write practice/headstock
     discovery challenge --family portal --family printer --cases 60
 
-    Run it again to go on where it stopped. Writes OUT/report.html, OUT/results.json and OUT/challenge.md.
+    Run the same command again to continue after a stop. Writes report.html, results.json and challenge.md
+    into OUT.
     """
     from discovery.challenge.run import challenge as run_challenge
     from discovery.challenge.run import family_list, practice

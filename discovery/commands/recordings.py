@@ -17,15 +17,14 @@ def check(
     ],
     models: Annotated[
         list[Path] | None,
-        typer.Option("--model", help="A model file: do its names and units fit? Repeatable."),
+        typer.Option("--model", help="Also check names and units of a model file; repeatable."),
     ] = None,
 ) -> None:
-    """List what is wrong with the recordings of CAMPAIGN, worst first: where, and what to do about it.
+    """List the faults in the recordings of CAMPAIGN, worst first, each with its place and a remedy.
 
-    Each channel is looked at by itself, beside its siblings, and beside the other recordings: units,
-    signs, clocks,
-    swapped columns, dead or frozen sensors, copies. An `error` keeps the recording from being used (exit
-    status 1); a `warning` is worth a look.
+    Each channel is checked alone, against similar channels, and against other recordings: units, signs,
+    clocks, swapped columns, dead or frozen sensors, copies. An `error` means that the recording cannot be
+    used (exit status 1). A `warning` deserves a look.
     """
     from discovery.recordings.check import check_campaign, summary
     from discovery.recordings.finding import folded
@@ -45,45 +44,43 @@ def check(
 
 
 def new(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that the files are written into.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the new files.")],
     sources: Annotated[
         list[Path] | None,
         typer.Option(
             "--from",
             metavar="FILE",
-            help="Your recording (CSV of any kind, .xlsx, Parquet); repeat it for several of one machine.",
+            help="Your recording (any CSV, .xlsx, Parquet); repeat it for several of one machine.",
         ),
     ] = None,
     joins: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--join", metavar="FILE", help="A second logger of the same hours, one for each --from."
-        ),
+        typer.Option("--join", metavar="FILE", help="A second logger of the same time, one for each --from."),
     ] = None,
     statements: Annotated[
         list[str] | None,
         typer.Option(
             "--is",
             metavar="NAME=ROLE,UNIT",
-            help="What a column is: --is 'CH1=error,um'; the unit of the clock: --is time=min. Repeatable.",
+            help="Role and unit of a column: --is 'CH1=error,um'; unit of time: --is time=min. Repeatable.",
         ),
     ] = None,
     room: Annotated[
         str | None,
-        typer.Option(metavar="COLUMN", help="A column that stands for the air around (outdoors, a cabinet)."),
+        typer.Option(metavar="COLUMN", help="Column to use as ambient temperature (outdoors, a cabinet)."),
     ] = None,
     again: Annotated[
         bool,
-        typer.Option("--again", help="Make model and experiment anew; what you wrote in DIR stays."),
+        typer.Option("--again", help="Make model and experiment again; your own changes in DIR stay."),
     ] = False,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Do not compare models: write a simple and a discovered one.")
+        bool, typer.Option("--quick", help="Skip the comparison: write a simple and a discovered model.")
     ] = False,
     ask: Annotated[
         bool | None, typer.Option("--ask/--no-ask", help="Ask about doubtful guesses [if on a terminal].")
     ] = None,
 ) -> None:
-    """Make campaign, model and experiment from your own files, say what was guessed, choose a first model.
+    """Make campaign, model and experiment from your own files; show the guesses; choose a first model.
 
     \b
     discovery new lathe --from monday.csv --from tuesday.csv
@@ -132,13 +129,13 @@ def _list_effects(given: list[str] | None) -> list[str] | None:
 
 
 def record(
-    out: Annotated[Path, typer.Option("--out", help="Folder of the campaign that is written.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder for the campaign.")],
     campaign: Annotated[
         str | None,
-        typer.Option(help="Record a known campaign, e.g. nmv5000; no other option but --out counts."),
+        typer.Option(help="Record a known campaign, e.g. nmv5000; only --out is used then."),
     ] = None,
     recordings: Annotated[
-        int, typer.Option(min=1, max=100, help="How many recordings, each with the next seed.")
+        int, typer.Option(min=1, max=100, help="Number of recordings; each uses the next seed.")
     ] = 1,
     cycle: Annotated[
         str,
@@ -147,7 +144,7 @@ def record(
             "cooling, nozzle or flooded."
         ),
     ] = "fit",
-    seed: Annotated[int, typer.Option(min=0, help="Everything random comes from it.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything random.")] = 1,
     hours: Annotated[float, typer.Option(help="Length of a recording.")] = 72.0,
     nozzle_height: Annotated[float, typer.Option(help="Nozzle above the table, mm.")] = 50.0,
     nozzle_side: Annotated[float, typer.Option(help="0: over the centre, 1: left of the table.")] = 0.0,
@@ -164,17 +161,17 @@ def record(
         typer.Option(
             callback=_list_effects,
             is_eager=True,
-            help="NAME[@CHANNEL]=SIZE: a fault of measuring, in the first recording; help lists them.",
+            help="NAME[@CHANNEL]=SIZE: a measurement fault in the first recording; help lists them.",
         ),
     ] = None,
     conceal: Annotated[
-        bool, typer.Option("--conceal", help="Hide an effect drawn by seed, without --effect.")
+        bool, typer.Option("--conceal", help="Hide an effect that the seed chooses, without --effect.")
     ] = False,
-    reveal: Annotated[bool, typer.Option("--reveal", help="Put the answer into OUT, too.")] = False,
+    reveal: Annotated[bool, typer.Option("--reveal", help="Also write the answer into OUT.")] = False,
 ) -> None:
-    """Record the virtual machine: a rotary table under cutting fluid, some 50 nodes, with R-Test readings.
+    """Record a simulated machine: a rotary table under cutting fluid, 59 temperatures, with R-Test readings.
 
-    The same options give the same files, bit for bit. What was concealed stands in OUT.answer.json.
+    The same options give the same files, bit for bit. OUT.answer.json holds a concealed effect.
 
     \b
     discovery record --out runs/plain --recordings 2

@@ -26,7 +26,7 @@ def run(
         Path,
         typer.Argument(
             metavar="EXPERIMENT",
-            help="An experiment file, e.g. experiments/nmv5000.toml; or a folder of them.",
+            help="An experiment file, e.g. experiments/demonstration.toml; or a folder of them.",
         ),
     ],
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the results [runs/NAME].")] = None,
@@ -40,24 +40,21 @@ def run(
             "tcp://10.0.0.5:8786. The workers need the same files at the same place.",
         ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Run although the recordings cannot be used as they are.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Nothing but the last five lines.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Run in spite of faulty recordings.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the last five lines.")] = False,
     as_json: Annotated[
-        bool, typer.Option("--json", help="What was found as one JSON object on stdout, nothing else.")
+        bool, typer.Option("--json", help="Print only one JSON object with the findings.")
     ] = False,
 ) -> None:
-    """Do the main job: look at the recordings, fit, discover, cross-validate, compare, diagnose, report,
-    export.
+    """Run a whole experiment: check the recordings, fit, discover, compare, diagnose, report, export.
 
-    Recordings that are wrong (`discovery check`) stop it, unless --force. The last five lines say which
-    model wins,
-    how sure that is, what is missing, what is doubtful, what to do next. The results in the folder are
-    replaced as a
-    whole at the end: an interrupted run leaves nothing behind. Exports, figures and notes in it stay.
+    Faulty recordings (see `discovery check`) stop the run; --force overrides this. The last five lines give
+    the best model, how sure that is, the missing physics, the doubts and the next step. The results in the
+    folder are replaced at the very end, so an interrupted run changes nothing. Your exports, figures and
+    notes stay.
 
-    Of a folder every experiment is run that is not finished yet: start it again to go on where it stopped.
+    For a folder, every experiment that is not finished yet is run: start the command again to go on where it
+    stopped.
     """
     import json
 
@@ -123,20 +120,16 @@ def _run_folder(
 
 
 def diagnose(
-    experiment: Annotated[
-        Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file, experiments/*.toml.")
-    ],
-    out: Annotated[
-        Path | None, typer.Option(help="Folder of the results; default runs/<experiment name>.")
-    ] = None,
+    experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file.")],
+    out: Annotated[Path | None, typer.Option(help="Folder of the results [runs/NAME].")] = None,
     jobs: Jobs = None,
 ) -> None:
-    """Find what the model of [mismatch] leaves out: where, which physics, how sure, and how much better the
-    repair fits.
+    """Find the physics that the model of [mismatch] lacks: which effect, where, how sure, and what its repair
+    gains.
 
-    Writes diagnosis.json, the repaired model and report.html; other models that a run of the same recordings
-    left in the folder stay. "no mismatch" and "unexplained" are answers too: nothing is named that the
-    recordings cannot tell apart.
+    Writes diagnosis.json, the repaired model and report.html. Other models of the same recordings stay in the
+    folder. "no mismatch" and "unexplained" are possible answers: an effect is named only if the recordings
+    determine it.
     """
     use_jobs(jobs)
     from discovery.diagnosis.summary import summary
@@ -156,10 +149,10 @@ def diagnose(
 def compare(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN", help="Folders of results.")],
     out: Annotated[
-        Path | None, typer.Option("--out", help="Write a page on them: FILE.html, or a folder.")
+        Path | None, typer.Option("--out", help="Also write a page: FILE.html, or a folder.")
     ] = None,
 ) -> None:
-    """Put the models of several runs side by side: rms of each error, recording by recording."""
+    """Compare the models of several runs: rms of each error and recording."""
     from discovery.experiment.summary import comparison
 
     for line in comparison(runs):
@@ -176,7 +169,7 @@ def report(
         bool, typer.Option("--figures", help="Also write RUN/figures/*.svg and *.pdf.")
     ] = False,
 ) -> None:
-    """Write the report of RUN anew: one page that opens offline."""
+    """Write the report of RUN again: one HTML file that opens offline."""
     from discovery.report import write_figures, write_report
 
     typer.echo(write_report(run))

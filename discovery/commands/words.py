@@ -8,7 +8,7 @@ import typer
 def list_words(
     what: Annotated[str, typer.Argument(metavar="effects|models|roles", help="What to list.")],
 ) -> None:
-    """List the effects, the kinds of models, or the roles of channels, each in a line."""
+    """List the effects, the kinds of models, or the roles of channels, one per line."""
     from discovery.firsthour.explain import list_words as lines_of
 
     for line in lines_of(what):
@@ -18,7 +18,7 @@ def list_words(
 def explain(
     effect: Annotated[str, typer.Argument(metavar="EFFECT", help="A word of `discovery list effects`.")],
 ) -> None:
-    """Explain the physics of EFFECT: formula, size, signature, what it is confused with."""
+    """Explain the physics of EFFECT: formula, size, signature, similar effects."""
     from discovery.firsthour.explain import explain as lines_of
 
     for line in lines_of(effect):
@@ -27,10 +27,10 @@ def explain(
 
 def schema(
     file: Annotated[
-        str, typer.Argument(metavar="campaign|model|experiment|results|diagnosis", help="Which.")
+        str, typer.Argument(metavar="campaign|model|experiment|results|diagnosis", help="Kind of file.")
     ],
 ) -> None:
-    """Print the JSON schema of a file: for an editor, or for programs that read results."""
+    """Print the JSON schema of a file, for editors and for programs that read results."""
     from discovery.firsthour.schemas import schema as schema_of
 
     typer.echo(schema_of(file))

@@ -23,7 +23,7 @@ NOTHING_CLOSE = (
     "body: its temperature, and whatever else heats or cools it"
 )
 
-APART = Aim("tells the rivals apart", "the two answers differ there")
+APART = Aim("separates the rivals", "the two answers differ there")
 CONFIRM = Aim("would confirm the answer", "the model with and without it differs there")
 
 
@@ -67,9 +67,9 @@ def aim(shown: Sequence[Hypothesis], rival: Hypothesis | None, answered: bool) -
         does = CONFIRM.does if all(h.recording is None for h in shown) else f"would confirm {laws}"
         return Aim(does, CONFIRM.differ)
     if rival:
-        what = f"would tell apart what came closest ({_called(shown)}, or {_called([rival])})"
+        what = f"would separate the closest effects ({_called(shown)}, or {_called([rival])})"
         return Aim(what, "the two differ there")
-    return Aim(f"would put to the test what came closest ({laws})", CONFIRM.differ)
+    return Aim(f"would test the closest effect ({laws})", CONFIRM.differ)
 
 
 def look_back(context: Context, events: Sequence[Hypothesis]) -> str:

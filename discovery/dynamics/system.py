@@ -283,7 +283,7 @@ def simulate(
         new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
         if not np.all(np.abs(new) < _FAR):
             raise RunsAwayError(
-                f"model '{system.model.name}' runs away on recording '{system.grid.recording}'; "
+                f"model '{system.model.name}' diverges on recording '{system.grid.recording}'; "
                 "check signs, bounds and start values of its parameters"
             )
         change = np.max(np.abs(new - x) / (1.0 + np.abs(new)), initial=0.0)

@@ -41,11 +41,17 @@ def table_1(results: Mapping[str, Any], model: str, recordings: Mapping[str, str
     return Table(f"Reduction of the arithmetic mean by '{model}' [%] (Table 1)", tuple(header), tuple(rows))
 
 
-def table_3(results: Mapping[str, Any], recording: str, models: Sequence[str] | None = None) -> Table:
+def table_3(
+    results: Mapping[str, Any],
+    recording: str,
+    models: Sequence[str] | None = None,
+    paper: bool = True,
+) -> Table:
     """Table 3: P_V, M_V, Q_M and rms of each error on one recording, uncompensated and left over by each
     model.
 
-    Beside the uncompensated rows and those of equations (8) and (9) stand the figures that the paper prints.
+    With `paper`, the figures that the paper prints stand next to the uncompensated rows and those of
+    equations (8) and (9).
     """
     chosen = [
         name for name in models or results["models"] if recording in results["models"][name]["recordings"]
@@ -61,6 +67,10 @@ def table_3(results: Mapping[str, Any], recording: str, models: Sequence[str] | 
         for name in having:
             equation = equations[name] and f"{equations[name]} %"
             rows.append(_row(error, f"improvement {name} [%]", found[name][error]["improvement"], equation))
+    if not paper:
+        keep = [k for k, name in enumerate(header) if name != "paper"]
+        short = tuple(tuple(row[k] for k in keep) for row in rows)
+        return Table(f"Recording '{recording}'", tuple(header[k] for k in keep), short)
     return Table(f"Recording '{recording}' (Table 3)", header, tuple(rows))
 
 

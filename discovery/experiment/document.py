@@ -124,8 +124,8 @@ class Recommended(Strict):
 
     model: str
     rms: Number
-    ties: list[str] = Field(description="models that the readings do not tell from it")
-    against: dict[str, dict[str, Any]] = Field(description="by model, how far behind it is")
+    ties: list[str] = Field(description="models that the readings do not separate from it")
+    against: dict[str, dict[str, Any]] = Field(description="by model, by how much it is worse")
 
 
 class ResultsDocument(Strict):
@@ -135,6 +135,7 @@ class ResultsDocument(Strict):
     command: str
     campaign: str
     campaign_file: str
+    simulated: bool | None = Field(None, description="whether the recordings come from a simulation")
     fit: list[str]
     held_out: list[str]
     outputs: list[str]
@@ -145,7 +146,7 @@ class ResultsDocument(Strict):
     parts: dict[str, str] = Field(description="which recording plays which part of the paper")
     notes: dict[str, str]
     findings: list[str] = Field(description="what is wrong with the recordings")
-    guessed: dict[str, str] | None = Field(None, description="of channels, what nobody has confirmed")
+    guessed: dict[str, str] | None = Field(None, description="by channel, guesses that were not confirmed")
     models: dict[str, ModelResults]
     recommended: dict[str, Recommended] | None = Field(None, description="by output")
     role_matrix: RoleMatrix | None = Field(None, description="each role left out of fit and search in turn")

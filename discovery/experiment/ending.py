@@ -4,38 +4,21 @@ next.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from discovery.report.ranking import astray, cells, ranked, ratio, rms_by_unit
+from discovery.report.lead import Lead, lead_over
+from discovery.report.ranking import astray, cells, ranked, rms_by_unit
 from discovery.report.run import Run, load_run
 from discovery.runfolder import DIAGNOSIS
 from discovery.terms import names
 
-Array = NDArray[np.float64]
-
-_BLOCKS = 12  # of each recording, drawn anew: neighbouring residuals hang together
-_DRAWS = 1000
 _BETTER = 0.95  # of the rms without a model: less is no improvement
 _MOVES = 0.05  # share of an effect from which a guess matters
-
-
-@dataclass(frozen=True)
-class Lead:
-    """`ratio`: rms of the winner over that of another model (or of none), with its 95 % interval; `sure`:
-    share of the draws in which the winner is better.
-    """
-
-    ratio: float
-    low: float
-    high: float
-    sure: float
 
 
 @dataclass(frozen=True)
@@ -74,17 +57,16 @@ class Ending:
 
     def _winner(self) -> str:
         where = f"{len(self.held_out)} held-out recording{'s' * (len(self.held_out) != 1)}"
-        where = where if self.held_out else "the recordings that it was fitted to (none is held out)"
+        where = where if self.held_out else "the recordings of the fit (none is held out)"
         if self.best is None:
             return "winner: none, no model could be compared"
         rms = ", ".join(f"{value:.3g} {unit}".strip() for unit, value in self.rms.items())
         none = self.against_none
         if self.winner is None or none is None:
-            share = f"{none.ratio:.0%}" if none else "more than all"
+            share = f"{none.ratio:.0%}" if none else "more than 100%"
             return (
-                f"winner: no model; the best, {self.best}, leaves {share} of the rms without any "
-                f"model on {where}: "
-                "do not use it"
+                f"winner: no model; the best one, {self.best}, has {share} of the rms without a model "
+                f"on {where}: do not use it"
             )
         return (
             f"winner: {self.winner} predicts best on {where}: rms {rms}, {1 - none.ratio:.0%} less "
@@ -95,11 +77,11 @@ class Ending:
         lead, other = self.against_runner_up, self.runner_up
         if lead is None or other is None or self.best is None:
             return "how sure: there is no other model to compare with"
-        said = "less" if lead.ratio < 1 else "more"
+        said = "smaller" if lead.ratio < 1 else "larger"
         low, high = sorted((1 - lead.low, 1 - lead.high))
-        close = "" if lead.high < 1 else "; the two cannot be told apart"
+        close = "" if lead.high < 1 else "; the recordings do not separate the two"
         return (
-            f"how sure: it leaves {abs(1 - lead.ratio):.0%} {said} than {other} (95 %: {low:.0%} to "
+            f"how sure: its rms is {abs(1 - lead.ratio):.0%} {said} than that of {other} (95 %: {low:.0%} to "
             f"{high:.0%}; "
             f"better in {lead.sure:.0%} of resampled recordings){close}"
         )
@@ -123,7 +105,7 @@ class Ending:
                 else name
                 for name in sorted(self.guesses, key=lambda n: -self.hangs_on_guesses.get(n, 0.0))
             ]
-            told.append(f"nobody has confirmed what was guessed of {', '.join(named[:4])}")
+            told.append(f"the guesses for {', '.join(named[:4])} are not confirmed")
         return f"doubts: {'; '.join(told)}" if told else "doubts: none; the recordings are sound"
 
 
@@ -132,7 +114,7 @@ def ending(folder: Path) -> Ending:
     run = load_run(folder)
     order = [model for model in ranked(run) if cells(run, model)]
     best = order[0] if order else None
-    none = _lead(run, best, None) if best else None
+    none = lead_over(run, best, None) if best else None
     helps = none is not None and none.ratio < _BETTER and not (best and astray(run, best))
     other = order[1] if len(order) > 1 else None
     diagnosis = run.diagnosis if (folder / DIAGNOSIS).exists() else None
@@ -145,7 +127,7 @@ def ending(folder: Path) -> Ending:
         best if helps else None,
         none,
         other,
-        _lead(run, best, other) if best and other else None,
+        lead_over(run, best, other) if best and other else None,
         rms,
         list(run.held_out),
         str(diagnosis["verdict"]) if diagnosis else None,
@@ -173,11 +155,11 @@ def _next(
         which = ", ".join(list(guesses)[:3])
         return f"confirm or correct {which} in the campaign file, then `discovery new DIR --again`"
     if not run.held_out:
-        return "hold a recording out: only that shows how well a model predicts"
+        return "hold out a recording: only that shows how well a model predicts"
     if diagnosis and diagnosis.get("next_experiment"):
         return str(diagnosis["next_experiment"]).rstrip(".")
     if not helps:
-        return "record what drives the machine, each input moving on its own"
+        return "record the inputs that drive the machine, and let each one move on its own"
     export = f"`discovery export {run.folder} --model {best} --to json`"
     return f'{export}, or diagnose it ([mismatch] model = "{best}")'
 
@@ -195,43 +177,3 @@ def hanging(run: Run, model: str, guesses: Mapping[str, str]) -> dict[str, float
         if carried >= _MOVES:
             found[name] = min(1.0, carried)
     return found
-
-
-def _lead(run: Run, model: str, other: str | None) -> Lead | None:
-    """rms of a model against another one (None: no model) on what no fit saw, blocks of it drawn anew."""
-    middle = ratio(run, model, other)
-    if not math.isfinite(middle):
-        return None
-    pairs = []  # of each recording and output: sums of squares by block, of the two
-    for recording, output in cells(run, model):
-        predictions = run.predictions.get(recording)
-        if predictions is None or output not in predictions.models.get(model, {}):
-            continue
-        mine = predictions.left_over(model, output)
-        if other is None:
-            theirs = _without(run, predictions.readings[output], output)
-        elif output in predictions.models.get(other, {}):
-            theirs = predictions.left_over(other, output)
-        else:
-            continue
-        both = np.isfinite(mine) & np.isfinite(theirs)
-        if both.sum() >= _BLOCKS:
-            pieces = np.array_split(np.flatnonzero(both), _BLOCKS)
-            pairs.append(np.array([[np.sum(mine[p] ** 2), np.sum(theirs[p] ** 2)] for p in pieces]))
-    if not pairs:
-        return Lead(middle, middle, middle, float(middle < 1))
-    rng = np.random.default_rng(0)
-    logs = np.zeros(_DRAWS)
-    for blocks in pairs:
-        drawn = blocks[rng.integers(0, len(blocks), (_DRAWS, len(blocks)))].sum(axis=1)
-        logs += 0.5 * np.log(np.maximum(drawn[:, 0], 1e-300) / np.maximum(drawn[:, 1], 1e-300)) / len(pairs)
-    found = np.exp(logs)
-    low, high = np.percentile(found, [2.5, 97.5])
-    return Lead(middle, float(low), float(high), float(np.mean(found < 1)))
-
-
-def _without(run: Run, readings: Array, output: str) -> Array:
-    """What is left without a model: errors themselves, temperatures from the first reading on."""
-    known = readings[np.isfinite(readings)]
-    first = known[0] if known.size and run.unit(output) in ("°C", "K", "°F", "degC") else 0.0
-    return np.asarray(readings - first)

@@ -89,7 +89,7 @@ def judged(
             seen, names = experiment.fitting, experiment.fit
             validation = cross_validate(fit.model, seen, names, outputs, fit.noise, refit)
         except RunsAwayError:  # a finding about the model, no mistake of the user's
-            lost.append(f"with a part of the readings left out the fit of {name} runs away: do not trust it")
+            lost.append(f"the fit of {name} diverges if a part of the readings is left out: do not trust it")
     seconds = clock.perf_counter() - began
     predictions = {r: predict(fit, experiment, r) for r in experiment.fit}
     for recording in experiment.held_out:
@@ -165,9 +165,9 @@ def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
         unit = differences(channels[name].unit)
         most = f" to {found[high][0]:+.2g} {unit} in '{high}'" if high != low else ""
         notes.append(
-            f"{name} is known within {channels[name].spread:.3g} {unit}: the fit takes it for off by "
-            f"{found[low][0]:+.2g} {unit} in '{low}'{most}; in an unseen recording the "
-            "first reading alone tells"
+            f"{name} is known within {channels[name].spread:.3g} {unit}; estimated offset: "
+            f"{found[low][0]:+.2g} {unit} in '{low}'{most}; in a held-out recording, only the first "
+            "reading is used to estimate it"
         )
     return notes
 

@@ -36,7 +36,7 @@ _BUILT = [
 Inputs = Annotated[list[str] | None, Field(min_length=1, description="default by role, as in the paper")]
 Outputs = Annotated[list[str] | None, Field(min_length=1, description="default: those of the experiment")]
 Pull = Annotated[Loss, Field(description="how outliers pull")]
-Also = Annotated[list[str], Field(description="recordings that this model is fitted to besides `fit`")]
+Also = Annotated[list[str], Field(description="recordings that this model is fitted to in addition to `fit`")]
 
 
 class FileEntry(Strict):
@@ -147,7 +147,7 @@ class MismatchForm(Strict):
     """[mismatch]: the model whose missing physics is looked for."""
 
     model: str
-    effects: list[EffectForm] = Field([], description="effects of your own, beside the catalogue's")
+    effects: list[EffectForm] = Field([], description="effects of your own, in addition to the catalogue")
 
 
 class ExportForm(Strict):

@@ -239,7 +239,7 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
         seconds = clock.perf_counter() - began
         fitted = judged(experiment, name, entry.kind, model, fit, report, seconds, progress)
     also = [recording for recording in experiment.fit if recording not in common]
-    told = [f"is fitted to {', '.join(also)} besides"] if also else []
+    told = [f"also fitted to {', '.join(also)}"] if also else []
     return replace(fitted, notes=(*told, *fitted.notes), seconds=clock.perf_counter() - began)
 
 

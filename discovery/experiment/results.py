@@ -29,13 +29,16 @@ from discovery.files import write_atomic
 from discovery.models import Model, write_model
 from discovery.models.equations import equations
 from discovery.recordings.finding import Finding, folded
-from discovery.runfolder import DIAGNOSIS, RESULTS
+from discovery.recordings.roles import is_input
+from discovery.report.chart import thinned
+from discovery.runfolder import DIAGNOSIS, INPUTS, RESULTS
 
 if TYPE_CHECKING:
     from discovery.experiment.fitted import Fitted
 
 Array = NDArray[np.float64]
 
+_SHOWN = 500  # points of an input that the page draws
 _PACKAGES = ("numpy", "scipy", "numba", "pandas", "scikit-learn", "pysindy", "pint")
 
 
@@ -59,6 +62,7 @@ def write_run(
     found = quality(experiment) if findings is None else findings
     document = results_document(verb, experiment, fitted, seconds, found, further)
     write_json(folder / RESULTS, document.model_dump(exclude_unset=True))
+    write_json(folder / INPUTS, inputs_over_time(experiment))
     if diagnosis is not None:
         write_json(folder / DIAGNOSIS, diagnosis)
     for name, one in fitted.items():
@@ -83,6 +87,7 @@ def results_document(
         "command": shlex.join(["discovery", verb, str(experiment.path)]),
         "campaign": experiment.campaign.name,
         "campaign_file": str(experiment.campaign.path.resolve()),  # an export may start elsewhere
+        "simulated": experiment.campaign.simulated,
         "fit": list(experiment.fit),
         "held_out": list(experiment.held_out),
         "outputs": list(experiment.outputs),
@@ -102,6 +107,21 @@ def results_document(
         **(further or {}),
     }
     return ResultsDocument.model_validate(_plain(content))
+
+
+def inputs_over_time(experiment: Experiment) -> dict[str, dict[str, dict[str, Any]]]:
+    """By recording and input: `time` [s] and `value`, lowest and highest of each bin. Constant inputs are not
+    listed.
+    """
+    found: dict[str, dict[str, dict[str, Any]]] = {}
+    for name in (*experiment.fit, *experiment.held_out):
+        one = experiment.campaign.recordings[name]
+        for channel, values in one.values.items():
+            known = values[np.isfinite(values)]
+            if is_input(experiment.campaign.channels[channel].role) and known.size and np.ptp(known) > 0:
+                time, value = thinned(one.time, values, _SHOWN)
+                found.setdefault(name, {})[channel] = {"time": time, "value": value}
+    return found
 
 
 def recommended(experiment: Experiment, fitted: Mapping[str, Fitted]) -> dict[str, dict[str, Any]]:

@@ -9,6 +9,7 @@ diagonal stands what nobody has seen.
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -47,6 +48,7 @@ def begin_folds(experiment: Experiment) -> Iterator[Fold]:
 
     The folds come in the order in which they are done.
     """
+    import cloudpickle
     from joblib import Parallel, delayed
 
     models = experiment.form.models
@@ -56,8 +58,14 @@ def begin_folds(experiment: Experiment) -> Iterator[Fold]:
         key=lambda t: models[t[0]].kind != "sindy",
     )
     work = Parallel(n_jobs=max(1, min(jobs(), len(tasks))), return_as="generator_unordered")
-    found: Iterator[Fold] = work(delayed(fold_of)(experiment, name, role) for name, role in tasks)
+    # Pickled now: joblib would pickle it later, in its own thread, while the fits fill its caches.
+    frozen = cloudpickle.dumps(experiment)
+    found: Iterator[Fold] = work(delayed(_fold_of_pickled)(frozen, name, role) for name, role in tasks)
     return found
+
+
+def _fold_of_pickled(experiment: bytes, name: str, role: str) -> Fold:
+    return fold_of(pickle.loads(experiment), name, role)
 
 
 def leave_roles_out(
@@ -101,7 +109,7 @@ def fold_of(experiment: Experiment, name: str, without: str) -> Fold:
         fitted = fit_entry(seen, name, entry)
     except (RunsAwayError, UserError) as error:
         return Fold(name, without, {}, {}, (str(error),))
-    lost = tuple(note for note in fitted.notes if "runs away" in note)
+    lost = tuple(note for note in fitted.notes if "diverges" in note)
     return Fold(name, without, _rms(fitted, experiment.form.roles or {}), terms_of(fitted.model), lost)
 
 

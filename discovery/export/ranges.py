@@ -142,7 +142,7 @@ def output_ranges(
         y = free_run(compiled, inputs)
         if len(y) < len(inputs):
             raise UserError(
-                f"model '{compiled.name}' runs away after {len(y) * compiled.step_s / 3600:.1f} h of "
+                f"model '{compiled.name}' diverges after {len(y) * compiled.step_s / 3600:.1f} h of "
                 f"recording '{recording}' with a fixed step of {compiled.step_s:g} s; check the model or "
                 "export with a shorter --step"
             )

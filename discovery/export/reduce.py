@@ -72,7 +72,7 @@ def reduce_model(
         y = _run(small, u)[1]
         if len(y) < len(u):
             raise UserError(
-                f"model '{model.name}' with {states} states runs away; keep more of its {len(names)} states"
+                f"model '{model.name}' with {states} states diverges; keep more of its {len(names)} states"
             )
         errors.append(np.abs(y - truth[recording][1]))
     worst = np.max(np.concatenate(errors), axis=0)

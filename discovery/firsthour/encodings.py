@@ -53,7 +53,7 @@ def decode(data: bytes, path: Path) -> tuple[str, tuple[str, ...]]:
         b"\n".join(line for line in data[:_SAMPLE].splitlines()[:-1] if not line.isascii()) or data[:_SAMPLE]
     )
     best = max(_ENCODINGS, key=lambda name: _likely(odd, name))
-    return data.decode(best, errors="replace"), (f"its letters were read as {_CALLED.get(best, best)}",)
+    return data.decode(best, errors="replace"), (f"text read as {_CALLED.get(best, best)}",)
 
 
 _CALLED = {"cp1252": "Windows-1252", "cp932": "Shift-JIS", "euc_jp": "EUC-JP", "gb18030": "GB 18030"}

@@ -119,7 +119,7 @@ def _said(shift: Shift, second: OwnTable) -> str:
         )
     if np.isfinite(shift.spread):
         return f"no shift between the clocks is seen (at most about {2 * shift.spread:.2g} s)"
-    return f"whether the clock of {second.path.name} is shifted cannot be told (?)"
+    return f"whether the clock of {second.path.name} is shifted cannot be determined (?)"
 
 
 def _on(column: Column, stamps: Array, time: Array) -> Column:

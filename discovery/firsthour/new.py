@@ -56,7 +56,7 @@ def new(
     there = (folder / "campaign.toml").exists()
     if there and not again:
         raise UserError(
-            f"{folder}: campaign.toml is there already; say --again to make model and experiment anew "
+            f"{folder}: campaign.toml is there already; use --again to make model and experiment again "
             "(what you "
             "wrote stays), or name another folder"
         )
@@ -183,7 +183,7 @@ def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Gue
         if one.below_zero
     ]
     names = list(found.recordings)
-    lines.append(f"recordings: fit {', '.join(names[:-1])}; unseen {names[-1]}")
+    lines.append(f"recordings: fit {', '.join(names[:-1])}; held out {names[-1]}")
     return lines
 
 

@@ -131,7 +131,7 @@ def _decided(
     told = [f"{one.name} {one.ratio:.0%}" for one in scores]
     how = "parts of it" if len(fit) == 1 else "recordings"
     remarks = [
-        f"Chosen by {how} left out of the fit. Left over there, of the error without any model:",
+        f"Chosen on {how} left out of the fit. rms there, relative to no model:",
         f"{', '.join(told)}.",
     ]
     mismatch = next((name for name in HAND_BUILT if name in helping), None)
@@ -139,13 +139,12 @@ def _decided(
         beside = [name for name in COMPARED if name in lines]
         chosen = list(dict.fromkeys([helping[0], *([mismatch] if mismatch else []), *helping[:3], *beside]))
         said = [
-            f"first model: {helping[0]}; it leaves {scores[0].ratio:.0%} of the error without a model "
-            f"on {how} "
-            f"that its fit did not see ({', '.join(told[1:])})"
+            f"first model: {helping[0]}; on {how} left out of its fit, its rms is {scores[0].ratio:.0%} of "
+            f"the rms without a model ({', '.join(told[1:])})"
         ]
     else:
         chosen = [next(iter(lines))]
-        remarks.append("None is better than no model: do not use one before more is recorded.")
+        remarks.append("None is better than no model: record more before you use one.")
         said = [
             f"no model is better than none on {how} left out ({', '.join(told)})",
             *missing(campaign, fit, outputs, guesses),
@@ -194,7 +193,7 @@ def missing(
         if known.size < _FEW:
             found.append(f"'{name}' has {known.size} readings: record longer, or read it more often")
         elif np.std(known) < _QUIET * np.median(np.abs(np.diff(known))) / 0.954:
-            found.append(f"'{name}' hardly moves beside its noise: load the machine more, or longer")
+            found.append(f"'{name}' hardly moves above its noise: load the machine more, or longer")
     if len(fit) == 1:
-        found.append("record a second run with other loads: one run rarely tells causes apart")
+        found.append("record a second run with other loads: one run rarely separates the causes")
     return found

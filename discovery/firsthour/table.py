@@ -138,7 +138,7 @@ def _table(sheet: Sheet) -> OwnTable:
         columns, more = _columns(sheet, names, units, clock, order, comma, taken)
         notes += [*said, *more]
     if not columns:
-        raise UserError(f"{sheet.path}: there is no column of numbers besides time")
+        raise UserError(f"{sheet.path}: there is no column of numbers except time")
     return OwnTable(
         sheet.path,
         np.round(time, 6),
@@ -186,7 +186,7 @@ def _columns(
         elif not np.isfinite(read.values).any():
             notes.append(f"column '{header}' holds nothing: left out")
         elif is_clock(names[index], read.values[order], clock.seconds):
-            notes.append(f"column '{header}' counts rows or tells the time again: left out")
+            notes.append(f"column '{header}' only counts rows or repeats the time: not used")
         else:
             about, unit = sheet.groups[index], units[index] or read.unit
             name = identifier(names[index] or about, taken)

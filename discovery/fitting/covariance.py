@@ -52,7 +52,7 @@ def covariance_of(problem: Problem, jacobian: Array, theta: Array) -> tuple[Arra
         if share < _UNSEEN:
             covariance[i, i] = np.inf if blind[k] else covariance[i, i]
             sentences.append(
-                f"{u.name}{where} cannot be told apart from other parameters with these recordings"
+                f"{u.name}{where} cannot be separated from other parameters with these recordings"
             )
         elif error * Z95 > max(abs(theta[i]), 1e-12) and not (
             np.isfinite(low[i]) and theta[i] <= low[i] + 1e-9

@@ -76,6 +76,7 @@ class Campaign:
     channels: Mapping[str, Channel]
     recordings: Mapping[str, Recording]
     path: Path = field(default=Path())
+    simulated: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", Named("channel", self.channels))
@@ -114,7 +115,7 @@ def load_campaign(path: str | os.PathLike[str], only: Collection[str] | None = N
         for name, one in form.recordings.items()
         if only is None or name in only
     }
-    return Campaign(form.name, channels, recordings, path)
+    return Campaign(form.name, channels, recordings, path, form.simulated)
 
 
 def make_channel(name: str, form: ChannelForm, to: Conversion) -> Channel:

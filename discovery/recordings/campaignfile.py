@@ -101,6 +101,7 @@ class CampaignForm(Strict):
     """The whole file."""
 
     name: str
+    simulated: bool = Field(False, description="true: the recordings come from a simulation; reports say so")
     guessed: str | None = Field(None, description="the same, of the clock of the files")
     channels: dict[Annotated[str, AfterValidator(_channel_name)], ChannelForm] = Field(min_length=1)
     recordings: dict[Annotated[str, AfterValidator(_recording_name)], RecordingForm] = Field(min_length=1)

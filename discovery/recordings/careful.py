@@ -111,7 +111,7 @@ def _rows(text: str, troubles: _Troubles) -> Iterator[tuple[int, list[str]]]:
     try:
         yield from ((reader.line_num, row) for row in reader if any(cell.strip() for cell in row))
     except csv.Error as error:
-        troubles.error(reader.line_num, f"cannot be cut into cells ({error})", _EXPORT)
+        troubles.error(reader.line_num, f"cannot be divided into cells ({error})", _EXPORT)
 
 
 def _is_whole(row: tuple[int, list[str]], header: Sequence[str], troubles: _Troubles) -> bool:
@@ -119,7 +119,7 @@ def _is_whole(row: tuple[int, list[str]], header: Sequence[str], troubles: _Trou
     if len(cells) == len(header):
         return True
     many = len(cells) > len(header)
-    do = "look for a decimal comma or a comma in a text" if many else "look for a line that was cut off"
+    do = "look for a decimal comma or a comma in a text" if many else "look for an incomplete line"
     kind = "long row" if many else "short row"
     troubles.cell(kind, line, f"{len(cells)} cells under {len(header)} columns", do)
     return False

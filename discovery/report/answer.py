@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from discovery.report.mismatch import NEAR, sizes
+from discovery.report.lead import Lead, lead_over
+from discovery.report.mismatch import NEAR, leads, sizes
 from discovery.report.ranking import (
     astray,
     cells,
@@ -17,7 +18,6 @@ from discovery.report.ranking import (
     mean_improvement,
     origin,
     ranked,
-    ratio,
     rms_by_unit,
 )
 from discovery.report.recommended import recommended
@@ -25,72 +25,104 @@ from discovery.report.run import Run, pretty_unit
 from discovery.report.text import counted, listed, number, percent, words
 
 _VERDICTS = {
-    "no mismatch": "Nothing is missing that these recordings could show",
-    "missing physics": "Physics is missing",
-    "measurement fault": "The measurement is at fault, not the physics",
-    "unexplained": "Something is missing that the catalogue does not explain",
+    "no mismatch": "No missing physics was detected in",
+    "missing physics": "Physics is missing in",
+    "measurement fault": "A fault of the measurement, not missing physics, explains the mismatch of",
+    "unexplained": "No effect of the catalogue explains the mismatch of",
 }
 
 
 @dataclass(frozen=True)
-class Answer:
+class Part:
     """`headline`: one sentence. `points`: what supports it. `figures`: (figure, caption), to show large."""
 
-    headline: str
-    points: tuple[str, ...]
-    figures: tuple[tuple[str, str], ...]
-    physics: str = ""  # the verdict of the diagnosis in one sentence
-    physics_points: tuple[str, ...] = ()
+    headline: str = ""
+    points: tuple[str, ...] = ()
+    figures: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The main answer of a run, and the other one: what is missing, and which model predicts best."""
+
+    first: Part
+    second: Part
 
 
 def answer(run: Run) -> Answer:
-    """What the run says, in words and in few figures."""
-    headline, points, figures = _models(run)
-    physics, physics_points = _physics(run.diagnosis)
-    if not headline:
-        headline, physics = physics, ""
-    return Answer(headline, tuple(points), tuple(figures), physics, tuple(physics_points))
+    """What the run says, in words and in few figures; missing physics comes first."""
+    models, missing = _models(run), _missing(run.diagnosis)
+    first = missing if leads(run) or not models.headline else models
+    second = models if first is missing else missing
+    return Answer(first, second)
 
 
-def _models(run: Run) -> tuple[str, list[str], list[tuple[str, str]]]:
+def _models(run: Run) -> Part:
+    """Which model predicts best, and how sure that is."""
     order = [model for model in ranked(run) if cells(run, model)]
     if not order:
-        return "", [], []
+        return Part()
     best = order[0]
-    unseen = [r for r in run.held_out if r not in astray(run, best)]
-    where = f"on {_called(unseen)}" if unseen else "on the recordings it was fitted to"
+    held_out = [r for r in run.held_out if r not in astray(run, best)]
+    where = f"on {_called(held_out)}" if held_out else "on the recordings of the fit"
     named = f" “{best}”" if best != origin(run, best) else ""
-    rivals = [
-        model
-        for model in order[1:]
-        if math.isfinite(ratio(run, best, model)) and astray(run, model) == astray(run, best)
-    ]
-    overall = f"The {origin(run, best)} model{named} predicts best {where}{_nearly(run, best, rivals)}."
-    headline = recommended(run, where) or overall
     points, figures = _removed(run, best) if is_error(run) else _left(run, best)
-    if headline != overall:
-        points = [overall, *points]
-    compared = [f"{_less(ratio(run, best, model))} {_name(run, model)}" for model in rivals]
-    if compared:
-        points.append(f"It leaves {listed(compared)}.")
-    figures += [
-        (_less(ratio(run, best, model), short=True), f"rms left by {best} against {model}")
-        for model in [
-            m for m in rivals if origin(run, m) == "hand-built" and abs(ratio(run, best, m) - 1) > 0.02
-        ][:2]
-    ]
+    points = [one for one in (recommended(run, best),) if one] + points
+    rivals = [m for m in order[1:] if astray(run, m) == astray(run, best)]
+    found = {m: lead for m in rivals if (lead := lead_over(run, best, m)) is not None}
+    for rival, lead in list(found.items())[:1]:
+        points.append(f"Next is {_name(run, rival)}: the rms of “{best}” is {_against(lead)}.")
+    given = [m for m in found if origin(run, m) == "given"][:2]
+    figures += [(_percent_less(found[m]), f"rms of {best} against {m}{_interval(found[m])}") for m in given]
     if is_error(run) and (worst := _worst(run, best)):
         points.append(worst)
-    points += [f"“{model}” runs away on {_called(lost)}." for model in order if (lost := astray(run, model))]
+    points += [
+        f"The free run of “{model}” diverges on {_called(lost)}."
+        for model in order
+        if (lost := astray(run, model))
+    ]
     if not run.held_out:
         points.append(
             "No recording was held out: these figures say how well the models fit, not how well they predict."
         )
-    return headline, points, figures
+    headline = f"The {origin(run, best)} model{named} predicts best {where}."
+    return Part(headline, tuple(points), tuple(figures))
+
+
+def _against(lead: Lead) -> str:
+    """A lead as words.
+
+    >>> _against(Lead(0.9, 0.85, 0.96, 1.0)), _against(Lead(1.0, 1.0, 1.0, 0.0))
+    ('10 % smaller (95 % interval: 4 to 15 %)', 'the same')
+    >>> _against(Lead(0.97, 0.9, 1.05, 0.8))
+    '3 % smaller (95 % interval: −5 to 10 %), so the recordings do not separate the two'
+    """
+    if 0.995 < lead.ratio < 1.005:
+        said, sign = "the same", 1
+    else:
+        said, sign = (f"{100 * abs(lead.ratio - 1):.0f} % ", 1 if lead.ratio < 1 else -1)
+        said += "smaller" if sign > 0 else "larger"
+    if lead.low == lead.high:
+        return said
+    low, high = sorted(100 * sign * (1 - end) for end in (lead.low, lead.high))
+    open_ = ", so the recordings do not separate the two" if lead.low <= 1 <= lead.high else ""
+    return f"{said} (95 % interval: {low:.0f} to {high:.0f} %){open_}".replace("-", "−")
+
+
+def _percent_less(lead: Lead) -> str:
+    change = 100 * (lead.ratio - 1)
+    return "0 %" if abs(change) < 0.5 else f"{'−' if change < 0 else '+'}{abs(change):.0f} %"
+
+
+def _interval(lead: Lead) -> str:
+    """The interval of a lead behind a caption; nothing where there is none."""
+    if lead.low == lead.high:
+        return ""
+    return f" (95 %: {100 * (lead.low - 1):.0f} to {100 * (lead.high - 1):.0f} %)".replace("-", "−")
 
 
 def _removed(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
-    """How much of the thermal error is gone; the error without compensation is what was read."""
+    """How much of the thermal error is gone; the error without compensation is the reading itself."""
     improved = mean_improvement(run, best)
     if not math.isfinite(improved):
         return [], []
@@ -99,45 +131,28 @@ def _removed(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
 
 
 def _left(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
-    """How far off a prediction of temperatures is: without a model there is nothing to compare with."""
+    """The rms of a prediction of temperatures: without a model there is nothing to compare with."""
     scored = rms_by_unit(run, best)
     if not scored:
         return [], []
     middle = [f"{number(float(np.median(rms)), 2)} {unit}".strip() for unit, rms in scored.items()]
     worst = listed([f"{number(max(rms), 2)} {unit}".strip() for unit, rms in scored.items()])
-    over = f"median rms over {_count(run, best)}, at worst {worst}"
-    return [f"It is off by {listed(middle)} ({over})."], [
-        (", ".join(middle), f"left by {best}, {_seen(run)}")
-    ]
+    over = f"median rms over {_count(run, best)}; largest: {worst}"
+    return [f"Its rms is {listed(middle)} ({over})."], [(", ".join(middle), f"rms of {best}, {_seen(run)}")]
 
 
 def _seen(run: Run) -> str:
-    return "unseen recordings" if run.held_out else "fitted recordings"
+    return "held-out recordings" if run.held_out else "recordings of the fit"
 
 
-def _called(unseen: Sequence[str]) -> str:
-    if len(unseen) > 4:
-        return f"{len(unseen)} unseen recordings"
-    return f"the unseen recording{'s' * (len(unseen) > 1)} {listed([f'“{name}”' for name in unseen])}"
-
-
-def _nearly(run: Run, best: str, rivals: Sequence[str]) -> str:
-    """A winner by less than 5 % has no lead worth the name."""
-    close = [model for model in rivals if ratio(run, best, model) > 0.95]
-    return f", and {listed([f'“{model}”' for model in close])} nearly as well" if close else ""
+def _called(held_out: Sequence[str]) -> str:
+    if len(held_out) > 4:
+        return f"{len(held_out)} held-out recordings"
+    return f"the held-out recording{'s' * (len(held_out) > 1)} {listed([f'“{name}”' for name in held_out])}"
 
 
 def _name(run: Run, model: str) -> str:
-    return f"“{model}”{' (hand-built)' if origin(run, model) == 'hand-built' else ''}"
-
-
-def _less(share: float, short: bool = False) -> str:
-    if 0.995 < share < 1.005:
-        return "0 %" if short else "as much as"
-    change = f"{100 * abs(share - 1):.0f} %"
-    if short:
-        return f"{'−' if share < 1 else '+'}{change}"
-    return f"{change} {'less than' if share < 1 else 'more than'}"
+    return f"“{model}”{' (given)' if origin(run, model) == 'given' else ''}"
 
 
 def _count(run: Run, model: str) -> str:
@@ -157,47 +172,76 @@ def _worst(run: Run, model: str) -> str:
         return ""
     (low_r, low_o), low = min(scored.items(), key=lambda item: item[1])
     (high_r, high_o), high = max(scored.items(), key=lambda item: item[1])
-    least, most = f"{number(low, 2)} % ({low_o} on {low_r})", f"{number(high, 2)} % ({high_o} on {high_r})"
-    return f"Between {least} and {most} of each error is removed."
+    return (
+        f"Most is removed of {high_o} on {high_r} ({number(high, 2)} %), "
+        f"least of {low_o} on {low_r} ({number(low, 2)} %)."
+    )
 
 
-def _physics(diagnosis: Mapping[str, Any] | None) -> tuple[str, list[str]]:
+def _missing(diagnosis: Mapping[str, Any] | None) -> Part:
+    """What the diagnosis says."""
     if not diagnosis:
-        return "", []
+        return Part()
     verdict = str(diagnosis.get("verdict", ""))
     found = diagnosis.get("physics") or []
-    model = diagnosis.get("model", "the model")
-    lead = _VERDICTS.get(verdict, verdict.capitalize())
-    sentence = f"{lead} in “{model}”"
+    lead = _VERDICTS.get(verdict, f"{verdict.capitalize()}:")
+    sentence = f"{lead} “{diagnosis.get('model', 'the model')}”"
     if found:
-        sentence += f": {listed([_effect(one) for one in found])}"
+        sentence += f": {_grouped(found)}"
     worse = (diagnosis.get("improvement") or {}).get("contradicted_by") or []
-    if worse:
+    if worse and found:
         contradict = "contradicts" if len(worse) == 1 else "contradict"
-        sentence += f"; but the unseen {listed([f'“{name}”' for name in worse])} {contradict} the repair"
-    points = [f"Size of {words(one['effect'])}: {listed(sizes(one))}." for one in found if sizes(one)]
+        sentence += f"; but the held-out {listed([f'“{name}”' for name in worse])} {contradict} the repair"
+    points = [f"Size of {_placed(one)}: {listed(sizes(one))}." for one in found if sizes(one)]
     p_value = diagnosis.get("detection", {}).get("p_value")
     if p_value is not None and verdict != "no mismatch":
         chance = "less than 1 in 1000" if p_value < 1e-3 else percent(p_value)
-        points.append(f"Probability that the model lacks nothing: {chance}.")
-    points += _proof(diagnosis) if found else []
+        points.append(f"Probability that nothing is missing: {chance}.")
     rivals = [one for one in diagnosis.get("alternatives") or [] if one["log_evidence_below_best"] <= NEAR]
     if rivals:
         points.append(
-            f"These recordings cannot tell it from {listed([_effect(one) for one in rivals], 'or')}."
+            f"These recordings do not exclude {listed([_effect(one) for one in rivals], 'or')} instead."
         )
-    return sentence + ".", points
+    figures: list[tuple[str, str]] = []
+    if found:
+        proof, figures = _proof(diagnosis)
+        points += proof
+    return Part(f"{sentence}.", tuple(points), tuple(figures))
 
 
 def _effect(one: Mapping[str, Any]) -> str:
+    sure = one.get("probability")
+    return _placed(one) + (f" ({percent(sure)} sure)" if sure is not None else "")
+
+
+def _grouped(found: Sequence[Mapping[str, Any]]) -> str:
+    """Effects with their places and probabilities; one effect at several places is named once."""
+    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for one in found:
+        alike = (words(str(one.get("effect"))), percent(one.get("probability")))
+        groups.setdefault(
+            alike if one.get("states") and not one.get("moved") else (*alike[:1], str(id(one))), []
+        ).append(one)
+    texts = []
+    for group in groups.values():
+        if len(group) == 1:
+            texts.append(_effect(group[0]))
+            continue
+        places = listed([listed([str(s) for s in one["states"]]) for one in group])
+        texts.append(
+            f"{words(str(group[0]['effect']))} at {places} ({percent(group[0].get('probability'))} sure each)"
+        )
+    return listed(texts)
+
+
+def _placed(one: Mapping[str, Any]) -> str:
     states = listed([str(state) for state in one.get("moved") or one.get("states", [])])
     where = f" at {states}" if states else f" in {one['recording']}" if one.get("recording") else ""
-    sure = one.get("probability")
-    text = f"{words(str(one.get('effect', 'unknown')))}{where}"
-    return text + (f" ({percent(sure)} sure)" if sure is not None else "")
+    return f"{words(str(one.get('effect', 'unknown')))}{where}"
 
 
-def _proof(diagnosis: Mapping[str, Any]) -> list[str]:
+def _proof(diagnosis: Mapping[str, Any]) -> tuple[list[str], list[tuple[str, str]]]:
+    """Free runs before and after the repair, on held-out recordings."""
     improvement = diagnosis.get("improvement") or {}
     points = []
     held = {
@@ -205,23 +249,35 @@ def _proof(diagnosis: Mapping[str, Any]) -> list[str]:
         for name, s in (improvement.get("held_out") or {}).items()
         if s.get("rms_before") is not None and s.get("rms_after") is not None
     }
+    unit = pretty_unit(improvement.get("unit") or "")
+    figures = [
+        (
+            f"{number(s['rms_before'])} → {number(s['rms_after'])}",
+            f"rms before and after the repair, {name} [{unit}]",
+        )
+        for name, s in list(held.items())[:3]
+    ]
     if held:
-        unit = pretty_unit(improvement.get("unit") or "")
         each = [
-            f"{number(s['rms_before'])} → {number(s['rms_after'])} {unit}".rstrip() + f" on {name}"
+            f"{number(s['rms_before'])} → {number(s['rms_after'])} {unit}".rstrip() + f" on {name}{_gain(s)}"
             for name, s in held.items()
         ]
-        points.append(
-            "Repaired and run freely on unseen recordings it leaves (rms, errors weighed by "
-            f"their noise): {listed(each)}."
-        )
+        points.append(f"Free runs before → after the repair, on held-out recordings (rms): {listed(each)}.")
     explained = improvement.get("explained")
     if improvement.get("contradicted_by"):
         points.append(
-            "There it is worse than without: what is named fits the recordings at hand and may be no more "
-            "than that. Do not use the repaired model; fit more recordings, each input moving on its own."
+            "On these recordings the repaired model is worse than the original one. The named effect may fit "
+            "only the recordings of the diagnosis. Do not use the repaired model. Fit more recordings in "
+            "which each input moves on its own."
         )
     elif explained is not None:
-        share = percent(explained) if explained >= 0.005 else "nothing"
-        points.append(f"The repair closes {share} of the gap that can be closed there.")
-    return points
+        share = percent(explained) if explained >= 0.005 else "none"
+        points.append(f"The repair removes {share} of this mismatch, noise not counted.")
+    return points, figures
+
+
+def _gain(one: Mapping[str, Any]) -> str:
+    """The interval of an improvement, behind its figures."""
+    if one.get("gain_low") is None:
+        return ""
+    return f" (improvement, 95 %: {number(one['gain_low'])} to {number(one['gain_high'])})"

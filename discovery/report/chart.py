@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -46,12 +47,19 @@ class Chart:
     shades: tuple[tuple[float, float, str], ...] = ()  # from, to, why
     group: str = ""  # charts of a group zoom together
     marks: Mapping[str, float] = field(default_factory=dict)  # named vertical lines
+    solid: bool = False  # thin solid curves, without the dashes that distinguish models
+    own_key: bool = True  # names its curves below; otherwise the legend of the section does
+
+    @property
+    def anchor(self) -> str:
+        """Id of its figure in the page, for links."""
+        return "chart-" + re.sub(r"[^A-Za-z0-9]+", "-", self.key)
 
     @property
     def key_items(self) -> list[Series]:
-        """Curves that a legend of the chart's own has to name; charts of a group share one."""
+        """Curves that the legend below the chart names."""
         named = {s.name: s for panel in self.panels for s in panel.series if s.kind in ("line", "band")}
-        return list(named.values()) if not self.group and len(named) > 1 else []
+        return list(named.values()) if self.own_key and len(named) > 1 else []
 
 
 def thinned(x: Array, y: Array, most: int) -> tuple[Array, Array]:

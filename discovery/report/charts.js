@@ -201,7 +201,15 @@
     }
   }
 
-  const drawAll = () => views.forEach((view) => view.draw());
+  const fit = () => {  // equations that are wider than the window get smaller, down to what can be read
+    for (const one of document.querySelectorAll(".equation, div.formula")) {
+      const math = one.querySelector("math");
+      math.style.fontSize = "";
+      const share = one.clientWidth / one.scrollWidth;
+      if (share < 1) math.style.fontSize = `${Math.max(0.97 * share, 0.55) * parseFloat(getComputedStyle(math).fontSize)}px`;
+    }
+  };
+  const drawAll = () => { fit(); views.forEach((view) => view.draw()); };
   for (const figure of document.querySelectorAll("figure[data-chart]")) {
     const chart = data.charts.find((one) => one.key === figure.dataset.chart);
     if (chart) views.push(new View(figure, chart));
@@ -223,6 +231,92 @@
     choice.addEventListener("change", apply);
     if (choice.checked) apply();
   }
+  const list = document.getElementById("recording"), find = document.getElementById("find");
+  if (list) {
+    const all = [...list.options];
+    const apply = () => {
+      for (const one of all) document.getElementById(one.value).classList.toggle("off", one.value !== list.value);
+      drawAll();
+    };
+    list.addEventListener("change", apply);
+    find.addEventListener("input", () => {
+      const fitting = all.filter((one) => one.text.toLowerCase().includes(find.value.trim().toLowerCase()));
+      if (!fitting.length) return;
+      const chosen = fitting.find((one) => one.value === list.value) || fitting[0];
+      list.replaceChildren(...fitting);
+      list.value = chosen.value;
+      apply();
+    });
+    apply();
+  }
+  const follow = () => {  // a link into a chart of a recording that is not shown
+    const aim = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const group = aim && aim.closest("[id^='rec-']");
+    if (!group || !group.classList.contains("off")) return;
+    const radio = document.querySelector(`input[data-shows="${group.id}"]`);
+    if (radio) { radio.checked = true; radio.dispatchEvent(new Event("change")); }
+    else if (list) { find.value = ""; find.dispatchEvent(new Event("input")); list.value = group.id; list.dispatchEvent(new Event("change")); }
+    aim.scrollIntoView();
+  };
+  window.addEventListener("hashchange", follow);
+  const save = (name, content) => {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([content], { type: "text/plain;charset=utf-8" }));
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  };
+  const forms = {
+    CSV: (rows) => rows.map((row) => row.map((cell) => (/[",\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell)).join(",")).join("\n") + "\n",
+    LaTeX: (rows) => {
+      const safe = (cell) => cell.replace(/[\\&%$#_{}~^]/g, (c) => ({ "\\": "\\textbackslash{}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}" })[c] || `\\${c}`)
+        .replaceAll("µ", "\\textmu{}").replaceAll("°", "\\textdegree{}").replaceAll("−", "$-$").replaceAll("→", "$\\to$").replaceAll("–", "--");
+      const line = (row) => `${row.map(safe).join(" & ")} \\\\`;
+      return ["\\begin{tabular}{l" + "r".repeat(rows[0].length - 1) + "}", "\\hline", line(rows[0]), "\\hline", ...rows.slice(1).map(line), "\\hline", "\\end{tabular}", ""].join("\n");
+    },
+  };
+  for (const table of document.querySelectorAll(".scroll > table:not(.terms)")) {
+    const caption = table.caption, title = caption ? caption.textContent.trim() : "table";
+    if (!caption || !table.tHead) continue;
+    const tools = document.createElement("span");
+    tools.className = "tools";
+    for (const [form, write] of Object.entries(forms)) {
+      const button = document.createElement("button");
+      button.type = "button"; button.textContent = form;
+      button.setAttribute("aria-label", `Save as ${form}: ${title}`);
+      button.addEventListener("click", () => {
+        const rows = [...table.rows].map((row) => [...row.cells].map((cell) => cell.textContent.replace(/\s+/g, " ").trim()));
+        const file = title.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60);
+        save(`${file}.${form === "CSV" ? "csv" : "tex"}`, write(rows));
+      });
+      tools.append(button);
+    }
+    caption.append(tools);
+  }
+  const ranking = document.querySelector("tr[data-score]")?.closest("table");
+  if (ranking && ranking.querySelectorAll("tr[data-score]").length > 1) {
+    const rows = [...ranking.tBodies[0].rows], column = [...ranking.tHead.rows[0].cells].findIndex((c) => c.textContent === "rms against the best");
+    const name = (row) => row.cells[0].textContent, first = rows.map((row) => row.cells[column].textContent);
+    const tools = ranking.caption.querySelector(".tools"), label = document.createElement("label"), choice = document.createElement("select");
+    label.className = "find"; label.append("Compare with ", choice);
+    for (const row of rows.filter((one) => one.dataset.score)) choice.add(new Option(name(row), name(row)));
+    choice.addEventListener("change", () => {
+      const aim = rows.find((row) => name(row) === choice.value), best = choice.selectedIndex === 0;
+      ranking.tHead.rows[0].cells[column].textContent = best ? "rms against the best" : `rms against ${choice.value}`;
+      rows.forEach((row, k) => {
+        const more = 100 * (Math.exp(row.dataset.score - aim.dataset.score) - 1);
+        const said = row === aim ? "reference" : !row.dataset.score ? "–" : `${more < 0 ? "−" : "+"}${Math.abs(more).toFixed(0)} %`;
+        row.cells[column].textContent = best ? first[k] : said;
+      });
+    });
+    tools.prepend(label);
+    if (rows.length > 8) {
+      const search = document.createElement("label"), text = document.createElement("input");
+      text.type = "search"; search.className = "find"; search.append("Find a model ", text);
+      text.addEventListener("input", () => rows.forEach((row) => { row.hidden = !row.textContent.toLowerCase().includes(text.value.trim().toLowerCase()); }));
+      tools.prepend(search);
+    }
+  }
   const theme = document.getElementById("theme");
   if (theme) theme.addEventListener("click", () => {
     const chosen = document.documentElement.dataset.theme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
@@ -241,4 +335,5 @@
   });
   for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", drawAll);
   drawAll();
+  follow();
 })();

@@ -64,6 +64,7 @@ def merged(runs: Sequence[Run], folder: Path) -> Run:
         "units": _together(runs, "units"),
         "noise": _together(runs, "noise"),
         "parts": {part: name for part, name in _together(runs, "parts").items() if name in common},
+        "simulated": any(run.results.get("simulated") for run in runs),
         "models": models,
         "inputs": {
             f"{label}: {name}": digest
@@ -76,7 +77,8 @@ def merged(runs: Sequence[Run], folder: Path) -> Run:
         for name in common
         if all(name in run.predictions for run in runs)
     }
-    return Run(folder, results, None, predictions, files)
+    inputs = {name: one for run in runs for name, one in run.inputs.items() if name in common}
+    return Run(folder, results, None, predictions, files, inputs)
 
 
 def _recordings(run: Run) -> list[str]:

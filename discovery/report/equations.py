@@ -38,7 +38,8 @@ class Row:
     effect: str
 
 
-_LINE = 70  # characters of a formula that fit beside each other
+_LINE = 40  # characters of an equation in one line
+_COLUMN = 32  # of a formula in the table of terms
 
 
 def symbols(model: Model) -> dict[str, str]:
@@ -75,7 +76,7 @@ def _balance(model: Model, state: State, signs: Mapping[str, str]) -> str:
     for term in model.terms:
         for sign, place in (("+", term.into), ("−", term.source)):
             if place == state.name:
-                body = mathml.expression(term.expression, signs)
+                body = mathml.stacked(mathml.lines(term.expression, signs))
                 if _is_sum(term.expression) and sign == "−":
                     body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
                 parts.append((sign, body, len(text(term.expression))))
@@ -86,11 +87,11 @@ def _summands(tree: Expression, signs: Mapping[str, str]) -> list[tuple[str, str
     """The summands of a sum with their signs and lengths."""
     if isinstance(tree, Apply) and tree.function in ("+", "-") and len(tree.arguments) == 2:
         left, right = tree.arguments
-        body = mathml.expression(right, signs)
+        body = mathml.stacked(mathml.lines(right, signs))
         if _is_sum(right):
             body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
         return [*_summands(left, signs), ("+" if tree.function == "+" else "−", body, len(text(right)))]
-    return [("+", mathml.expression(tree, signs), len(text(tree)))]
+    return [("+", mathml.stacked(mathml.lines(tree, signs)), len(text(tree)))]
 
 
 def _equation(left: str, parts: list[tuple[str, str, int]]) -> str:
@@ -125,7 +126,7 @@ def rows(model: Model, shares: Mapping[str, float] | None = None) -> list[Row]:
 def _row(model: Model, term: Term, share: float | None) -> Row:
     used = [name for name, p in model.parameters.items() if not p.fixed and name in names(term.expression)]
     place = f"{term.source} → {term.into}" if term.source else f"into {term.into}"
-    formula = mathml.math(mathml.expression(term.expression, symbols(model)))
+    formula = mathml.math(mathml.stacked(mathml.lines(term.expression, symbols(model), _COLUMN)))
     values = tuple(value(name, model.parameters[name]) for name in used)
     return Row(term.name, place, formula, text(term.expression), values, share, term.effect)
 

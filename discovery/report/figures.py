@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,8 @@ COLORS = {
     "3": "#7a3fc0",
     "4": "#b3253b",
     "5": "#00707c",
+    "6": "#8a6100",
+    "7": "#a03b8f",
 }
 DASHES: dict[str, Any] = {"1": (6, 2.5), "2": (2, 1.5), "3": (7, 2, 1.5, 2), "4": (4, 1.5)}
 STYLE: Any = {
@@ -54,6 +57,7 @@ def write_figures(run_dir: Path) -> list[Path]:
         UserError: no results there, or nothing in them that can be drawn.
     """
     import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     run = load_run(Path(run_dir))
@@ -68,6 +72,7 @@ def write_figures(run_dir: Path) -> list[Path]:
     with mpl.rc_context(STYLE):
         for chart in charts:
             figure = Figure(figsize=(WIDTH, 1.9 + 0.9 * (len(chart.panels) - 1)))
+            FigureCanvasAgg(figure)  # measures the legend
             _draw(figure, chart)
             name = re.sub(r"[^\w.-]+", "_", chart.key)
             for form in ("svg", "pdf"):
@@ -88,7 +93,21 @@ def _draw(figure: Any, chart: Chart) -> None:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     if len(handles) > 1:
-        figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=3)
+        _legend(figure, handles)
+
+
+def _legend(figure: Any, handles: Mapping[str, Any]) -> None:
+    """A legend above the panels with as many columns as the width holds; the figure grows by its height."""
+    for columns in range(min(3, len(handles)), 0, -1):
+        legend = figure.legend(
+            handles.values(), handles.keys(), loc="outside upper center", ncols=columns, columnspacing=1.2
+        )
+        box = legend.get_window_extent(figure.canvas.get_renderer())
+        if box.width < 0.98 * figure.bbox.width or columns == 1:
+            break
+        legend.remove()
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(width, height + box.height / figure.dpi)
 
 
 def _panel(ax: Axes, panel: Panel, chart: Chart) -> None:
@@ -97,7 +116,7 @@ def _panel(ax: Axes, panel: Panel, chart: Chart) -> None:
     if panel.zero:
         ax.axhline(0, color="#55606e", linewidth=0.6)
     for series in panel.series:
-        _series(ax, series, thin=panel.zero)
+        _series(ax, series, thin=panel.zero or chart.solid)
     for name, x in chart.marks.items():
         ax.axvline(x, color="#55606e", linewidth=0.7, linestyle="--")
         ax.annotate(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from discovery.models import Model
+from discovery.models.units import differences
 from discovery.report.chart import Array, Chart, Panel, Series
 from discovery.report.network import drawing
 from discovery.report.run import Run, pretty_unit
@@ -13,7 +14,9 @@ from discovery.report.text import with_unit
 
 
 def network(run: Run) -> dict[str, str] | None:
-    """The heat map on the thermal network of the diagnosed (else the first thermal) model."""
+    """The thermal network of the diagnosed (else the first thermal) model; its bodies show where physics is
+    missing.
+    """
     thermal = [m for m in (diagnosed(run), *run.models.values()) if m is not None and _is_thermal(m)]
     if not thermal:
         return None
@@ -27,18 +30,19 @@ def network(run: Run) -> dict[str, str] | None:
     shares = {k: float(v) for k, v in (location.get("states") or {}).items() if k in model.states}
     if (run.diagnosis or {}).get("verdict") == "no mismatch":
         note, svg = "", drawing(model, {})
-    elif watts and any(watts.values()):
-        note = "The darker a body, the more heat (rms) the recordings ask for there that no term provides."
+    elif any(shares.values()):  # the same weights as the answer has; the heat below is of no cause
+        note = "The darker a body, the more probable it is that physics is missing there."
+        svg = drawing(model, shares, "")
+    elif any(watts.values()):
+        note = "The darker a body, the more heat (rms) is missing there."
         svg = drawing(model, watts, heat_unit(run))
-    elif shares:
-        note, svg = "The darker a body, the larger its share of the mismatch.", drawing(model, shares, "")
     else:
         note, svg = "", drawing(model, {})
     return {
         "model": model.name,
         "note": note,
         "svg": svg,
-        "title": "Where heat is missing" if note else "The thermal network",
+        "title": "Where physics is missing" if note else "The thermal network",
     }
 
 
@@ -47,8 +51,16 @@ def _is_thermal(model: Model) -> bool:
 
 
 def heat_charts(run: Run) -> list[Chart]:
-    """Missing heat over time and against each input and state, where the diagnosis has reconstructed it."""
+    """Missing heat over time and against each input and state, where the diagnosis has reconstructed it and
+    it differs from zero somewhere.
+    """
     missing = (run.diagnosis or {}).get("missing_heat") or {}
+    if not any(
+        abs(heat) > 1.96 * sd
+        for one in (missing.get("over_time") or {}).values()
+        for heat, sd in zip(one["heat"], one["sd"], strict=True)
+    ):
+        return []
     unit, place = heat_unit(run), missing.get("state", "")
     label = with_unit("missing heat" if unit == "W" else "missing rate", unit)
     charts = []
@@ -88,11 +100,17 @@ def heat_unit(run: Run) -> str:
     model = diagnosed(run)
     if model is None or any(state.capacity for state in model.states.values()):
         return "W"
-    units = {pretty_unit(state.unit) for state in model.states.values() if state.unit}
+    units = {pretty_unit(differences(state.unit)) for state in model.states.values() if state.unit}
     return f"{units.pop()}/{model.time_unit}" if len(units) == 1 else f"unit of the state/{model.time_unit}"
 
 
 def diagnosed(run: Run) -> Model | None:
     """The fitted model that the diagnosis is about, by the name of its file or its own."""
+    key = diagnosed_key(run)
+    return None if key is None else run.models[key]
+
+
+def diagnosed_key(run: Run) -> str | None:
+    """The name, within the run, of the model that the diagnosis is about."""
     named = (run.diagnosis or {}).get("model")
-    return next((model for key, model in run.models.items() if named in (key, model.name)), None)
+    return next((key for key, model in run.models.items() if named in (key, model.name)), None)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from html import escape
 
 from discovery.terms import Apply, Expression, Name, Number
+from discovery.terms import text as plain
 
 _GREEK = {
     "alpha": "α",
@@ -96,6 +97,66 @@ def temperature(body: str) -> str:
 def expression(tree: Expression, symbols: Mapping[str, str] | None = None) -> str:
     """MathML of an expression tree; `symbols` gives names a symbol of their own."""
     return _write(tree, symbols or {})[0]
+
+
+def lines(tree: Expression, symbols: Mapping[str, str] | None = None, room: int = 44) -> list[str]:
+    """MathML of an expression, broken between factors and within cases; a line has about `room` characters.
+
+    >>> from discovery.terms import parse
+    >>> [len(lines(parse(text), room=12)) for text in ("a*b*c", "alpha*beta*gamma*delta", "a + b")]
+    [1, 2, 1]
+    """
+    signs = symbols or {}
+    factors = _factors(tree)
+    if len(plain(tree)) > room and isinstance(tree, Apply) and tree.function in ("+", "-"):
+        left, right = tree.arguments
+        body = expression(right, signs)
+        if tree.function == "-" and getattr(right, "function", "") in ("+", "-"):
+            body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
+        return [*lines(left, signs, room), f"<mo form='infix'>{_SIGN[tree.function]}</mo><mrow>{body}</mrow>"]
+    if len(plain(tree)) <= room or (len(factors) == 1 and not _is_where(tree)):
+        return [expression(tree, signs)]
+    if _is_where(tree):
+        assert isinstance(tree, Apply)
+        condition, then, other = tree.arguments
+        cases = [stacked(lines(one, signs, room)) for one in (then, other)]
+        return [_cases(f"<mrow>{expression(condition, signs)}</mrow>", *cases)]
+    found, length = [""], 0
+    for index, factor in enumerate(factors):
+        part = lines(factor, signs, room) if _is_where(factor) else [_write(factor, signs)[0]]
+        body = "".join(part)
+        if not _is_where(factor) and _write(factor, signs)[1] < (5 if index else 3):
+            body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
+        size = len(plain(factor))
+        if index and length + size > room:
+            found.append("<mo form='infix'>·</mo>")
+            length = 0
+        elif index and isinstance(factor, Number):
+            body = f"<mo>·</mo>{body}"
+        elif index:
+            body = f"<mspace width='0.17em'/>{body}"
+        found[-1] += f"<mrow>{body}</mrow>"
+        length += size
+    return found
+
+
+def stacked(rows: list[str]) -> str:
+    """Lines of MathML one below the other."""
+    if len(rows) == 1:
+        return f"<mrow>{rows[0]}</mrow>"
+    return f'<mtable class="lines">{"".join(f"<mtr><mtd>{row}</mtd></mtr>" for row in rows)}</mtable>'
+
+
+def _factors(tree: Expression) -> list[Expression]:
+    """The factors of a product, left to right."""
+    if isinstance(tree, Apply) and tree.function == "*":
+        left, right = tree.arguments
+        return [*_factors(left), *_factors(right)]
+    return [tree]
+
+
+def _is_where(tree: Expression) -> bool:
+    return isinstance(tree, Apply) and tree.function == "where"
 
 
 def _write(tree: Expression, symbols: Mapping[str, str]) -> tuple[str, int]:

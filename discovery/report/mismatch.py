@@ -1,4 +1,4 @@
-"""The part of the page that tells what a model left out."""
+"""The section on what a model left out."""
 
 from __future__ import annotations
 
@@ -12,11 +12,16 @@ from discovery.report.run import Run, pretty_unit
 from discovery.report.text import listed, number, percent, with_unit, words
 
 _MOST_RIVALS = 6
-NEAR = 3.0  # log evidence below which no rival is told apart: `thresholds.RIVAL`, not loaded here
+NEAR = 3.0  # log evidence below which a rival is not excluded: `thresholds.RIVAL`, not loaded here
 _HEAT_NOTE = (
-    "What would close the gap, cause unknown, over time and against each input and state (band: 95 %). "
-    "What it follows is missing."
+    "The heat that would remove the residual, whatever its cause: over time, and against each input and "
+    "state (band: 95 %). A quantity that this heat follows is a candidate for the missing physics."
 )
+
+
+def leads(run: Run) -> bool:
+    """Whether the diagnosis found something: then it opens the page, before the comparison of models."""
+    return (run.diagnosis or {}).get("verdict") not in (None, "no mismatch")
 
 
 def section(run: Run) -> dict[str, Any] | None:
@@ -27,24 +32,31 @@ def section(run: Run) -> dict[str, Any] | None:
     tables = [_physics(d), _proof(d), _outputs(run, d), _windows(run, d), _rivals(d), _considered(d)]
     return {
         "about": _about(d),
-        "reasons": list(d.get("reasons") or []),
+        "reasons": [_sentence(str(one)) for one in d.get("reasons") or []],
         "tables": [table for table in tables if table.rows],
         "charts": heat_charts(run),
         "heat_note": _HEAT_NOTE,
         "formula": _formula(d),
-        "next": d.get("next_experiment"),
-        "next_title": "What would have been seen" if d.get("verdict") == "no mismatch" else "Next experiment",
+        "next": _sentence(d.get("next_experiment") or ""),
+        "next_title": "What would have been detected"
+        if d.get("verdict") == "no mismatch"
+        else "Next experiment",
     }
+
+
+def _sentence(text: str) -> str:
+    """A text with a capital at its start and a full stop at its end."""
+    return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
 
 
 def _about(d: Mapping[str, Any]) -> str:
     text = f"Verdict on “{d.get('model', 'the model')}”: {d.get('verdict', 'unknown')}."
     location = d.get("location") or {}
     if location.get("regime"):
-        text += f" It shows where {location['regime']}."
+        text += f" The mismatch appears where {location['regime']}."
     if location.get("alike"):
         groups = listed([listed(group) for group in location["alike"]], "; and")
-        text += f" Heat at {groups} would look alike in these readings."
+        text += f" These readings do not separate heat at {groups}."
     return text
 
 
@@ -100,14 +112,14 @@ def _physics(d: Mapping[str, Any]) -> Printed:
 def _proof(d: Mapping[str, Any]) -> Printed:
     improvement = d.get("improvement") or {}
     parts = {"fitted": improvement.get("fit") or {}} | {
-        f"{name} (unseen)": one for name, one in (improvement.get("held_out") or {}).items()
+        f"{name} (held out)": one for name, one in (improvement.get("held_out") or {}).items()
     }
     rows = [
         Line(
             (
                 name,
                 number(one["rms_before"]),
-                "runs away" if one.get("runs_away") else number(one.get("rms_after")),
+                "diverges" if one.get("runs_away") else number(one.get("rms_after")),
                 number(one.get("noise_floor")),
                 _gain(one),
             )
@@ -116,10 +128,10 @@ def _proof(d: Mapping[str, Any]) -> Printed:
         if one.get("rms_before") is not None and one.get("rms_before") != one.get("rms_after")
     ]
     unit = pretty_unit(improvement.get("unit") or "")
-    header = ("Recording", "rms before", "rms repaired", "Noise floor", "Improvement (95 %)")
+    header = ("Recording", "rms before", "rms after", "rms of the noise", "Improvement (95 %)")
     return Printed(
         with_unit(
-            "The proof: free runs before and after the repair, all errors weighed by their noise", unit
+            "Free runs before and after the repair: rms over all outputs, each weighted by its noise", unit
         ),
         header,
         tuple(rows),
@@ -133,19 +145,22 @@ def _gain(one: Mapping[str, Any]) -> str:
 def _outputs(run: Run, d: Mapping[str, Any]) -> Printed:
     detection, shares = d.get("detection") or {}, (d.get("location") or {}).get("outputs") or {}
     noise, rms = detection.get("noise") or {}, detection.get("residual_rms") or {}
+    sharing = leads(run)
     rows = [
         Line(
             (
                 with_unit(name, rms_unit(run, name)),
                 number(noise.get(name)),
                 number(rms.get(name)),
-                percent(shares.get(name)),
+                *([percent(shares.get(name))] if sharing else []),
             )
         )
         for name in dict.fromkeys([*rms, *noise, *shares])
     ]
     return Printed(
-        "Where it shows", ("Error", "Reading noise", "Left over, rms", "Share of the mismatch"), tuple(rows)
+        "Mismatch by output",
+        ("Output", "Reading noise", "Residual, rms", *(["Share of the mismatch"] if sharing else [])),
+        tuple(rows),
     )
 
 
@@ -177,14 +192,14 @@ def _windows(run: Run, d: Mapping[str, Any]) -> Printed:
         "Body",
         with_unit("Missing heat" if heat == "W" else "Missing rate", heat),
     )
-    return Printed("When it shows", header, tuple(rows), frozenset({3}))
+    return Printed("When heat is missing", header, tuple(rows), frozenset({3}))
 
 
 def _rivals(d: Mapping[str, Any]) -> Printed:
     rows = []
     for one in (d.get("alternatives") or [])[:_MOST_RIVALS]:
         below = one["log_evidence_below_best"]
-        judged = "cannot be told apart" if below <= NEAR else "less likely" if below < 10 else "ruled out"
+        judged = "not excluded" if below <= NEAR else "less likely" if below < 10 else "ruled out"
         rows.append(Line((words(one["effect"]), _place(one), number(below), judged)))
     return Printed(
         "Rivals",
@@ -205,8 +220,8 @@ def _considered(d: Mapping[str, Any]) -> Printed:
         Line((*named, number(c.get("log_evidence")), percent(c.get("share_that_a_refit_leaves"))))
         for named, c in best.items()
     ]
-    header = ("Effect", "Where", "Log evidence", "Share of it that no other parameter shows")
-    return Printed("What came closest", header, tuple(rows), frozenset({1, 3}))
+    header = ("Effect", "Where", "Log evidence", "Share not explained by other parameters")
+    return Printed("Closest effects of the catalogue", header, tuple(rows), frozenset({1, 3}))
 
 
 def _formula(d: Mapping[str, Any]) -> str:

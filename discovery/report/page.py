@@ -15,8 +15,9 @@ from discovery.files import write_atomic
 from discovery.report import heat, mismatch, sections, series
 from discovery.report.answer import answer
 from discovery.report.chart import Chart, payload
-from discovery.report.printed import paper_tables, rms_tables, summary
+from discovery.report.printed import is_paper, paper_tables, rms_tables, summary
 from discovery.report.ranking import is_error, origin, ranked
+from discovery.report.recommended import table as best_by_output
 from discovery.report.run import Run, load_run
 from discovery.report.text import listed
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 _HERE = Path(__file__).parent
 _BUDGET = 300_000  # numbers that all curves of a page may hold together, below 2 MB
-_MOST_CURVES = 6  # more than that cannot be told apart
+_MOST_CURVES = 6  # more of them cannot be distinguished
 
 
 def write_report(run_dir: Path) -> Path:
@@ -59,7 +60,7 @@ def render(run: Run) -> str:
     for part in (missing, found, residual):
         charts += part["charts"] if part else []
     tables = paper_tables(run) if is_error(run) else rms_tables(run)
-    shown = 2 if tables and "Table 1" in tables[0].title else 1  # the other recordings fold away
+    shown = sum("Table 1" in one.title for one in tables) if is_error(run) else len(tables)  # the rest folds
     view: dict[str, Any] = {
         "title": f"{run.name}: report",
         "eyebrow": _eyebrow(run),
@@ -68,11 +69,12 @@ def render(run: Run) -> str:
         "shaded": any(chart.shades for chart in curves),
         "curves": _legend(run, order, curves),
         "summary": summary(run),
-        "errors": is_error(run),
-        "unseen": bool(run.held_out),
+        "held_out": bool(run.held_out),
+        "by_output": best_by_output(run),
         "tables": tables[:shown],
         "more_tables": tables[shown:],
-        "paper": paper.SOURCE if set(run.outputs) & set(paper.TABLE_3) else "",
+        "paper": paper.SOURCE if is_paper(run) else "",
+        "missing_first": mismatch.leads(run),
         "diagnosis": missing,
         "network": heat.network(run),
         "models": [sections.model(run, name) for name in sections.detailed(run)],
@@ -136,15 +138,17 @@ def style() -> Markup:
 
 
 def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
-    parts = [
-        ("predictions", "Measured, predicted"),
+    compared = [
+        ("predictions", "Measured and predicted"),
         ("summary", "Models compared"),
-        ("roles", "Each role left out"),
-        ("diagnosis", "What was left out"),
-        ("network", "Thermal network"),
+        ("roles", "Cross-validation over roles"),
+    ]
+    missing = [("diagnosis", "Missing physics"), ("network", "Thermal network")]
+    parts = [
+        *(missing + compared if view["missing_first"] else compared + missing),
         ("models", ""),
-        ("discovery", "How it was found"),
-        ("residual", "What is left"),
+        ("discovery", "Search for terms"),
+        ("residual", "Residuals"),
         ("budgets", "Heat and fluid"),
         ("quality", "The recordings"),
         ("reproduce", "Reproduce"),
@@ -162,10 +166,25 @@ def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def shown_models(run: Run) -> list[str]:
-    """Models with predictions, best first, as many as can be told apart."""
+    """Models with predictions, best first, as many as the eye can distinguish."""
     having = list(dict.fromkeys(model for p in run.predictions.values() for model in p.models))
     order = [model for model in ranked(run) if model in having]
-    return [*order, *(model for model in having if model not in order)][:_MOST_CURVES]
+    order += [model for model in having if model not in order]
+    pair = [model for model in before_and_after(run) if model in order]
+    others = [model for model in order if model not in pair][: _MOST_CURVES - len(pair)]
+    return [model for model in order if model in (*pair, *others)]
+
+
+def before_and_after(run: Run) -> list[str]:
+    """The diagnosed and the repaired model, where the diagnosis found something."""
+    if not mismatch.leads(run):
+        return []
+    subject = heat.diagnosed_key(run)
+    return [
+        model
+        for model in run.results.get("models", {})
+        if model == subject or origin(run, model) == "repaired"
+    ]
 
 
 def _legend(run: Run, order: Sequence[str], curves: Sequence[Chart]) -> list[dict[str, Any]]:
@@ -173,26 +192,34 @@ def _legend(run: Run, order: Sequence[str], curves: Sequence[Chart]) -> list[dic
         return []
     noise = any(one.color == "noise" for chart in curves for panel in chart.panels for one in panel.series)
     other = [name for name in order[1:] if origin(run, name) != origin(run, order[0])] or list(order[1:])
-    first = {*order[:1], *other[:1]}  # more curves at once hide each other
+    pair = before_and_after(run)  # more curves at once hide each other
+    first = set(pair) if len(pair) > 1 else {*order[:1], *other[:1]}
     items = [{"name": "measured", "color": "measured", "on": True}]
     items += [{"name": name, "color": str(index), "on": name in first} for index, name in enumerate(order)]
+    names = {one.name for chart in curves for panel in chart.panels for one in panel.series}
+    items += [{"name": series.BAND, "color": "band", "on": order[0] in first}] if series.BAND in names else []
     return items + ([{"name": "reading noise, ±2σ", "color": "noise", "on": True}] if noise else [])
 
 
 def _group(run: Run, recording: str, charts: list[Chart]) -> dict[str, Any]:
     tag = (
-        "unseen" if recording in run.held_out else "fitted" if recording in run.results.get("fit", []) else ""
+        "held out"
+        if recording in run.held_out
+        else "fitted"
+        if recording in run.results.get("fit", [])
+        else ""
     )
     note = (run.results.get("notes") or {}).get(recording, "")
     return {"name": recording, "tag": tag, "note": note, "charts": charts}
 
 
 def _eyebrow(run: Run) -> str:
-    parts = [run.name]
+    parts = ["Simulated machine"] if run.results.get("simulated") else []
+    parts.append(run.name)
     if run.results.get("fit"):
         parts.append(f"fitted to {_brief(run.results['fit'])}")
     if run.held_out:
-        parts.append(f"judged on {_brief(run.held_out)}, which no fit, choice or threshold has seen")
+        parts.append(f"compared on {_brief(run.held_out)}, which no fit and no choice of this run has used")
     return " · ".join(parts)
 
 

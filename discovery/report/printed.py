@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from discovery.evaluation import tables
+from discovery.report.lead import Lead, lead_over
 from discovery.report.ranking import (
     cells,
     is_error,
     kind,
     mean_improvement,
+    mean_log_rms,
     mean_rms,
     origin,
     ranked,
-    ratio,
     rms_unit,
     rms_units,
 )
@@ -32,6 +32,7 @@ class Line:
     cells: tuple[str, ...]
     look: str = ""
     repeated: str = ""  # the first cell, where it is printed only once for several rows
+    score: float | None = None  # of a model: mean logarithm of its rms, to compare with any other row
 
 
 @dataclass(frozen=True)
@@ -56,58 +57,74 @@ def printed(table: tables.Table, left: Sequence[int] = ()) -> Printed:
 
 
 def summary(run: Run) -> Printed | None:
-    """Models, best first, with what they improve on unseen recordings and what they cost."""
+    """Models, best first, with what they improve on held-out recordings and what they cost."""
     order = [model for model in ranked(run) if cells(run, model)]
     if not order:
         return None
     recordings = list(dict.fromkeys(r for model in order for r, _ in cells(run, model)))
+    shared = set.intersection(*(set(cells(run, model)) for model in order))
     shown = recordings[:_MOST_RECORDINGS]
     removed = is_error(run)
     units = rms_units(run)
-    what = "rms removed [%]" if removed else f"rms left [{', '.join(units)}]"
-    header = (
-        "Model",
-        "Kind",
-        "Terms",
-        "Parameters",
-        *(f"{r}: {what}" for r in shown),
-        "left against best",
-        "Fit [s]",
-    )
+    what = "removed rms [%]" if removed else f"rms [{', '.join(units)}]"
+    header = ("Model", "Kind", "Terms", "Parameters", *shown, "rms against the best", "Fit [s]")
     rows = []
     for model in order:
         entry = run.results["models"][model]
-        share = ratio(run, model, order[0])
         figures = [
             number(mean_improvement(run, model, r), 2)
             if removed
             else ", ".join(number(mean_rms(run, model, r).get(unit)) for unit in units)
             for r in shown
         ]
-        made = dict.fromkeys([origin(run, model), kind(run, model)])
+        made = {one.lower(): one for one in (origin(run, model), kind(run, model))}.values()
         size = [number(entry.get("terms")), number(entry.get("parameters"))]
-        times = "–" if not math.isfinite(share) else f"× {number(share, 3)}"
+        times = "best" if model == order[0] else _behind(lead_over(run, order[0], model))
         look = "best" if model == order[0] else ""
-        rows.append(
-            Line((model, ", ".join(made), *size, *figures, times, number(entry.get("seconds"), 2)), look)
-        )
-    title = "Mean over all errors" if removed else "Over all outputs"
-    return Printed(title, header, tuple(rows), frozenset({1}))
+        line = (model, ", ".join(made), *size, *figures, times, number(entry.get("seconds"), 2))
+        rows.append(Line(line, look, score=mean_log_rms(run, model, shared)))
+    title = f"{what}, {'mean over all errors' if removed else 'over all outputs of a unit'}"
+    return Printed(title[0].upper() + title[1:] if removed else title, header, tuple(rows), frozenset({1}))
+
+
+def _behind(lead: Lead | None) -> str:
+    """How much more rms than the best model has, with its 95 % interval.
+
+    >>> _behind(Lead(0.8, 0.75, 0.9, 1.0)), _behind(None)
+    ('+25 % (+11 to +33)', '–')
+    """
+    if lead is None or lead.ratio <= 0:
+        return "–"
+    more = [100 * (1 / one - 1) for one in (lead.ratio, lead.high, lead.low) if one > 0]
+    middle, *ends = (f"{one:+.0f}".replace("-", "−") for one in more)
+    return (
+        f"{middle} % ({ends[0]} to {ends[1]})" if lead.low < lead.high and len(ends) == 2 else f"{middle} %"
+    )
 
 
 def paper_tables(run: Run) -> list[Printed]:
-    """Table 3 for each recording that was compared, unseen ones first, and Table 1 for a thermobalance."""
+    """Criteria (Table 3 of the paper) for each recording, held-out ones first; Table 1 for a
+    thermobalance.
+    """
     found = run.results.get("models", {})
     recordings = list(dict.fromkeys([*run.held_out, *run.results.get("fit", [])]))
     scored = [r for r in recordings if any(r in model.get("recordings", {}) for model in found.values())]
     order = ranked(run)
-    out = [printed(_in_units(run, tables.table_3(run.results, r, order)), left=[1]) for r in scored]
-    parts = run.results.get("parts") or {}
+    printed_too = is_paper(run)
+    out = [
+        printed(_in_units(run, tables.table_3(run.results, r, order, printed_too)), left=[1]) for r in scored
+    ]
+    parts = (run.results.get("parts") or {}) if printed_too else {}
     for model in order:
         if "thermobalance" in (model, kind(run, model)) and found[model].get("recordings") and parts:
             out.insert(0, printed(tables.table_1(run.results, model, parts)))
             break
     return out
+
+
+def is_paper(run: Run) -> bool:
+    """Whether the campaign is that of the paper: then its printed figures stand next to those of the run."""
+    return "paper" in run.results
 
 
 def _in_units(run: Run, table: tables.Table) -> tables.Table:
@@ -117,7 +134,7 @@ def _in_units(run: Run, table: tables.Table) -> tables.Table:
 
 
 def rms_tables(run: Run) -> list[Printed]:
-    """What each model leaves of temperatures: a row for each recording and output, unseen ones first."""
+    """What each model leaves of temperatures: a row for each recording and output, held-out ones first."""
     order, found = ranked(run), run.results.get("models", {})
     rows, units = [], rms_units(run)
     for recording in dict.fromkeys([*run.held_out, *run.results.get("fit", [])]):
@@ -126,7 +143,7 @@ def rms_tables(run: Run) -> list[Printed]:
                 found[model].get("recordings", {}).get(recording, {}).get(output, {}).get("rms")
                 for model in order
             ]
-            seen = "unseen" if recording in run.held_out else "fitted"
+            seen = "held out" if recording in run.held_out else "fitted"
             named = output if len(units) == 1 else with_unit(output, rms_unit(run, output))
             first = Line((recording, seen, named, *map(number, scores)), "first")
             rows.append(
@@ -134,4 +151,4 @@ def rms_tables(run: Run) -> list[Printed]:
             )
     said = [with_unit(model, units[0]) if len(units) == 1 else model for model in order]
     header = ("Recording", "", "Output", *said)
-    return [Printed("rms left over", header, tuple(rows), frozenset({1, 2}))] if rows else []
+    return [Printed("rms of the residual", header, tuple(rows), frozenset({1, 2}))] if rows else []

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, TypeGuard
 
 from discovery.report.run import Run
 
-HAND_BUILT = ("reduced", "superposition", "file", "thermobalance", "convection")
+GIVEN = ("reduced", "superposition", "file", "thermobalance", "convection")
 
 
 def kind(run: Run, model: str) -> str:
@@ -19,20 +19,18 @@ def kind(run: Run, model: str) -> str:
 def is_discovered(run: Run, model: str) -> bool:
     """Whether a model was found from data and not written by hand."""
     word = kind(run, model)
-    return word.startswith(("sindy", "discovered", "sparse")) or (
-        word not in HAND_BUILT and "discover" in model
-    )
+    return word.startswith(("sindy", "discovered", "sparse")) or (word not in GIVEN and "discover" in model)
 
 
 def origin(run: Run, model: str) -> str:
-    """Where a model comes from: "discovered", "hand-built", "repaired" after a diagnosis, or a method
-    to compare with: "PySINDy", "regression".
+    """Where a model comes from: "given" (its structure was written or chosen), "discovered", "repaired" after
+    a diagnosis, or a method to compare with: "PySINDy", "regression".
     """
     if kind(run, model) in ("repaired", "regression"):
         return kind(run, model)
     if kind(run, model) == "pysindy":
         return "PySINDy"
-    return "discovered" if is_discovered(run, model) else "hand-built"
+    return "discovered" if is_discovered(run, model) else "given"
 
 
 def cells(run: Run, model: str) -> dict[tuple[str, str], Mapping[str, Any]]:
@@ -64,6 +62,15 @@ def ratio(run: Run, model: str, other: str | None) -> float:
         if key in theirs and _positive(mine[key].get("rms")) and _positive(theirs[key].get("rms"))
     ]
     return math.exp(sum(logs) / len(logs)) if logs else math.nan
+
+
+def mean_log_rms(run: Run, model: str, shared: Collection[tuple[str, str]]) -> float | None:
+    """Mean logarithm of the rms over (recording, output) pairs; None where one is missing or zero."""
+    found = cells(run, model)
+    values = [found[key].get("rms") if key in found else None for key in shared]
+    if not values or not all(_positive(value) for value in values):
+        return None
+    return sum(math.log(value) for value in values if value) / len(values)
 
 
 def _positive(value: object) -> bool:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from discovery.errors import UserError
 from discovery.files import read_text
 from discovery.models import Model
 from discovery.models.modelfile import read_model
-from discovery.runfolder import DIAGNOSIS, RESULTS, read_diagnosis, read_results
+from discovery.runfolder import DIAGNOSIS, INPUTS, RESULTS, read_diagnosis, read_results
 
 Array = NDArray[np.float64]
 
@@ -39,13 +40,14 @@ class Predictions:
 
 @dataclass(frozen=True)
 class Run:
-    """Everything that a report is made from."""
+    """Everything that a report is made from. `inputs`: by recording and input, time [s] and value (K,)."""
 
     folder: Path
     results: Mapping[str, Any]
     diagnosis: Mapping[str, Any] | None
     predictions: Mapping[str, Predictions]
     models: Mapping[str, Model]
+    inputs: Mapping[str, Mapping[str, tuple[Array, Array]]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -90,6 +92,14 @@ class Run:
         value = detection.get("noise", {}).get(output, self.results.get("noise", {}).get(output))
         return float(value) if value else None
 
+    def band(self, model: str, output: str) -> float | None:
+        """Half width of the 95 % prediction band of a model: 1.96 times its rms in cross-validation; with
+        recordings left out where there are several, else with blocks of time.
+        """
+        found = self.results.get("models", {}).get(model, {}).get("cross_validation") or {}
+        rms = (found.get("recordings") or found.get("blocks") or {}).get(output)
+        return 1.96 * float(rms) if rms else None
+
 
 def load_run(folder: Path) -> Run:
     """Read a run folder; what is not there is left out.
@@ -110,7 +120,23 @@ def load_run(folder: Path) -> Run:
         path.stem: read_predictions(path) for path in sorted((folder / "predictions").glob("*.csv"))
     }
     models = {path.stem: read_model(path) for path in sorted((folder / "models").glob("*.toml"))}
-    return Run(folder, results, diagnosis, predictions, models)
+    return Run(folder, results, diagnosis, predictions, models, read_inputs(folder / INPUTS))
+
+
+def read_inputs(path: Path) -> dict[str, dict[str, tuple[Array, Array]]]:
+    """Inputs over time by recording; empty where the run left none. Raises UserError for a broken file."""
+    if not path.exists():
+        return {}
+    try:
+        return {
+            recording: {
+                name: (np.array(one["time"], dtype=float), np.array(one["value"], dtype=float))
+                for name, one in inputs.items()
+            }
+            for recording, inputs in json.loads(read_text(path)).items()
+        }
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise UserError(f"{path}: cannot be read ({error}); make the run again") from None
 
 
 def read_predictions(path: Path) -> Predictions:

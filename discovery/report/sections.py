@@ -1,4 +1,4 @@
-"""Parts of the page: models in detail, the search, what is left over, recordings, how to reproduce."""
+"""Parts of the page: models in detail, the search, residuals, recordings, how to reproduce."""
 
 from __future__ import annotations
 
@@ -51,9 +51,8 @@ def model(run: Run, name: str) -> dict[str, Any]:
         "equations": equations.equations(model),
         "rows": equations.rows(model, shares),
         "shares": bool(shares),
-        "largest": max(shares.values(), default=1.0) or 1.0,
-        "share_note": "Share of the effect: what the errors would lose without the term, to first order; "
-        "all terms together are 100 %.",
+        "share_note": "Share of the effect: change of the outputs without the term, to first order. "
+        "All terms together are 100 %.",
         "others": equations.other_values(model),
         "capacities": equations.capacities(model),
         "notes": entry.get("notes") or [],
@@ -74,8 +73,8 @@ def discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
         charts += _pareto(name, entry.get("path") or [])
         costs = [pair for group in entry.get("groups") or [] for pair in _costs(group)]
         if costs:
-            head = f"{name}: what each term is worth, by data left out"
-            tables.append(Printed(head, ("Term", "rms without it"), tuple(Line(pair) for pair in costs)))
+            head = f"{name}: increase of the rms on left-out data without each term"
+            tables.append(Printed(head, ("Term", "Increase"), tuple(Line(pair) for pair in costs)))
         if entry.get("stability"):
             shares = sorted(entry["stability"].items(), key=lambda pair: -pair[1])
             rare = [share for _, share in shares if share < _OFTEN]
@@ -84,14 +83,14 @@ def discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
             rows += (Line((f"{len(rare)} others", f"< {percent(_OFTEN)}")),) if rare else ()
             tables.append(
                 Printed(
-                    f"{name}: how often each term is chosen when the search is repeated on parts of the data",
+                    f"{name}: share of repeated searches, each on a part of the data, that choose the term",
                     ("Term", "Chosen"),
                     rows,
                 )
             )
     about = (
-        "Each further term must earn its place on data that the choice has not used. "
-        "Terms that are chosen again and again do not depend on which hours were recorded."
+        "A term is added only if it lowers the error on data that the choice has not used. "
+        "A term that is chosen in most repetitions does not depend on which hours were recorded."
     )
     return {"about": about, "charts": charts, "tables": tables}
 
@@ -131,7 +130,7 @@ def _pareto(name: str, path: Sequence[Mapping[str, Any]]) -> list[Chart]:
 
 
 def residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
-    """What the best model leaves on the first unseen recording, examined; None without predictions."""
+    """Residuals of the best model on the first held-out recording; None without predictions."""
     recording = next((r for r in run.recordings if r in run.held_out), next(iter(run.recordings), None))
     if recording is None or not order:
         return None
@@ -139,7 +138,7 @@ def residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
     rows = series.residual_table(run, model, recording)
     if not rows:
         return None
-    keys = ("rms", "ratio", "mean", "memory", "largest", "beyond", "count")
+    keys = ("rms", "ratio", "mean", "memory", "largest", "beyond", "inside", "count")
     lines = tuple(
         Line((f"{row['output']} [{row['unit'] or '-'}]", *(number(row[k]) for k in keys))) for row in rows
     )
@@ -151,12 +150,13 @@ def residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
         "correlation of neighbours",
         "largest",
         "beyond 3σ [%]",
+        "inside the 95 % band [%]",
         "readings",
     )
     return {
-        "about": f"What “{model}” leaves on {recording}. If only sensor noise were left, neighbours "
-        "would not be alike and bars would stay inside the band.",
-        "table": Printed(f"Left over on {recording}", header, lines),
+        "about": f"Reading minus “{model}” on {recording}. Pure sensor noise would have no correlation "
+        "between neighbouring readings: all bars would be inside the band.",
+        "table": Printed(f"Residuals on {recording}", header, lines),
         "charts": series.residual_charts(run, model, recording),
     }
 
@@ -168,10 +168,10 @@ def roles(run: Run) -> dict[str, Any] | None:
         return None
     units = {error: run.unit(error) for error in run.outputs}
     return {
-        "about": "Each role was left out of fit and search in turn, and every model found anew from the "
+        "about": "Each role was left out of fit and search in turn, and every model was fitted to the "
         "others. "
-        "The columns judge a role when it was left out; the last one is the mean over what the fits had "
-        "seen.",
+        "Each column shows the error on a role when it was left out. The last column is the mean over the "
+        "recordings that were fitted.",
         "summary": printed(rolematrix.left_out(found, units), left=[1]),
         "matrices": [printed(rolematrix.matrix(found, e, units[e]), left=[1]) for e in run.outputs],
         "steadiness": [printed(rolematrix.steadiness(found, m), left=[1, 2]) for m in found["models"]],
@@ -187,14 +187,14 @@ def budgets(run: Run) -> dict[str, Any] | None:
         return None
     found = models[order[0]]["budgets"]
     return {
-        "about": f"Heat as the fitted model “{order[0]}” has it, integrated over each recording. Heat that "
-        "enters and is not stored would be an error of the integration.",
+        "about": f"Heat flows of the fitted model “{order[0]}”, integrated over each recording. Heat that "
+        "enters but is not stored would be an error of the integration.",
         "tables": [printed(table) for table in budget_tables(found)],
     }
 
 
 def quality(run: Run) -> dict[str, Any] | None:
-    """Readings of each recording and what was found wrong with them; None without predictions."""
+    """Readings of each recording and the faults that were found; None without predictions."""
     rows = []
     for recording in run.recordings:
         data = run.predictions[recording]
@@ -256,6 +256,6 @@ def reproduce(run: Run) -> dict[str, Any]:
     return {
         "command": run.results.get("command", ""),
         "table": Printed(
-            "Versions, and hashes of what went in", ("What", "Value"), tuple(rows), frozenset({1})
+            "Versions, and hashes of the input files", ("What", "Value"), tuple(rows), frozenset({1})
         ),
     }

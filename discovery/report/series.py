@@ -1,4 +1,4 @@
-"""Charts of a run: measured, predicted and left over, and what the left over looks like."""
+"""Charts of a run: measured and predicted outputs, inputs, residuals and their autocorrelation."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.report.chart import Chart, Panel, Series
-from discovery.report.run import Run
+from discovery.report.ranking import rms_unit
+from discovery.report.run import Run, pretty_unit
 from discovery.report.text import number, with_unit
 
 Array = NDArray[np.float64]
 
-FEWEST = 12  # readings left over that can have a memory
+BAND = "95 % band of the best model"
+FEWEST = 12  # residuals from which an autocorrelation is computed
+_COLORS = 8  # of curves in the style sheet
 
 
 def time_axis(time: Array) -> tuple[Array, str, float]:
@@ -24,11 +27,40 @@ def time_axis(time: Array) -> tuple[Array, str, float]:
 
 
 def prediction_charts(run: Run, models: Sequence[str]) -> list[Chart]:
-    """One chart for each recording and error: readings and models above, reading minus model below."""
+    """One chart for each recording and error: readings and models above, residuals below; then its inputs."""
     return [
-        _prediction_chart(run, recording, output, models)
+        chart
         for recording in run.recordings
-        for output in run.predictions[recording].readings
+        for chart in (
+            *(
+                _prediction_chart(run, recording, output, models)
+                for output in run.predictions[recording].readings
+            ),
+            *_input_charts(run, recording),
+        )
+    ]
+
+
+def _input_charts(run: Run, recording: str) -> list[Chart]:
+    """The inputs of a recording, a panel for each unit; at most one chart."""
+    inputs, time = run.inputs.get(recording, {}), run.predictions[recording].time
+    if not inputs or not len(time):
+        return []
+    _, label, scale = time_axis(time)
+    units = run.results.get("input_units") or {}
+    by_unit: dict[str, list[Series]] = {}
+    for index, (name, (at, value)) in enumerate(inputs.items()):
+        series = Series(name, at / scale, value, "line", str(index % _COLORS))
+        by_unit.setdefault(pretty_unit(str(units.get(name, ""))), []).append(series)
+    panels = tuple(
+        Panel(
+            with_unit(series[0].name if len(series) == 1 else "inputs", unit),
+            tuple(series),
+        )
+        for unit, series in by_unit.items()
+    )
+    return [
+        Chart(f"{recording}-inputs", f"Inputs of {recording}", label, panels, group=recording, solid=True)
     ]
 
 
@@ -45,6 +77,13 @@ def _prediction_chart(run: Run, recording: str, output: str, models: Sequence[st
         below.append(
             Series("reading noise, ±2σ", read, flat, "band", "noise", flat - 2 * noise, flat + 2 * noise)
         )
+    for model in models[:1]:
+        half = run.band(model, output)
+        if half is not None and output in data.models.get(model, {}):
+            middle = data.models[model][output]
+            known = np.isfinite(middle)
+            ends = middle[known] - half, middle[known] + half
+            above.insert(0, Series(BAND, x[known], middle[known], "band", "0", *ends))
     for index, model in enumerate(models):
         if output in data.models.get(model, {}):
             above.append(Series(model, x, data.models[model][output], "line", str(index)))
@@ -55,10 +94,11 @@ def _prediction_chart(run: Run, recording: str, output: str, models: Sequence[st
         label,
         (
             Panel(with_unit(output, unit), tuple(above)),
-            Panel(with_unit("left over", unit), tuple(below), zero=True),
+            Panel(with_unit("residual", rms_unit(run, output)), tuple(below), zero=True),
         ),
         _windows(run, recording, scale),
         group=recording,
+        own_key=False,
     )
 
 
@@ -78,7 +118,7 @@ def _windows(run: Run, recording: str, scale: float) -> tuple[tuple[float, float
 
 
 def residual_charts(run: Run, model: str, recording: str) -> list[Chart]:
-    """Autocorrelation of what a model leaves, one chart for each error."""
+    """Autocorrelation of the residual of a model, one chart for each output."""
     charts = []
     for output, left in _left_over(run, model, recording):
         correlation = autocorrelation(left, min(40, len(left) // 3))
@@ -89,7 +129,7 @@ def residual_charts(run: Run, model: str, recording: str) -> list[Chart]:
         charts.append(
             Chart(
                 f"acf-{output}",
-                f"{output}: memory of what is left",
+                f"{output}: autocorrelation of the residual",
                 "lag [readings]",
                 (Panel("autocorrelation [-]", (band, bars), zero=True),),
             )
@@ -116,21 +156,23 @@ def autocorrelation(values: Array, lags: int) -> Array:
 
 
 def residual_table(run: Run, model: str, recording: str) -> list[dict[str, Any]]:
-    """What is left of each error in figures: rms against noise, mean, memory, largest."""
+    """The residual of each output in figures: rms against noise, mean, autocorrelation, largest."""
     rows: list[dict[str, Any]] = []
     for output, left in _left_over(run, model, recording):
         spread = float(np.std(left)) or 1.0
         rms, noise = float(np.sqrt(np.mean(left**2))), run.noise(output)
+        half = run.band(model, output)
         rows.append(
             {
                 "output": output,
-                "unit": run.unit(output),
+                "unit": rms_unit(run, output),
                 "rms": rms,
                 "ratio": rms / noise if noise else None,
                 "mean": float(left.mean()),
                 "memory": float(autocorrelation(left, 1)[0]),
                 "largest": float(np.abs(left).max()),
                 "beyond": 100 * float(np.mean(np.abs(left - left.mean()) > 3 * spread)),
+                "inside": 100 * float(np.mean(np.abs(left) <= half)) if half else None,
                 "count": len(left),
             }
         )

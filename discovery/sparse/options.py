@@ -88,7 +88,7 @@ class SparseOptions(Strict):
     bootstraps: int = Field(40, ge=0, le=1000, description="block bootstraps for the stability of each term")
     refine: bool = Field(True, description="fit all numbers of the chosen model by output error at the end")
     seed: int = Field(0, ge=0, description="of the bootstraps")
-    also: Words = Field((), description="recordings that this model is fitted to besides `fit`")
+    also: Words = Field((), description="recordings that this model is fitted to in addition to `fit`")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -255,4 +255,4 @@ def campaign_toml(title: str, orders: Sequence[Order]) -> str:
         for c in orders[0].machine.channels
     }
     recordings = {o.name: {"file": file_name(o)} | ({"note": o.note} if o.note else {}) for o in orders}
-    return format_toml({"name": title, "channels": channels, "recordings": recordings})
+    return format_toml({"name": title, "simulated": True, "channels": channels, "recordings": recordings})

@@ -13,7 +13,15 @@ from pathlib import Path
 
 from tests.browser.driver import Browser, browser
 
-WIDTHS = (1440, 800)
+CUT = (  # elements that show only a part of their content, or stick out of the page
+    "return [...document.querySelectorAll('.scroll, .equation, .formula, pre, td, th, svg.network')]"
+    ".filter(e => e.offsetParent && e.getBoundingClientRect().width"
+    " && (getComputedStyle(e).overflowX === 'visible'"
+    " ? e.getBoundingClientRect().right > innerWidth + 1 : e.scrollWidth > e.clientWidth + 1))"
+    ".map(e => `${e.getAttribute('aria-label') || e.textContent.slice(0, 40)}"
+    " (${e.scrollWidth} > ${e.clientWidth} px)`)"
+)
+WIDTHS = (1440, 1024, 800, 390)
 
 
 def check(page: Path, axe: str, session: Browser, pictures: Path | None) -> list[str]:
@@ -28,6 +36,7 @@ def check(page: Path, axe: str, session: Browser, pictures: Path | None) -> list
             session.open(page)
             where = f"{width} px, {scheme}"
             wrong += [f"{where}: {line}" for line in _figures(session) + _rules(session, axe)]
+            wrong += [f"{where}: cut: {one}" for one in session.run(CUT)]
             if session.run("return document.documentElement.scrollWidth > innerWidth"):
                 wrong.append(f"{where}: wider than the window")
             if pictures:

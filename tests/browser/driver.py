@@ -142,6 +142,7 @@ def browser() -> Iterator[Browser]:
             }
             made = session.send("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})
             session = Browser(f"{session.address}/session/{made['sessionId']}")
+            session.send("POST", "/timeouts", {"script": 110_000})
             try:
                 yield session
             finally:

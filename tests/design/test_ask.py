@@ -82,7 +82,7 @@ def test_a_pattern_starts_where_the_machine_was_read() -> None:
     still = replace(fitted, parameters={**fitted.parameters, "gain": Parameter(0.0, "K/W/s", fixed=True)})
     faster = still.with_values({"loss": 2 * still.parameters["loss"].value})
     said = next_experiment(where, faster, still, Noise(("T",), (0.1,)), APART)
-    assert "tells the rivals apart within about" in said
+    assert "separates the rivals within about" in said
 
 
 @pytest.mark.parametrize("wet", [True, False])
@@ -170,9 +170,9 @@ def test_what_has_no_answer_is_not_confirmed() -> None:
     law, event = found("friction_speed", "motor"), found("unmeasured_heat", "bed", "r1")
     drag = found("film_drag", "motor")
     said = aim([law, event], None, answered=False)
-    assert said.does == "would put to the test what came closest (friction_speed at motor)"
+    assert said.does == "would test the closest effect (friction_speed at motor)"
     said = aim([law], drag, answered=False)
-    assert said.does == "would tell apart what came closest (friction_speed at motor, or film_drag at motor)"
+    assert said.does == "would separate the closest effects (friction_speed at motor, or film_drag at motor)"
     assert "answer" not in said.does + said.differ
     assert aim([law, event], None, answered=True).does == "would confirm friction_speed at motor"
     assert aim([law], None, answered=True).does == "would confirm the answer"

@@ -139,5 +139,5 @@ def test_a_runaway_model_is_a_sentence(campaign: Campaign) -> None:
 
     model = two_bodies("k*(a - T)**3", "a", k=1e6)
     system = make_system(model, make_grid(campaign, "r", model.inputs, ["y"]))
-    with pytest.raises(UserError, match=r"runs away on recording 'r'"):
+    with pytest.raises(UserError, match=r"diverges on recording 'r'"):
         simulate(system, model.values())

@@ -129,7 +129,7 @@ def test_what_has_no_effect_is_named() -> None:
 def test_two_parameters_that_do_the_same_are_named() -> None:
     twice = model(g2=Parameter(0.01)).with_terms(Term("again", "y", parse("g2*u")))
     fit = fit_model(twice, campaign(recording(0)), ["r0"])
-    assert any("g2 cannot be told apart" in sentence for sentence in fit.unidentified)
+    assert any("g2 cannot be separated" in sentence for sentence in fit.unidentified)
     assert fit.model.parameters["g"].value + fit.model.parameters["g2"].value == pytest.approx(0.02, rel=0.05)
 
 
@@ -159,7 +159,7 @@ def test_parameters_that_do_nearly_the_same_are_named(angle: float, apart: bool)
     size = 1e6
     a, g = [size, 0.0, 0, 0], [size * np.cos(angle), size * np.sin(angle), 0, 0]
     covariance, sentences = told([1.0, 1.0, 1.0], [a, g, [0, 0, 9.0, 0]])
-    assert [text.split()[0] for text in sentences if "told apart" in text] == ([] if apart else ["a", "g"])
+    assert [text.split()[0] for text in sentences if "separated" in text] == ([] if apart else ["a", "g"])
     for i in (0, 1):
         own = (size * np.sin(angle)) ** -2.0 if angle else np.inf
         assert covariance[i, i] == pytest.approx(own, rel=1e-2)

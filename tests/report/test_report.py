@@ -117,8 +117,9 @@ def test_the_answer_agrees_with_an_independent_count(folder: Path, page: str) ->
     scores = {name: entry["recordings"]["validation"] for name, entry in results["models"].items()}
     logs = [np.log(scores["discovered"][o]["rms"] / scores["reduced"][o]["rms"]) for o in sample.OUTPUTS]
     less = 100 * (1 - np.exp(np.mean(logs)))
-    assert "The discovered model predicts best on the unseen recording “validation”" in page
-    assert f"{less:.0f} % less than “reduced” (hand-built)" in page
+    assert "The discovered model predicts best on the held-out recording “validation”" in page
+    more = 100 * (np.exp(-np.log(1 - less / 100)) - 1)
+    assert f"+{more:.0f} % (" in page
     removed = np.mean([scores["discovered"][o]["improvement"]["rms"] for o in sample.OUTPUTS])
     assert f"It removes {float(f'{removed:.2g}'):.0f} % of the thermal error" in page
 
@@ -144,15 +145,43 @@ def test_kelvins_and_micrometres_are_not_mixed(tmp_path: Path, together: bool) -
         (folders[-1] / "results.json").write_text(json.dumps(content))
     written = write_comparison(folders, tmp_path) if together else write_report(folders[0])
     page = written.read_text("utf-8")
-    assert "off by 0.3 K and 0.64 µm (median rms over 3 outputs and 1 recording, at worst 0.4 K and" in page
-    assert "sun: rms left [K, µm]" in page
+    assert (
+        "Its rms is 0.3 K and 0.64 µm (median rms over 3 outputs and 1 recording; largest: 0.4 K and" in page
+    )
+    assert "rms [K, µm], over all outputs of a unit" in page
     assert f"{float(np.sqrt((0.2**2 + 0.4**2) / 2)):.3f}, 0.64<" in page
     assert "T_head [K]" in page
     assert "dZ [µm]" in page
 
 
+def test_every_model_can_be_the_reference(folder: Path, page: str) -> None:
+    run = load_run(folder)
+    scores = [float(text) for text in re.findall(r'data-score="([^"]+)"', page)]
+    assert len(scores) == len(run.results["models"])
+    assert scores == sorted(scores)  # best first
+    more = np.exp(scores[-1] - scores[0])
+    assert more == pytest.approx(1 / ratio(run, "discovered", "superposition"), rel=1e-4)
+
+
+def test_a_simulated_machine_is_said_first_and_inputs_are_drawn(tmp_path: Path) -> None:
+    folder = sample.write_sample(tmp_path / "run")
+    results = json.loads((folder / "results.json").read_text())
+    (folder / "results.json").write_text(
+        json.dumps(results | {"simulated": True, "input_units": {"pump": "1"}})
+    )
+    inputs = {"validation": {"pump": {"time": [0, 3600], "value": [0, 1]}}}
+    (folder / "inputs.json").write_text(json.dumps(inputs))
+    page = write_report(folder).read_text("utf-8")
+    assert re.search(r'class="eyebrow">Simulated machine · ', page)
+    (chart,) = (one for one in _data(page)["charts"] if one["key"] == "validation-inputs")
+    assert chart["panels"][0]["label"] == "pump [-]"
+    (folder / "inputs.json").write_text('{"validation": {"pump": [1]}}')
+    with pytest.raises(UserError, match=r"inputs\.json: cannot be read"):
+        write_report(folder)
+
+
 def test_the_tables_beside_the_papers_name_units(page: str) -> None:
-    tables = page[page.index("The models compared") :]
+    tables = page[page.index("Comparison of the models") :]
     assert re.search(r"E_Y0C \[µm\]\s*</t[hd]>", tables)
     assert re.search(r"E_A0C \[µm/m\]\s*</t[hd]>", tables)
     assert "mean square about the mean (in the square of the unit)" in tables
@@ -167,7 +196,7 @@ def test_a_recording_that_was_fitted_decides_nothing(folder: Path) -> None:
     assert ratio(run, "discovered", "reduced") == before
 
 
-def test_the_missing_physics_is_told_with_size_and_certainty(page: str) -> None:
+def test_the_missing_physics_is_named_with_size_and_certainty(page: str) -> None:
     assert "flooded gap at c_body_1 and b_corpus (98 % sure)" in page
     assert "G_gap = 38.3 W/K (95 %: 35.1 to 41.6)" in page
     assert "less than 1 in 1000" in page
@@ -192,15 +221,15 @@ def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path
     }
     path.write_text(json.dumps(diagnosis))
     page = write_report(folder).read_text("utf-8")
-    assert "clock shift in fit (98 % sure); but the unseen “left” contradicts the repair." in page
+    assert "clock shift in fit (98 % sure); but the held-out “left” contradicts the repair." in page
     assert "Do not use the repaired model" in page
-    assert "The repair closes" not in page
+    assert "The repair removes" not in page
     held |= {"rms_after": 1.59, "gain_low": -0.1, "gain_high": 0.2}
     diagnosis["improvement"] = {"fit": {}, "held_out": {"left": held}, "explained": -0.002}
     path.write_text(json.dumps(diagnosis))
     page = write_report(folder).read_text("utf-8")
     assert "contradict" not in page
-    assert "The repair closes nothing of the gap" in page
+    assert "The repair removes none of this mismatch" in page
 
 
 @pytest.mark.parametrize(("unit", "said"), [("um", "µm"), ("times the reading noise",) * 2])
@@ -211,7 +240,7 @@ def test_the_proof_says_what_its_figures_are(tmp_path: Path, unit: str, said: st
     (folder / "diagnosis.json").write_text(json.dumps(diagnosis))
     page = write_report(folder).read_text("utf-8")
     assert f"0.6 → 0.5 {said} on validation" in page
-    assert f"all errors weighed by their noise [{said}]" in page
+    assert f"each weighted by its noise [{said}]" in page
 
 
 def test_what_came_closest_has_its_recording_and_hours_and_stands_once(tmp_path: Path) -> None:
@@ -226,7 +255,7 @@ def test_what_came_closest_has_its_recording_and_hours_and_stands_once(tmp_path:
     (tmp_path / "diagnosis.json").write_text(json.dumps(document))
     found = section(load_run(tmp_path))
     assert found
-    (table,) = (t for t in found["tables"] if t.title == "What came closest")
+    (table,) = (t for t in found["tables"] if t.title == "Closest effects of the catalogue")
     assert [row.cells for row in table.rows] == [
         ("unmeasured heat", "head in mon (10 to 14 h)", "60", "60 %"),
         ("unmeasured heat", "head in fri (10 to 30 min)", "50", "60 %"),
@@ -278,7 +307,7 @@ def test_without_diagnosis_and_discovered_model_those_parts_do_not_show(tmp_path
     assert "mismatch" not in ids
     assert "discovery" not in ids
     assert {"answer", "predictions", "comparison", "network", "reproduce"} <= set(ids)
-    assert "The hand-built model “thermobalance” predicts best" in page
+    assert "The given model “thermobalance” predicts best" in page
 
 
 def test_a_diagnosis_alone_makes_a_report(tmp_path: Path) -> None:
@@ -321,7 +350,7 @@ def test_a_comparison_counts_as_unseen_only_what_no_run_has_fitted(folder: Path,
     (other / "results.json").write_text(json.dumps(results))
     page = write_comparison([folder, other], tmp_path).read_text("utf-8")
     assert "discovered, second" in page
-    assert "judged on validation" in page
+    assert "compared on validation" in page
     with pytest.raises(UserError, match="two runs or more"):
         write_comparison([folder], tmp_path)
 

@@ -90,17 +90,18 @@ def units(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
             continue
         if channel.unit == "degC":
             for unit, factor, offset in _SCALES:
-                what, do = f"'{name}' looks like {unit} read as degC", f'say unit = "{unit}", or convert it'
+                what, do = f"'{name}' looks like {unit} read as degC", f'state unit = "{unit}", or convert it'
                 yield Repair("unit", (name,), what, do, one.having({name: factor * values + offset}))
             continue
         named = _FACTORS.get(channel.role, ())
         for factor, unit, meant in named:
             what = f"'{name}' looks like {unit} read as {meant}"
-            do = f"multiply it by {factor:g}, or say its unit"
+            do = f"multiply it by {factor:g}, or state its unit"
             yield Repair("unit", (name,), what, do, one.having({name: factor * values}))
         for factor, words in _ANY_FACTORS:
             if not any(abs(factor / f - 1) < 0.01 for f, _, _ in named):
-                what, do = f"'{name}' is {words} beside the other recordings", "look at its unit and scale"
+                what = f"'{name}' is {words} compared with the other recordings"
+                do = "check its unit and scale"
                 yield Repair("factor", (name,), what, do, one.having({name: factor * values}))
 
 
@@ -109,10 +110,10 @@ def signs(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
     for name in _moving(one, [*inputs, *outputs]):
         values = one.values[name]
         if _is_switch(values):
-            what, do = f"'{name}' is 1 where it should be 0", "turn the switch round"
+            what, do = f"'{name}' is 1 where it should be 0", "invert the switch"
             yield Repair("sign", (name,), what, do, one.having({name: 1.0 - values}))
         elif channels[name].unit != "degC":
-            what, do = f"'{name}' has the other sign than in the other recordings", "turn its sign"
+            what, do = f"'{name}' has the other sign than in the other recordings", "change its sign"
             yield Repair("sign", (name,), what, do, one.having({name: -values}))
 
 
@@ -133,17 +134,18 @@ def swaps(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
 def shifted(one: Seen, group: Sequence[str], seconds: float) -> Repair:
     """A channel, or all readings, that are late (early where below zero) by so many seconds."""
     said = f"'{group[0]}' is" if len(group) == 1 else "the readings are"
-    what = f"{said} {_duration(abs(seconds))} {'late' if seconds > 0 else 'early'} beside the other channels"
+    when = "late" if seconds > 0 else "early"
+    what = f"{said} {_duration(abs(seconds))} {when} compared with the other channels"
     moved = {name: _moved(one.time, one.values[name], seconds) for name in group if name in one.values}
-    return Repair("shift", tuple(group), what, "look at the clock of its logger", one.having(moved))
+    return Repair("shift", tuple(group), what, "check the clock of its logger", one.having(moved))
 
 
 def drifting(one: Seen, name: str, per_second: float) -> Repair:
     """An output that creeps away by so much a second."""
     whole = per_second * float(one.time[-1])
     made = one.values[name] - per_second * one.time
-    what = f"'{name}' drifts by {whole:.3g} over the recording, which nothing that was recorded explains"
-    return Repair("drift", (name,), what, "look at its zero and its holder", one.having({name: made}))
+    what = f"'{name}' drifts by {whole:.3g} over the recording; no recorded input explains it"
+    return Repair("drift", (name,), what, "check its zero and its holder", one.having({name: made}))
 
 
 def offset(one: Seen, name: str, since: float, size: float, unit: str) -> Repair:
@@ -151,8 +153,8 @@ def offset(one: Seen, name: str, since: float, size: float, unit: str) -> Repair
     made = one.values[name] - size * (one.time > since)
     side = "higher" if size > 0 else "lower"
     at = _duration(since)
-    what = f"'{name}' is {abs(size):.3g} {unit} {side} from {at} on, which nothing recorded explains"
-    do = "look at the sensor and its holder; split the recording there"
+    what = f"'{name}' is {abs(size):.3g} {unit} {side} from {at} on; no recorded input explains it"
+    do = "check the sensor and its holder; split the recording there"
     return Repair("offset", (name,), what, do, one.having({name: made}))
 
 
@@ -200,7 +202,7 @@ def halves(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequen
                     "halfway",
                     (name,),
                     what,
-                    "split the recording there, or mend it",
+                    "split the recording there, or correct it",
                     one.having({name: made}),
                 )
 
