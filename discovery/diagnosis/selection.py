@@ -117,8 +117,7 @@ class Search:
                 continue
             own = current.evidence - self.keep(without).evidence
             pool = _hopeful(scan.without[h.key], RIVALS, own if own < inf else -inf)
-            same = [c for c in scan.without[h.key] if c.hypothesis.effect.word == h.effect.word][:1]
-            best = self._refitted(without, others, [*pool, *(c for c in same if c.odds > 0)])
+            best = self._refitted(without, others, [*pool, *_alike(h, scan.without[h.key])])
             if max(best.evidence, without.evidence) > current.evidence:
                 return self._questioned(max(best, without, key=lambda a: a.evidence))
         return current
@@ -140,6 +139,15 @@ class Search:
             if one is not None and self.keep(one).evidence > best.evidence:
                 best = one
         return best
+
+
+def _alike(h: Hypothesis, claims: Sequence[Score]) -> list[Score]:
+    """The best claim of the same effect elsewhere, and of each one that it is confused with: of what looks
+    the same, the first order need not show which one is better.
+    """
+    words = (h.effect.word, *h.effect.confused_with)
+    found = [next((c for c in claims if c.hypothesis.effect.word == word), None) for word in words]
+    return [c for c in found if c is not None and c.odds > 0]
 
 
 def _hopeful(claims: Sequence[Score], most: int, reached: float = -inf) -> list[Score]:
