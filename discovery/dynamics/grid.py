@@ -20,6 +20,7 @@ Ints = NDArray[np.intp]
 
 MOST_NODES = 30_000  # of a recording as it is; beyond, it is coarsened
 COARSE_NODES = 8_000  # of a coarsened one, about; as many at most for its inputs' switches
+LONGEST_BLOCK = 120.0  # s, about; a recording of weeks has more nodes than these for its sake
 _SAME = 1e-6  # of its span: means of a held input that differ by less are one
 MOVED = 0.1  # of its span: a held input that moves so far within a block of a coarsened grid divides it
 
@@ -204,7 +205,7 @@ def make_grid(
     inputs: Iterable[str],
     outputs: Iterable[str],
     max_step: float = 600.0,
-    coarse: int = COARSE_NODES,
+    coarse: int | None = None,
     most: int = MOST_NODES,
 ) -> Grid:
     """Grid of a recording: every stamp of an input or a reading is a node, long intervals are divided.
@@ -218,7 +219,8 @@ def make_grid(
         inputs: channels that the model uses.
         outputs: channels that were measured and are to be compared with the model.
         max_step: longest interval [s]; linear terms are exact whatever it is.
-        coarse: blocks, about, where there are more nodes than `most`.
+        coarse: blocks, about, where there are more nodes than `most`; default COARSE_NODES, and as many as
+            keep a block within LONGEST_BLOCK.
         most: nodes of a grid that is left as it is.
 
     Raises:
@@ -252,6 +254,8 @@ def make_grid(
         return Grid(
             recording, time, samples, outputs, index, table[taken], spread, logged=logged, means=means
         )
+    if coarse is None:
+        coarse = max(COARSE_NODES, round(float(np.ptp(data.time)) / LONGEST_BLOCK))
     base = np.isin(rows, np.append(rows[:: -(-len(rows) // coarse)], rows[-1]))
     switched = _switches(rows, base, samples.values(), data.time, coarse)
     first = rows[base | switched]

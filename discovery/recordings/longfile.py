@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discovery.recordings.columns import Array, Columns
 from discovery.recordings.oddvalues import impossible_readings
@@ -105,7 +106,7 @@ class Reduction:
         while len(self.begin) > 2 * BLOCKS:
             self._halve()
 
-    def _block(self, time: Array, values: Mapping[str, Array], first: Array, end: float) -> None:
+    def _block(self, time: Array, values: Mapping[str, Array], first: NDArray[np.int64], end: float) -> None:
         from discovery.recordings.blocks import block_means, held_means
 
         new: dict[str, _Mean] = {}

@@ -69,6 +69,18 @@ def test_switches_keep_their_instants_and_ripple_its_mean() -> None:
     assert missed(switched(1, 0.0)) < 1e-5  # nodes at all switches: only a parabola between nodes is left
 
 
+def test_a_recording_of_months_is_not_averaged_over_what_its_body_does() -> None:
+    """115 days, a stamp every 20 s: blocks stay at two minutes, and a body of 20 minutes is met."""
+    rows, step, tau = 500_000, 20.0, 1200.0
+    u = np.repeat(np.random.default_rng(3).choice([0.0, 400.0, 1500.0], rows // 100), 100)
+    e = np.exp(-step / tau)
+    y = np.asarray(lfilter([0.0, GAIN * (1 - e)], [1.0, -e], u))
+    data = Campaign("c", CHANNELS, {"r": Recording("r", np.arange(rows) * step, {"u": u, "y": y})})
+    grid = make_grid(data, "r", ["u"], ["y"])
+    found = predict(simulate(make_system(model(), grid), {"tau": tau, "gain": GAIN}))
+    assert np.max(np.abs(found - grid.readings)) < 1e-3  # of 75 K
+
+
 def test_a_pulsed_heater_is_averaged() -> None:
     """On for 2 s of 6 s, more switches than nodes: its mean warms the body as it does, within the swing of a
     single pulse.
