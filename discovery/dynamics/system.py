@@ -331,7 +331,7 @@ def predict(trajectory: Trajectory) -> Array:
                 f"{grid.time[grid.read][lost][0]:.0f} s after the start of recording '{grid.recording}'; "
                 "check what it divides by and what log(), sqrt() and ** are taken of"
             )
-    return np.column_stack(columns)
+    return np.ascontiguousarray(columns.T)
 
 
 def output_matrix(trajectory: Trajectory, nodes: Ints | None = None) -> Array:

@@ -148,9 +148,9 @@ def _recording_findings(
     print_of = fingerprint(columns.time, [v for c, v in values.items() if channels[c].measured])
     whole = None
     if columns.runs_forward and len(values) == len(channels):
-        known = {c: _plausible(channels[c], v) for c, v in values.items()}
+        plausible = {c: _plausible(channels[c], v) for c, v in values.items()}
         time = columns.time - columns.time[0]
-        whole = Seen(name, file, time, known, columns.lines, frozenset(recording.set))
+        whole = Seen(name, file, time, plausible, columns.lines, frozenset(recording.set))
     return findings, print_of, whole
 
 

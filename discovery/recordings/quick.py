@@ -218,6 +218,7 @@ class Clock:
             )
             self.origin = _instant(shown.as_py()).isoformat()
         counts = np.frombuffer(b"".join(chunk.buffers()[1].to_pybytes() for chunk in ticks.chunks), np.int64)
+        assert isinstance(self.first, int)
         return np.asarray((counts - self.first) * _SECONDS[unit])
 
     def _parsed(self, stamps: Any) -> Array:

@@ -75,7 +75,9 @@ def test_a_recording_of_months_is_not_averaged_over_what_its_body_does() -> None
     u = np.repeat(np.random.default_rng(3).choice([0.0, 400.0, 1500.0], rows // 100), 100)
     e = np.exp(-step / tau)
     y = np.asarray(lfilter([0.0, GAIN * (1 - e)], [1.0, -e], u))
-    data = Campaign("c", CHANNELS, {"r": Recording("r", np.arange(rows) * step, {"u": u, "y": y})})
+    data = Campaign(
+        "c", CHANNELS, {"r": Recording("r", np.asarray(np.arange(rows) * step, float), {"u": u, "y": y})}
+    )
     grid = make_grid(data, "r", ["u"], ["y"])
     found = predict(simulate(make_system(model(), grid), {"tau": tau, "gain": GAIN}))
     assert np.max(np.abs(found - grid.readings)) < 1e-3  # of 75 K
@@ -121,7 +123,7 @@ def test_outputs_that_are_read_at_other_stamps_are_compared_where_they_were_read
         "rare": np.where(rng.random(ROWS) < 0.003, y, np.nan),
     }
     channels = CHANNELS | {name: replace(CHANNELS["y"], name=name) for name in ("z", "rare")}
-    data = Campaign("c", channels, {"r": Recording("r", np.arange(ROWS) * STEP, values)})
+    data = Campaign("c", channels, {"r": Recording("r", np.asarray(np.arange(ROWS) * STEP, float), values)})
     grid = make_grid(data, "r", ["u"], ["y", "z", "rare"])
     several = replace(model(), outputs={"z": parse("y"), "rare": parse("y")})
     found = predict(simulate(make_system(several, grid), several.values()))

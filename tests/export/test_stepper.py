@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -110,7 +112,7 @@ def test_a_step_that_is_not_finite_changes_nothing() -> None:
     assert stepper.step(np.array([np.inf])) is None
     assert stepper.x == before.x
     assert stepper.count == before.count
-    y = stepper.step(np.array([np.e]))
+    y = stepper.step(np.array([math.e]))
     assert y is not None
     assert y[0] == pytest.approx(2.0)
 

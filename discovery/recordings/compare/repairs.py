@@ -118,7 +118,7 @@ def signs(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
 
 
 def swaps(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]) -> Iterator[Repair]:
-    """Two channels in each other's columns. Readings that only settle, with no input that moves, cannot say."""
+    """Two channels in each other's columns. Readings that only settle, with no input moving, cannot say."""
     for group in (inputs, outputs if _moving(one, inputs) else ()):
         # of the two one may stand still here: a heater that was off
         names, moving = _recorded(one, group), set(_moving(one, group))
