@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from itertools import count
 
 from discovery.terms import Apply, Expression, Name, Number, Term, names, substitute
@@ -172,17 +173,19 @@ def read_at_start(model: Model, outputs: Collection[str]) -> Model:
         if states[name].start_sd is None or states[name].memory:
             states[name] = replace(states[name], start=Name(output), start_sd=None, read_as=output)
     for output in sorted(outputs):
-        body = _read_in(model, model.outputs.get(output, Name(output)))
-        if body is None or body in shown:
+        found = _read_in(model, model.outputs.get(output, Name(output)))
+        if found is None or found[0] in shown:
             continue
-        if states[body].start is None or states[body].start_sd is None:
-            states[body] = replace(states[body], start=Name(output))
+        body, more = found
+        if states[body].start is None or (more is None and states[body].start_sd is None):
+            start = Name(output) if more is None else Apply("-", (Name(output), more))
+            states[body] = replace(states[body], start=start)
     return replace(model, states=states)
 
 
-def _read_in(model: Model, expression: Expression) -> str | None:
-    """The state that an output shows once everything that remembers has settled, apart from what no state
-    changes; None where there is none or more than one.
+def _read_in(model: Model, expression: Expression) -> tuple[str, Expression | None] | None:
+    """The state that an output shows once everything that remembers has settled, and what it shows in
+    addition, which no state changes (None: nothing); None where it shows none or more than one.
     """
     followed = {t.into: t.expression for t in model.terms if t.into in model.states}
     memories: dict[str, Expression] = {}
@@ -195,7 +198,10 @@ def _read_in(model: Model, expression: Expression) -> str | None:
     parts = _addends(rewrite(rewrite(expression, _settled), _short))
     bodies = [part.id for part in parts if isinstance(part, Name) and part.id in model.states]
     held = [part for part in parts if names(part) & model.states.keys()]
-    return bodies[0] if len(bodies) == len(held) == 1 else None
+    if not len(bodies) == len(held) == 1:
+        return None
+    rest = [part for part in parts if part is not held[0]]
+    return bodies[0], reduce(lambda a, b: Apply("+", (a, b)), rest) if rest else None
 
 
 def _addends(expression: Expression) -> list[Expression]:

@@ -54,7 +54,10 @@ def layout(head: bytes, wanted: Collection[str]) -> Layout | None:
         header = first_line.decode("utf-8-sig").rstrip("\r")
     except UnicodeDecodeError:
         return None
-    names = [name.strip() for name in next(csv.reader([header]), [])]
+    try:
+        names = [name.strip() for name in next(csv.reader([header]), [])]
+    except csv.Error:  # a carriage return within the line: for the careful reader
+        return None
     doubtful = (
         header.count('"') % 2 == 1 or any('"' in name for name in names) or len(set(names)) < len(names)
     )
