@@ -15,7 +15,7 @@ demo: $(STAMP)
 	@echo "The report: runs/demonstration/report.html"
 
 test: $(STAMP)
-	$(BIN)/pytest -n auto
+	$(BIN)/pytest -n auto --dist worksteal
 
 # Beside PySINDy, solve_ivp and least_squares; stops where a job has become slower by half
 benchmarks: $(STAMP)
