@@ -17,7 +17,7 @@ demo: $(STAMP)
 test: $(STAMP)
 	$(BIN)/pytest -n auto --dist worksteal
 
-# Beside PySINDy, solve_ivp and least_squares; stops where a job has become slower by half
+# Against PySINDy, solve_ivp and least_squares; stops where a job has become slower by half
 benchmarks: $(STAMP)
 	$(BIN)/python -m benchmarks.side_by_side
 	$(BIN)/python -m benchmarks.compare

@@ -1,7 +1,7 @@
 """Whether the workbench has become slower: python -m benchmarks.compare
 
 Measures the ratios of benchmarks/side_by_side.py anew and holds them against benchmarks/figures.json.
-Status 1 where a job takes half as long again as it did, beside the reference that runs on the same machine.
+Status 1 where a job takes half as long again as it did, next to the reference that runs on the same machine.
 """
 
 from __future__ import annotations

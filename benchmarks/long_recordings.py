@@ -2,7 +2,7 @@
 
 Two (`x1`: one) recordings of a body that a drive heats, 10 readings a second, every row with ripple on the
 power and noise on two readings. `discovery run` fits the body in a process of its own; printed are its
-seconds, its largest memory, and each number of the model with the width of its 95 % interval beside what
+seconds, its largest memory, and each number of the model with the width of its 95 % interval next to what
 all readings can give. By default for 1e5, 1e6 and 1e7 rows each in Parquet.
 """
 

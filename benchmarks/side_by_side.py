@@ -1,4 +1,4 @@
-"""The workbench beside what else one would use for the same job: python -m benchmarks.side_by_side [--store]
+"""The workbench and what else one would use for the same job: python -m benchmarks.side_by_side [--store]
 
 Prints seconds of processor time, the least of several, of both, their ratio, and that they agree.
 `--store` writes the ratios to benchmarks/figures.json; `python -m benchmarks.compare` holds new ones against

@@ -21,7 +21,7 @@ MOST = 6  # effects at once
 REFITS = 5  # claims that are refitted at each step
 RIVALS = 3  # ... in the place of another one
 HOPE = 4.0  # log odds below those of the model without it from which a claim is not refitted
-HALF = 0.5  # of the best log odds: claims that reach it are refitted
+HALF = 0.6  # of the best log odds: claims that reach it are refitted
 FAR = 40.0  # log evidence below the best from which a model is not scored again
 
 Keys = frozenset[Key]
@@ -116,7 +116,10 @@ class Search:
             if scan is None or without is None:
                 continue
             own = current.evidence - self.keep(without).evidence
-            pool = _hopeful(scan.without[h.key], RIVALS, own if own < inf else -inf)
+            reached = (
+                own if own < inf else -inf
+            )  # what is left has a size of the wrong sign: nothing is reached
+            pool = _hopeful(scan.without[h.key], RIVALS, reached)
             best = self._refitted(without, others, [*pool, *_alike(h, scan.without[h.key])])
             if max(best.evidence, without.evidence) > current.evidence:
                 return self._questioned(max(best, without, key=lambda a: a.evidence))

@@ -160,8 +160,8 @@ def fit_model(
         left = [problem.residual(t) for t in solution.trajectories]
         settled = True
         if noise is None:
-            alone = [r * s.grid.per_reading for r, s in zip(left, problem.systems, strict=True)]
-            updated = white_noise(problem.outputs, stated, alone, least)
+            single = [r * s.grid.per_reading for r, s in zip(left, problem.systems, strict=True)]
+            updated = white_noise(problem.outputs, stated, single, least)
             change = max(abs(np.log(a / b)) for a, b in zip(updated.white, current.white, strict=True))
             settled, current = change < 0.02, updated
         if nuisance:
@@ -222,7 +222,7 @@ def _first_noise(
     """
     readings = [system.grid.readings for system in problem.systems]
     most = white_noise(problem.outputs, stated, readings, least)
-    left = [problem.residual(problem.run(s, theta)) for s in problem.systems]
+    left = [problem.residual(problem.run(s, theta)) * s.grid.per_reading for s in problem.systems]
     begun = white_noise(problem.outputs, stated, left, least)
     white = [min(a, b) if np.isfinite(a) else b for a, b in zip(begun.white, most.white, strict=True)]
     return replace(most, white=tuple(white))

@@ -187,12 +187,7 @@ def _read_in(model: Model, expression: Expression) -> tuple[str, Expression | No
     """The state that an output shows once everything that remembers has settled, and what it shows in
     addition, which no state changes (None: nothing); None where it shows none or more than one.
     """
-    followed = {t.into: t.expression for t in model.terms if t.into in model.states}
-    memories: dict[str, Expression] = {}
-    for name, state in model.states.items():
-        match followed.get(name):
-            case Apply("/", (Apply("-", (inner, _)), _)) if state.memory:
-                memories[name] = inner
+    memories = _fed_with(model)
     while memories.keys() & names(expression):
         expression = substitute(expression, memories)
     parts = _addends(rewrite(rewrite(expression, _settled), _short))
@@ -202,6 +197,16 @@ def _read_in(model: Model, expression: Expression) -> tuple[str, Expression | No
         return None
     rest = [part for part in parts if part is not held[0]]
     return bodies[0], reduce(lambda a, b: Apply("+", (a, b)), rest) if rest else None
+
+
+def _fed_with(model: Model) -> dict[str, Expression]:
+    """By memory of an expanded model: what it follows, and shows once it has settled."""
+    found: dict[str, Expression] = {}
+    for term in model.terms:
+        match term.expression:
+            case Apply("/", (Apply("-", (inner, _)), _)) if model.states[term.into].memory:
+                found[term.into] = inner
+    return found
 
 
 def _addends(expression: Expression) -> list[Expression]:
@@ -263,13 +268,10 @@ def with_settled_memories(model: Model) -> Model:
     """An expanded model whose memories start with what they are fed with, as expressions: what has no solver
     for balances (a controller) starts there, too.
     """
-    states = dict(model.states)
-    for name in [n for n, state in states.items() if state.memory and state.start is None]:
+    states, fed = dict(model.states), _fed_with(model)
+    for name in [n for n in states if n in fed and states[n].start is None]:
         starts = {s: state.start for s, state in states.items() if state.start is not None}
-        followed = next((t.expression for t in model.terms if t.into == name), None)
-        match followed:
-            case Apply("/", (Apply("-", (inner, _)), _)):
-                states[name] = replace(states[name], start=rewrite(substitute(inner, starts), _settled))
+        states[name] = replace(states[name], start=rewrite(substitute(fed[name], starts), _settled))
     return replace(model, states=states)
 
 

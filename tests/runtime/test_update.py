@@ -48,7 +48,7 @@ def days(
 
 def days_of(machine: Campaign, plant: Model, count: int, readings: int = 8) -> Campaign:
     """The same days of a machine that is what its model says: only what was changed has changed. What a finer
-    plant makes of the comparison stands in `docs/runtime.md`.
+    plant makes of the comparison stands in `benchmarks/runtime.md`.
     """
     whole = days(machine, count, five_axis(), readings=readings)
     values = {name: p.value for name, p in plant.parameters.items()}
