@@ -24,6 +24,8 @@ Value = float | Array
 _FAR = 1e50  # in any unit: beyond it a model has run away, before its squares overflow
 _ROUNDS = 30  # of Newton on the trajectory
 _TOLERANCE = 1e-8  # largest change of a state in its unit, relative to 1 + its size
+_CLOSE = 1e-6  # change from which one step of Newton ends it
+_HELPS = 0.3  # factor by which steps with an old linearisation have to become shorter
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,7 @@ class Trajectory:
     system: System
     values: Mapping[str, float]
     x: Array  # (T, n)
+    a: Array  # (K, n, n) state matrices
     which: NDArray[np.int64]
     e: Array
     w0: Array
@@ -240,6 +243,18 @@ def _linearise(system: System, values: Mapping[str, float], x: Array) -> tuple[A
     return a, g0, g1
 
 
+def _rates(system: System, values: Mapping[str, float], x: Array) -> Array:
+    """What changes each state at both ends of each interval, (2 K, n)."""
+    env: dict[str, Array | float] = {**system.grid.ends, **values, **_state_ends(system, x)}
+    rates = np.zeros((2 * len(system.grid.step), len(system.states)))
+    found = system.rates(env, frozenset(), system.ends)
+    for dual, i, j in zip(found, system.into, system.source, strict=True):
+        rates[:, i] += system.scale[i] * dual.value
+        if j >= 0:
+            rates[:, j] -= system.scale[j] * dual.value
+    return rates
+
+
 def flows(trajectory: Trajectory) -> Array:
     """Size (K, n) of what flows through each state in each interval: the root of the sum of squares of its
     terms, W at a body, else a rate in the unit of the state per time unit.
@@ -261,23 +276,28 @@ def simulate(
     system: System,
     values: Mapping[str, float],
     start: Array | None = None,
-    guess: Array | None = None,
+    near: Trajectory | None = None,
 ) -> Trajectory:
     """Free run of a model on a recording.
+
+    Newton on the trajectory where terms are not linear. Most of its time goes into the exponentials of a new
+    linearisation, so that steps with the last one come first, as long as they help.
 
     Args:
         values: parameter values by name.
         start: (n,) start values; default the declared ones.
-        guess: (T, n) trajectory to start Newton from (nonlinear terms only).
+        near: a run close by, to begin from (nonlinear terms only).
 
     Raises:
         RunsAwayError: the trajectory does not stay finite.
     """
     first = start_values(system, values) if start is None else start
-    x = np.tile(first, (len(system.grid.time), 1)) if guess is None else guess
+    last = None if system.affine else near
+    x = last.x if last else np.tile(first, (len(system.grid.time), 1))
     before = 1.0
     for _ in range(1 if system.affine else _ROUNDS):
         with np.errstate(all="ignore"):
+            x = _nearer(system, values, first, last, x) if last else x
             a, g0, g1 = _linearise(system, values, x)
         which, e, w0, w1 = kernel.transitions(a, system.grid.step)
         new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
@@ -286,13 +306,36 @@ def simulate(
                 f"model '{system.model.name}' diverges on recording '{system.grid.recording}'; "
                 "check signs, bounds and start values of its parameters"
             )
-        change = np.max(np.abs(new - x) / (1.0 + np.abs(new)), initial=0.0)
-        x = new
+        change = _change(x, new)
+        x, last = new, Trajectory(system, dict(values), new, a, which, e, w0, w1)
         # Newton's steps shrink at least as fast as this one did, a first one to less than its square
         if change * min(1.0, change / before) < _TOLERANCE:
             break
         before = change
-    return Trajectory(system, dict(values), x, which, e, w0, w1)
+    assert last is not None
+    return last
+
+
+def _nearer(system: System, values: Mapping[str, float], first: Array, last: Trajectory, x: Array) -> Array:
+    """A trajectory (T, n) nearer to the solution, by steps with a linearisation that is there already."""
+    before = np.inf
+    for _ in range(_ROUNDS):
+        rates = _rates(system, values, x)
+        g0 = rates[0::2] - np.matmul(last.a, x[:-1, :, None])[:, :, 0]
+        g1 = rates[1::2] - np.matmul(last.a, x[1:, :, None])[:, :, 0]
+        new = kernel.trajectory(last.which, last.e, last.w0, last.w1, g0, g1, first)
+        change = _change(x, new)
+        if not change < _HELPS * before:  # also NaN
+            return x
+        x, before = new, change
+        if change < _CLOSE:
+            return x
+    return x
+
+
+def _change(old: Array, new: Array) -> float:
+    """Largest change of a state in its unit, relative to 1 + its size."""
+    return float(np.max(np.abs(new - old) / (1.0 + np.abs(new)), initial=0.0))
 
 
 def outputs(trajectory: Trajectory, wrt: frozenset[str] = frozenset()) -> list[Dual]:

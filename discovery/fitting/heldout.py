@@ -71,7 +71,7 @@ def predict_recording(
     if inputs:
         system = shifted(system, dict(zip(inputs, shift[: len(inputs)].tolist(), strict=True)))
     moved = dict(zip(spreads, shift[len(inputs) :].tolist(), strict=True))
-    return simulate(system, values, start_values(system, values, moved), trajectory.x)
+    return simulate(system, values, start_values(system, values, moved), trajectory)
 
 
 def _spread(system: System, state: State, white: Mapping[str, float]) -> float:

@@ -149,8 +149,8 @@ class Problem:
                 out[self.unknowns[i].name] = float(theta[i])
         return out
 
-    def run(self, system: System, theta: Array, guess: Array | None = None) -> Trajectory:
-        """Free run of a recording with the unknowns at `theta`."""
+    def run(self, system: System, theta: Array, near: Trajectory | None = None) -> Trajectory:
+        """Free run of a recording with the unknowns at `theta`; `near`: one close by, to begin from."""
         values = self.values(system, theta)
         mine = [(self.unknowns[i], float(theta[i])) for i in self.concerns(system)]
         offset = {u.name: value for u, value in mine if u.is_offset}
@@ -158,7 +158,7 @@ class Problem:
         if offset or late:
             system = shifted(system, offset, late)
         start = start_values(system, values, {u.name: value for u, value in mine if u.is_start})
-        return simulate(system, values, start, guess)
+        return simulate(system, values, start, near)
 
     def residual(self, trajectory: Trajectory) -> Array:
         """Readings minus model (R, Y), NaN where nothing was read."""

@@ -120,9 +120,9 @@ def solve(
 
 
 def _trajectories(problem: Problem, x: Array, near: _Run | None) -> tuple[Trajectory, ...]:
-    """Free runs at a place; `near`: a run close by, whose trajectories Newton begins from."""
-    guesses = {t.system.grid.recording: t.x for t in near.trajectories} if near else {}
-    return tuple(problem.run(s, x, guesses.get(s.grid.recording)) for s in problem.systems)
+    """Free runs at a place; `near`: a run close by, to begin from."""
+    known = {t.system.grid.recording: t for t in near.trajectories} if near else {}
+    return tuple(problem.run(s, x, known.get(s.grid.recording)) for s in problem.systems)
 
 
 def _filters(trajectories: tuple[Trajectory, ...], noise: Noise) -> Filters:

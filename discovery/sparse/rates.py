@@ -27,6 +27,8 @@ from discovery.terms import Apply, Expression, Name, Number, Term, names, parse,
 
 Array = NDArray[np.float64]
 
+ENOUGH = 1e-5  # relative change of the cost that ends a fit of the search
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -259,7 +261,10 @@ def refit(
     noise: Noise | None = None,
     max_rounds: int = 25,
 ) -> Fit:
-    """Fit from values that are already near; a given noise is kept, else it is estimated along the way."""
+    """Fit from values that are already near; a given noise is kept, else it is estimated along the way.
+
+    It ends where sizes are compared, not where the last digit stands: the chosen model is fitted once more.
+    """
     inside = {
         name: float(np.clip(value, model.parameters[name].min, model.parameters[name].max))
         for name, value in values.items()
@@ -273,4 +278,5 @@ def refit(
         noise=noise,
         grids=grids,
         max_rounds=max_rounds,
+        tolerance=ENOUGH,
     )
