@@ -71,18 +71,24 @@ def test_from_nothing_to_a_diagnosis_in_four_commands(desk: Path, monkeypatch: p
     assert "Physics is missing in “first order”" in page
 
 
-def test_values_in_fahrenheit_arrive_in_celsius(desk: Path) -> None:
+@pytest.fixture(scope="module")
+def one(desk: Path) -> Path:
+    """A project from one recording."""
+    result = CliRunner().invoke(app, ["new", str(desk / "one"), "--from", str(desk / "tuesday.csv")])
+    assert result.exit_code == 0, result.output
+    return desk / "one"
+
+
+def test_values_in_fahrenheit_arrive_in_celsius(one: Path) -> None:
     from discovery.recordings import load_campaign
 
-    result = CliRunner().invoke(app, ["new", str(desk / "one"), "--from", str(desk / "monday.csv")])
-    assert result.exit_code == 0, result.output
-    campaign = load_campaign(desk / "one")
-    with gzip.open(TCLAB / "random_both_01.csv.gz", "rt") as file:
+    campaign = load_campaign(one)
+    with gzip.open(TCLAB / "step_h1_up_090.csv.gz", "rt") as file:
         first = next(csv.DictReader(file))
     recording = campaign.recordings["first_part"]
     assert recording.values["Plate_1_temp"][0] == pytest.approx(float(first["T1"]), abs=1e-3)
-    assert recording.time[1] - recording.time[0] == pytest.approx(10.0, abs=0.02)
-    experiment = tomllib.loads((desk / "one" / "experiment.toml").read_text())
+    assert recording.time[1] - recording.time[0] == pytest.approx(2.0, abs=0.02)
+    experiment = tomllib.loads((one / "experiment.toml").read_text())
     assert (experiment["fit"], experiment["held_out"]) == (["first_part"], ["last_part"])
 
 
@@ -96,10 +102,8 @@ def test_a_room_that_nobody_measured_is_an_unknown_with_a_spread(desk: Path) -> 
     assert (load_campaign(desk / "room").channels["T_env"].spread or 0.0) >= 1.0
 
 
-def test_nothing_is_overwritten(desk: Path) -> None:
-    arguments = ["new", str(desk / "two"), "--from", str(desk / "monday.csv")]
-    assert CliRunner().invoke(app, arguments).exit_code == 0
-    again = CliRunner().invoke(app, arguments)
+def test_nothing_is_overwritten(one: Path, desk: Path) -> None:
+    again = CliRunner().invoke(app, ["new", str(one), "--from", str(desk / "tuesday.csv")])
     assert again.exit_code == 1
     assert "campaign.toml is there already" in again.stderr
 
