@@ -10,58 +10,79 @@ from numpy.typing import NDArray
 
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.proof import FreeRuns, Improvement, improvement
-from discovery.diagnosis.scored import Scored, with_effects
+from discovery.diagnosis.scored import ENOUGH, Scored, with_effects
 from discovery.dynamics.system import predict
-from discovery.effects.hypothesis import Hypothesis
+from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
-from discovery.evaluation.crossvalidation import folds
+from discovery.evaluation.crossvalidation import Fold, folds
 from discovery.fitting import fit_model, predict_recording
+from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
 
-def left_out(context: Context, answer: Scored, h: Hypothesis) -> Improvement | None:
-    """What an effect changes of free runs on recordings that are left out of the fit in turn.
+def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> dict[Key, Improvement | None]:
+    """What each of some effects of a model changes of free runs on recordings that are left out of the fit in
+    turn.
 
     Models are fitted anew to the others, and start, as those of an experiment are; rms in reading noises.
     None where nothing can be left out, or where recordings left out can say nothing of an effect because it
     does not act in all of them.
     """
-    if len(context.recordings) < 2 or h.recording is not None:
-        return None
-    rest = tuple(o for o in answer.hypotheses if o.key != h.key)
-    without = _residuals(context, answer, rest)
-    with_it = _residuals(context, answer, answer.hypotheses)
-    one = np.ones(len(context.outputs))
-    runs = [
-        FreeRuns(without[run], with_it.get(run), 1.0, one) for run in context.recordings if run in without
+    told = [h for h in chosen if h.recording is None] if len(context.recordings) > 1 else []
+    sets = [tuple(o for o in answer.hypotheses if o.key != h.key) for h in told]
+    tasks = [
+        (effects, fold)
+        for effects in ([answer.hypotheses, *sets] if told else [])
+        for fold in folds(context.campaign, context.recordings, blocks=0)
     ]
-    return improvement(runs, context.outputs) if runs else None
+    left: dict[frozenset[Key], dict[str, Array]] = {}
+    parts = side_by_side(lambda task: _residuals(context, answer, *task), tasks)
+    for (effects, _), part in zip(tasks, parts, strict=True):
+        left.setdefault(frozenset(o.key for o in effects), {}).update(part)
+    found: dict[Key, Improvement | None] = dict.fromkeys(h.key for h in chosen)
+    one = np.ones(len(context.outputs))
+    for h in told:
+        without, with_it = left[answer.keys - {h.key}], left[answer.keys]
+        runs = [
+            FreeRuns(without[run], with_it.get(run), 1.0, one) for run in context.recordings if run in without
+        ]
+        found[h.key] = improvement(runs, context.outputs) if runs else None
+    return found
 
 
-def _residuals(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> dict[str, Array]:
-    """Readings minus free run (R, Y) over the reading noise, of each recording that does not run away."""
+def _residuals(
+    context: Context, answer: Scored, chosen: Sequence[Hypothesis], fold: Fold
+) -> dict[str, Array]:
+    """Readings minus free run (R, Y) over the reading noise, of what is left out and does not run away."""
     model, found = with_effects(context.model, chosen), answer.fit.model.parameters
     model = model.with_values({n: found[n].value for n in model.free if n in found})
-    white, out = np.array(context.white.white), {}
-    for fold in folds(context.campaign, context.recordings, blocks=0):
-        kept = [r for r in context.recordings if r not in fold.recordings]
-        seen = replace(context.campaign, recordings={r: context.campaign.recordings[r] for r in kept})
-        grids = {r: context.grids[r] for r in kept}
-        try:
-            fit = fit_model(
-                model, seen, kept, context.outputs, grids=grids, belief=context.belief, begin=answer.fit
+    white = np.array(context.white.white)
+    kept = [r for r in context.recordings if r not in fold.recordings]
+    seen = replace(context.campaign, recordings={r: context.campaign.recordings[r] for r in kept})
+    grids = {r: context.grids[r] for r in kept}
+    out = {}
+    try:
+        fit = fit_model(
+            model,
+            seen,
+            kept,
+            context.outputs,
+            grids=grids,
+            belief=context.belief,
+            begin=answer.fit,
+            tolerance=ENOUGH,
+        )
+        for name in fold.recordings:
+            run = predict_recording(
+                fit.model,
+                context.campaign,
+                name,
+                context.outputs,
+                answer.noise.white,
+                context.grids[name],
             )
-            for name in fold.recordings:
-                run = predict_recording(
-                    fit.model,
-                    context.campaign,
-                    name,
-                    context.outputs,
-                    answer.noise.white,
-                    context.grids[name],
-                )
-                out[name] = (run.system.grid.readings - predict(run)) / white
-        except RunsAwayError:
-            continue
+            out[name] = (run.system.grid.readings - predict(run)) / white
+    except RunsAwayError:
+        pass
     return out

@@ -77,7 +77,8 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
     sure = _needed(context, found, answer, [n for n in probable if n.hypothesis.key not in refused])
     whole = found.tried.get(_keys(sure), answer)
-    refused |= {n.hypothesis.key: text for n in sure if (text := _idle_outside(context, whole, n.hypothesis))}
+    outside = left_out(context, whole, [n.hypothesis for n in sure])
+    refused |= {n.hypothesis.key: text for n in sure if (text := _idle(n.hypothesis, outside))}
     reasons = list(refused.values())
     named = tuple(n for n in sure if n.hypothesis.key not in refused)
     short = posterior.best.evidence - _alone(context, found, answer, named)
@@ -96,9 +97,9 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     return Verdict(MISSING if True in kinds else FAULT, answer, named, (), tuple(reasons))
 
 
-def _idle_outside(context: Context, whole: Scored, h: Hypothesis) -> str | None:
-    """Why an effect of a model is not named for what is left out of the fit; None where it may be."""
-    outside = left_out(context, whole, h)
+def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None:
+    """Why an effect is not named for what recordings left out of the fit show; None where it may be."""
+    outside = proofs[h.key]
     if outside is None or outside.explained >= thresholds.MATTERS:
         return None
     rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"

@@ -68,11 +68,12 @@ def test_a_scan_sees_the_effect_and_what_would_stand_without_it() -> None:
 
 def test_what_is_there_predicts_recordings_that_are_left_out() -> None:
     (h,) = wetted().hypotheses
-    found = left_out(dry(), wetted(), h)
+    event = claim_of(dry(), "unmeasured_heat", "bed", "r2")
+    proofs = left_out(dry(), wetted(), [h, event])
+    found = proofs[h.key]
     assert found is not None
     assert found.after < 1.2 < found.before
     assert found.low > 0
-    event = claim_of(dry(), "unmeasured_heat", "bed", "r2")
-    assert left_out(dry(), wetted(), event) is None  # other recordings say nothing of it
+    assert proofs[event.key] is None  # other recordings say nothing of it
     alone = replace(dry(), recordings=("r1",))
-    assert left_out(alone, wetted(), h) is None
+    assert left_out(alone, wetted(), [h]) == {h.key: None}
