@@ -90,7 +90,7 @@ def make_case(family: str, seed: int, plan: Plan, name: str = "") -> Case:
     world = draw_world(rng, FAMILIES[family], coloured=coloured)
     logs, key = conceal(rng, world, plan)
     key = {"effect": None, "states": []} | key | {"family": family, "kind": plan.kind} | _facts(world)
-    title = name or f"{world.machine.title}, case {seed}"
+    title = name or f"{world.machine.title} {seed}"
     return Case(case_files(title, world, logs, stated=bool(rng.uniform() < 0.5)), key)
 
 

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from discovery.challenge.prepare import adopt, draw_orders
 from discovery.cli import app
 from discovery.errors import UsageError
+from discovery.experiment import load_experiment
 from discovery.models import read_model
 from discovery.recordings import load_campaign
 from discovery.virtual import faults
@@ -64,6 +65,7 @@ def test_a_case_is_a_case_folder(kind: str, cases: dict[str, Case], tmp_path: Pa
     assert sorted(case.files) == sorted(
         [*(f"{r}.csv.gz" for r in "abc"), "baseline.toml", "campaign.toml", "experiment.toml"]
     )
+    assert load_experiment(tmp_path / "experiment.toml").fit == ("a", "b")  # every name may be that of a file
     assert (experiment["fit"], experiment["held_out"]) == (["a", "b"], ["c"])
     assert set(model.inputs) <= set(campaign.channels)
     for recording in campaign.recordings.values():
