@@ -102,7 +102,7 @@ class Context:
             return [(amplitude.plausible, thresholds.FACTOR, float(amplitude.sign))] * count
         if h.shown:
             return [
-                (thresholds.JUMP * noise / max(size, 1e-12), thresholds.JUMP_FACTOR, float(amplitude.sign))
+                (thresholds.JUMP * noise / max(size, 1e-12), thresholds.FACTOR, float(amplitude.sign))
                 for size, noise in self._shown(h)
             ]
         states = {t.into for t in h.terms}
@@ -189,7 +189,7 @@ def make_context(
         {n: size for n in inputs if (size := _largest(campaign, recordings, n)) > 0},
         frozenset(set(inputs) - set(model.inputs)),
         thresholds.ODDS,
-        thresholds.EVENT_ODDS,
+        thresholds.ODDS,
     )
     duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
     spacing = min(float(np.median(np.diff(g.time[g.read]))) for g in grids.values() if len(g.read) > 1)

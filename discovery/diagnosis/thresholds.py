@@ -25,12 +25,10 @@ UNKNOWN_FORCE = 3.0  # times the process noise of a body at level one: a latent 
 
 # --- effects ----------------------------------------------------------------------------------------------
 BELIEF = 0.5  # log of the factor within which the start values of a hand-built model are believed
-ODDS = 0.02  # prior odds of each effect of the catalogue to act, shared by the places where it can
-EVENT_ODDS = 0.02  # the same of events and faults in each recording
+ODDS = 0.02  # prior odds of an effect of the catalogue to act, over all places; of an event in each recording
 USUAL = 0.2  # median size of an effect: what it makes flow, as a share of the largest flow of the model
-FACTOR = 3.5  # 68 % of sizes lie within this factor of the median (log-normal: zero at zero)
+FACTOR = 3.5  # 68 % of sizes lie within this factor of their median (log-normal: zero at zero)
 JUMP = 8.0  # median size of what a sensor shows too much, in reading noises
-JUMP_FACTOR = 4.0
 
 # --- what is said -----------------------------------------------------------------------------------------
 SUREST = 0.98  # probability that is never exceeded: causes that nobody thought of
