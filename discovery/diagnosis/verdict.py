@@ -76,25 +76,42 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     probable = [n for n in candidates if n.probability >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
     sure = _needed(context, found, answer, [n for n in probable if n.hypothesis.key not in refused])
-    whole = found.tried.get(_keys(sure), answer)
-    outside = left_out(context, whole, [n.hypothesis for n in sure])
-    refused |= {n.hypothesis.key: text for n in sure if (text := _idle(n.hypothesis, outside))}
-    reasons = list(refused.values())
-    named = tuple(n for n in sure if n.hypothesis.key not in refused)
-    short = posterior.best.evidence - _alone(context, found, answer, named)
+    named, idle = _proved(context, found, answer, sure)
+    reasons = [*refused.values(), *idle.values()]
+    # what changes no free run outside the fit is not lacking either
+    rest = [m for m in posterior.models if not m.keys & idle.keys()]
+    best = max(rest or [posterior.best], key=lambda m: m.evidence)
+    short = best.evidence - _alone(context, found, answer, named)
     if short > max(thresholds.SHORT, thresholds.SMALL * found.gain):
-        if unknown := posterior.best.forced:
-            reasons.append(f"heat of unknown cause at {unknown} explains more than what can be named")
+        if best.forced:
+            reasons.append(f"heat of unknown cause at {best.forced} explains more than what can be named")
         reasons.append(f"what can be named explains too little (log evidence {short:.0f} below the best)")
         named = ()
     if not named and not reasons:
         reasons.append(f"no effect reaches a probability of {thresholds.NAMED:g}")
-    rest = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
-    reasons += _apart(found, answer, rest)
+    unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
+    reasons += _apart(found, answer, unsure)
     if not named:
         return Verdict(UNEXPLAINED, answer, (), candidates, tuple(reasons))
     kinds = {n.hypothesis.effect.is_physics for n in named}
     return Verdict(MISSING if True in kinds else FAULT, answer, named, (), tuple(reasons))
+
+
+def _proved(
+    context: Context, found: Search, answer: Scored, chosen: Sequence[Named]
+) -> tuple[tuple[Named, ...], dict[Key, str]]:
+    """Those that make free runs better outside the fit, and why each other one is not named."""
+    kept, idle = tuple(chosen), dict[Key, str]()
+    while kept:
+        whole = found.tried.get(_keys(kept), answer)
+        proofs = left_out(context, whole, [n.hypothesis for n in kept])
+        more = {n.hypothesis.key: text for n in kept if (text := _idle(n.hypothesis, proofs))}
+        if not more:
+            break
+        idle |= more
+        kept = tuple(n for n in kept if n.hypothesis.key not in more)
+        _alone(context, found, answer, kept)
+    return kept, idle
 
 
 def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None:

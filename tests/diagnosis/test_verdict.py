@@ -84,7 +84,11 @@ class Believed:
     """Each word has a probability; `best`: the most likely model with what is unknown."""
 
     words: dict[str, float]
-    best: Model
+    models: Sequence[Model]
+
+    @property
+    def best(self) -> Model:
+        return max(self.models, key=lambda m: m.evidence)
 
     def of_claim(self, h: Hypothesis) -> float:
         return self.words[h.effect.word]
@@ -110,7 +114,7 @@ def said(
     unknown: Model | None = None,
     gain: float = 10.0,
 ) -> Verdict:
-    chances = Believed(words, unknown or found.best)
+    chances = Believed(words, [*found.models, unknown] if unknown else found.models)
     return decide(cast(Context, world or World()), cast(Search, found), cast(Posterior, chances), gain)
 
 
@@ -223,6 +227,20 @@ def test_rivals_stand_in_the_place_of_one_effect() -> None:
         ("unmeasured_heat", 10.0),
     ]
     assert rivals["friction_speed"] == ()
+
+
+def test_what_changes_no_free_run_is_not_lacking(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other one adds 50 to the evidence and nothing to free runs: the first one is named alone."""
+    proofs = {FLUID.key: Improvement(1.0, 0.5, 0.5, -1.0, 1.0, {}), FRICTION.key: None}
+    idle = Improvement(1.0, 1.0, 0.5, -1.0, 1.0, {})
+    monkeypatch.setattr(
+        verdict, "left_out", lambda _, __, chosen: {h.key: proofs[h.key] or idle for h in chosen}
+    )
+    found = said(
+        pair(FLUID, FRICTION, 150.0, 100.0, 50.0), {"fluid_convection": 0.98, "friction_speed": 0.98}
+    )
+    assert [n.hypothesis for n in found.named] == [FLUID]
+    assert "does not make free runs better" in found.reasons[0]
 
 
 @pytest.mark.parametrize(
