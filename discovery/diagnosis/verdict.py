@@ -79,8 +79,8 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     named, idle = _proved(context, found, answer, sure)
     reasons = [*refused.values(), *idle.values()]
     # what changes no free run outside the fit is not lacking either
-    rest = [m for m in posterior.models if not m.keys & idle.keys()]
-    best = max(rest or [posterior.best], key=lambda m: m.evidence)
+    rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
+    best = max(rest, key=lambda m: m.evidence)
     short = best.evidence - _alone(context, found, answer, named)
     if short > max(thresholds.SHORT, thresholds.SMALL * found.gain):
         if best.forced:
