@@ -15,7 +15,7 @@ from discovery.sparse.gram import Gram
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.problem import Problem
 from discovery.sparse.ratedata import RateData, rough_noise
-from discovery.sparse.rates import extended_bic, linearised, refit, regress, without
+from discovery.sparse.rates import around, extended_bic, linearised, refit, regress, without
 from discovery.sparse.search import Terms
 
 
@@ -46,8 +46,8 @@ def grown(
     entered = list(growth.entered)
     noise = rough_noise(data)
     for _ in range(growth.most + 1):
-        model, _ = _fitted_with(data, model, labels, entered, growth, noise)
-        seen = linearised(_as_it_stands(data, model, noise))
+        model, fit = _fitted_with(data, model, labels, entered, growth, noise)
+        seen = linearised(around(fit, model, data.campaign))
         kept = [name for name in seen.names if name in entered or name not in labels]
         best = regress(seen, kept, options, partial(_next, library=len(labels)), 1).terms
         if len(best) == len(kept):
@@ -73,9 +73,9 @@ def _exchanged(
     right one out. From where all fit together, every set of that size is ranked anew.
     """
     entered = list(entered)
-    model, cost = _fitted_with(data, model, labels, entered, growth, noise)
+    model, fit = _fitted_with(data, model, labels, entered, growth, noise)
     for _ in range(growth.most):
-        seen = linearised(_as_it_stands(data, model, noise))
+        seen = linearised(around(fit, model, data.campaign))
         kept = [name for name in seen.names if name not in labels or name in growth.always]
         choice = regress(
             seen, kept, options, partial(_best_set, library=len(labels)), len(entered) - len(growth.always)
@@ -84,12 +84,12 @@ def _exchanged(
         if set(other) == set(entered):
             break
         tried, its = _fitted_with(data, model, labels, other, growth, noise)
-        dispersion = max(2 * min(cost, its) / seen.count, 1.0)
+        dispersion = max(2 * min(fit.cost, its.cost) / seen.count, 1.0)
         price = np.log(max(seen.count, 2)) + 2 * np.log(len(labels))
-        before, after = (2 * c / dispersion + len(k) * price for c, k in ((cost, entered), (its, other)))
+        before, after = (2 * c / dispersion + len(k) * price for c, k in ((fit.cost, entered), (its.cost, other)))
         if after >= before:
             break
-        entered, model, cost = other, tried, its
+        entered, model, fit = other, tried, its
     return model, entered
 
 
@@ -100,8 +100,8 @@ def _fitted_with(
     entered: Sequence[str],
     growth: Growth,
     noise: Noise,
-) -> tuple[Model, float]:
-    """The model with all candidates, fitted with those that entered (the others zero), and its cost."""
+) -> tuple[Model, Fit]:
+    """The model with all candidates, those that entered fitted and the others zero, and that fit."""
     small = without(model, [name for name in labels if name not in entered])
     starts = [{}, growth.restart] if growth.restart else [{}]
     fits = [
@@ -114,12 +114,7 @@ def _fitted_with(
         for name in labels
         if name not in entered
     }
-    return model.with_values(out | {name: fit.model.parameters[name].value for name in small.free}), fit.cost
-
-
-def _as_it_stands(data: RateData, model: Model, noise: Noise) -> Fit:
-    """The fit of a model around where it stands."""
-    return refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, noise, 1)
+    return model.with_values(out | {name: fit.model.parameters[name].value for name in small.free}), fit
 
 
 def _next(problem: Problem, library: int) -> Choice:
