@@ -86,7 +86,9 @@ def _exchanged(
         tried, its = _fitted_with(data, model, labels, other, growth, noise)
         dispersion = max(2 * min(fit.cost, its.cost) / seen.count, 1.0)
         price = np.log(max(seen.count, 2)) + 2 * np.log(len(labels))
-        before, after = (2 * c / dispersion + len(k) * price for c, k in ((fit.cost, entered), (its.cost, other)))
+        before, after = (
+            2 * c / dispersion + len(k) * price for c, k in ((fit.cost, entered), (its.cost, other))
+        )
         if after >= before:
             break
         entered, model, fit = other, tried, its

@@ -173,7 +173,9 @@ def around(fit: Fit, model: Model, campaign: Campaign) -> Fit:
     problem = replace(problem, unknowns=tuple(unknowns))
     runs = tuple(problem.run(s, theta) for s in problem.systems)
     size = len(theta)
-    return replace(fit, problem=problem, theta=theta, covariance=np.full((size, size), np.nan), trajectories=runs)
+    return replace(
+        fit, problem=problem, theta=theta, covariance=np.full((size, size), np.nan), trajectories=runs
+    )
 
 
 def linearised(fit: Fit) -> Linearised:
