@@ -59,6 +59,7 @@ ORDERS = (
         side=1.0,
     ),
     _order(16, "ten_days", "validation", 240.0, "random cycle of ten days, nozzle at 50 mm"),
+    _order(17, "nozzle_long", "nozzle", 72.0, "as `nozzle`, three times as long"),
 )
 
 CAMPAIGNS = {"nmv5000": (TITLE, ORDERS)}
