@@ -35,7 +35,7 @@ def piece(folder: Path, name: str, seed: int, wear: float, features: int) -> str
     effects = tuple(Request("wear", wear, (body,)) for body in ("c_body_1", "c_body_2")) if wear else ()
     table = pd.DataFrame(take(Order(name, "fit", seed, 24.0, effects=effects, age=1.0)).columns)
     read = np.flatnonzero(np.isfinite(table[ERRORS[0]]))
-    rows = [table.drop(columns=[c for c in table if c.startswith("E_")])]
+    rows = [table.drop(columns=[*ERRORS, "E_X0C"])]
     for k, i in enumerate(read[np.linspace(0, len(read) - 1, features).astype(int)]):
         error = ERRORS[k % len(ERRORS)]
         rows.append(pd.DataFrame({"time": [table["time"][i] + 1.0], error: [round(table[error][i], 2)]}))
