@@ -50,6 +50,7 @@ from discovery.threads import one_thread, side_by_side
 if TYPE_CHECKING:
     from discovery.diagnosis import Diagnosis
     from discovery.experiment.roles import Fold
+    from discovery.paper.chapter import Chapter
 
 
 @one_thread
@@ -100,10 +101,11 @@ def run(
         if found is not None and found.repaired is not None:
             name = _free_name("repaired", fitted)
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
-        progress("writing the report")
+        made = paper_chapters(experiment, fitted, findings, progress)  # while folds are under way
         further = roles_of(experiment, begun, progress)
+        progress("writing the report")
         if experiment.form.paper:
-            further |= paper_page(temporary, experiment, fitted, further, findings, progress)
+            further |= paper_page(temporary, experiment, made, further)
         seconds = clock.perf_counter() - began
         write_run(temporary, "run", experiment, fitted, _written(found), seconds, findings, further)
         write_report(temporary)
@@ -156,21 +158,34 @@ def roles_of(experiment: Experiment, begun: Iterator[Fold] | None, progress: Pro
     return {"role_matrix": leave_roles_out(experiment, begun, progress)}
 
 
-def paper_page(
-    folder: Path,
+def paper_chapters(
     experiment: Experiment,
     fitted: Mapping[str, Fitted],
-    further: Mapping[str, Any],
     findings: Sequence[Finding],
     progress: Progress = silent,
-) -> dict[str, Any]:
-    """Write paper.html; what results.json holds of it."""
-    from discovery.paper.page import chapters, write_page
+) -> list[Chapter]:
+    """The chapters of paper.html, all but that of the roles; none where the experiment has no [paper]."""
+    if experiment.form.paper is None:
+        return []
+    from discovery.paper.page import chapters
 
-    document = results_document("run", experiment, fitted, 0.0, findings, further)
-    results = document.model_dump(exclude_unset=True)
-    made = chapters(experiment, fitted, results, progress)
-    write_page(folder, experiment.name, made, results["command"])
+    document = results_document("run", experiment, fitted, 0.0, findings)
+    return chapters(experiment, fitted, document.model_dump(exclude_unset=True), progress)
+
+
+def paper_page(
+    folder: Path, experiment: Experiment, made: Sequence[Chapter], further: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Write paper.html; what results.json holds of it.
+
+    Args:
+        further: what results.json holds of the roles.
+    """
+    from discovery.paper.page import role_chapter, write_page
+
+    if further:
+        made = [*made, role_chapter(further["role_matrix"], experiment.campaign.channels)]
+    write_page(folder, experiment, made)
     return {"paper": {one.key: one.document() for one in made}}
 
 

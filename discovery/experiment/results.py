@@ -72,6 +72,11 @@ def write_run(
             write_atomic(folder / "predictions" / f"{recording}.csv", predictions_table(recording, fitted))
 
 
+def command_of(verb: str, experiment: Experiment) -> str:
+    """The command that makes a run, as one would type it."""
+    return shlex.join(["discovery", verb, str(experiment.path)])
+
+
 def results_document(
     verb: str,
     experiment: Experiment,
@@ -84,7 +89,7 @@ def results_document(
     channels = experiment.campaign.channels
     content = {
         "experiment": experiment.name,
-        "command": shlex.join(["discovery", verb, str(experiment.path)]),
+        "command": command_of(verb, experiment),
         "campaign": experiment.campaign.name,
         "campaign_file": str(experiment.campaign.path.resolve()),  # an export may start elsewhere
         "simulated": experiment.campaign.simulated,

@@ -124,14 +124,13 @@ def nozzle(m: Material) -> Chapter | None:
     for _, recording in wanted:
         start = _started(base.model.values())
         outputs = base.fit.problem.outputs
-        recordings = [*m.results["fit"], recording]
         try:
-            model = fit_model(start, campaign, recordings, outputs).model
+            fit = fit_model(start, campaign, [recording], outputs)
         except (RunsAwayError, UserError) as error:
             shows.append(f"{recording}: the fit failed: {error}")
             continue
         for name, what in (("b", "nozzle height"), ("m", "fluid velocity V_j")):
-            p = model.parameters[name]
+            p = widened(fit.model.parameters[name], fit.together)
             told = told_apart(p)
             rows.append((recording, what, p.value, p.low, p.high, "identified" if told else "not identified"))
             shows.append(
@@ -145,7 +144,7 @@ def nozzle(m: Material) -> Chapter | None:
         "V_j enters by Re^0.75.",
         (
             Table(
-                "Exponents found, 95 % intervals",
+                "Exponents found in one recording each, 95 % intervals with the correlation of the residuals",
                 ("Recording", "of", "value", "low", "high", ""),
                 tuple(rows),
             ),
@@ -156,6 +155,19 @@ def nozzle(m: Material) -> Chapter | None:
             "whatever h is.",
         ),
     )
+
+
+def widened(p: Parameter, together: float) -> Parameter:
+    """A parameter with its interval for readings of which `together` count as one (`Fit.together`).
+
+    >>> p = widened(Parameter(0.5, low=0.4, high=0.6), 4.0)
+    >>> round(p.low, 3), round(p.high, 3)
+    (0.3, 0.7)
+    """
+    if p.low is None or p.high is None:
+        return p
+    far = max(together, 1.0) ** 0.5
+    return replace(p, low=p.value - far * (p.value - p.low), high=p.value + far * (p.high - p.value))
 
 
 def told_apart(p: Parameter) -> bool:

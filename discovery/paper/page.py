@@ -11,6 +11,7 @@ from discovery.evaluation.paper import SOURCE
 from discovery.evaluation.rolematrix import left_out, matrix, steadiness
 from discovery.experiment.experiment import Experiment
 from discovery.experiment.fitted import Fitted
+from discovery.experiment.results import command_of
 from discovery.files import write_atomic
 from discovery.paper.active_figures import section_3, section_4
 from discovery.paper.chapter import Chapter, Material
@@ -18,6 +19,7 @@ from discovery.paper.film import equation_6, nozzle
 from discovery.paper.influences import budgets, equation_8
 from discovery.paper.machine import figure_2, figure_3, symmetric
 from discovery.progress import Progress, silent
+from discovery.recordings import Channel
 from discovery.report.page import fill
 from discovery.report.printed import printed
 
@@ -51,7 +53,7 @@ def chapters(
     """The chapters of the page, in the order of the paper.
 
     Args:
-        results: content of results.json, with "role_matrix" where the experiment names roles.
+        results: content of results.json, as far as it is known before the roles are left out.
     """
     assert experiment.form.paper is not None
     material = Material(experiment, fitted, results, experiment.form.paper)
@@ -64,15 +66,17 @@ def chapters(
             chapter = Chapter(name.replace(" ", "-"), f"{name}: not made", "", not_shown=(str(error),))
         if chapter is not None:
             made.append(chapter)
-    if results.get("role_matrix"):
-        made.append(role_chapter(results))
     return made
 
 
-def role_chapter(results: Mapping[str, Any]) -> Chapter:
-    """Cross-validation over roles: what the paper's validation cycle and nozzle tests ask, for every role."""
-    roles, units = results["role_matrix"], results["units"]
+def role_chapter(roles: Mapping[str, Any], channels: Mapping[str, Channel]) -> Chapter:
+    """Cross-validation over roles: what the paper's validation cycle and nozzle tests ask, for every role.
+
+    Args:
+        roles: "role_matrix" of results.json.
+    """
     errors = list(dict.fromkeys(e for model in roles["models"].values() for e in model["rms"]))
+    units = {error: channels[error].unit for error in errors}
     lost = [f"{name} {line}" for name, model in roles["models"].items() for line in model["lost"]]
     return Chapter(
         "roles",
@@ -109,13 +113,13 @@ def _worst(roles: Mapping[str, Any]) -> list[str]:
     return out
 
 
-def write_page(folder: Path, name: str, made: Sequence[Chapter], command: str) -> Path:
+def write_page(folder: Path, experiment: Experiment, made: Sequence[Chapter]) -> Path:
     """Write paper.html into a run folder: one file, no network."""
     charts = [chart for one in made for chart in one.charts]
     view = {
-        "title": f"{name}: the paper, figure by figure",
+        "title": f"{experiment.name}: the paper, figure by figure",
         "source": SOURCE,
-        "command": command,
+        "command": command_of("run", experiment),
         "not_repeated": NOT_REPEATED,
         "chapters": [
             {

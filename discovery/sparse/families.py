@@ -88,6 +88,7 @@ def _family(
     room = room or (air[0] if air else f"{inputs.reference:g}")
     heat = inputs.of(*HEAT)
     speeds = inputs.of("rotation speed")
+    sides = inputs.of("nozzle side")
     conserved = model.states[state].capacity is not None
     partners = [name for name in (states[: states.index(state)] if conserved else states) if name != state]
 
@@ -111,7 +112,9 @@ def _family(
             wet += [
                 (name, f"{inputs.gate}*(abs({n}) > 1)*({name} - {state})") for name in fluid for n in speeds
             ]
-            return towards(*wet) + plain(*(f"{inputs.gate}*{name}" for name in heat))
+            # a jet that points aside wets more of one body and less of another
+            aside = [f"{inputs.gate}*{side}*({name} - {state})" for name in fluid for side in sides]
+            return towards(*wet) + plain(*aside, *(f"{inputs.gate}*{name}" for name in heat))
         case "rotation":
             powers = [f"({name}/1000)**{power:g}" for name in speeds for power in (1.5, 2, 3)]
             return plain(*powers) + towards(*((room, f"({name}/1000)*({room} - {state})") for name in speeds))

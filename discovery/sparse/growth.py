@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -15,8 +15,10 @@ from discovery.sparse.gram import Gram
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.problem import Problem
 from discovery.sparse.ratedata import RateData, rough_noise
-from discovery.sparse.rates import extended_bic, linearised, refit, regress, without
+from discovery.sparse.rates import around, extended_bic, linearised, refit, regress, without
 from discovery.sparse.search import Terms
+
+_ALIKE = 1e-4  # of the cost: two fits that differ by less ended at the same place
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ class Growth:
     enter.
 
     A baseline that lacks something large is bent by its fit; so each fit also starts from the values
-    `restart` that the baseline had before, and the better one counts.
+    `restart` that the baseline had before, and the better one counts, until both have ended alike twice.
     """
 
     entered: tuple[str, ...] = ()
@@ -45,9 +47,13 @@ def grown(
     """
     entered = list(growth.entered)
     noise = rough_noise(data)
+    before = False
     for _ in range(growth.most + 1):
-        model, _ = _fitted_with(data, model, labels, entered, growth, noise)
-        seen = linearised(_as_it_stands(data, model, noise))
+        model, fit, alike = _fitted_with(data, model, labels, entered, growth, noise)
+        if alike and before:  # the bend is gone
+            growth = replace(growth, restart={})
+        before = alike and bool(entered)
+        seen = linearised(around(fit, model, data.campaign))
         kept = [name for name in seen.names if name in entered or name not in labels]
         best = regress(seen, kept, options, partial(_next, library=len(labels)), 1).terms
         if len(best) == len(kept):
@@ -73,9 +79,9 @@ def _exchanged(
     right one out. From where all fit together, every set of that size is ranked anew.
     """
     entered = list(entered)
-    model, cost = _fitted_with(data, model, labels, entered, growth, noise)
+    model, fit, _ = _fitted_with(data, model, labels, entered, growth, noise)
     for _ in range(growth.most):
-        seen = linearised(_as_it_stands(data, model, noise))
+        seen = linearised(around(fit, model, data.campaign))
         kept = [name for name in seen.names if name not in labels or name in growth.always]
         choice = regress(
             seen, kept, options, partial(_best_set, library=len(labels)), len(entered) - len(growth.always)
@@ -83,13 +89,15 @@ def _exchanged(
         other = [seen.names[f] for f in choice.terms.members if seen.names[f] in labels]
         if set(other) == set(entered):
             break
-        tried, its = _fitted_with(data, model, labels, other, growth, noise)
-        dispersion = max(2 * min(cost, its) / seen.count, 1.0)
+        tried, its, _ = _fitted_with(data, model, labels, other, growth, noise)
+        dispersion = max(2 * min(fit.cost, its.cost) / seen.count, 1.0)
         price = np.log(max(seen.count, 2)) + 2 * np.log(len(labels))
-        before, after = (2 * c / dispersion + len(k) * price for c, k in ((cost, entered), (its, other)))
+        before, after = (
+            2 * c / dispersion + len(k) * price for c, k in ((fit.cost, entered), (its.cost, other))
+        )
         if after >= before:
             break
-        entered, model, cost = other, tried, its
+        entered, model, fit = other, tried, its
     return model, entered
 
 
@@ -100,8 +108,10 @@ def _fitted_with(
     entered: Sequence[str],
     growth: Growth,
     noise: Noise,
-) -> tuple[Model, float]:
-    """The model with all candidates, fitted with those that entered (the others zero), and its cost."""
+) -> tuple[Model, Fit, bool]:
+    """The model with all candidates, those that entered fitted and the others zero; that fit, and whether the
+    fits from all starts ended alike.
+    """
     small = without(model, [name for name in labels if name not in entered])
     starts = [{}, growth.restart] if growth.restart else [{}]
     fits = [
@@ -109,17 +119,14 @@ def _fitted_with(
         for start in starts
     ]
     fit = min(fits, key=lambda one: one.cost)
+    alike = max(one.cost for one in fits) <= (1 + _ALIKE) * fit.cost
     out = {
         name: float(np.clip(0.0, model.parameters[name].min, model.parameters[name].max))
         for name in labels
         if name not in entered
     }
-    return model.with_values(out | {name: fit.model.parameters[name].value for name in small.free}), fit.cost
-
-
-def _as_it_stands(data: RateData, model: Model, noise: Noise) -> Fit:
-    """The fit of a model around where it stands."""
-    return refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, noise, 1)
+    whole = model.with_values(out | {name: fit.model.parameters[name].value for name in small.free})
+    return whole, fit, alike
 
 
 def _next(problem: Problem, library: int) -> Choice:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid
 from discovery.errors import UserError
-from discovery.fitting import Fit, Noise, Unknown, fit_model
+from discovery.fitting import Fit, Noise, Unknown, fit_model, make_problem
 from discovery.models import Model, Parameter
 from discovery.recordings import Campaign
 from discovery.sparse.choice import Choice
@@ -27,7 +27,7 @@ from discovery.terms import Apply, Expression, Name, Number, Term, names, parse,
 
 Array = NDArray[np.float64]
 
-ENOUGH = 1e-5  # relative change of the cost that ends a fit of the search
+_ENOUGH = 1e-5  # relative change of the cost that ends a fit: far below what a term has to bring
 
 
 @dataclass(frozen=True)
@@ -160,6 +160,24 @@ class Linearised:
         return sum(int(np.isfinite(one).sum()) for one in self.target)
 
 
+def around(fit: Fit, model: Model, campaign: Campaign) -> Fit:
+    """The fit of a smaller model as one of `model`, which adds terms to it: nothing is fitted.
+
+    The added coefficients are as `model` has them, and known to nothing: there is no covariance.
+    """
+    grids = {s.grid.recording: s.grid for s in fit.problem.systems}
+    problem = make_problem(model, campaign, list(grids), fit.problem.outputs, grids)
+    known = {u.key: (u, value) for u, value in zip(fit.problem.unknowns, fit.theta, strict=True)}
+    unknowns = [replace(u, prior=known[u.key][0].prior) if u.key in known else u for u in problem.unknowns]
+    theta = np.array([known[u.key][1] if u.key in known else u.start for u in unknowns])
+    problem = replace(problem, unknowns=tuple(unknowns))
+    runs = tuple(problem.run(s, theta) for s in problem.systems)
+    size = len(theta)
+    return replace(
+        fit, problem=problem, theta=theta, covariance=np.full((size, size), np.nan), trajectories=runs
+    )
+
+
 def linearised(fit: Fit) -> Linearised:
     """Linearise a fit: rows J theta + residual against J."""
     problem, sd = fit.problem, np.array(fit.noise.white)
@@ -278,5 +296,5 @@ def refit(
         noise=noise,
         grids=grids,
         max_rounds=max_rounds,
-        tolerance=ENOUGH,
+        tolerance=_ENOUGH,
     )

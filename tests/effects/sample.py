@@ -30,6 +30,7 @@ CHANNELS = {
     "chiller": Channel("chiller", "cooling power", "W", None, "held"),
     "cut": Channel("cut", "other input", "W", None, "held"),
     "spray": Channel("spray", "fluid flow", "l/min", None, "held"),
+    "side": Channel("side", "nozzle side", "1", None, "held"),
     "rack": Channel("rack", "temperature", "degC", None, "linear"),
     "E_Y": Channel("E_Y", "error", "um", 0.5, "linear"),
     "E_Z": Channel("E_Z", "error", "um", 0.5, "linear"),
@@ -45,7 +46,15 @@ TERMS = (
 )
 UNITS = {"G_mt": "W/K", "loss": "1", "cold": "1", "P_b": "W", "hA": "W/K", "hF": "W/K"}
 RUNS = ("one", "two")
-HIGH = {"pump": 4.0, "rpm": 1000.0, "drive": 500.0, "chiller": 300.0, "cut": 2000.0, "spray": 9.0}
+HIGH = {
+    "pump": 4.0,
+    "rpm": 1000.0,
+    "drive": 500.0,
+    "chiller": 300.0,
+    "cut": 2000.0,
+    "spray": 9.0,
+    "side": 1.0,
+}
 OF_ERRORS = ("error state", "output of errors")  # places of models whose states are the errors
 EVERY, LONG = 600.0, 10800.0  # s, between readings and of a recording
 ODDS, EVENT_ODDS = 0.1, 0.05

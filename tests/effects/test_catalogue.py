@@ -95,7 +95,8 @@ def test_names_in_the_formula_mean_something(effect: Effect) -> None:
     assert used <= known
     assert {s.name for s in effect.shapes} <= used
     assert effect.amplitude.name in used or effect.place in (*TERM_PLACES, "inputs of a recording")
-    follows_any = bool(used & {INPUT, LEVEL}) and effect.place not in (*TERM_PLACES, "inputs of a recording")
+    replaced = effect.place in (*TERM_PLACES, "inputs of a recording")  # `input` is the channel there
+    follows_any = LEVEL in used or (INPUT in used and not replaced)
     assert bool(effect.roles) == follows_any  # without roles such an entry is offered nowhere
 
 

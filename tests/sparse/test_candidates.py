@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -128,6 +130,22 @@ def test_each_family_has_its_terms(family: str, asked: list[str], free: set[str]
     assert {text(c.expression) for c in mine if c.low == -np.inf} == free
     assert {text(c.expression) for c in mine if c.low == 0.0} == upwards
     assert len(mine) == len(free | upwards)
+
+
+def test_a_jet_that_points_aside_wets_more_of_one_body_and_less_of_another() -> None:
+    plain = campaign()
+    run = replace(
+        plain.recordings["r"], values={**plain.recordings["r"].values, "side": np.array([0.0, 1.0])}
+    )
+    channels = {**CHANNELS, "side": Channel("side", "nozzle side", "1", None, "held")}
+    aside = replace(plain, channels=channels, recordings={"r": run})
+    found = make_inputs(aside, ["r"], ["fluid", "pump", "side"])
+    model = Model("m", {}, {"a": State("a", "degC", 1e4, Number(20.0), 0.0, 1.0)}, (), {})
+    offers = candidates(["a"], model, aside, found, ["wet"], SparseOptions())
+    assert {(text(c.expression), c.low) for c in offers} == {
+        ("pump*(fluid - a)", 0.0),
+        ("pump*side*(fluid - a)", -np.inf),
+    }
 
 
 def test_bodies_of_known_capacity_exchange_their_heat_and_others_follow_each_other() -> None:

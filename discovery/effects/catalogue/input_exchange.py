@@ -19,6 +19,6 @@ EFFECT = Effect(
     signature="the body comes closer to the room, or less so, while a recorded input is on",
     confused_with=("input_heat", "rotating_air_convection"),
     source="VDI Heat Atlas, part G: forced convection of 10 to 100 W/m2K against 5 W/m2K of still air",
-    roles=("other input", "nozzle height", "nozzle side", "fluid flow"),
+    roles=("other input", "nozzle height", "fluid flow"),
     examples=(Example({"G_in": 6.0, "level": 0.5, "ambient": 20.0, "body": 30.0}, -30.0),),
 )

@@ -19,6 +19,6 @@ EFFECT = Effect(
     signature="two bodies come closer in temperature while a recorded input is on",
     confused_with=("flooded_gap", "conduction_path"),
     source="VDI Heat Atlas, part G: coefficients of forced convection follow the flow",
-    roles=("other input", "nozzle height", "nozzle side", "fluid flow"),
+    roles=("other input", "nozzle height", "fluid flow"),
     examples=(Example({"G_in": 20.0, "level": 0.5, "other": 30.0, "body": 25.0}, 50.0),),
 )

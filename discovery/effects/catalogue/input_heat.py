@@ -19,6 +19,6 @@ EFFECT = Effect(
     signature="the missing heat follows a recorded input",
     confused_with=("input_exchange", "unmeasured_heat"),
     source="heat balance of a lumped body (Incropera, DeWitt, ch. 5); heaters of 10 W to 1 kW",
-    roles=("other input", "nozzle height", "nozzle side", "fluid flow"),
+    roles=("other input", "nozzle height", "fluid flow"),
     examples=(Example({"q_in": 60.0, "level": 0.5}, 30.0),),
 )

@@ -50,6 +50,16 @@ ORDERS = (
     _order(
         14, "nozzle_flooded", "flooded", 24.0, "table turns under 8 to 16 l/min; height 20 to 400 mm in steps"
     ),
+    _order(
+        15,
+        "left_nozzle_second",
+        "validation",
+        72.0,
+        "nozzle on the left, second random cycle: to judge what was learned from the first",
+        side=1.0,
+    ),
+    _order(16, "ten_days", "validation", 240.0, "random cycle of ten days, nozzle at 50 mm"),
+    _order(17, "nozzle_long", "nozzle", 72.0, "as `nozzle`, three times as long"),
 )
 
 CAMPAIGNS = {"nmv5000": (TITLE, ORDERS)}
