@@ -54,7 +54,7 @@ _SPELLED = {
     "kWh": "kwh",
     "Wh": "wh",
     "A*h": "ah",
-    "1": "- 1 – — [-] -/- bool",
+    "1": "- 1 – — [-] -/- bool boolean 0/1 0|1 1/0 on/off off/on ein/aus aus/ein sí/no si/no oui/non",
 }
 _KNOWN = {word: unit for unit, words in _SPELLED.items() for word in words.split()}
 TIME_UNITS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
@@ -75,6 +75,7 @@ CLOCKS = re.compile(
     r"sekunden|minuten|stunden|laufzeit|messzeit|heure|temps|fecha|tiempo|tempo|ora|data|orario|tijd|t)\b|"
     r"(time|zeit|stamp)\b|zeit\b|時刻|時間|日時|日付|経過|时间|日期|시간|время|дата"
 )
+_DATE = re.compile(r"\b(date|datum|data|fecha|dato|dia|tag|jour|giorno)\b|дата|日付|日期")
 DEGREES = ("degC", "degF", "K")
 _SUPERSCRIPTS = str.maketrans("²³⁻¹", "23-1")
 
@@ -130,7 +131,11 @@ def unit_in(header: str) -> tuple[str, str] | None:
 
 
 def _belongs(name: str, unit: str) -> bool:
-    """Whether a single letter behind a name is its unit: T1_C is a temperature, Heater A is one of two."""
+    """Whether a word behind a name is its unit: T1_C is a temperature, Heater A is one of two, `Data/ora`
+    and `Fecha y hora` are the date and the time of day.
+    """
+    if time_unit(unit) and is_dated(name):
+        return False
     if len(unit) > 1 or unit in "%°":
         return True
     has = dimension_of(known_unit(unit) or "")
@@ -144,6 +149,15 @@ _WITH_UNIT = (
     re.compile(r"(.*?)\s*[,/:]\s*(\S+)"),
     re.compile(r"(.*?)[_ ]([^\s_]+(?:/[^\s_]+)?)"),
 )
+
+
+def is_dated(name: str) -> bool:
+    """Whether a name holds a word for date: an hour in it is then the time of day, no unit.
+
+    >>> is_dated("Data/ora"), is_dated("Tempo (ore)")
+    (True, False)
+    """
+    return bool(_DATE.search(fold(name)))
 
 
 def _is_unit(written: str, bracketed: bool) -> bool:

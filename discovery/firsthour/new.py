@@ -148,12 +148,13 @@ def _outputs(found: Recorded, guesses: Mapping[str, Guess]) -> list[str]:
 
 def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Guess]) -> list[str]:
     lines = []
-    runs = {run.path: run for run in found.recordings.values()}
     for table in tables:
-        run = runs.get(table.path, table)
-        length = sum(float(r.time[-1] - r.time[0]) for r in found.recordings.values() if r.path == table.path)
+        runs = [r for r in found.recordings.values() if (r.path, r.name) == (table.path, table.name)]
+        length = sum(float(run.time[-1] - run.time[0]) for run in runs)
+        sheet = f", sheet '{table.name}'" if table.name else ""
         lines.append(
-            f"{table.path.name}: {len(table.time)} rows over {_duration(length)}; time {run.about_time}"
+            f"{table.path.name}{sheet}: {len(table.time)} rows over {_duration(length)}; "
+            f"time {runs[-1].about_time}"
         )
         lines += [f"  {note}" for note in table.notes]
     lines += found.notes
