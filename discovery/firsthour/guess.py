@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.firsthour.evidence import OTHER, evidence
+from discovery.firsthour.evidence import OTHER, Evidence, evidence
 from discovery.firsthour.measures import DEGREES, unit_of
 from discovery.firsthour.odds import likely, probabilities
 from discovery.firsthour.shapes import Shape, shape
@@ -28,6 +28,7 @@ _SENT = 0.85  # that what a controller sends is what heats
 _HELD = 0.5  # share of readings that repeat the one before: what is set, not measured
 _NEXT = 0.02  # of an answer worth offering
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
+_ONE_OF_SEVERAL = re.compile(r"\d+|(?<![^\W\d_])(d ?)?[xyz](?![^\W\d_])")
 CURRENTS, VOLTAGES = ("A", "mA", "kA"), ("V", "mV", "kV")
 
 
@@ -64,7 +65,13 @@ class Guess:
 def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str, Guess]:
     """Role and unit of each column by name, and which error a correction belongs to."""
     hints = hints or {}
-    guesses = {column.name: guess(column, hints.get(column.name, ())) for column in columns}
+    found = {column.name: _evidence_of(column, hints.get(column.name, ())) for column in columns}
+    guesses = {
+        column.name: _guessed(
+            column, found[column.name], [found[other.name] for other in _alike(column, columns)]
+        )
+        for column in columns
+    }
     guesses = _one_scale(columns, guesses)
     guesses = _one_unit(columns, guesses)
     guesses = _the_fluid(_one_room(columns, guesses))
@@ -79,10 +86,35 @@ def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str
 
 def guess(column: Column, hints: Sequence[tuple[str, Mapping[str, float]]] = ()) -> Guess:
     """Role and unit of a column by itself."""
+    found = _evidence_of(column, hints)
+    return _guessed(column, found, [found])
+
+
+def _evidence_of(column: Column, hints: Sequence[tuple[str, Mapping[str, float]]]) -> Evidence:
+    return evidence(column.header, column.about, _unit_read(column), column.values, hints)
+
+
+def _unit_read(column: Column) -> str | None:
+    """The unit of the header where it is one."""
     spelled, named = unit_of(column.unit)
-    unit = named or (spelled if spelled and _known(spelled, OTHER) else None)
-    found = evidence(column.header, column.about, unit, column.values, hints)
-    roles = probabilities(found.roles())
+    return named or (spelled if spelled and _known(spelled, OTHER) else None)
+
+
+def _alike(column: Column, columns: Sequence[Column]) -> list[Column]:
+    """Columns of one unit whose names differ in a number or an axis alone, this one among them."""
+
+    def kind(one: Column) -> tuple[str, str]:
+        return _ONE_OF_SEVERAL.sub("#", fold(one.header)), one.unit
+
+    return [other for other in columns if kind(other) == kind(column)]
+
+
+def _guessed(column: Column, found: Evidence, alike: Sequence[Evidence]) -> Guess:
+    """Role and unit. `alike`: evidence of all columns of its kind, which have one role: the mean counts."""
+    spelled, named = unit_of(column.unit)
+    unit = _unit_read(column)
+    of_each = [one.roles() for one in alike]
+    roles = probabilities({role: float(np.mean([one[role] for one in of_each])) for role in of_each[0]})
     role, chance = next(iter(roles.items()))
     rivals = tuple((other, p) for other, p in roles.items() if other != role and p > _NEXT)
     why = found.why(role)

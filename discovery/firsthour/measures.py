@@ -17,7 +17,7 @@ _SPELLED = {
     "delta_degC": "deltak dk",
     "percent": "% pct percent prozent proz. パーセント %pwm %rh %r.h. %rf vh",
     "rpm": "rpm 1/min u/min u/min. umin upm r/min rev/min min-1 min^-1 min⁻¹ /min tr/min giri/min "
-    "ob/min 回転/分 r.p.m.",
+    "ob/min obr/min ot/min varv/min omw/min o/min 回転/分 r.p.m.",
     "1/s": "1/s s-1 s^-1 s⁻¹ rps rev/s",
     "W": "w watt watts ワット",
     "kW": "kw kilowatt",
@@ -72,7 +72,7 @@ _TIME = {word: unit for unit, words in _TIMES.items() for word in words.split()}
 # what a clock is called
 CLOCKS = re.compile(
     r"\b(time|zeit|datetime|timestamp|zeitstempel|date|datum|elapsed|seconds|minutes|hours|clock|stamp|uhrzeit|"
-    r"sekunden|minuten|stunden|laufzeit|messzeit|heure|temps|fecha|tiempo|tempo|ora|data|orario|tijd|t)\b|"
+    r"sekunden|minuten|stunden|laufzeit|messzeit|heure|temps|fecha|tiempo|tempo|ora|data|orario|tijd|czas|cas|horodatage|tid|t)\b|"
     r"(time|zeit|stamp)\b|zeit\b|時刻|時間|日時|日付|経過|时间|日期|시간|время|дата"
 )
 _DATE = re.compile(r"\b(date|datum|data|fecha|dato|dia|tag|jour|giorno)\b|дата|日付|日期")
