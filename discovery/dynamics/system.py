@@ -97,8 +97,21 @@ def start_values(
     """Start values (n,): an expression at the first instant, or the balance of the state's terms there.
 
     Args:
-        moved: how far states begin from that; memories are settled with it.
+        moved: how far states begin from that. Starts whose expression names the moved state follow, memories
+            are settled with it.
     """
+    free = balanced(system)
+    out = _balanced(system, values, _declared(system, values, {}), free)
+    if not moved:
+        return out
+    begun = _declared(system, values, moved)
+    for i, name in enumerate(system.states):
+        out[i] = out[i] + moved.get(name, 0.0) if i in free else begun[i]
+    return _balanced(system, values, out, memories(system, free))
+
+
+def _declared(system: System, values: Mapping[str, float], moved: Mapping[str, float]) -> Array:
+    """Starts (n,) by expression, of channels, parameters and the starts of states above; 0 without one."""
     known: dict[str, float] = {**first_values(system.grid), **values}
     out = np.zeros(len(system.states))
     for i, name in enumerate(system.states):
@@ -106,17 +119,14 @@ def start_values(
         if start is None:
             continue
         try:
-            out[i] = float(np.mean(evaluate(start, known, memory=None).value))
+            out[i] = float(np.mean(evaluate(start, known, memory=None).value)) + moved.get(name, 0.0)
         except KeyError as missing:
             raise UserError(
                 f"model '{system.model.name}': the start of state '{name}' needs {missing}, "
                 f"which recording '{system.grid.recording}' does not give"
             ) from None
-    free = balanced(system)
-    out = _balanced(system, values, out, free)
-    for name, change in (moved or {}).items():
-        out[system.states.index(name)] += change
-    return _balanced(system, values, out, memories(system, free)) if moved else out
+        known.setdefault(name, out[i])  # a channel of that name is its first reading
+    return out
 
 
 def balanced(system: System) -> list[int]:
