@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from discovery.dynamics.system import (
     outputs,
     rates_at_start,
     shifted,
+    starts_follow,
 )
 from discovery.terms import evaluate, names
 
@@ -130,12 +131,14 @@ def _start_slopes(
     trajectory: Trajectory, parameters: Sequence[str], starts: Sequence[str], total: int
 ) -> Array:
     """Slopes of the start values, (n, M)."""
-    system, count = trajectory.system, len(parameters)
+    system, wanted = trajectory.system, frozenset(parameters)
     start = np.zeros((len(system.states), total))
-    follows = list(_start_partials(trajectory, parameters))
-    for i, of_parameters, of_states in follows:
+    for i, state in enumerate(system.model.states.values()):
         # one that also moves freely does so around what its formula says
-        start[i, :count] = of_parameters + of_states @ start[:, :count]
+        if state.start is not None and not wanted.isdisjoint(names(state.start)):
+            known = {**first_values(system.grid), **trajectory.values}
+            for name, slope in evaluate(state.start, known, wanted).partials.items():
+                start[i, parameters.index(name)] = float(np.mean(slope))
     free = balanced(system)
     wrt = [*dict.fromkeys((*system.states, *parameters))]
     slopes = rates_at_start(system, trajectory.values, trajectory.x[0], wrt)[1] if free else np.zeros((0, 0))
@@ -149,28 +152,9 @@ def _start_slopes(
 
     if free:
         settle(free)
+    follow = starts_follow(system) if starts else np.zeros((0, 0))
     for k, name in enumerate(starts):
-        start[system.states.index(name), count + k] += 1.0
-    for i, _, of_states in follows:
-        start[i, count : count + len(starts)] += of_states @ start[:, count : count + len(starts)]
+        start[:, len(parameters) + k] += follow[:, system.states.index(name)]
     if starts and (late := memories(system, free)):
         settle(late)
     return start
-
-
-def _start_partials(trajectory: Trajectory, parameters: Sequence[str]) -> Iterator[tuple[int, Array, Array]]:
-    """Of each declared start: place of the state, slopes with parameters, slopes with starts of others."""
-    system = trajectory.system
-    read = first_values(system.grid)
-    known = {**dict(zip(system.states, trajectory.x[0].tolist(), strict=True)), **read, **trajectory.values}
-    place = {name: i for i, name in enumerate(system.states) if name not in read}
-    wanted = frozenset((*parameters, *place))
-    for i, state in enumerate(system.model.states.values()):
-        if state.start is None or wanted.isdisjoint(names(state.start)):
-            continue
-        partials = evaluate(state.start, known, wanted).partials
-        of_parameters = [float(np.mean(partials.get(name, 0.0))) for name in parameters]
-        of_states = np.zeros(len(system.states))
-        for name in partials.keys() & place.keys():
-            of_states[place[name]] = float(np.mean(partials[name]))
-        yield i, np.array(of_parameters), of_states

@@ -97,21 +97,9 @@ def start_values(
     """Start values (n,): an expression at the first instant, or the balance of the state's terms there.
 
     Args:
-        moved: how far states begin from that. Starts whose expression names the moved state follow, memories
-            are settled with it.
+        moved: how far states begin from that, and with them the states whose starts follow; memories are
+        settled with it.
     """
-    free = balanced(system)
-    out = _balanced(system, values, _declared(system, values, {}), free)
-    if not moved:
-        return out
-    begun = _declared(system, values, moved)
-    for i, name in enumerate(system.states):
-        out[i] = out[i] + moved.get(name, 0.0) if i in free else begun[i]
-    return _balanced(system, values, out, memories(system, free))
-
-
-def _declared(system: System, values: Mapping[str, float], moved: Mapping[str, float]) -> Array:
-    """Starts (n,) by expression, of channels, parameters and the starts of states above; 0 without one."""
     known: dict[str, float] = {**first_values(system.grid), **values}
     out = np.zeros(len(system.states))
     for i, name in enumerate(system.states):
@@ -119,14 +107,26 @@ def _declared(system: System, values: Mapping[str, float], moved: Mapping[str, f
         if start is None:
             continue
         try:
-            out[i] = float(np.mean(evaluate(start, known, memory=None).value)) + moved.get(name, 0.0)
+            out[i] = float(np.mean(evaluate(start, known, memory=None).value))
         except KeyError as missing:
             raise UserError(
                 f"model '{system.model.name}': the start of state '{name}' needs {missing}, "
                 f"which recording '{system.grid.recording}' does not give"
             ) from None
-        known.setdefault(name, out[i])  # a channel of that name is its first reading
-    return out
+    free = balanced(system)
+    out = _balanced(system, values, out, free)
+    if moved:
+        out += starts_follow(system) @ np.array([moved.get(name, 0.0) for name in system.states])
+    return _balanced(system, values, out, memories(system, free)) if moved else out
+
+
+def starts_follow(system: System) -> Array:
+    """How far each state begins off its start (rows) where another one is moved by one (columns), (n, n)."""
+    found = np.eye(len(system.states))
+    for i, state in enumerate(system.model.states.values()):
+        for other, part in state.start_with.items():
+            found[i] += part * found[system.states.index(other)]
+    return found
 
 
 def balanced(system: System) -> list[int]:

@@ -14,6 +14,7 @@ from discovery.fitting.noise import readings_as_one
 from discovery.sparse.folds import Ints, bootstraps, choose
 from discovery.sparse.gram import Gram
 from discovery.sparse.problem import Problem, equal_shares
+from discovery.sparse.pursuit import POINTS
 from discovery.sparse.search import Search, Terms, on_grid
 
 Array = NDArray[np.float64]
@@ -42,12 +43,11 @@ def chosen(problem: Problem) -> Choice:
     ends at the slow end of the time constants. Terms then share a time constant where the criterion is
     better for it.
     """
-    problem = _with_spread(problem)
+    problem = _with_parts(_with_spread(problem))
     while True:
         search = problem.search()
         path = search.path(problem.max_terms)
-        left = problem.residuals(on_grid(path[-1], problem.families))
-        effective = search.g.count / readings_as_one([r[:, None] for r in left])
+        effective = _effective(problem, search, path[-1])
         worth = partial(_criterion, problem, search.g, effective)
         folds = problem.folds()
         errors = _left_out(problem, folds, path, int(np.argmin([worth(one) for one in path])) + 1)
@@ -101,6 +101,29 @@ def _with_spread(problem: Problem) -> Problem:
         if score < least:
             best, least = tried, score
     return best
+
+
+def _with_parts(problem: Problem) -> Problem:
+    """The problem with the prior that no response has a part in the readings much larger than its share.
+
+    The parts of n responses add up to what the readings move: each is believed normal with 1/n of its
+    variance. Inputs that follow each other, as a cooling power follows the load, could otherwise have gains
+    that cancel; on what was left out of the same recordings these do as well as smaller ones.
+    """
+    if not (problem.families.count >= POINTS).any():
+        return problem
+    search = problem.search()
+    largest = search.path(problem.max_terms)[-1]
+    moved = search.g.square - search.of(problem.always).gain
+    left = max(search.g.square - largest.gain, 1e-12 * search.g.square)
+    share = left / max(moved, left) / _effective(problem, search, largest)
+    return replace(problem, parts=share * len(largest))
+
+
+def _effective(problem: Problem, search: Search, terms: Terms) -> float:
+    """How many independent readings there are, as what a set leaves of them says."""
+    left = problem.residuals(on_grid(terms, problem.families))
+    return float(search.g.count / readings_as_one([r[:, None] for r in left]))
 
 
 def _criterion(problem: Problem, g: Gram, effective: float, terms: Terms) -> float:

@@ -64,7 +64,7 @@ def discover(
     began = clock.perf_counter()
     inputs = make_inputs(campaign, recordings, options.inputs)
     roles = {campaign.channels[name].role for name in outputs}
-    forms = _forms(roles, options)
+    together = False  # whether all outputs are masses
     if options.built_on_file:
         progress("terms on the baseline")
         parts = [_on_file(campaign, recordings, outputs, inputs, options, folder or campaign.path.parent)]
@@ -72,10 +72,12 @@ def discover(
         progress("terms of " + ", ".join(outputs))
         parts = [discover_temperatures(campaign, recordings, outputs, inputs, options)]
     else:
+        forms = _forms(roles, options)
         groups = [list(outputs)] if _coupled(outputs, options) else [[name] for name in outputs]
         parts = [_best(campaign, recordings, group, inputs, forms, options, progress) for group in groups]
+        together = forms == ("masses",)
     found = joined("discovered", parts, 0.0)
-    if not options.built_on_file and forms == ("masses",):
+    if together:
         found = _begun(found, campaign, recordings, outputs, options)
     found.report["seconds"] = round(clock.perf_counter() - began, 2)
     return found

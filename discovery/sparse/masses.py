@@ -24,7 +24,7 @@ from discovery.terms import Number, Term, evaluate, parse, text
 Array = NDArray[np.float64]
 
 _AT = 1e-3  # share of a bound that counts as at it
-_OWN = 1e-4  # of the variance of a start, that the starts of other masses never tell
+_OWN = 1e-4  # of the variance of a start, which the starts of other masses never tell
 QUICKER = 10.0  # times below the grid that the time constant of a fit may go
 
 
@@ -148,17 +148,17 @@ def starts_of(fit: Fit) -> Model:
         return fit.model
     mean, covariance = _population(fit)
     states = dict(fit.model.states)
-    away = {
-        n: f"({n} - ({text(states[n].start or Number(0.0))}) - {m:.6g})"
-        for n, m in zip(order, mean, strict=True)
-    }
     for i, name in enumerate(order):
-        above = covariance[:i, :i] + 1e-9 * np.diag(np.diag(covariance)[:i])
+        above = covariance[:i, :i] + _OWN * np.diag(np.diag(covariance)[:i])
         follows = np.linalg.solve(above, covariance[:i, i])
-        rest = max(covariance[i, i] - follows @ covariance[:i, i], (_OWN * covariance[i, i]))
-        parts = [f"{b:.6g}*{away[other]}" for b, other in zip(follows, order[:i], strict=True)]
-        begun = " + ".join([text(states[name].start or Number(0.0)), f"{mean[i]:.6g}", *parts])
-        states[name] = replace(states[name], start=parse(begun), start_sd=float(np.sqrt(rest)))
+        rest = max(covariance[i, i] - follows @ covariance[:i, i], _OWN * covariance[i, i])
+        declared = states[name].start or Number(0.0)
+        states[name] = replace(
+            states[name],
+            start=parse(f"{text(declared)} + {mean[i]:.6g}"),
+            start_sd=float(np.sqrt(rest)),
+            start_with=dict(zip(order[:i], follows.tolist(), strict=True)),
+        )
     return replace(fit.model, states=states)
 
 

@@ -5,7 +5,7 @@ searched.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -41,6 +41,7 @@ class Problem:
     tolerance: float = 1.0  # standard errors by which a sparser set may be worse on what was left out
     bootstraps: int = 0
     seed: int = 0
+    parts: float = 0.0  # precision of the part that a family has in the readings, of what it moves there
 
     @cached_property
     def grams(self) -> tuple[dict[int, Gram], ...]:
@@ -68,7 +69,22 @@ class Problem:
 
     def search(self, weights: Array | None = None) -> Search:
         """Moves between sets on the pooled normal equations."""
-        return Search(self.pooled(weights), self.families, self.always)
+        return Search(self._believed(self.pooled(weights)), self.families, self.always)
+
+    def _believed(self, g: Gram) -> Gram:
+        """Normal equations with the prior of the parts: rho |X_f theta_f|^2 of each family f, what is always
+        in the set (the offset) taken out of X_f.
+        """
+        if not self.parts:
+            return g
+        fixed = self.families.start[self.always]
+        inverse = np.linalg.pinv(g.matrix[np.ix_(fixed, fixed)])
+        matrix = g.matrix.copy()
+        for first, count in zip(self.families.start, self.families.count, strict=True):
+            mine = slice(first, first + count)
+            across = g.matrix[mine, fixed]
+            matrix[mine, mine] += self.parts * (g.matrix[mine, mine] - across @ inverse @ across.T)
+        return replace(g, matrix=matrix)
 
     def folds(self) -> list[tuple[Ints, Search]]:
         """What is left out in each fold, and the search on the rest."""
