@@ -36,12 +36,14 @@ _LOST = 10.0  # times the error without a model: what is said of a model that ru
 
 # simplest first: name -> entry of an experiment file; INPUTS stands for the channels that drive the outputs
 CANDIDATES = {
-    "regression": '{ kind = "regression", inputs = [INPUTS] }',
+    "regression": '{ kind = "regression" }',
     "reduced": '{ kind = "reduced", inputs = [INPUTS] }',
     "first_order": '{ file = "model.toml" }',
     "two_masses": '{ file = "two_masses.toml" }',
     "discovered": '{ kind = "sindy", bootstraps = 0 }',
 }
+# what stands beside them to compare with, and is not tried here
+BESIDE = {"pysindy": '{ kind = "pysindy" }'}
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ QUANTITIES = (
     "fan",
 )
 PLACES = ("body", "air", "fluid", "coolant")
-SET_POINT = "set point"
+SET_POINT, CELL = "set point", "cell"
 
 # gloss (what stands for a word of another script in the name of a channel), log odds, words
 _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
@@ -195,6 +195,16 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         {"fluid": 8, "flow": 0.5},
         "fluid emulsion kss ~kuehlschmierstoff sump ~cutting_fluid tank ~切削液 ~切削油 "
         "~절삭유 ~クーラントタンク fluide lubrifiant lubrorefrigerante",
+    ),
+    (
+        "inlet",
+        {"fluid": 6},
+        "inlet inflow ~zulauf ~eintritt ~einlass entree ingresso entrada ~入口",
+    ),
+    (
+        CELL,
+        {},
+        "cell cells battery batteries batt pack ~batterie akku ~akkus zelle accu bateria ~電池 ~电池 soc ocv",
     ),
     (
         "coolant",

@@ -106,6 +106,23 @@ def _guessed(*columns: tuple[str, str, float, float]) -> dict[str, Guess]:
     )
 
 
+def test_a_spring_a_cell_and_a_vessel() -> None:
+    """What answers is an output, whatever moves it; nothing is heated by a valve."""
+    ring, pulses = np.sin(np.arange(200) / 5), np.arange(200) // 30 % 3 * 5.0
+    spring = guess_all([Column("F_N", "F", "N", ring), Column("x_m", "x", "m", ring / 9)])
+    assert [one.role for one in spring.values()] == ["other input", "other output"]
+    warm = Column("T_cell", "T_cell", "degC", 20 + np.arange(200) / 50)
+    cell = guess_all([Column("I", "I", "A", pulses), Column("U", "U", "V", 3 + ring / 9), warm])
+    assert [one.role for one in cell.values()] == ["other input", "other output", "temperature"]
+    vessel = guess_all([Column("Valve", "Valve", "%", pulses), Column("p", "p", "bar", 2 + ring)])
+    assert [one.role for one in vessel.values()] == ["other input", "other output"]
+
+
+def test_sensors_on_the_machine_are_inputs_of_its_errors() -> None:
+    found = _guessed(("n", "rpm", 0, 900), ("T nut", "degC", 20, 30), ("X", "um", 0, 9))
+    assert [one.role for one in found.values()] == ["rotation speed", "other input", "error"]
+
+
 def test_columns_named_alike_have_one_role() -> None:
     """A sensor that jumps is known by its sisters; X and Z of one probe are both errors."""
     calm, jumpy = np.linspace(20, 30, 50), 20 + 10.0 * (np.arange(50) // 9 % 2) + np.arange(50) / 97
