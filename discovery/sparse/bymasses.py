@@ -61,6 +61,7 @@ def discover_masses(
         data.drives.linear,
         data.drives.settled,
         integrals=[d for d in data.drives.integrals if d not in options.forbid],
+        zeroed=campaign.channels[output].role == "error",
     )
     search = SparseSearch(
         library,
@@ -86,6 +87,7 @@ def discover_masses(
         options.bounds,
         (float(library.taus_[0]), float(library.taus_[-1])),
         choice.start_sd,
+        library.zeroed,
     )
     model, left = _clear(rules, features, choice, campaign, recordings, grids, options)
     return Discovery(model, *_evidence(output, features, left, over(choice, noise), library))

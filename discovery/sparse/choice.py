@@ -79,28 +79,31 @@ def evidence(problem: Problem, terms: Terms) -> Choice:
 def _with_spread(problem: Problem) -> Problem:
     """The problem with the spread of start values that makes its readings most likely (empirical Bayes).
 
-    -2 log p = n log(cost/n) + log det(1 + spread^2 D'D/m), with D the decays of each trajectory over the
-    noise.
+    -2 log p = n log(cost/n) + log det(1 + P^-1 D'D), with D the decays of each trajectory over the noise and
+    P the precisions of the starts. Where trajectories have zeros of their own, masses may begin closer to
+    their declared starts than these.
     """
     counts = [d.shape[1] for d in problem.nuisance]
     if not all(counts):
         return problem
-    values = [
-        np.linalg.eigvalsh(d[np.isfinite(y)].T @ d[np.isfinite(y)])
-        for d, y in zip(problem.nuisance, problem.readings, strict=True)
-    ]
     size = float(np.nanstd(np.concatenate(problem.readings)))
-    best, least = problem, np.inf
-    for share in SPREADS:
-        spread = share * size
-        tried = replace(problem, start_sd=spread, precision=equal_shares(spread, counts))
-        search = tried.search()
-        left = max(search.g.square - search.path(tried.max_terms)[-1].gain, 1e-12 * search.g.square)
-        volume = sum(np.log1p(np.maximum(v, 0.0) * spread**2 / len(v)).sum() for v in values)
-        score = search.g.count * np.log(left / search.g.count) + volume
-        if score < least:
-            best, least = tried, score
-    return best
+
+    def tried(masses: float, zero: float) -> tuple[float, Problem]:
+        precision = equal_shares(masses * size, counts, zero * size if problem.zeroed else None)
+        one = replace(problem, start_sd=masses * size, zero_sd=zero * size, precision=precision)
+        search = one.search()
+        left = max(search.g.square - search.path(one.max_terms)[-1].gain, 1e-12 * search.g.square)
+        volume = 0.0
+        for d, y, own in zip(one.nuisance, one.readings, precision, strict=True):
+            scaled = d[np.isfinite(y)] / np.sqrt(own)
+            volume += float(np.linalg.slogdet(np.eye(len(own)) + scaled.T @ scaled)[1])
+        return search.g.count * np.log(left / search.g.count) + volume, one
+
+    found = {(share, share): tried(share, share) for share in SPREADS}
+    if problem.zeroed:
+        zero = min(found, key=lambda pair: found[pair][0])[1]
+        found |= {(share, zero): tried(share, zero) for share in SPREADS if share < zero}
+    return min(found.values(), key=lambda one: one[0])[1]
 
 
 def _with_parts(problem: Problem) -> Problem:
@@ -179,20 +182,26 @@ def _missed(problem: Problem, terms: Terms, fold: Ints, errors: Array) -> None:
 def free_run(problem: Problem, terms: Terms, i: int) -> Array:
     """Prediction (R,) of a trajectory, zeroed on its first reading alone.
 
-    The same Bayesian step as `fitting.predict_recording`: the masses in use share what the first reading
-    says.
+    The same Bayesian step as `fitting.predict_recording`: the masses in use, and the zero of the trajectory,
+    share what the first reading says.
     """
     readings = problem.readings[i]
     predicted = problem.columns[i] @ on_grid(terms, problem.families)
     places = np.unique(terms.place[problem.curved(terms)])
     first = np.flatnonzero(np.isfinite(readings))
-    if not len(places) or not len(first):
+    if not len(places) + problem.zeroed or not len(first):
         return np.asarray(predicted)
-    low = np.minimum(places.astype(int), problem.nuisance[i].shape[1] - 2)
+    masses = problem.nuisance[i].shape[1] - problem.zeroed
+    low = np.minimum(places.astype(int), masses - 2)
     share = places - low
     decays = (1 - share) * problem.nuisance[i][:, low] + share * problem.nuisance[i][:, low + 1]
+    if problem.zeroed:
+        decays = np.column_stack([decays, problem.nuisance[i][:, -1]])
     decay = decays[first[0]]
-    gain = decay / (decay @ decay + problem.start_sd**-2.0)
+    sd = np.full(len(decay), problem.start_sd)
+    if problem.zeroed:
+        sd[-1] = problem.zero_sd
+    gain = decay * sd**2 / (decay**2 @ sd**2 + 1.0)
     return np.asarray(predicted + decays @ gain * (readings[first[0]] - predicted[first[0]]))
 
 

@@ -53,6 +53,7 @@ class Rules:
     bounds: Mapping[str, tuple[float, float]]
     time_constants: tuple[float, float]  # s
     start_sd: float
+    zeroed: bool = False  # each recording has a zero of its own
 
 
 def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
@@ -88,6 +89,8 @@ def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
                 states[state] = replace(states[state], start=parse(begun))
             terms.append(Term(f"{drive} through {state}", state, parse(f"{driven}/{tau}")))
         parameters[gain] = Parameter(r.gain, per, low, high)
+    if rules.zeroed and responses:
+        states[f"{y}_zero"] = State(f"{y}_zero", unit, None, Number(0.0), rules.start_sd, 1.0)
     output = parse(" + ".join([*states, *direct]) or "0")
     return Model(y, parameters, states, tuple(terms), {y: output}, "s")
 
@@ -169,13 +172,17 @@ def _population(fit: Fit) -> tuple[Array, Array]:
     order = list(fit.problem.model.states)
     away = [one.x - _begun(one) for one in fit.trajectories]
     every = np.concatenate(away)
+    count = len(away)
     starts = np.array([*(one[0] for one in away), every.mean(axis=0)])
     within = [
-        np.cov(every.T, bias=True).reshape(len(order), -1),
         *(_unknown(fit, one) for one in fit.trajectories),
+        np.cov(every.T, bias=True).reshape(len(order), -1),
     ]
-    apart = starts - starts.mean(axis=0)
-    return starts.mean(axis=0), (apart.T @ apart + np.sum(within, axis=0)) / len(starts)
+    # the more recordings have shown how they begin, the less counts what has not been seen
+    weights = np.r_[np.ones(count), 1 / count] / (count + 1 / count)
+    mean = weights @ starts
+    apart = starts - mean
+    return mean, (weights * apart.T) @ apart + np.tensordot(weights, np.array(within), 1)
 
 
 def _unknown(fit: Fit, trajectory: Trajectory) -> Array:

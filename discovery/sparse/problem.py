@@ -41,6 +41,8 @@ class Problem:
     tolerance: float = 1.0  # standard errors by which a sparser set may be worse on what was left out
     bootstraps: int = 0
     seed: int = 0
+    zeroed: bool = False  # the last nuisance is a zero of each trajectory
+    zero_sd: float = 1.0  # its spread
     parts: float = 0.0  # precision of the part that a family has in the readings, of what it moves there
 
     @cached_property
@@ -119,6 +121,12 @@ class Problem:
         return left
 
 
-def equal_shares(start_sd: float, counts: Sequence[int]) -> tuple[Array, ...]:
-    """Precisions of nuisances (m,) that share the variance of a start value equally."""
-    return tuple(np.full(m, m / start_sd**2) for m in counts)
+def equal_shares(start_sd: float, counts: Sequence[int], zero_sd: float | None = None) -> tuple[Array, ...]:
+    """Precisions of nuisances (m,) that share the variance of a start value equally.
+
+    Args:
+        zero_sd: the last one is the zero of the trajectory, with this spread of its own.
+    """
+    if zero_sd is None:
+        return tuple(np.full(m, m / start_sd**2) for m in counts)
+    return tuple(np.r_[np.full(m - 1, (m - 1) / start_sd**2), 1 / zero_sd**2] for m in counts)
