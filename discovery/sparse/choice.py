@@ -171,38 +171,74 @@ def _better(search: Search, path: Sequence[Terms], whole: Sequence[Terms]) -> li
 def _missed(problem: Problem, terms: Terms, fold: Ints, errors: Array) -> None:
     """Fill in the mean squared error (B,) of the free run on the blocks of a fold."""
     blocks = problem.blocks
-    for i in dict.fromkeys(blocks.recording[fold].tolist()):
-        left = problem.readings[i] - free_run(problem, terms, i)
+    gone = list(dict.fromkeys(blocks.recording[fold].tolist()))
+    begin = _begin(problem, terms, [i for i in range(len(problem.readings)) if i not in gone])
+    for i in gone:
+        left = problem.readings[i] - free_run(problem, terms, i, begin)
         for b in fold[blocks.recording[fold] == i]:
             mine = left[(blocks.of[i] == b) & np.isfinite(left)]
             if len(mine):
                 errors[b] = max(float(np.mean(mine**2)), 1e-12)
 
 
-def free_run(problem: Problem, terms: Terms, i: int) -> Array:
+def free_run(problem: Problem, terms: Terms, i: int, begin: tuple[Array, Array] | None = None) -> Array:
     """Prediction (R,) of a trajectory, zeroed on its first reading alone.
 
     The same Bayesian step as `fitting.predict_recording`: the masses in use, and the zero of the trajectory,
     share what the first reading says.
+
+    Args:
+        begin: mean (k,) and covariance (k, k) of their starts; default those of no other trajectory.
     """
-    readings = problem.readings[i]
-    predicted = problem.columns[i] @ on_grid(terms, problem.families)
-    places = np.unique(terms.place[problem.curved(terms)])
+    readings, decays = problem.readings[i], _decays(problem, terms, i)
+    mean, covariance = begin or _begin(problem, terms, [])
+    predicted = problem.columns[i] @ on_grid(terms, problem.families) + decays @ mean
     first = np.flatnonzero(np.isfinite(readings))
-    if not len(places) + problem.zeroed or not len(first):
+    if not len(mean) or not len(first):
         return np.asarray(predicted)
-    masses = problem.nuisance[i].shape[1] - problem.zeroed
+    decay = decays[first[0]]
+    gain = covariance @ decay / (decay @ covariance @ decay + 1.0)
+    return np.asarray(predicted + decays @ gain * (readings[first[0]] - predicted[first[0]]))
+
+
+def _decays(problem: Problem, terms: Terms, i: int) -> Array:
+    """What is left of the starts (R, k) of the masses in use in a trajectory, and of its zero."""
+    nuisance = problem.nuisance[i]
+    places = np.unique(terms.place[problem.curved(terms)])
+    masses = nuisance.shape[1] - problem.zeroed
+    if not len(places) or not masses:
+        return nuisance[:, masses:]
     low = np.minimum(places.astype(int), masses - 2)
     share = places - low
-    decays = (1 - share) * problem.nuisance[i][:, low] + share * problem.nuisance[i][:, low + 1]
+    decays = (1 - share) * nuisance[:, low] + share * nuisance[:, low + 1]
+    return np.column_stack([decays, nuisance[:, masses:]])
+
+
+def _begin(problem: Problem, terms: Terms, others: Sequence[int]) -> tuple[Array, Array]:
+    """Mean (k,) and covariance (k, k) of the starts of a trajectory to come, from those of others.
+
+    The prior of a start counts as one more, the less the more others there are.
+    """
+    count = _decays(problem, terms, 0).shape[1]
+    variance = np.full(count, problem.start_sd**2)
     if problem.zeroed:
-        decays = np.column_stack([decays, problem.nuisance[i][:, -1]])
-    decay = decays[first[0]]
-    sd = np.full(len(decay), problem.start_sd)
-    if problem.zeroed:
-        sd[-1] = problem.zero_sd
-    gain = decay * sd**2 / (decay**2 @ sd**2 + 1.0)
-    return np.asarray(predicted + decays @ gain * (readings[first[0]] - predicted[first[0]]))
+        variance[-1] = problem.zero_sd**2
+    if not others:
+        return np.zeros(count), np.diag(variance)
+    theta = on_grid(terms, problem.families)
+    starts, within = [np.zeros(count)], [np.diag(variance)]
+    for i in others:
+        known = np.isfinite(problem.readings[i])
+        decays = _decays(problem, terms, i)[known]
+        left = (problem.readings[i] - problem.columns[i] @ theta)[known]
+        covariance = np.linalg.inv(decays.T @ decays + np.diag(1 / variance))
+        starts.append(covariance @ (decays.T @ left))
+        within.append(covariance)
+    weights = np.r_[1 / len(others), np.ones(len(others))]
+    weights = weights / weights.sum()
+    mean = weights @ np.array(starts)
+    apart = np.array(starts) - mean
+    return mean, (weights * apart.T) @ apart + np.tensordot(weights, np.array(within), 1)
 
 
 def _costs(problem: Problem, terms: Terms) -> tuple[float, tuple[float, ...]]:
