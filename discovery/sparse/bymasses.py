@@ -23,6 +23,7 @@ from discovery.sparse.library import Feature, FilteredInputs
 from discovery.sparse.masses import Response, Rules, mass_model, responses_of, within
 from discovery.sparse.optimiser import SparseSearch, features_of, rough_noise
 from discovery.sparse.options import SparseOptions
+from discovery.sparse.problem import WHOLE
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,8 @@ def discover_masses(
         data.drives.linear,
         data.drives.settled,
         integrals=[d for d in data.drives.integrals if d not in options.forbid],
-        zeroed=campaign.channels[output].role == "error",
+        # how far zeros are apart is known from several recordings alone
+        zeroed=campaign.channels[output].role == "error" and len(recordings) >= WHOLE,
     )
     search = SparseSearch(
         library,
