@@ -199,7 +199,7 @@ def _unknown(fit: Fit, trajectory: Trajectory) -> Array:
 def _begun(trajectory: Trajectory) -> Array:
     """(T, n) where each mass would begin by its declared start if the recording began at each instant."""
     grid = trajectory.system.grid
-    known = {**grid.nodes, **trajectory.values}
+    known: dict[str, float | Array] = {**grid.nodes, **trajectory.values}
     return np.column_stack(
         [
             np.broadcast_to(0.0 if s.start is None else evaluate(s.start, known).value, grid.time.shape)
