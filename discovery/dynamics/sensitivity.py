@@ -18,6 +18,7 @@ from discovery.dynamics.system import (
     outputs,
     rates_at_start,
     shifted,
+    starts_follow,
 )
 from discovery.terms import evaluate, names
 
@@ -151,8 +152,9 @@ def _start_slopes(
 
     if free:
         settle(free)
+    follow = starts_follow(system) if starts else np.zeros((0, 0))
     for k, name in enumerate(starts):
-        start[system.states.index(name), len(parameters) + k] += 1.0
+        start[:, len(parameters) + k] += follow[:, system.states.index(name)]
     if starts and (late := memories(system, free)):
         settle(late)
     return start

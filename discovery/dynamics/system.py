@@ -100,7 +100,8 @@ def start_values(
     """Start values (n,): an expression at the first instant, or the balance of the state's terms there.
 
     Args:
-        moved: how far states begin from that; memories are settled with it.
+        moved: how far states begin from that, and with them the states whose starts follow; memories are
+        settled with it.
     """
     known: dict[str, float] = {**first_values(system.grid), **values}
     out = np.zeros(len(system.states))
@@ -117,9 +118,18 @@ def start_values(
             ) from None
     free = balanced(system)
     out = _balanced(system, values, out, free)
-    for name, change in (moved or {}).items():
-        out[system.states.index(name)] += change
+    if moved:
+        out += starts_follow(system) @ np.array([moved.get(name, 0.0) for name in system.states])
     return _balanced(system, values, out, memories(system, free)) if moved else out
+
+
+def starts_follow(system: System) -> Array:
+    """How far each state begins off its start (rows) where another one is moved by one (columns), (n, n)."""
+    found = np.eye(len(system.states))
+    for i, state in enumerate(system.model.states.values()):
+        for other, part in state.start_with.items():
+            found[i] += part * found[system.states.index(other)]
+    return found
 
 
 def balanced(system: System) -> list[int]:

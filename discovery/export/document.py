@@ -106,6 +106,14 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
                 f"{place}: term '{term.name}' enters or leaves a state that is not "
                 "listed; export the model again"
             )
+    above: set[str] = set()
+    for state in model.states.values():
+        if not state.start_with.keys() <= above:
+            raise UserError(
+                f"{place}: the start of state '{state.name}' follows one that is not listed above it; "
+                "export the model again"
+            )
+        above.add(state.name)
     if model_inputs(model) != tuple(i["name"] for i in document["inputs"]):
         raise UserError(f"{place}: the inputs listed are not those of its formulas; export the model again")
     ranges = InputRange.__dataclass_fields__
@@ -161,6 +169,7 @@ def _model(document: Mapping[str, Any], place: str | Path) -> Model:
             s["start_sd"],
             s["scale"],
             s.get("memory", False),
+            s.get("start_with", {}),
         )
         for s in document["states"]
     }

@@ -139,7 +139,8 @@ def _state(state: State) -> dict[str, Any]:
         "start": text(state.start) if state.start is not None else None,
         "start_sd": state.start_sd,
     }
-    return entry | ({"memory": True} if state.memory else {})
+    follows = {"start_with": dict(state.start_with)} if state.start_with else {}
+    return entry | follows | ({"memory": True} if state.memory else {})
 
 
 def _term(term: Term) -> dict[str, Any]:

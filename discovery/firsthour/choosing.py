@@ -23,6 +23,7 @@ from discovery.models import Model
 from discovery.progress import Progress, silent
 from discovery.recordings import Campaign, Recording
 from discovery.sparse.ratedata import time_scale
+from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -36,12 +37,14 @@ _LOST = 10.0  # times the error without a model: what is said of a model that ru
 
 # simplest first: name -> entry of an experiment file; INPUTS stands for the channels that drive the outputs
 CANDIDATES = {
-    "regression": '{ kind = "regression", inputs = [INPUTS] }',
+    "regression": '{ kind = "regression" }',
     "reduced": '{ kind = "reduced", inputs = [INPUTS] }',
     "first_order": '{ file = "model.toml" }',
     "two_masses": '{ file = "two_masses.toml" }',
     "discovered": '{ kind = "sindy", bootstraps = 0 }',
 }
+# what stands beside them to compare with, and is not tried here
+BESIDE = {"pysindy": '{ kind = "pysindy" }'}
 
 
 @dataclass(frozen=True)
@@ -69,14 +72,20 @@ def choose(experiment: Experiment, progress: Progress = silent) -> list[Score]:
     """
     thin = replace(experiment, campaign=thinned(experiment.fitting, _points(experiment)))
     parts = [one for one in folds(thin.campaign, thin.fit) if len(thin.fit) < 2 or one.windows is None]
+    models = experiment.form.models
+
+    def tried(one: tuple[str, int]) -> tuple[Array, Array]:
+        name, k = one
+        progress(f"trying {name}, part {k + 1} of {len(parts)} left out")
+        return _left_out(thin, name, models[name], parts[k])
+
+    pairs = [(name, k) for name in reversed(models) for k in range(len(parts))]  # the longest first
+    squares = dict(zip(pairs, side_by_side(tried, pairs), strict=True))
     scores = []
-    for name, entry in experiment.form.models.items():
-        squares: list[tuple[Array, Array]] = []
-        for k, fold in enumerate(parts, start=1):
-            progress(f"trying {name}, part {k} of {len(parts)} left out")
-            squares.append(_left_out(thin, name, entry, fold))
-        pooled = sum(left for left, _ in squares) / sum(of for _, of in squares)
-        each = tuple(float(np.sqrt(np.mean(left / of))) for left, of in squares)
+    for name in models:
+        mine = [squares[name, k] for k in range(len(parts))]
+        pooled = sum(left for left, _ in mine) / sum(of for _, of in mine)
+        each = tuple(float(np.sqrt(np.mean(left / of))) for left, of in mine)
         scores.append(Score(name, float(np.sqrt(np.mean(pooled))), each))
     order = sorted(scores, key=lambda one: one.ratio)
     best = order[0].ratio

@@ -7,6 +7,7 @@ header, so that the words of the vocabulary say more.
 from __future__ import annotations
 
 import codecs
+import re
 import unicodedata
 from pathlib import Path
 
@@ -29,6 +30,7 @@ _ENCODINGS = (
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _SIGNS = set("°℃℉µμ±²³·ΔΩ×‰")
 _SAMPLE = 65536  # bytes
+_MIXED = re.compile(r"[a-z][\u0400-\u04ff]|[\u0400-\u04ff][a-z]", re.IGNORECASE)  # no word has both alphabets
 _WORD, _LETTER, _SIGN, _ODD = 6.0, 0.5, 1.0, -4.0
 
 
@@ -75,8 +77,9 @@ def _likely(data: bytes, encoding: str) -> float:
         text = data.decode(encoding)
     except UnicodeDecodeError:
         return float("-inf")
-    found = sum(not word.said.isascii() or "ue" in word.said for word in words_of(text[:2000]))
-    return _WORD * found + sum(map(_letter, filter(lambda c: not c.isascii(), text)))
+    found = sum(not word.said.isascii() or len(word.said) > 2 for word in words_of(text[:2000]))
+    letters = sum(map(_letter, filter(lambda c: not c.isascii(), text)))
+    return _WORD * found + letters + _ODD * len(_MIXED.findall(text))
 
 
 def _letter(char: str) -> float:
@@ -88,5 +91,7 @@ def _letter(char: str) -> float:
     if name.startswith(("HIRAGANA", "KATAKANA", "CJK", "HANGUL", "FULLWIDTH")):
         return _LETTER / 2  # two bytes make one
     if name.startswith(("LATIN SMALL", "CYRILLIC SMALL")):
+        if char in "ąćęłńśźżčďěňřšťůžőű":
+            return 0.0
         return _LETTER if char in "äöüßéèêàçñóíáúâîôûåæøãõ" or name.startswith("CYR") else -1.0
     return 0.0

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.firsthour.evidence import OTHER, evidence
+from discovery.firsthour.evidence import OTHER, Evidence, evidence
 from discovery.firsthour.measures import DEGREES, unit_of
 from discovery.firsthour.odds import likely, probabilities
 from discovery.firsthour.shapes import Shape, shape
 from discovery.firsthour.table import Column
 from discovery.firsthour.unitodds import error_odds, flow_odds, load_odds, speed_odds, temperature_odds, usual
-from discovery.firsthour.vocabulary import fold, words_of
+from discovery.firsthour.vocabulary import CELL, fold, words_of
 from discovery.recordings.correction import corrected_by_name
 from discovery.recordings.units import UnitError, conversion
 from discovery.recordings.valuecheck import below_zero
@@ -28,6 +28,8 @@ _SENT = 0.85  # that what a controller sends is what heats
 _HELD = 0.5  # share of readings that repeat the one before: what is set, not measured
 _NEXT = 0.02  # of an answer worth offering
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
+_ONE_OF_SEVERAL = re.compile(r"\d+|(?<![^\W\d_])(d ?)?[xyz](?![^\W\d_])")
+_PUSHES = ("torque", "current", "signal", "flow", "power", "speed")
 CURRENTS, VOLTAGES = ("A", "mA", "kA"), ("V", "mV", "kV")
 
 
@@ -64,25 +66,56 @@ class Guess:
 def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str, Guess]:
     """Role and unit of each column by name, and which error a correction belongs to."""
     hints = hints or {}
-    guesses = {column.name: guess(column, hints.get(column.name, ())) for column in columns}
+    found = {column.name: _evidence_of(column, hints.get(column.name, ())) for column in columns}
+    guesses = {
+        column.name: _guessed(
+            column, found[column.name], [found[other.name] for other in _alike(column, columns)]
+        )
+        for column in columns
+    }
     guesses = _one_scale(columns, guesses)
     guesses = _one_unit(columns, guesses)
     guesses = _the_fluid(_one_room(columns, guesses))
     guesses = _corrections(columns, _signed(columns, _answers(columns, guesses)))
-    if any(one.role == "error" for one in guesses.values()) and not _stated(guesses):
+    if any(one.role == "error" for one in guesses.values()):
         for name, one in guesses.items():
             if one.role == "temperature" and one.unit in DEGREES:
-                why = f"{one.why}; an input of the errors, since nothing else says what heats the machine"
+                why = f"{one.why}; a sensor on the machine is an input of the errors"
                 guesses[name] = replace(one, role=OTHER, why=why)
     return guesses
 
 
 def guess(column: Column, hints: Sequence[tuple[str, Mapping[str, float]]] = ()) -> Guess:
     """Role and unit of a column by itself."""
+    found = _evidence_of(column, hints)
+    return _guessed(column, found, [found])
+
+
+def _evidence_of(column: Column, hints: Sequence[tuple[str, Mapping[str, float]]]) -> Evidence:
+    return evidence(column.header, column.about, _unit_read(column), column.values, hints)
+
+
+def _unit_read(column: Column) -> str | None:
+    """The unit of the header where it is one."""
     spelled, named = unit_of(column.unit)
-    unit = named or (spelled if spelled and _known(spelled, OTHER) else None)
-    found = evidence(column.header, column.about, unit, column.values, hints)
-    roles = probabilities(found.roles())
+    return named or (spelled if spelled and _known(spelled, OTHER) else None)
+
+
+def _alike(column: Column, columns: Sequence[Column]) -> list[Column]:
+    """Columns of one unit whose names differ in a number or an axis alone, this one among them."""
+
+    def kind(one: Column) -> tuple[str, str]:
+        return _ONE_OF_SEVERAL.sub("#", fold(one.header)), one.unit
+
+    return [other for other in columns if kind(other) == kind(column)]
+
+
+def _guessed(column: Column, found: Evidence, alike: Sequence[Evidence]) -> Guess:
+    """Role and unit. `alike`: evidence of all columns of its kind, which have one role: the mean counts."""
+    spelled, named = unit_of(column.unit)
+    unit = _unit_read(column)
+    of_each = [one.roles() for one in alike]
+    roles = probabilities({role: float(np.mean([one[role] for one in of_each])) for role in of_each[0]})
     role, chance = next(iter(roles.items()))
     rivals = tuple((other, p) for other, p in roles.items() if other != role and p > _NEXT)
     why = found.why(role)
@@ -214,18 +247,42 @@ def _one_unit(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[s
 
 def _answers(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
     """Where no error and no temperature is measured: what never holds its value answers to what somebody
-    sets.
+    sets, and what a controller sends is no heat. A voltage that answers a current is that of a cell.
     """
     found = dict(guesses)
+    holds = {c.name: _held(c.values) for c in columns if found[c.name].role != "applied correction"}
     if any(one.role in TEMPERATURES or one.role == "error" for one in guesses.values()):
-        return found
-    holds = {c.name: _held(c.values) for c in columns if found[c.name].role not in ("applied correction",)}
-    if True not in holds.values():
+        cell = any(word.gloss == CELL for c in columns for word in words_of(c.header))
+        return _cell(found, holds) if cell else found
+    for name, one in guesses.items():
+        if one.quantity == "signal" and one.role == "heat load" and not any(map(_is_heat, guesses.values())):
+            found[name] = replace(one, role=OTHER, why=f"{one.why}; nothing here is heated")
+    if True not in holds.values():  # all move: what pushes drives what moves
+        pushes = [name for name, one in found.items() if one.quantity in _PUSHES and one.role == OTHER]
+        for name, one in found.items():
+            if pushes and one.role == OTHER and one.quantity not in _PUSHES and holds.get(name) is False:
+                found[name] = one.doubtful(f"taken to answer to {pushes[0]}", role="other output")
         return found
     for name, held in holds.items():
         if held is False and found[name].role == OTHER:
             why = "it never holds its value, as what somebody sets does; nothing else is measured"
             found[name] = found[name].doubtful(why, role="other output")
+    return found
+
+
+def _is_heat(one: Guess) -> bool:
+    return one.role == "heat load" and one.quantity != "signal"
+
+
+def _cell(guesses: Mapping[str, Guess], holds: Mapping[str, bool | None]) -> dict[str, Guess]:
+    """A current that is set, a voltage that is not, and no error: the voltage is what is measured."""
+    found = dict(guesses)
+    currents = [n for n, one in guesses.items() if one.unit in CURRENTS and holds.get(n)]
+    voltages = [n for n, one in guesses.items() if one.unit in VOLTAGES and holds.get(n) is False]
+    if len(currents) == 1 and not any(one.role == "error" for one in guesses.values()):
+        for name in voltages:
+            why = f"it answers to {currents[0]}, which is set"
+            found[name] = guesses[name].doubtful(why, role="other output")
     return found
 
 

@@ -17,7 +17,7 @@ _SPELLED = {
     "delta_degC": "deltak dk",
     "percent": "% pct percent prozent proz. パーセント %pwm %rh %r.h. %rf vh",
     "rpm": "rpm 1/min u/min u/min. umin upm r/min rev/min min-1 min^-1 min⁻¹ /min tr/min giri/min "
-    "ob/min 回転/分 r.p.m.",
+    "ob/min obr/min ot/min varv/min omw/min o/min 回転/分 r.p.m.",
     "1/s": "1/s s-1 s^-1 s⁻¹ rps rev/s",
     "W": "w watt watts ワット",
     "kW": "kw kilowatt",
@@ -31,7 +31,8 @@ _SPELLED = {
     "mil": "mil mils thou",
     "um/m": "um/m µm/m μm/m µrad μrad urad microrad",
     "mm/m": "mm/m mrad",
-    "l/min": "l/min lpm l/m liter/min litre/min lit/min l/min. l·min-1 l/分 slpm",
+    "l/min": "nl/min nl/m nlpm nlm ln/min slm sl/min "
+    "l/min lpm l/m liter/min litre/min lit/min l/min. l·min-1 l/分 slpm",
     "l/h": "l/h lph liter/h l/hr",
     "m**3/h": "m3/h m^3/h m³/h cbm/h",
     "m**3/s": "m3/s m³/s",
@@ -51,10 +52,11 @@ _SPELLED = {
     "Hz": "hz",
     "m/s": "m/s",
     "mm/min": "mm/min",
+    "m/min": "m/min",
     "kWh": "kwh",
     "Wh": "wh",
     "A*h": "ah",
-    "1": "- 1 – — [-] -/- bool",
+    "1": "- 1 – — [-] -/- bool boolean 0/1 0|1 1/0 on/off off/on ein/aus aus/ein sí/no si/no oui/non",
 }
 _KNOWN = {word: unit for unit, words in _SPELLED.items() for word in words.split()}
 TIME_UNITS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
@@ -72,11 +74,13 @@ _TIME = {word: unit for unit, words in _TIMES.items() for word in words.split()}
 # what a clock is called
 CLOCKS = re.compile(
     r"\b(time|zeit|datetime|timestamp|zeitstempel|date|datum|elapsed|seconds|minutes|hours|clock|stamp|uhrzeit|"
-    r"sekunden|minuten|stunden|laufzeit|messzeit|heure|temps|fecha|tiempo|tempo|ora|data|orario|tijd|t)\b|"
+    r"sekunden|minuten|stunden|laufzeit|messzeit|heure|temps|fecha|tiempo|tempo|ora|data|orario|tijd|czas|cas|horodatage|tid|t)\b|"
     r"(time|zeit|stamp)\b|zeit\b|時刻|時間|日時|日付|経過|时间|日期|시간|время|дата"
 )
+_DATE = re.compile(r"\b(date|datum|data|fecha|dato|dia|tag|jour|giorno)\b|дата|日付|日期")
 DEGREES = ("degC", "degF", "K")
-_SUPERSCRIPTS = str.maketrans("²³⁻¹", "23-1")
+# letters that stand for a quantity in formulas, by the unit of one letter behind them: F_N, U_V, x_m
+_SYMBOLS = {"N": "f", "V": "u e", "A": "i", "W": "p q", "C": "t", "K": "t", "F": "t", "m": "x y z s h l"}
 
 
 def _folded(written: str) -> str:
@@ -118,19 +122,31 @@ def unit_in(header: str) -> tuple[str, str] | None:
 
     >>> unit_in("Bed temp [°F]"), unit_in("T1_degC"), unit_in("主軸温度（℃）"), unit_in("x [table]")
     (('Bed temp', '°F'), ('T1', 'degC'), ('主軸温度', '℃'), None)
+    >>> unit_in("F_N"), unit_in("Heater_A"), unit_in("v_x_m_min"), unit_in("T1_min")
+    (('F', 'N'), None, ('v_x', 'm/min'), None)
     """
     for form in _WITH_UNIT:
         found = form.fullmatch(header)
         if not found or not found[1].strip():
             continue
-        name, unit = found[1].strip(), found[2].strip()
-        if _is_unit(unit, form is _WITH_UNIT[0]) and (form is _WITH_UNIT[0] or _belongs(name, unit)):
+        name, unit = found[1].strip(), re.sub(r"(?<=[^\W_])_(?=[^\W_])", "/", found[2].strip())
+        meant = form is _WITH_UNIT[0] or _is_symbol(name, unit)
+        if _is_unit(unit, meant) and (meant or _belongs(name, unit)):
             return name, unit
     return None
 
 
+def _is_symbol(name: str, unit: str) -> bool:
+    """Whether a name ends with the letter that formulas have for what has the unit: F_N, U_V."""
+    return fold(name).split()[-1:] in [[letter] for letter in _SYMBOLS.get(unit, "").split()]
+
+
 def _belongs(name: str, unit: str) -> bool:
-    """Whether a single letter behind a name is its unit: T1_C is a temperature, Heater A is one of two."""
+    """Whether a word behind a name is its unit: T1_C is a temperature, Heater A is one of two, `Data/ora`
+    and `Fecha y hora` are the date and the time of day.
+    """
+    if time_unit(unit) and (is_dated(name) or not CLOCKS.search(fold(name))):
+        return False
     if len(unit) > 1 or unit in "%°":
         return True
     has = dimension_of(known_unit(unit) or "")
@@ -142,8 +158,18 @@ _WITH_UNIT = (
     re.compile(r"(.*?)\s*[\[(（［【<]([^\])）］】>]*)[\])）］】>]\s*\.?"),
     re.compile(r"(.*?)\s+in\s+(\S+)"),
     re.compile(r"(.*?)\s*[,/:]\s*(\S+)"),
+    re.compile(r"(.*?)_([^\W\d_]{1,2}_(?:min|s|h|m))"),
     re.compile(r"(.*?)[_ ]([^\s_]+(?:/[^\s_]+)?)"),
 )
+
+
+def is_dated(name: str) -> bool:
+    """Whether a name holds a word for date: an hour in it is then the time of day, no unit.
+
+    >>> is_dated("Data/ora"), is_dated("Tempo (ore)")
+    (True, False)
+    """
+    return bool(_DATE.search(fold(name)))
 
 
 def _is_unit(written: str, bracketed: bool) -> bool:
@@ -189,6 +215,7 @@ _ODDS: dict[str, Mapping[str, float]] = {
     "1/s": {"speed": 6, "other": 6},
     "um": {"displacement": 9, "correction": 7, "position": 3},
     "mm": {"displacement": 5, "correction": 4, "nozzle height": 4, "position": 6},
+    "m": {"position": 9, "displacement": -1},
     "um/m": {"displacement": 9, "correction": 7},
     "l/min": {"flow": 12},
     "percent": {

@@ -9,7 +9,7 @@ from discovery.errors import UsageError, UserError
 from discovery.files import read_toml, write_atomic
 from discovery.firsthour.again import rewrite, touched
 from discovery.firsthour.asking import Ask, answered, doubt, questions, read_statements, with_statements
-from discovery.firsthour.guess import Guess, drives
+from discovery.firsthour.guess import TEMPERATURES, Guess, drives
 from discovery.firsthour.joining import join_all
 from discovery.firsthour.measures import DEGREES
 from discovery.firsthour.plan import Plan, plan
@@ -81,7 +81,8 @@ def new(
     if not outputs:
         raise UserError(
             f"{sources[0]}: no column looks like a measured temperature or error; say which one is to be "
-            f'predicted, as in --is "{found.seen[-1].header}=other output,V" or --is "CH1=error,um"'
+            f'predicted, as in --is "{found.seen[-1].header}=other output,{found.seen[-1].unit or "V"}" or '
+            '--is "CH1=error,um"'
         )
     runs = list(found.recordings.values())
     air, about_room = unknown_room(runs[:-1], guesses, outputs)
@@ -148,12 +149,13 @@ def _outputs(found: Recorded, guesses: Mapping[str, Guess]) -> list[str]:
 
 def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Guess]) -> list[str]:
     lines = []
-    runs = {run.path: run for run in found.recordings.values()}
     for table in tables:
-        run = runs.get(table.path, table)
-        length = sum(float(r.time[-1] - r.time[0]) for r in found.recordings.values() if r.path == table.path)
+        runs = [r for r in found.recordings.values() if (r.path, r.name) == (table.path, table.name)]
+        length = sum(float(run.time[-1] - run.time[0]) for run in runs)
+        sheet = f", sheet '{table.name}'" if table.name else ""
         lines.append(
-            f"{table.path.name}: {len(table.time)} rows over {_duration(length)}; time {run.about_time}"
+            f"{table.path.name}{sheet}: {len(table.time)} rows over {_duration(length)}; "
+            f"time {runs[-1].about_time}"
         )
         lines += [f"  {note}" for note in table.notes]
     lines += found.notes
@@ -171,7 +173,8 @@ def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Gue
             + ", ".join(f"{v:g}" for v in values.values())
         )
     warmed = [n for n, one in guesses.items() if one.role == "other input" and one.unit in DEGREES]
-    if not drives(guesses) and not warmed and not found.constants:
+    thermal = any(one.role == "error" or one.role in TEMPERATURES for one in guesses.values())
+    if thermal and not drives(guesses) and not warmed and not found.constants:
         lines.append(
             "no column says what heats the machine: a model can only follow its surroundings; "
             "record a power, current, speed or switch as well"

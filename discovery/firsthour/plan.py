@@ -12,7 +12,7 @@ import numpy as np
 
 from discovery.experiment import load_experiment
 from discovery.files import read_toml, write_atomic
-from discovery.firsthour.choosing import CANDIDATES, Score, choose
+from discovery.firsthour.choosing import BESIDE, CANDIDATES, Score, choose
 from discovery.firsthour.firstmodel import first_model, usual_inputs
 from discovery.firsthour.guess import Guess, drives
 from discovery.firsthour.inputs import strongest
@@ -23,7 +23,7 @@ from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, ChannelForm
 from discovery.recordings.valuecheck import below_zero
 
-COMPARED = ("regression",)  # what a user would pick: it stands in every experiment
+COMPARED = ("regression", "pysindy")  # what a user would pick: they stand in every experiment
 HAND_BUILT = {"first_order": ("model.toml", 1), "two_masses": ("two_masses.toml", 2)}
 _FEW = 20  # readings of an output: fewer carry no model
 _QUIET = 3.0  # times its noise: an output that moves less says nothing
@@ -83,6 +83,7 @@ def plan(
     write_atomic(folder / "experiment.toml", trial)
     experiment = load_experiment(folder / "experiment.toml")  # whatever is wrong with it is said now
     scores = [] if quick else choose(experiment, progress)
+    lines |= BESIDE
     return _decided(title, names, outputs, scores, lines, files, campaign, guesses, fit)
 
 
@@ -168,7 +169,9 @@ def _unchosen(
 ) -> Plan:
     """The simple model and a discovered one, not compared."""
     simple = "first_order" if files else next(iter(lines))
-    models = {name: lines[name].replace(", bootstraps = 0", "") for name in (simple, "discovered")}
+    beside = [name for name in COMPARED if name in lines]
+    chosen = dict.fromkeys((simple, "discovered", *beside))
+    models = {name: lines[name].replace(", bootstraps = 0", "") for name in chosen}
     remarks = ["Not compared (--quick): `discovery new DIR --again` chooses by what each predicts."]
     mismatch = simple if files else None
     content = {f: "# Written by `discovery new`.\n" + text for f, text in files.items() if f == "model.toml"}

@@ -179,10 +179,12 @@ def _counted(
     if not undecided:
         return recordings, {}, []
     seen = [run for name, run in list(recordings.items())[:-1] if run.counted] or [recordings[undecided[0]]]
+    roles = {one.role for one in guess_all(seen[0].columns).values()}
+    thermal = not roles.isdisjoint((*TEMPERATURES, "error"))
     odds: dict[str, float] = {}
     for run in seen:
         for unit, value in time_odds(
-            run.time, [c.values for c in run.columns], stated_interval(run.above)
+            run.time, [c.values for c in run.columns], stated_interval(run.above), thermal=thermal
         ).items():
             # recordings of one logger say the same again: their mean counts, not their sum
             odds[unit] = odds.get(unit, 0.0) + value / len(seen)

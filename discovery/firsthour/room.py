@@ -42,6 +42,8 @@ def unknown_room(
     """
     if any(one.role == "ambient temperature" for one in guesses.values()):
         return None, ""
+    if not any(guesses[name].role in ("temperature", "error") for name in outputs):
+        return None, ""
     if not any(guesses[name].role == "temperature" for name in outputs):
         return None, (
             "no room temperature was recorded, and none is made up: what the air does to the errors stays in "

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from discovery.errors import UserError
 from discovery.firsthour.cells import is_empty, is_number, is_stamp, read_numbers
 from discovery.firsthour.instants import is_date, is_time_of_day, read_instants, read_times_of_day
-from discovery.firsthour.measures import CLOCKS, TIME_UNITS, time_unit
+from discovery.firsthour.measures import CLOCKS, TIME_UNITS, is_dated, time_unit
 from discovery.firsthour.sheets import Sheet
 from discovery.firsthour.vocabulary import fold
 
@@ -172,9 +172,11 @@ def _counted(at: int, cells: Sequence[str], values: Array, name: str, unit: str)
 def named_time_unit(name: str) -> str | None:
     """The unit of time that the name of a clock holds.
 
-    >>> [named_time_unit(name) for name in ("Minuten", "経過分", "Time", "t_min")]
-    ['min', 'min', None, 'min']
+    >>> [named_time_unit(name) for name in ("Minuten", "経過分", "Time", "t_min", "Data e ora")]
+    ['min', 'min', None, 'min', None]
     """
+    if is_dated(name):
+        return None
     words = fold(name).split()
     found = [unit for word in words[::-1] if len(word) > 1 and (unit := time_unit(word))]
     if found and fold(name) != "時間":

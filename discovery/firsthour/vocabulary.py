@@ -34,7 +34,7 @@ QUANTITIES = (
     "fan",
 )
 PLACES = ("body", "air", "fluid", "coolant")
-SET_POINT = "set point"
+SET_POINT, CELL = "set point", "cell"
 
 # gloss (what stands for a word of another script in the name of a channel), log odds, words
 _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
@@ -52,20 +52,22 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "disp",
         {"displacement": 6},
         "disp displ ~displacement ~verlagerung ~verschiebung ~auslenkung ~変位 ~位移 ~변위 "
-        "~deplacement ~spostamento ~desplazamiento ~смещение ~erweiterung ",
+        "~deplacement ~spostamento ~desplazamiento ~deslocamento ~verplaatsing ~przemieszczenie ~posunuti "
+        "~forskjutning ~смещение ~erweiterung",
     ),
     (
         "error",
         {"displacement": 5},
         "error errors err ~fehler ~abweichung dev deviation ~誤差 ~误差 ~偏差 ~오차 ~ecart "
-        "~erreur ~errore ~scostamento ~desviacion ~погрешность tcp ~positionierfehler",
+        "~erreur ~errore erro ~scostamento ~desviacion ~afwijking fout blad ~odchylka ~avvikelse "
+        "~погрешность tcp ~positionierfehler",
     ),
     (
         "growth",
         {"displacement": 5},
         "growth elongation expansion ~ausdehnung ~dehnung ~伸び ~伸长 ~热变形 ~熱変位 "
         "~drift lvdt ~messtaster ~taster ~wegaufnehmer ~wegsensor gap rtest runout ~allongement "
-        "~dilatation ~nullpunkt",
+        "~dilatation ~dilatacion ~deformacion ~deformazione ~nullpunkt etve",
     ),
     ("probe", {"displacement": 3}, "probe shift eddy ~プローブ"),
     (
@@ -81,23 +83,24 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         {"flow": 6},
         "flow ~flow_rate ~durchfluss ~volumenstrom ~volume_stream ~流量 ~유량 debit ~portata ~caudal ~расход",
     ),
-    ("pump", {"flow": 6}, "pump ~pumpe pumps ~ポンプ ~泵 ~펌프 pompe ~pompa bomba ~насос"),
+    ("pump", {"flow": 6}, "pump ~pumpe pumps ~ポンプ ~泵 ~펌프 pompe ~pompa bomba ~насос ~pomp cerpadlo"),
     (
         "speed",
         {"speed": 7},
         "speed rpm n rev revs revolution revolutions ~drehzahl ~回転数 ~回転速度 ~转速 ~회전수 vitesse "
-        "~velocita ~velocidad ~обороты nist nsoll",
+        "~velocita ~velocidad velocidade rotacao ~toerental ~predkosc ~obroty ~otacky varvtal ~обороты "
+        "nist nsoll",
     ),
     (
         "spindle",
         {"speed": 2, "power": 0.5, "body": 1},
-        "spindle ~spindel ~主軸 ~主轴 ~스핀들 broche mandrino husillo ~шпиндель",
+        "spindle ~spindel ~主軸 ~主轴 ~스핀들 broche mandrino husillo fuso spil ~wrzecion ~vreteno ~шпиндель",
     ),
     (
         "power",
         {"power": 6},
         "power p pw watt watts ~leistung ~wirkleistung ~電力 ~消費電力 ~功率 ~전력 puissance potenza "
-        "potencia ~мощность q ph",
+        "potencia ~vermogen moc vykon effekt ~мощность q ph",
     ),
     (
         "heat",
@@ -174,7 +177,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "amb ambient env environment ~umgebung ~umgebungs outside outdoor outdoors "
         "ext external surrounding surroundings ~aussen ~外気 ~周囲 ~环境 ~環境 ~室外 ambiant ambiante "
         "ambiental ambiente ~주변 "
-        "exterieur esterno exterior ta taussen",
+        "exterieur esterno exterior ~omgeving ~otoczeni okoli omgivning ta taussen",
     ),
     (
         "air",
@@ -194,10 +197,21 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "~절삭유 ~クーラントタンク fluide lubrifiant lubrorefrigerante",
     ),
     (
+        "inlet",
+        {"fluid": 6},
+        "inlet inflow ~zulauf ~eintritt ~einlass entree ingresso entrada ~入口",
+    ),
+    (
+        CELL,
+        {},
+        "cell cells battery batteries batt pack ~batterie akku ~akkus zelle accu bateria ~電池 ~电池 soc ocv",
+    ),
+    (
         "coolant",
         {"coolant": 8},
         "coolant ~kuehlmittel ~kuehlwasser ~kuehlung ~kuhlmittel chiller ~冷却水 ~クーラント "
-        "~冷却液 ~冷却 ~냉각 refroidissement refrigerante cooler cooling cool ~kuehl ~kuehler",
+        "~冷却液 ~冷却 ~냉각 refroidissement refrigerante ~koelvloeistof ~koelmiddel ~chlodziw "
+        "~chladivo kylvatska cooler cooling cool ~kuehl ~kuehler",
     ),
     ("cool", {"coolant": 2, "power": 0}, "~水 ~油 water ~wasser oil ~oel"),
     (
@@ -217,7 +231,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
 _FORMS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     ("error", {"displacement": 6}, r"\be ?[xyzabcr]\d?[0a-z]*\b"),
     ("disp", {"displacement": 4}, r"\b(d|delta) ?[xyz](?![^\W\d_])"),
-    ("disp", {"displacement": 1.5, "position": 2}, r"\b[xyz](?![^\W\d_])"),
+    ("disp", {"displacement": 2, "position": 2}, r"\b[xyz](?![^\W\d_])"),
     ("nozzle height", {"nozzle height": 7}, r"\bnozzle.*height\b|\bh nozzle\b"),
     ("nozzle side", {"nozzle side": 7}, r"\bnozzle.*side\b|\bside.*nozzle\b"),
 )
@@ -240,7 +254,7 @@ def fold(text: str) -> str:
     """
     text = unicodedata.normalize("NFKC", text.replace("℃", "°C").replace("℉", "°F"))
     text = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", text).lower()
-    for letter, pair in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("ß", "ss")):
+    for letter, pair in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("ß", "ss"), ("ł", "l")):
         text = text.replace(letter, pair)
     text = "".join(
         unicodedata.normalize("NFD", c)[0] if unicodedata.name(c, "").startswith("LATIN") else c for c in text

@@ -45,8 +45,9 @@ class State:
     `start` is an expression of channels and parameters at the first instant, or None: the balance of its
     terms there. `start_sd` is the spread around it (0: exact). Without one, a state that an output shows as
     it is starts at the first reading of that output, known to the noise of a reading, and any other state
-    has a spread that a fit finds. `scale` turns the sum of its terms into unit per second. `memory`: it is
-    what a lag() remembers, no part of the machine.
+    has a spread that a fit finds. `start_with`: by state above it, how much of what that one begins off its
+    start this one begins off, too; `start_sd` is then the spread of the rest. `scale` turns the sum of its
+    terms into unit per second. `memory`: it is what a lag() remembers, no part of the machine.
     """
 
     name: str
@@ -56,6 +57,7 @@ class State:
     start_sd: float | None = None
     scale: float = 1.0
     memory: bool = False
+    start_with: Mapping[str, float] = field(default_factory=dict)
     read_as: str = ""  # output at whose first reading it starts; set where a model meets recordings
 
 

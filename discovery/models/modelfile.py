@@ -57,6 +57,11 @@ class StateForm(Strict):
         description="spread of the start value; without it a state that is read starts at its first reading, "
         "and the spread of any other is found by the fit",
     )
+    start_with: dict[str, float] = Field(
+        default_factory=dict,
+        description="by state above: how much of what that one begins off its start this one begins "
+        "off, too; start_sd is then the spread of the rest (written by a discovery)",
+    )
     memory: bool = Field(False, description="true: what a lag() remembers, no body (written by a fit)")
 
 
@@ -101,6 +106,7 @@ def read_model(path: Path) -> Model:
         name: _state(name, entry, per_unit, at("states", name, "start"))
         for name, entry in form.states.items()
     }
+    _check_start_with(states, at)
     terms: list[Term] = []
     taken: set[str] = set()
     for i, entry in enumerate(form.terms):
@@ -167,7 +173,21 @@ def _state(name: str, entry: StateForm, per_unit: float, place: str) -> State:
         start = parse(entry.start, place)
         check_start(start, place)
     scale = 1.0 / entry.capacity if entry.capacity else per_unit
-    return State(name, entry.unit, entry.capacity, start, entry.start_sd, scale, entry.memory)
+    return State(
+        name, entry.unit, entry.capacity, start, entry.start_sd, scale, entry.memory, entry.start_with
+    )
+
+
+def _check_start_with(states: Mapping[str, State], at: Callable[..., str]) -> None:
+    above: list[str] = []
+    for name, state in states.items():
+        for other in state.start_with:
+            if other not in above:
+                raise UserError(
+                    f"{at('states', name, 'start_with')}: '{other}' is no state above '{name}' "
+                    f"({', '.join(above) or 'there is none'}); name one, or leave it out"
+                )
+        above.append(name)
 
 
 def _term(i: int, entry: TermForm, states: Mapping[str, State], at: Callable[..., str]) -> Term:
@@ -219,6 +239,7 @@ def _state_entry(state: State) -> dict[str, Any]:
             "capacity": state.capacity,
             "start": state.start and text(state.start),
             "start_sd": state.start_sd,
+            "start_with": dict(state.start_with) or None,
             "memory": state.memory or None,
         }
     )

@@ -109,4 +109,7 @@ class CampaignForm(Strict):
 
 def campaign_path(path: Path) -> Path:
     """The campaign file itself when its folder is named."""
-    return path / "campaign.toml" if path.is_dir() else path
+    try:
+        return path / "campaign.toml" if path.is_dir() else path
+    except OSError:  # a name too long for any file: reading it says so
+        return path

@@ -19,6 +19,12 @@ _LENGTH = (np.log(5 * _HOUR), np.log(4.0))  # of a recording [s]: median and spr
 _STEP = (np.log(15.0), np.log(10.0))  # of a logger [s]
 _ANSWER = (np.log(0.5 * _HOUR), np.log(4.0))  # s that a temperature needs for a third of its range
 _USUAL_STEPS = (
+    0.001,
+    0.002,
+    0.005,
+    0.01,
+    0.02,
+    0.05,
     0.1,
     0.2,
     0.25,
@@ -43,12 +49,15 @@ _USUAL_STEPS = (
 )
 
 
-def time_odds(values: Array, moving: Sequence[Array], interval: float | None = None) -> dict[str, float]:
+def time_odds(
+    values: Array, moving: Sequence[Array], interval: float | None = None, *, thermal: bool = True
+) -> dict[str, float]:
     """Log odds of the units in which a clock counts.
 
     Args:
         values: (N,) of the clock. moving: each (N,), what was read. interval: of the logger [s], where the
-            file states it.
+            file states it. thermal: something of a machine's heat is recorded; of a spring or a tank nobody
+            knows how long it takes.
     """
     steps = np.diff(values)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
@@ -57,9 +66,11 @@ def time_odds(values: Array, moving: Sequence[Array], interval: float | None = N
     odds = {}
     for unit, prior in _PRIOR.items():
         scale = SECONDS[unit]
-        score = prior + _log_normal(length * scale, _LENGTH) + 0.5 * _log_normal(step * scale, _STEP)
+        score = prior + thermal * (
+            _log_normal(length * scale, _LENGTH) + 0.5 * _log_normal(step * scale, _STEP)
+        )
         score += 1.5 * any(abs(step * scale / usual - 1) < 1e-3 for usual in _USUAL_STEPS)
-        if answers:
+        if answers and thermal:
             score += _log_normal(float(np.median(answers)) * scale, _ANSWER)
         if interval:
             score += 6.0 * (abs(step * scale / interval - 1) < 0.02)

@@ -20,9 +20,10 @@ from discovery.sparse.discovery import Discovery, PathPoint, path_points
 from discovery.sparse.drives import Drives
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.library import Feature, FilteredInputs
-from discovery.sparse.masses import Response, Rules, mass_model, responses_of, with_spreads, within
+from discovery.sparse.masses import Response, Rules, mass_model, responses_of, within
 from discovery.sparse.optimiser import SparseSearch, features_of, rough_noise
 from discovery.sparse.options import SparseOptions
+from discovery.sparse.problem import WHOLE
 
 Array = NDArray[np.float64]
 
@@ -44,7 +45,10 @@ def discover_masses(
     output: str,
     options: SparseOptions,
 ) -> Discovery:
-    """Choose the inputs and time constants of one output and fit their numbers."""
+    """Choose the inputs and time constants of one output and fit their numbers.
+
+    Where the masses begin in a recording to come is told by those of all outputs together: see `starts_of`.
+    """
     import pysindy
 
     options = matched(options, data.drives.expressions, campaign.path)
@@ -58,6 +62,8 @@ def discover_masses(
         data.drives.linear,
         data.drives.settled,
         integrals=[d for d in data.drives.integrals if d not in options.forbid],
+        # how far zeros are apart is known from several recordings alone
+        zeroed=campaign.channels[output].role == "error" and len(recordings) >= WHOLE,
     )
     search = SparseSearch(
         library,
@@ -83,6 +89,7 @@ def discover_masses(
         options.bounds,
         (float(library.taus_[0]), float(library.taus_[-1])),
         choice.start_sd,
+        library.zeroed,
     )
     model, left = _clear(rules, features, choice, campaign, recordings, grids, options)
     return Discovery(model, *_evidence(output, features, left, over(choice, noise), library))
@@ -131,7 +138,7 @@ def _clear(
         free = [i for i, r in enumerate(responses) if r.feature.drive not in options.keep]
         weakest = min(free, key=lambda i: strength[i], default=None)
         if weakest is None or strength[weakest] >= CLEAR:
-            return fitted(with_spreads(fit)).model, [r.chosen for r in responses]
+            return fit.model, [r.chosen for r in responses]
         responses = [r for i, r in enumerate(responses) if i != weakest]
 
 

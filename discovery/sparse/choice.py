@@ -14,6 +14,7 @@ from discovery.fitting.noise import readings_as_one
 from discovery.sparse.folds import Ints, bootstraps, choose
 from discovery.sparse.gram import Gram
 from discovery.sparse.problem import Problem, equal_shares
+from discovery.sparse.pursuit import POINTS
 from discovery.sparse.search import Search, Terms, on_grid
 
 Array = NDArray[np.float64]
@@ -42,12 +43,11 @@ def chosen(problem: Problem) -> Choice:
     ends at the slow end of the time constants. Terms then share a time constant where the criterion is
     better for it.
     """
-    problem = _with_spread(problem)
+    problem = _with_parts(_with_spread(problem))
     while True:
         search = problem.search()
         path = search.path(problem.max_terms)
-        left = problem.residuals(on_grid(path[-1], problem.families))
-        effective = search.g.count / readings_as_one([r[:, None] for r in left])
+        effective = _effective(problem, search, path[-1])
         worth = partial(_criterion, problem, search.g, effective)
         folds = problem.folds()
         errors = _left_out(problem, folds, path, int(np.argmin([worth(one) for one in path])) + 1)
@@ -79,28 +79,54 @@ def evidence(problem: Problem, terms: Terms) -> Choice:
 def _with_spread(problem: Problem) -> Problem:
     """The problem with the spread of start values that makes its readings most likely (empirical Bayes).
 
-    -2 log p = n log(cost/n) + log det(1 + spread^2 D'D/m), with D the decays of each trajectory over the
-    noise.
+    -2 log p = n log(cost/n) + log det(1 + P^-1 D'D), with D the decays of each trajectory over the noise and
+    P the precisions of the starts. Where trajectories have zeros of their own, masses may begin closer to
+    their declared starts than these.
     """
     counts = [d.shape[1] for d in problem.nuisance]
     if not all(counts):
         return problem
-    values = [
-        np.linalg.eigvalsh(d[np.isfinite(y)].T @ d[np.isfinite(y)])
-        for d, y in zip(problem.nuisance, problem.readings, strict=True)
-    ]
     size = float(np.nanstd(np.concatenate(problem.readings)))
-    best, least = problem, np.inf
-    for share in SPREADS:
-        spread = share * size
-        tried = replace(problem, start_sd=spread, precision=equal_shares(spread, counts))
-        search = tried.search()
-        left = max(search.g.square - search.path(tried.max_terms)[-1].gain, 1e-12 * search.g.square)
-        volume = sum(np.log1p(np.maximum(v, 0.0) * spread**2 / len(v)).sum() for v in values)
-        score = search.g.count * np.log(left / search.g.count) + volume
-        if score < least:
-            best, least = tried, score
-    return best
+
+    def tried(masses: float, zero: float) -> tuple[float, Problem]:
+        precision = equal_shares(masses * size, counts, zero * size if problem.zeroed else None)
+        one = replace(problem, start_sd=masses * size, zero_sd=zero * size, precision=precision)
+        search = one.search()
+        left = max(search.g.square - search.path(one.max_terms)[-1].gain, 1e-12 * search.g.square)
+        volume = 0.0
+        for d, y, own in zip(one.nuisance, one.readings, precision, strict=True):
+            scaled = d[np.isfinite(y)] / np.sqrt(own)
+            volume += float(np.linalg.slogdet(np.eye(len(own)) + scaled.T @ scaled)[1])
+        return search.g.count * np.log(left / search.g.count) + volume, one
+
+    found = {(share, share): tried(share, share) for share in SPREADS}
+    if problem.zeroed:
+        zero = min(found, key=lambda pair: found[pair][0])[1]
+        found |= {(share, zero): tried(share, zero) for share in SPREADS if share < zero}
+    return min(found.values(), key=lambda one: one[0])[1]
+
+
+def _with_parts(problem: Problem) -> Problem:
+    """The problem with the prior that no response has a part in the readings much larger than its share.
+
+    The parts of n responses add up to what the readings move: each is believed normal with 1/n of its
+    variance. Inputs that follow each other, as a cooling power follows the load, could otherwise have gains
+    that cancel; on what was left out of the same recordings these do as well as smaller ones.
+    """
+    if not (problem.families.count >= POINTS).any():
+        return problem
+    search = problem.search()
+    largest = search.path(problem.max_terms)[-1]
+    moved = search.g.square - search.of(problem.always).gain
+    left = max(search.g.square - largest.gain, 1e-12 * search.g.square)
+    share = left / max(moved, left) / _effective(problem, search, largest)
+    return replace(problem, parts=share * len(largest))
+
+
+def _effective(problem: Problem, search: Search, terms: Terms) -> float:
+    """How many independent readings there are, as what a set leaves of them says."""
+    left = problem.residuals(on_grid(terms, problem.families))
+    return float(search.g.count / readings_as_one([r[:, None] for r in left]))
 
 
 def _criterion(problem: Problem, g: Gram, effective: float, terms: Terms) -> float:
@@ -145,32 +171,74 @@ def _better(search: Search, path: Sequence[Terms], whole: Sequence[Terms]) -> li
 def _missed(problem: Problem, terms: Terms, fold: Ints, errors: Array) -> None:
     """Fill in the mean squared error (B,) of the free run on the blocks of a fold."""
     blocks = problem.blocks
-    for i in dict.fromkeys(blocks.recording[fold].tolist()):
-        left = problem.readings[i] - free_run(problem, terms, i)
+    gone = list(dict.fromkeys(blocks.recording[fold].tolist()))
+    begin = _begin(problem, terms, [i for i in range(len(problem.readings)) if i not in gone])
+    for i in gone:
+        left = problem.readings[i] - free_run(problem, terms, i, begin)
         for b in fold[blocks.recording[fold] == i]:
             mine = left[(blocks.of[i] == b) & np.isfinite(left)]
             if len(mine):
                 errors[b] = max(float(np.mean(mine**2)), 1e-12)
 
 
-def free_run(problem: Problem, terms: Terms, i: int) -> Array:
+def free_run(problem: Problem, terms: Terms, i: int, begin: tuple[Array, Array] | None = None) -> Array:
     """Prediction (R,) of a trajectory, zeroed on its first reading alone.
 
-    The same Bayesian step as `fitting.predict_recording`: the masses in use share what the first reading
-    says.
+    The same Bayesian step as `fitting.predict_recording`: the masses in use, and the zero of the trajectory,
+    share what the first reading says.
+
+    Args:
+        begin: mean (k,) and covariance (k, k) of their starts; default those of no other trajectory.
     """
-    readings = problem.readings[i]
-    predicted = problem.columns[i] @ on_grid(terms, problem.families)
-    places = np.unique(terms.place[problem.curved(terms)])
+    readings, decays = problem.readings[i], _decays(problem, terms, i)
+    mean, covariance = begin or _begin(problem, terms, [])
+    predicted = problem.columns[i] @ on_grid(terms, problem.families) + decays @ mean
     first = np.flatnonzero(np.isfinite(readings))
-    if not len(places) or not len(first):
+    if not len(mean) or not len(first):
         return np.asarray(predicted)
-    low = np.minimum(places.astype(int), problem.nuisance[i].shape[1] - 2)
-    share = places - low
-    decays = (1 - share) * problem.nuisance[i][:, low] + share * problem.nuisance[i][:, low + 1]
     decay = decays[first[0]]
-    gain = decay / (decay @ decay + problem.start_sd**-2.0)
+    gain = covariance @ decay / (decay @ covariance @ decay + 1.0)
     return np.asarray(predicted + decays @ gain * (readings[first[0]] - predicted[first[0]]))
+
+
+def _decays(problem: Problem, terms: Terms, i: int) -> Array:
+    """What is left of the starts (R, k) of the masses in use in a trajectory, and of its zero."""
+    nuisance = problem.nuisance[i]
+    places = np.unique(terms.place[problem.curved(terms)])
+    masses = nuisance.shape[1] - problem.zeroed
+    if not len(places) or not masses:
+        return nuisance[:, masses:]
+    low = np.minimum(places.astype(int), masses - 2)
+    share = places - low
+    decays = (1 - share) * nuisance[:, low] + share * nuisance[:, low + 1]
+    return np.column_stack([decays, nuisance[:, masses:]])
+
+
+def _begin(problem: Problem, terms: Terms, others: Sequence[int]) -> tuple[Array, Array]:
+    """Mean (k,) and covariance (k, k) of the starts of a trajectory to come, from those of others.
+
+    The prior of a start counts as one more, the less the more others there are.
+    """
+    count = _decays(problem, terms, 0).shape[1]
+    variance = np.full(count, problem.start_sd**2)
+    if problem.zeroed:
+        variance[-1] = problem.zero_sd**2
+    if not others:
+        return np.zeros(count), np.diag(variance)
+    theta = on_grid(terms, problem.families)
+    starts, within = [np.zeros(count)], [np.diag(variance)]
+    for i in others:
+        known = np.isfinite(problem.readings[i])
+        decays = _decays(problem, terms, i)[known]
+        left = (problem.readings[i] - problem.columns[i] @ theta)[known]
+        covariance = np.linalg.inv(decays.T @ decays + np.diag(1 / variance))
+        starts.append(covariance @ (decays.T @ left))
+        within.append(covariance)
+    weights = np.r_[1 / len(others), np.ones(len(others))]
+    weights = weights / weights.sum()
+    mean = weights @ np.array(starts)
+    apart = np.array(starts) - mean
+    return mean, (weights * apart.T) @ apart + np.tensordot(weights, np.array(within), 1)
 
 
 def _costs(problem: Problem, terms: Terms) -> tuple[float, tuple[float, ...]]:

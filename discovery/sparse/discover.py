@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from discovery.sparse.drives import Inputs, make_drives, make_inputs
 from discovery.sparse.families import candidates
 from discovery.sparse.folds import CLAIM, PREDICT, choose
 from discovery.sparse.growth import Growth, grown
+from discovery.sparse.masses import starts_of
 from discovery.sparse.options import HIDDEN, SparseOptions
 from discovery.sparse.ratedata import make_rate_data
 from discovery.sparse.rates import with_candidates
@@ -62,6 +64,7 @@ def discover(
     began = clock.perf_counter()
     inputs = make_inputs(campaign, recordings, options.inputs)
     roles = {campaign.channels[name].role for name in outputs}
+    together = False  # whether all outputs are masses
     if options.built_on_file:
         progress("terms on the baseline")
         parts = [_on_file(campaign, recordings, outputs, inputs, options, folder or campaign.path.parent)]
@@ -72,7 +75,25 @@ def discover(
         forms = _forms(roles, options)
         groups = [list(outputs)] if _coupled(outputs, options) else [[name] for name in outputs]
         parts = [_best(campaign, recordings, group, inputs, forms, options, progress) for group in groups]
-    return joined("discovered", parts, clock.perf_counter() - began)
+        together = forms == ("masses",)
+    found = joined("discovered", parts, 0.0)
+    if together:
+        found = _begun(found, campaign, recordings, outputs, options)
+    found.report["seconds"] = round(clock.perf_counter() - began, 2)
+    return found
+
+
+def _begun(
+    found: Discovery,
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    options: SparseOptions,
+) -> Discovery:
+    """Masses with where they begin in a recording to come: those of all outputs are warm together."""
+    if not options.refine:
+        return found
+    return replace(found, model=starts_of(fit_model(found.model, campaign, recordings, outputs)))
 
 
 def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:
@@ -119,6 +140,7 @@ def _best(
     states = [form for form in forms if form != "masses"]
     if not states:
         return found[0]
+    found = [_begun(one, campaign, recordings, outputs, options) for one in found]
     rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
     if not (found and leaves_noise(campaign, recordings, found[0].model, outputs)):
         for one in discover_states(rates, options, states, progress):

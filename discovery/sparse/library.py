@@ -67,6 +67,7 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
         at_once: whether a drive may act without a lag, too.
         integrals: drives that may be added up without bound, as charge is.
         offset: whether a constant is offered.
+        zeroed: whether each trajectory has a zero of its own, as a probe that is set to zero at its start.
     """
 
     def __init__(
@@ -79,6 +80,7 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
         at_once: bool = True,
         integrals: Sequence[str] = (),
         offset: bool = True,
+        zeroed: bool = False,
     ) -> None:
         self.names = names
         self.drives = drives
@@ -88,6 +90,7 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
         self.at_once = at_once
         self.integrals = integrals
         self.offset = offset
+        self.zeroed = zeroed
 
     @x_sequence_or_item
     def fit(self, x_full: Sequence[Any], y: Any = None) -> Self:  # noqa: ARG002
@@ -142,9 +145,10 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
         return [AxesArray(columns, {"ax_time": 0, "ax_coord": 1}) for columns in made]
 
     def _decays(self, x: Any) -> Array:
-        """What is left of a start value (rows, COUNT) for each time constant of the grid."""
+        """What is left of a start value (rows, COUNT) for each time constant of the grid; a zero stays."""
         time = self._column(x, "time")
-        return np.asarray(np.exp(-(time[self._read(x)] - time[0])[:, None] / self.taus_))
+        left = np.exp(-(time[self._read(x)] - time[0])[:, None] / self.taus_)
+        return np.column_stack([left, np.ones(len(left))]) if self.zeroed else np.asarray(left)
 
     def _features(self, x: Any) -> Array:
         time, read = self._column(x, "time"), self._read(x)

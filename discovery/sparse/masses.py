@@ -12,14 +12,19 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from discovery.dynamics import Trajectory
 from discovery.fitting import Fit
 from discovery.models import Model, Parameter, State
 from discovery.models.dimensions import unit_of
 from discovery.sparse.library import Feature
-from discovery.terms import Number, Term, parse, text
+from discovery.terms import Number, Term, evaluate, parse, text
+
+Array = NDArray[np.float64]
 
 _AT = 1e-3  # share of a bound that counts as at it
+_OWN = 1e-4  # of the variance of a start, which the starts of other masses never tell
 QUICKER = 10.0  # times below the grid that the time constant of a fit may go
 
 
@@ -48,6 +53,7 @@ class Rules:
     bounds: Mapping[str, tuple[float, float]]
     time_constants: tuple[float, float]  # s
     start_sd: float
+    zeroed: bool = False  # each recording has a zero of its own
 
 
 def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
@@ -83,6 +89,8 @@ def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
                 states[state] = replace(states[state], start=parse(begun))
             terms.append(Term(f"{drive} through {state}", state, parse(f"{driven}/{tau}")))
         parameters[gain] = Parameter(r.gain, per, low, high)
+    if rules.zeroed and responses:
+        states[f"{y}_zero"] = State(f"{y}_zero", unit, None, Number(0.0), rules.start_sd, 1.0)
     output = parse(" + ".join([*states, *direct]) or "0")
     return Model(y, parameters, states, tuple(terms), {y: output}, "s")
 
@@ -129,21 +137,72 @@ def within(rules: Rules, responses: Sequence[Response]) -> list[Response]:
     return found
 
 
-def with_spreads(fit: Fit) -> Model:
-    """The fitted model with the spread of the start of each mass in a recording to come.
+def starts_of(fit: Fit) -> Model:
+    """The fitted model with where its masses begin in a recording to come: means, spreads, and how the start
+    of each follows those of the masses above it.
 
-    The mean square of the starts that were found, and of one more: a recording may be cut out of what goes
-    on, and then the mass stands anywhere in its own range. Few cold starts do not say that all are cold.
+    A recording may be cut out of what goes on; then the masses stand anywhere in their own range. That counts
+    as one start among those that were found: few cold starts do not say that all are cold. Masses are warm
+    together, so that the first reading alone says much of each. Starts are counted from the declared ones,
+    which follow the inputs where a mass begins in balance with them.
     """
-    found: dict[str, list[float]] = {}
-    for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
-        if u.is_start:
-            found.setdefault(u.name, []).append(float(value) ** 2 + float(error) ** 2)
     order = list(fit.problem.model.states)
-    runs = np.concatenate([one.x for one in fit.trajectories])
-    states = {
-        name: replace(s, start_sd=float(np.sqrt(np.mean([*found.get(name, []), moved**2]))))
-        for name, s in fit.model.states.items()
-        for moved in [float(np.std(runs[:, order.index(name)]))]
-    }
+    if not order:
+        return fit.model
+    mean, covariance = _population(fit)
+    states = dict(fit.model.states)
+    for i, name in enumerate(order):
+        above = covariance[:i, :i] + _OWN * np.diag(np.diag(covariance)[:i])
+        follows = np.linalg.solve(above, covariance[:i, i])
+        rest = max(covariance[i, i] - follows @ covariance[:i, i], _OWN * covariance[i, i])
+        declared = states[name].start or Number(0.0)
+        states[name] = replace(
+            states[name],
+            start=parse(f"{text(declared)} + {mean[i]:.6g}"),
+            start_sd=float(np.sqrt(rest)),
+            start_with=dict(zip(order[:i], follows.tolist(), strict=True)),
+        )
     return replace(fit.model, states=states)
+
+
+def _population(fit: Fit) -> tuple[Array, Array]:
+    """Mean (n,) and covariance (n, n) of how far the masses begin from their declared starts: of those that
+    were found, each with what the fit does not know of it, and of all instants of the recordings.
+    """
+    order = list(fit.problem.model.states)
+    away = [one.x - _begun(one) for one in fit.trajectories]
+    every = np.concatenate(away)
+    count = len(away)
+    starts = np.array([*(one[0] for one in away), every.mean(axis=0)])
+    within = [
+        *(_unknown(fit, one) for one in fit.trajectories),
+        np.cov(every.T, bias=True).reshape(len(order), -1),
+    ]
+    # the more recordings have shown how they begin, the less counts what has not been seen
+    weights = np.r_[np.ones(count), 1 / count] / (count + 1 / count)
+    mean = weights @ starts
+    apart = starts - mean
+    return mean, (weights * apart.T) @ apart + np.tensordot(weights, np.array(within), 1)
+
+
+def _unknown(fit: Fit, trajectory: Trajectory) -> Array:
+    """Covariance (n, n) of the starts that the fit found in a recording."""
+    order, recording = list(fit.problem.model.states), trajectory.system.grid.recording
+    place = {u.name: k for k, u in enumerate(fit.problem.unknowns) if u.is_start and u.recording == recording}
+    free = [i for i, name in enumerate(order) if name in place]
+    rows = [place[order[i]] for i in free]
+    found = np.zeros((len(order), len(order)))
+    found[np.ix_(free, free)] = fit.covariance[np.ix_(rows, rows)]
+    return found
+
+
+def _begun(trajectory: Trajectory) -> Array:
+    """(T, n) where each mass would begin by its declared start if the recording began at each instant."""
+    grid = trajectory.system.grid
+    known: dict[str, float | Array] = {**grid.nodes, **trajectory.values}
+    return np.column_stack(
+        [
+            np.broadcast_to(0.0 if s.start is None else evaluate(s.start, known).value, grid.time.shape)
+            for s in trajectory.system.model.states.values()
+        ]
+    )

@@ -112,10 +112,11 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
         size = float(np.nanstd(target)) or 1.0
         noise = (self.noise[k] if self.noise else None) or rough_noise(readings) or 1e-3 * size
         counts = [d.shape[1] for d in nuisance]
+        zeroed = isinstance(library, FilteredInputs) and library.zeroed
         precision = (
             tuple(library.precision_)
             if isinstance(library, ModelTerms)
-            else equal_shares(size / noise, counts)
+            else equal_shares(size / noise, counts, size / noise if zeroed else None)
         )
         kept = [int(self._mine(name)[-1]) for name in self._always]
         problem = Problem(
@@ -131,6 +132,7 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
             self.tolerance,
             self.bootstraps,
             self.seed,
+            zeroed,
         )
         return problem, float(noise)
 

@@ -5,7 +5,7 @@ searched.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -41,6 +41,9 @@ class Problem:
     tolerance: float = 1.0  # standard errors by which a sparser set may be worse on what was left out
     bootstraps: int = 0
     seed: int = 0
+    zeroed: bool = False  # the last nuisance is a zero of each trajectory
+    zero_sd: float = 1.0  # its spread
+    parts: float = 0.0  # precision of the part that a family has in the readings, of what it moves there
 
     @cached_property
     def grams(self) -> tuple[dict[int, Gram], ...]:
@@ -68,7 +71,22 @@ class Problem:
 
     def search(self, weights: Array | None = None) -> Search:
         """Moves between sets on the pooled normal equations."""
-        return Search(self.pooled(weights), self.families, self.always)
+        return Search(self._believed(self.pooled(weights)), self.families, self.always)
+
+    def _believed(self, g: Gram) -> Gram:
+        """Normal equations with the prior of the parts: rho |X_f theta_f|^2 of each family f, what is always
+        in the set (the offset) taken out of X_f.
+        """
+        if not self.parts:
+            return g
+        fixed = self.families.start[self.always]
+        inverse = np.linalg.pinv(g.matrix[np.ix_(fixed, fixed)])
+        matrix = g.matrix.copy()
+        for first, count in zip(self.families.start, self.families.count, strict=True):
+            mine = slice(first, first + count)
+            across = g.matrix[mine, fixed]
+            matrix[mine, mine] += self.parts * (g.matrix[mine, mine] - across @ inverse @ across.T)
+        return replace(g, matrix=matrix)
 
     def folds(self) -> list[tuple[Ints, Search]]:
         """What is left out in each fold, and the search on the rest."""
@@ -103,6 +121,12 @@ class Problem:
         return left
 
 
-def equal_shares(start_sd: float, counts: Sequence[int]) -> tuple[Array, ...]:
-    """Precisions of nuisances (m,) that share the variance of a start value equally."""
-    return tuple(np.full(m, m / start_sd**2) for m in counts)
+def equal_shares(start_sd: float, counts: Sequence[int], zero_sd: float | None = None) -> tuple[Array, ...]:
+    """Precisions of nuisances (m,) that share the variance of a start value equally.
+
+    Args:
+        zero_sd: the last one is the zero of the trajectory, with this spread of its own.
+    """
+    if zero_sd is None:
+        return tuple(np.full(m, m / start_sd**2) for m in counts)
+    return tuple(np.r_[np.full(m - 1, (m - 1) / start_sd**2), 1 / zero_sd**2] for m in counts)

@@ -4,6 +4,8 @@ terms.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -52,8 +54,19 @@ def two_bodies(expression: str, output: str, **parameters: float) -> Model:
     return Model("two", {k: Parameter(v) for k, v in given.items()}, states, terms, {"y": parse(output)})
 
 
+def together(model: Model, part: float) -> Model:
+    """The model whose body b begins off its start with a."""
+    states = dict(model.states)
+    states["b"] = replace(states["b"], start_with={"a": part})
+    return replace(model, states=states)
+
+
 CASES = {
     "linear": two_bodies("k*(T - a)", "2*a + b", k=5.0),
+    "bodies that are warm together": together(two_bodies("k*(T - a)", "2*a + b", k=5.0), 0.7),
+    "lag and bodies that are warm together": together(
+        two_bodies("k*(lag(a, tau) - a)", "a", k=9.0, tau=900.0), 2.0
+    ),
     "bilinear": two_bodies("k*P*(T - a)", "a*b/20", k=0.02),
     "natural convection": two_bodies("k*(abs(T - a) + 0.01)**m*(T - a)", "a", k=3.0, m=0.25),
     "radiation": two_bodies("-eps*5.67e-8*((a + 273.15)**4 - (T + 273.15)**4)", "a", eps=2.0),

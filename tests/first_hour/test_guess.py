@@ -63,6 +63,10 @@ CASES = [
     ("T_control", "", np.linspace(20, 30, 50), "temperature", "degC"),
     ("T_spindle", "", np.linspace(20, 30, 50), "temperature", "degC"),
     ("motor temp", "", np.linspace(20, 30, 50), "temperature", "degC"),
+    ("Prędkość wrzeciona", "obr/min", np.linspace(0, 900, 50), "rotation speed", "rpm"),
+    ("Temp. chłodziwa", "°C", np.linspace(20, 30, 50), "coolant temperature", "degC"),
+    ("Koelvloeistof temp", "", np.linspace(20, 30, 50), "coolant temperature", "degC"),
+    ("Pump", "0/1", np.arange(50.0) % 2, "fluid flow", "1"),
     ("solar", "W/m2", np.linspace(0, 900, 50), "other input", "W/m**2"),
     ("solar", "W/m^2", np.linspace(0, 900, 50), "other input", "W/m^2"),
     ("solar", "W/m²", np.linspace(0, 900, 50), "other input", "W/m²"),
@@ -100,6 +104,37 @@ def _guessed(*columns: tuple[str, str, float, float]) -> dict[str, Guess]:
     return guess_all(
         [Column(n, n.replace(" ", "_"), unit, np.linspace(low, high, 50)) for n, unit, low, high in columns]
     )
+
+
+def test_a_spring_a_cell_and_a_vessel() -> None:
+    """What answers is an output, whatever moves it; nothing is heated by a valve."""
+    ring, pulses = np.sin(np.arange(200) / 5), np.arange(200) // 30 % 3 * 5.0
+    spring = guess_all([Column("F_N", "F", "N", ring), Column("x_m", "x", "m", ring / 9)])
+    assert [one.role for one in spring.values()] == ["other input", "other output"]
+    warm = Column("T_cell", "T_cell", "degC", 20 + np.arange(200) / 50)
+    cell = guess_all([Column("I", "I", "A", pulses), Column("U", "U", "V", 3 + ring / 9), warm])
+    assert [one.role for one in cell.values()] == ["other input", "other output", "temperature"]
+    vessel = guess_all([Column("Valve", "Valve", "%", pulses), Column("p", "p", "bar", 2 + ring)])
+    assert [one.role for one in vessel.values()] == ["other input", "other output"]
+
+
+def test_sensors_on_the_machine_are_inputs_of_its_errors() -> None:
+    found = _guessed(("n", "rpm", 0, 900), ("T nut", "degC", 20, 30), ("X", "um", 0, 9))
+    assert [one.role for one in found.values()] == ["rotation speed", "other input", "error"]
+
+
+def test_columns_named_alike_have_one_role() -> None:
+    """A sensor that jumps is known by its sisters; X and Z of one probe are both errors."""
+    calm, jumpy = np.linspace(20, 30, 50), 20 + 10.0 * (np.arange(50) // 9 % 2) + np.arange(50) / 97
+    columns = [Column(n, n, "", v) for n, v in (("T1", calm), ("T2", calm), ("T3", jumpy))]
+    assert {one.role for one in guess_all(columns).values()} == {"temperature"}
+    assert not guess(columns[2]).sure
+    assert all(one.sure for one in guess_all(columns).values())
+    slow = np.linspace(0, 40, 50) ** 0.5
+    axes = [
+        Column(n, n, "", v) for n, v in (("X", slow), ("Z", slow + 3.0), ("S1", np.arange(50) % 2 * 900.0))
+    ]
+    assert [one.role for one in guess_all(axes).values()][:2] == ["error", "error"]
 
 
 def test_what_goes_to_a_heater_is_asked_about_and_a_heater_is_not() -> None:

@@ -183,3 +183,19 @@ def test_a_fit_written_another_way_keeps_its_numbers() -> None:
     assert again.offsets == fit.offsets
     for a, b in zip(again.trajectories, fit.trajectories, strict=True):
         assert a.x == pytest.approx(b.x)
+
+
+def test_masses_that_are_warm_together_share_a_first_reading() -> None:
+    """The start is the mean of two normal masses given their sum with noise, in closed form."""
+    states = {
+        "a": State("a", "degC", None, parse("2.0"), 3.0, 1.0),
+        "b": State("b", "degC", None, parse("1.0"), 0.5, 1.0, start_with={"a": 0.8}),
+    }
+    terms = (Term("a cools", "a", parse("-h*a")), Term("b cools", "b", parse("-h*b/9")))
+    two = Model("two", {"h": Parameter(0.001, "1/s", 0.0)}, states, terms, {"T": parse("a + b")})
+    seen = campaign(Recording("r", np.array([0.0, 60.0]), {"T": np.array([11.0, np.nan])}))
+    found = predict_recording(two, seen, "r", ["T"], [NOISE]).x[0]
+    covariance = np.array([[9.0, 0.8 * 9.0], [0.8 * 9.0, 0.8**2 * 9.0 + 0.25]])
+    sums = covariance.sum(axis=1)
+    expected = [2.0, 1.0] + sums / (covariance.sum() + NOISE**2) * (11.0 - 3.0)
+    assert found == pytest.approx(expected)

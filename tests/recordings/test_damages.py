@@ -20,12 +20,12 @@ from tests.recordings.damages import (
 )
 from tests.recordings.simulated import simulated
 
-# what the comparison does not find: too near to what sound recordings differ by
+# what the comparison does not find: too near to what sound recordings differ by; or names by its other side:
+# readings that are early, where the inputs are late
 NOT_FOUND = {
     "pump switch turned round",
-    "swapped: T_env, T_cool",
     "a clock that runs 20 % fast",
-    "a power half as large",
+    "a clock one hour off",
 }
 SEEDS = range(12)  # the thresholds were set on 100 others: benchmarks/damages.md
 

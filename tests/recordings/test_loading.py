@@ -185,6 +185,11 @@ def test_mistakes_in_the_campaign_file(write: Write, old: str, new: str, said: s
     assert said in str(caught.value)
 
 
+def test_a_name_too_long_for_a_file_is_said(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="cannot be read"):
+        load_campaign(tmp_path / ("1" * 400 + ".toml"))
+
+
 @pytest.mark.parametrize(("between", "expected"), [("held", [1, 1, 1, 5, 5]), ("linear", [1, 1, 3, 5, 5])])
 def test_inputs_between_their_stamps(between: str, expected: list[float]) -> None:
     channel = Channel("x", "other input", "1", None, "linear" if between == "linear" else "held")
