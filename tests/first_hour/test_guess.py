@@ -108,10 +108,11 @@ def _guessed(*columns: tuple[str, str, float, float]) -> dict[str, Guess]:
 
 def test_a_spring_a_cell_and_a_vessel() -> None:
     """What answers is an output, whatever moves it; nothing is heated by a valve."""
-    ring, pulses = np.sin(np.arange(200) / 5), np.arange(200) // 30 % 3 * 5.0
+    count = np.arange(200.0)
+    ring, pulses = np.sin(count / 5), count // 30 % 3 * 5.0
     spring = guess_all([Column("F_N", "F", "N", ring), Column("x_m", "x", "m", ring / 9)])
     assert [one.role for one in spring.values()] == ["other input", "other output"]
-    warm = Column("T_cell", "T_cell", "degC", 20 + np.arange(200) / 50)
+    warm = Column("T_cell", "T_cell", "degC", 20 + count / 50)
     cell = guess_all([Column("I", "I", "A", pulses), Column("U", "U", "V", 3 + ring / 9), warm])
     assert [one.role for one in cell.values()] == ["other input", "other output", "temperature"]
     vessel = guess_all([Column("Valve", "Valve", "%", pulses), Column("p", "p", "bar", 2 + ring)])
@@ -125,15 +126,14 @@ def test_sensors_on_the_machine_are_inputs_of_its_errors() -> None:
 
 def test_columns_named_alike_have_one_role() -> None:
     """A sensor that jumps is known by its sisters; X and Z of one probe are both errors."""
-    calm, jumpy = np.linspace(20, 30, 50), 20 + 10.0 * (np.arange(50) // 9 % 2) + np.arange(50) / 97
+    count = np.arange(50.0)
+    calm, jumpy = np.linspace(20, 30, 50), 20 + 10.0 * (count // 9 % 2) + count / 97
     columns = [Column(n, n, "", v) for n, v in (("T1", calm), ("T2", calm), ("T3", jumpy))]
     assert {one.role for one in guess_all(columns).values()} == {"temperature"}
     assert not guess(columns[2]).sure
     assert all(one.sure for one in guess_all(columns).values())
     slow = np.linspace(0, 40, 50) ** 0.5
-    axes = [
-        Column(n, n, "", v) for n, v in (("X", slow), ("Z", slow + 3.0), ("S1", np.arange(50) % 2 * 900.0))
-    ]
+    axes = [Column(n, n, "", v) for n, v in (("X", slow), ("Z", slow + 3.0), ("S1", count % 2 * 900.0))]
     assert [one.role for one in guess_all(axes).values()][:2] == ["error", "error"]
 
 
