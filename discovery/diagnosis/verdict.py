@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite, log
+from math import inf, isfinite, log, sqrt
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
@@ -19,6 +19,7 @@ from discovery.diagnosis.scored import Scored, score
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.vetoes import vetoed
 from discovery.effects.hypothesis import Hypothesis, Key
+from discovery.fitting.covariance import Z95
 from discovery.printed import printed
 
 NO_MISMATCH, MISSING, FAULT, UNEXPLAINED = (
@@ -127,12 +128,16 @@ def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None
 
 
 def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> list[Named]:
-    """Those without which a model of them alone would be short: each one has to add evidence of its own."""
+    """Those without which a model of them alone would be short: each one has to add evidence of its own, and
+    more than by chance next to large effects. Log evidence of G on average varies by sqrt(2 G): it is half
+    of a squared distance in standard deviations, one of which is by chance.
+    """
     kept = list(chosen)
+    least = max(thresholds.SHORT, Z95 * sqrt(2 * max(found.gain, 0.0)))
     while kept:
         fewer = [[o for o in kept if o is not n] for n in kept]
         best = max(fewer, key=lambda others: _alone(context, found, answer, others))
-        if not _alone(context, found, answer, kept) - _alone(context, found, answer, best) < thresholds.SHORT:
+        if not _alone(context, found, answer, kept) - _alone(context, found, answer, best) < least:
             break
         kept = best
     return kept

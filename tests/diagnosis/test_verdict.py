@@ -147,14 +147,17 @@ def test_what_is_not_there_is_not_named(by: float, word: str) -> None:
 
 
 def test_a_name_needs_evidence_of_its_own() -> None:
-    """However probable: its rivals may be less probable for want of evidence, not for what they are."""
-    both = pair(FLUID, FRICTION, 100.0 + SHORT - 0.1, 100.0, 30.0)
+    """However probable: its rivals may be less probable for want of evidence, not for what they are.
+
+    Of 131.8 in all, 31.8 is what two standard deviations make: 1.96 sqrt(2 * 131.8).
+    """
+    both = pair(FLUID, FRICTION, 131.7, 100.0, 30.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
     assert [n.hypothesis for n in found.named] == [FLUID]
     assert found.reasons == (
-        f"friction_speed at {FRICTION.where} may act, too (probability 0.95, log evidence 11)",
+        f"friction_speed at {FRICTION.where} may act, too (probability 0.95, log evidence 32)",
     )
-    both = pair(FLUID, FRICTION, 100.0 + SHORT + 0.1, 100.0, 30.0)
+    both = pair(FLUID, FRICTION, 131.9, 100.0, 30.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
     assert [n.hypothesis for n in found.named] == [FLUID, FRICTION]
 
@@ -204,7 +207,7 @@ def test_what_is_left_unnamed_may_not_carry_the_answer() -> None:
 
 
 def test_what_would_be_missed_most_is_named_first() -> None:
-    both = pair(FRICTION, FLUID, 180.0, 30.0, 150.0)
+    both = pair(FRICTION, FLUID, 200.0, 50.0, 150.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
     assert [n.hypothesis for n in found.named] == [FLUID, FRICTION]
 
