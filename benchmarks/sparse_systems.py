@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.errors import UserError
 from discovery.fitting import predict_recording
 from discovery.frames import campaign_from_frames

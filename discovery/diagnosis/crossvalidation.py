@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.proof import FreeRuns, Improvement, improvement
 from discovery.diagnosis.scored import ENOUGH, Scored, with_effects
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
 from discovery.evaluation.crossvalidation import Fold, folds

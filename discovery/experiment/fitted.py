@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics.system import predict as model_outputs
+from discovery.dynamics import predict as model_outputs
 from discovery.errors import RunsAwayError
 from discovery.evaluation import evaluate
 from discovery.evaluation.budget import Budget, budget

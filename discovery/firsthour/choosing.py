@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.errors import UserError
 from discovery.evaluation.crossvalidation import Fold, folds, masked
 from discovery.experiment import Experiment

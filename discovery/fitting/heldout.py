@@ -13,11 +13,12 @@ from discovery.dynamics import (
     Trajectory,
     make_grid,
     make_system,
+    predict,
     sensitivities,
     simulate,
     start_values,
 )
-from discovery.dynamics.system import inputs_of, predict, shifted, uncertain
+from discovery.dynamics.system import inputs_of, shifted, uncertain
 from discovery.fitting.problem import read_spread
 from discovery.models import Model, State, expanded
 from discovery.recordings import Campaign

@@ -15,12 +15,13 @@ from discovery.dynamics import (
     Trajectory,
     make_grid,
     make_system,
+    predict,
     sensitivities,
     simulate,
     start_values,
 )
 from discovery.dynamics.sensitivity import moved_in_time
-from discovery.dynamics.system import inputs_of, predict, shifted, uncertain
+from discovery.dynamics.system import inputs_of, shifted, uncertain
 from discovery.fitting.noise import Noise
 from discovery.models import Model, Parameter, State, expanded
 from discovery.recordings import Campaign

@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid
-from discovery.dynamics.system import predict
+from discovery.dynamics import Grid, predict
 from discovery.errors import RunsAwayError
 from discovery.fitting import Fit, predict_recording
 from discovery.sparse.folds import make_folds

@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid, make_grid
-from discovery.dynamics.system import predict
+from discovery.dynamics import Grid, make_grid, predict
 from discovery.errors import RunsAwayError
 from discovery.fitting import Fit, predict_recording
 from discovery.fitting.held import held_fit

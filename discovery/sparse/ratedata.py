@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discovery.dynamics import Grid, make_grid
-from discovery.dynamics.system import predict
+from discovery.dynamics import Grid, make_grid, predict
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise, predict_recording
 from discovery.models import Model

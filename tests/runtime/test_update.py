@@ -11,8 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
-from discovery.dynamics import make_grid, make_system, simulate
-from discovery.dynamics.system import predict
+from discovery.dynamics import make_grid, make_system, predict, simulate
 from discovery.errors import UserError
 from discovery.export.document import Exported, read_document, write_document
 from discovery.models import Model
