@@ -134,7 +134,7 @@ def _blocks(path: Path) -> Iterator[bytes]:
 
 
 def _reason(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error or "damaged")
+    return str(getattr(error, "strerror", None) or error) or "damaged"
 
 
 def _size(count: int) -> str:

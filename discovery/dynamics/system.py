@@ -76,9 +76,9 @@ def inputs_of(model: Model, campaign: Campaign, outputs: Collection[str]) -> lis
     Raises:
         UserError: an output that is no channel.
     """
-    outputs = [name for name in outputs if campaign.channels[name]]
+    shown = {campaign.channels[name].name for name in outputs}
     starting = model.start_names & set(campaign.channels)
-    return sorted({*model.inputs, *starting} - set(outputs))
+    return sorted({*model.inputs, *starting} - shown)
 
 
 def uncertain(system: System) -> tuple[str, ...]:
