@@ -176,7 +176,7 @@ def _table(cells: Sequence[Sequence[str]]) -> str:
 
 
 def summary(tallies: Mapping[str, Tally]) -> list[str]:
-    """What the terminal shows besides the table: every wrong answer."""
+    """What the terminal shows below the table: every wrong answer."""
     return [
         f"{s.case}: {s.judgement.word}; truth {told(s.key)}, said {said(s)}"
         for s in wrong(tallies[WORKBENCH])

@@ -1,4 +1,4 @@
-"""The next experiment: which pattern of inputs would tell two models apart, and how long it takes."""
+"""The next experiment: which pattern of inputs would separate two models, and how long it takes."""
 
 from __future__ import annotations
 

@@ -177,7 +177,7 @@ class Grid:
         before, here, behind = (
             shown[np.searchsorted(self.looked_at, np.clip(self.read + k, 0, last))] for k in (-1, 0, 1)
         )
-        left, right = self.means.beside.reshape(2, *here.shape[:2], *[1] * (here.ndim - 2))
+        left, right = self.means.neighbours.reshape(2, *here.shape[:2], *[1] * (here.ndim - 2))
         return np.asarray(here + left * (before - here) + right * (behind - here))
 
     @cached_property
@@ -266,11 +266,13 @@ def make_grid(
     bound[-1] = True
     time = _divided(np.union1d(data.time[first[bound]], found.time), max_step)
     index = np.searchsorted(time, found.time)
-    beside = found.weights(time, index)
+    neighbours = found.weights(time, index)
 
     def shown(one: Samples) -> Array:
         means = block_means(data.time, one.integral(data.time) + read, np.append(first, len(taken)))
-        return as_readings_show(time, one.integral(time), index, means.mean[found.blocks], beside[:, :, -1])
+        return as_readings_show(
+            time, one.integral(time), index, means.mean[found.blocks], neighbours[:, :, -1]
+        )
 
     single = some_of(table[taken])
     number = found.counts[:, :-1]
@@ -285,7 +287,7 @@ def make_grid(
         spread,
         instants=len(rows),
         logged=logged,
-        means=Means(number, beside[:, :, :-1], single),
+        means=Means(number, neighbours[:, :, :-1], single),
     )
 
 

@@ -270,7 +270,7 @@ def _flow(
 def _changed(
     effect: Effect, formula: Expression, naming: _Naming, spot: Spot, term: Term, inputs: set[str]
 ) -> Term:
-    """What a term changes by: the formula where it speaks of the term, else the term with a channel replaced
+    """What a term changes by: the formula where it names the term, else the term with a channel replaced
     by the formula, less the term.
     """
     known = naming.sized(effect)

@@ -160,7 +160,7 @@ def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
     notes = []
     for name, found in fit.offsets.items():
         if max(abs(value) for value, _ in found.values()) < _NEGLIGIBLE * channels[name].spread:
-            continue  # no reading speaks against what was given
+            continue  # no reading contradicts what was given
         low, high = (pick(found, key=lambda r: found[r][0]) for pick in (min, max))
         unit = differences(channels[name].unit)
         most = f" to {found[high][0]:+.2g} {unit} in '{high}'" if high != low else ""

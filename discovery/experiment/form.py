@@ -218,7 +218,7 @@ class ExperimentForm(Strict):
 
 
 def own_recordings(entry: ModelEntry) -> list[tuple[str, str]]:
-    """What a model says of recordings of its own, beside those that all are fitted to: word and recording."""
+    """Recordings that one model is fitted to, other than those common to all: word and recording."""
     alone = [("separate", name) for names in separate(entry).values() for name in names]
     return alone + [("also", name) for name in getattr(entry, "also", ())]
 

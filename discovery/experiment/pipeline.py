@@ -69,9 +69,9 @@ def run(
         out: folder of the results; default runs/<experiment name>. The results in it are replaced as a whole
             at the very end, so an interrupted run leaves what was there before; exports, figures and
             whatever else stands there stay.
-        progress: told what begins.
+        progress: called with what begins.
         force: use recordings that are wrong all the same.
-        tell: told what is wrong with the recordings, a line each.
+        tell: called with what is wrong with the recordings, a line each.
 
     Returns:
         The folder.
@@ -115,11 +115,11 @@ def run(
     return folder
 
 
-_DIAGNOSIS = 4.0  # how long it takes beside a model that is only fitted
+_DIAGNOSIS = 4.0  # how long it takes, relative to a model that is only fitted
 
 
 def _weight(entry: ModelEntry) -> float:
-    """How long a model takes beside one that is only fitted."""
+    """How long a model takes, relative to one that is only fitted."""
     return 3.0 if isinstance(entry, SparseOptions) else 1.0
 
 
@@ -140,7 +140,7 @@ def fit_all(experiment: Experiment, steps: Steps) -> dict[str, Fitted]:
 
 
 def begin_roles(experiment: Experiment) -> Iterator[Fold] | None:
-    """Folds of the cross-validation over roles, under way beside the fits of the experiment itself."""
+    """Folds of the cross-validation over roles, under way during the fits of the experiment itself."""
     if experiment.form.roles is None:
         return None
     from discovery.experiment.roles import begin_folds

@@ -17,7 +17,7 @@ _SHOWN = 3  # errors in the sentence that refuses them
 
 
 def quality(experiment: Experiment) -> list[Finding]:
-    """What is wrong with the recordings that the experiment uses, beside each other and by themselves."""
+    """What is wrong with the recordings that the experiment uses, alone and compared with each other."""
     used = {path.resolve() for path in input_files(experiment).values()}
     return [
         one

@@ -190,7 +190,7 @@ def _rates(
 
 
 def _said(term: Term) -> str:
-    """A term in words, for a comment beside its number."""
+    """A term in words, for the comment next to its number."""
     leaving = f", out of {term.source}" if term.source is not None else ""
     return f"{term.name}: {text(term.expression)}, into {term.into}{leaving}"
 

@@ -231,7 +231,7 @@ def export_document(
     Its recordings are not at hand: the reference inputs run through its trained ranges.
 
     Args:
-        out_dir: default a folder beside the document that bears its name.
+        out_dir: default a folder next to the document, with its name.
         key: signs the document anew; without one it is copied as it is, with its signature.
 
     Raises:

@@ -43,8 +43,8 @@ CANDIDATES = {
     "two_masses": '{ file = "two_masses.toml" }',
     "discovered": '{ kind = "sindy", bootstraps = 0 }',
 }
-# what stands beside them to compare with, and is not tried here
-BESIDE = {"pysindy": '{ kind = "pysindy" }'}
+# in every experiment for comparison, but never the first model
+NOT_TRIED = {"pysindy": '{ kind = "pysindy" }'}
 
 
 @dataclass(frozen=True)

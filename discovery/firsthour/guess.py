@@ -307,7 +307,7 @@ def _air(column: Column) -> tuple[float, int]:
 def _one_room(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
     """Of several columns that may be the air around, the clearest is; the other rooms are what is measured.
 
-    So are rooms beside which nothing else is measured.
+    So are rooms if nothing else is measured.
     """
     air = {c.name: _air(c) for c in columns if guesses[c.name].role == "ambient temperature"}
     found = dict(guesses)

@@ -19,7 +19,7 @@ from discovery.firsthour.table import OwnTable, read_tables
 from discovery.firsthour.texts import campaign_text, clock_doubt, csv_text
 from discovery.progress import Progress, silent
 from discovery.recordings.campaignfile import CampaignForm
-from discovery.runfolder import beside
+from discovery.runfolder import temporary_folder
 
 
 def new(
@@ -88,7 +88,7 @@ def new(
     air, about_room = unknown_room(runs[:-1], guesses, outputs)
     kept = _written(folder) if there else {}
     names = list(found.recordings)
-    with beside(folder) as temporary:
+    with temporary_folder(folder) as temporary:
         for name, table in found.recordings.items():
             write_atomic(temporary / f"{name}.csv", csv_text(table))
         text = campaign_text(folder.resolve().name, found, guesses, air, about_room, kept)
@@ -117,7 +117,7 @@ def _planned_again(folder: Path, progress: Progress, *, quick: bool) -> list[str
     before = touched(folder)
     if before is not None:
         names = [*(n for n in names if n not in before.held_out), *(n for n in names if n in before.held_out)]
-    with beside(folder) as temporary:
+    with temporary_folder(folder) as temporary:
         for recording in campaign.recordings.values():
             source = (folder / recording.file).resolve()
             if source.is_file():

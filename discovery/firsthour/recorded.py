@@ -107,7 +107,7 @@ def _renewed(
     hints: Mapping[str, Sequence[tuple[str, Mapping[str, float]]]],
     guesses: Mapping[str, Guess],
 ) -> dict[str, Guess]:
-    """Guesses once more beside the columns that were kept: a column that was left out says nothing of
+    """Guesses again from the columns that were kept: a column that was left out says nothing of
     them.
     """
     again = guess_all(kept, hints)

@@ -1,4 +1,4 @@
-"""The clock of an engineer's table: which columns tell the time, and in which unit.
+"""The clock of an engineer's table: which columns hold the time, and in which unit.
 
 Where nothing says the unit, evidence does: how long thermal recordings last, how often loggers read, how
 quickly temperatures move. What is left open is asked (see `asking`).

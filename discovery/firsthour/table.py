@@ -99,7 +99,7 @@ class OwnTable:
 def read_own(path: Path) -> OwnTable:
     """Read a CSV (plain or gzip, any encoding), Excel workbook or Parquet file; of several sheets the first.
 
-    Columns without any number, and columns that count the rows or tell the time again, are left out.
+    Columns without any number, and columns that count the rows or repeat the time, are left out.
 
     Raises:
         UserError: no regular file, no header, a ragged row, no column of time, or cells that are no numbers.

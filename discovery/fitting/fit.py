@@ -44,7 +44,7 @@ class Fit:
     noise: Noise
     trajectories: tuple[Trajectory, ...]
     cost: float  # half the sum of squared whitened residuals and priors
-    unidentified: tuple[str, ...]  # one sentence for each parameter that these recordings do not tell
+    unidentified: tuple[str, ...]  # one sentence for each parameter that these recordings do not determine
     seconds: float
     together: float = 1.0  # readings that count as one against what is known of inputs with a spread
 

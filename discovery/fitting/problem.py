@@ -64,7 +64,7 @@ class Unknown:
 
     @property
     def key(self) -> tuple[str, str | None, bool, bool, bool]:
-        """What tells it from the others."""
+        """What distinguishes it from the others."""
         return self.name, self.recording, self.is_start, self.is_offset, self.is_late
 
     @property

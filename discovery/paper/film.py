@@ -1,4 +1,4 @@
-"""Equations (1) to (6) of the paper: variants of eq. (6), validity, what nozzle height and flow tell."""
+"""Equations (1) to (6) of the paper: variants of eq. (6), validity, what nozzle height and flow show."""
 
 from __future__ import annotations
 
@@ -131,11 +131,11 @@ def nozzle(m: Material) -> Chapter | None:
             continue
         for name, what in (("b", "nozzle height"), ("m", "fluid velocity V_j")):
             p = widened(fit.model.parameters[name], fit.together)
-            told = told_apart(p)
-            rows.append((recording, what, p.value, p.low, p.high, "identified" if told else "not identified"))
+            word = "identified" if identified(p) else "not identified"
+            rows.append((recording, what, p.value, p.low, p.high, word))
             shows.append(
                 f"{recording}: the exponent of the {what} is {p.value:.2f} ({_interval(p)})"
-                + ("." if told else ": this recording does not tell it from no influence.")
+                + ("." if identified(p) else ": not identified.")
             )
     return Chapter(
         "nozzle",
@@ -170,10 +170,10 @@ def widened(p: Parameter, together: float) -> Parameter:
     return replace(p, low=p.value - far * (p.value - p.low), high=p.value + far * (p.high - p.value))
 
 
-def told_apart(p: Parameter) -> bool:
-    """Whether an exponent is told from no influence: its 95 % interval leaves zero out.
+def identified(p: Parameter) -> bool:
+    """Whether an exponent is identified: its 95 % interval excludes zero.
 
-    >>> told_apart(Parameter(0.4, low=0.3, high=0.5)), told_apart(Parameter(0.4, low=-0.3, high=1.1))
+    >>> identified(Parameter(0.4, low=0.3, high=0.5)), identified(Parameter(0.4, low=-0.3, high=1.1))
     (True, False)
     """
     return p.low is not None and p.high is not None and (p.low > 0.0 or p.high < 0.0)

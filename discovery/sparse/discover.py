@@ -55,7 +55,7 @@ def discover(
     Args:
         recordings: names of the recordings to fit.
         outputs: measured channels.
-        progress: told in a few words what is being done.
+        progress: called with a few words on what is being done.
         folder: where a relative baseline file is looked for; default the campaign's folder.
 
     Raises:

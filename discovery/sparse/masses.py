@@ -24,7 +24,7 @@ from discovery.terms import Number, Term, evaluate, parse, text
 Array = NDArray[np.float64]
 
 _AT = 1e-3  # share of a bound that counts as at it
-_OWN = 1e-4  # of the variance of a start, which the starts of other masses never tell
+_OWN = 1e-4  # share of the variance of a start that the starts of other masses never explain
 QUICKER = 10.0  # times below the grid that the time constant of a fit may go
 
 

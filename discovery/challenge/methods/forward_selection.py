@@ -1,6 +1,6 @@
 """Forward selection by BIC with white residuals: the classical way through the same catalogue.
 
-Each step refits the claims that the residual speaks for most and keeps the one with the lowest BIC, until
+Each step refits the claims that the residual supports most and keeps the one with the lowest BIC, until
 none lowers it (Bacher & Madsen, Energy and Buildings 43, 2011, with BIC in place of their likelihood-ratio
 test).
 """

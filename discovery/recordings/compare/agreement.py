@@ -1,4 +1,4 @@
-"""Do the recordings of a campaign tell one story? And if one does not: what would make it agree?
+"""Do the recordings of a campaign agree? And if one does not: what would make it agree?
 
 Every measured channel is predicted in each recording by what the others say of it: a sum of first-order
 responses to the inputs, from the first reading on, with coefficients from the other recordings alone. Where a

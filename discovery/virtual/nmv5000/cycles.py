@@ -1,4 +1,4 @@
-"""Test cycles by seed: what the machine is told to do and what the room does, with the hours before a
+"""Test cycles by seed: the commands of the machine and what the room does, with the hours before a
 recording.
 
 R-Test readings need the table at rest: every reading is a stop of two minutes, with the sensors read in its
