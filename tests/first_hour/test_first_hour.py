@@ -42,7 +42,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_from_nothing_to_a_diagnosis_in_four_commands(desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(desk)
     commands = [
-        "new rig --from monday.csv --from tuesday.csv",
+        "new rig --quick --from monday.csv --from tuesday.csv",  # the tutorial compares the models
         "check rig",
         "diagnose rig/experiment.toml --out answer",
         "explain conduction_path",
