@@ -95,7 +95,9 @@ def test_values_in_fahrenheit_arrive_in_celsius(one: Path) -> None:
 def test_a_room_that_nobody_measured_is_an_unknown_with_a_spread(desk: Path) -> None:
     from discovery.recordings import load_campaign
 
-    result = CliRunner().invoke(app, ["new", str(desk / "room"), "--from", str(desk / "tuesday.csv")])
+    result = CliRunner().invoke(
+        app, ["new", str(desk / "room"), "--quick", "--from", str(desk / "tuesday.csv")]
+    )
     assert "no room temperature was recorded: T_env is an unknown of each recording" in " ".join(
         result.output.split()
     )
@@ -191,7 +193,9 @@ def test_where_no_power_is_recorded(tmp_path: Path, header: str, term: str | Non
 
     rows = [f"{k},{k // 10 % 2},{20 + k / 9}" for k in range(60)]
     (tmp_path / "run.csv").write_text("\n".join([header, *rows]), "utf-8")
-    result = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), "--from", str(tmp_path / "run.csv")])
+    result = CliRunner().invoke(
+        app, ["new", str(tmp_path / "rig"), "--quick", "--from", str(tmp_path / "run.csv")]
+    )
     assert result.exit_code == 0, result.output
     assert ("what heats the machine" in result.output) is hint
     load_experiment(tmp_path / "rig" / "experiment.toml")
