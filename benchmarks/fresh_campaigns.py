@@ -23,7 +23,7 @@ import numpy as np
 from discovery.evaluation.paper import TABLE_3
 from discovery.experiment import Experiment, load_experiment
 from discovery.experiment.fitted import predict
-from discovery.experiment.pipeline import starting_model
+from discovery.experiment.modelfits import starting_model
 from discovery.fitting import fit_model
 from discovery.recordings import load_campaign
 from discovery.virtual.machine import Machine

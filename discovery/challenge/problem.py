@@ -16,7 +16,7 @@ from discovery.diagnosis.scored import Scored, score, scored
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.experiment import Experiment, load_experiment
-from discovery.experiment.pipeline import starting_model
+from discovery.experiment.modelfits import starting_model
 from discovery.fitting import Fit
 from discovery.fitting.noise import white_noise
 from discovery.models import Model

@@ -55,6 +55,15 @@ ROLE_OF = {
 # `rate` is such a level of a flow
 INPUT, LEVEL, RATE = "input", "level", "rate"
 TERM = "term"  # the term of the model that an effect changes
+DRIVING = (  # roles of the inputs that an error may follow by a law of its own
+    "heat load",
+    "cooling power",
+    "rotation speed",
+    "fluid flow",
+    "nozzle height",
+    "nozzle side",
+    "other input",
+)
 
 _RATIO = 3.0  # between neighbouring values of a shape in a search: signatures of both are much alike
 _REACH = 2.0  # standard deviations of a prior that a search covers

@@ -17,7 +17,7 @@ from discovery.errors import UserError
 from discovery.evaluation.crossvalidation import Fold, folds, masked
 from discovery.experiment import Experiment
 from discovery.experiment.form import ModelEntry
-from discovery.experiment.pipeline import fit_of
+from discovery.experiment.modelfits import fit_of
 from discovery.fitting import predict_recording
 from discovery.models import Model
 from discovery.progress import Progress, silent

@@ -17,7 +17,8 @@ from discovery.effects.not_offered import not_offered
 from discovery.effects.own import EffectForm
 from discovery.errors import UserError
 from discovery.experiment import diagnose, load_experiment
-from discovery.experiment.pipeline import diagnosis, fit_entry
+from discovery.experiment.modelfits import fit_entry
+from discovery.experiment.pipeline import diagnosis
 from discovery.models import read_model, write_model
 from discovery.progress import silent
 from tests import machine

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from discovery.experiment import load_experiment
 from discovery.experiment.form import ExperimentForm
-from discovery.experiment.pipeline import starting_model
+from discovery.experiment.modelfits import starting_model
 from discovery.files import read_toml
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.sparse import SparseOptions, discover
