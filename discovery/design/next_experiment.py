@@ -13,7 +13,8 @@ from discovery.design.separation import separation
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.thresholds import BELIEF
 from discovery.dynamics import Trajectory, make_system, simulate
-from discovery.dynamics.grid import Grid, Samples
+from discovery.dynamics.grid import Grid
+from discovery.dynamics.samples import Samples
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise
 from discovery.models import Model

@@ -228,12 +228,12 @@ def _begin(problem: Problem, terms: Terms, others: Sequence[int]) -> tuple[Array
     if not others:
         return prior
     theta = on_grid(terms, problem.families)
-    seen = []
+    seen: list[tuple[Array, Array]] = []
     for i in others:
         known = np.isfinite(problem.readings[i])
         decays = _decays(problem, terms, i)[known]
         left = (problem.readings[i] - problem.columns[i] @ theta)[known]
-        covariance = np.linalg.inv(decays.T @ decays + np.diag(1 / variance))
+        covariance = np.asarray(np.linalg.inv(decays.T @ decays + np.diag(1 / variance)), dtype=np.float64)
         seen.append((covariance @ (decays.T @ left), covariance))
     return next_start(seen, prior)
 
