@@ -248,7 +248,7 @@ def test_files_mixed_up_are_called_by_their_kind(
     ("old", "new", "words"),
     [
         ('fit = ["a", "b"]', 'fit = ["a", "bb"]', ["line 4", "fit", "no recording 'bb'", "did you mean 'b'"]),
-        ('held_out = ["c"]', 'held_out = ["b"]', ["line 5", "'b' stands in fit too"]),
+        ('held_out = ["c"]', 'held_out = ["b"]', ["line 5", "'b' is also in fit"]),
         ('held_out = ["c"]', 'held_out = ["d"]', ["line 5", "no recording 'd'"]),
         ('fit = ["a", "b"]', "fit = []", ["line 4", "at least 1"]),
         ('fit = ["a", "b"]', 'fit = "a"', ["line 4", "fit: should be a list", "not 'a'"]),

@@ -169,7 +169,7 @@ class EffectForm(Strict):
                 f"{where}: '{name}' means nothing in its formula; known: {', '.join(sorted(known))}"
             )
         if self.amplitude not in used:
-            raise UserError(f"{where}: the amplitude '{self.amplitude}' does not stand in the formula")
+            raise UserError(f"{where}: the amplitude '{self.amplitude}' is not in the formula")
         at_terms = self.place in (*TERM_PLACES, "inputs of a recording")
         replaces = at_terms and TERM not in used  # then it is what a channel becomes, no change
         if not replaces and not _is_a_factor(self.amplitude, formula):

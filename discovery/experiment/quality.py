@@ -35,8 +35,7 @@ def refuse(findings: Sequence[Finding]) -> None:
     rest = f"\n  and {len(lines) - _SHOWN} more" if len(lines) > _SHOWN else ""
     told = "".join(f"\n  {line}" for line in lines[:_SHOWN])
     raise UserError(
-        "the recordings cannot be used as they are; mend them, or say --force to run all the "
-        f"same:{told}{rest}"
+        f"the recordings cannot be used; correct them, or say --force to run all the same:{told}{rest}"
     )
 
 

@@ -343,7 +343,7 @@ def _the_fluid(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
     )
     if flows and not fluids and len(coolants) == 1:
         [name] = coolants
-        why = f"taken for the fluid of {flows[0]}, as the file has no other"
+        why = f"assumed to be the fluid of {flows[0]}, as the file has no other"
         found[name] = guesses[name].doubtful(why, role="fluid temperature")
     return found
 

@@ -204,7 +204,7 @@ def _forward(
         return seconds, None, []
     if (steps <= 0).all():
         order = np.arange(len(seconds))[::-1]
-        return seconds[::-1] - seconds[-1], order, ["the newest row stood first: the rows were turned round"]
+        return seconds[::-1] - seconds[-1], order, ["the newest row came first: the rows were reversed"]
     if series is not None:
         order = np.argsort(seconds, kind="stable")
         return seconds[order] - seconds[order[0]], order, []

@@ -157,7 +157,7 @@ def _table(sheet: Sheet) -> OwnTable:
 
 def _spread(clock: Clock) -> tuple[Array, list[str]]:
     same = int(np.sum(np.diff(clock.seconds) == 0))
-    said = [f"{same} rows bear the stamp of the row before: spread evenly"] if same else []
+    said = [f"{same} rows have the time of the row before: spread evenly"] if same else []
     return spread_evenly(clock.seconds), said
 
 

@@ -68,7 +68,7 @@ def equation_6(m: Material) -> Chapter:
         shows.append(
             f"Eq. (6) changes what is left by at most {max(span) - min(span):.2g} (of {min(span):.2g}, "
             f"at {where}): "
-            "above 750 rpm the table follows the fluid whichever factor stands before h."
+            "above 750 rpm the table follows the fluid whichever factor h has."
         )
     shows.append(
         f"As printed, eq. (6) makes h {curves['as printed'][-1] / curves['off'][-1]:.1f} times larger at "
@@ -83,7 +83,7 @@ def equation_6(m: Material) -> Chapter:
         tuple(tables),
         shows=tuple(shows),
         not_shown=(
-            "The coefficient and exponents of eq. (1) rest on the paper alone. ν_f is read as the "
+            "The coefficient and exponents of eq. (1) come only from the paper. ν_f is read as the "
             "kinematic viscosity.",
             "The plant's own film law is another one, so no variant can be 'the true one' here.",
         ),

@@ -48,7 +48,7 @@ class Update:
                 "runs it in the shadow of the one at work first"
             )
             return lines
-        lines.append(f"the model stays as it is: {_why(self.comparison)}")
+        lines.append(f"the model is kept: {_why(self.comparison)}")
         return lines
 
 

@@ -39,7 +39,7 @@ def matched(
         if not found and not (key == "forbid" and options.form == "auto"):
             raise UnknownTermError(
                 f"{path}: the discovery has '{word}' under {key}, which is no term of its library; write it "
-                f"as it stands there: {', '.join(dict.fromkeys(offered))}"
+                f"as the library does: {', '.join(dict.fromkeys(offered))}"
             )
         return found
 

@@ -88,7 +88,7 @@ def record_orders(
         yield f"what is concealed is in {envelope_file}"
     if reveal:
         write_answers(out / "answer.json", answers)
-        yield f"the answer stands in {out / 'answer.json'}"
+        yield f"the answer is in {out / 'answer.json'}"
 
 
 def _refuse_another_campaign(out: Path, orders: Sequence[Order]) -> None:

@@ -233,7 +233,7 @@ def test_a_coolant_with_a_flow_can_be_offered_as_convection(tmp_path: Path) -> N
     assert result.exit_code == 0, result.output
     [line] = [one for one in result.output.splitlines() if one.startswith("  T_coolant")]
     assert "fluid temperature, degC ? " in line
-    assert "taken for the fluid of flow" in line
+    assert "assumed to be the fluid of flow" in line
     experiment = load_experiment(tmp_path / "rig" / "experiment.toml")
     model = experiment.model_file("first_order")
     assert {"T_coolant", "flow"} <= set(model.inputs)

@@ -262,7 +262,7 @@ def test_clocks_of_many_kinds(tmp_path: Path, lines: list[str], last: float) -> 
 def test_rows_of_one_stamp_are_spread(tmp_path: Path) -> None:
     table = read_own(_file(tmp_path, "time,T1", *(f"{k // 4},{k}" for k in range(40))))
     np.testing.assert_allclose(np.diff(table.time), 0.25)
-    assert "30 rows bear the stamp of the row before" in table.notes[0]
+    assert "30 rows have the time of the row before" in table.notes[0]
 
 
 def test_what_a_logger_writes_above_and_between(tmp_path: Path) -> None:

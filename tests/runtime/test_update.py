@@ -253,7 +253,7 @@ def test_the_command(machine: Campaign, fitted: Model, at_work: Path) -> None:
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
     assert "d0: nothing" in done.output
-    assert "the model stays as it is" in done.output
+    assert "the model is kept" in done.output
 
 
 def test_what_cannot_be_told_apart_is_not_signed() -> None:
