@@ -232,7 +232,7 @@ def report_random(count: int, first: int) -> None:
         print(
             f"{done} systems: exact set in {exact}, outputs {outputs_exact} of {2 * done}; {extra} too many "
             f"beside {true} true terms, {zero} intervals hold zero; median off: gains {off[0]}, time "
-            f"constants {off[1]}; median rms unseen: {rms}{same}; {clock.process_time() - began:.0f} s",
+            f"constants {off[1]}; median rms held out: {rms}{same}; {clock.process_time() - began:.0f} s",
             flush=True,
         )
 
