@@ -1,4 +1,4 @@
-"""How far an experiment to come would set two models apart: log evidence as its readings come in."""
+"""How well a future experiment would separate two models: log evidence as its readings come in."""
 
 from __future__ import annotations
 

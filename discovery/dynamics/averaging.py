@@ -86,7 +86,7 @@ def averaged(time: Array, table: Array, first: Ints, counts: Sequence[Array | No
 
 
 def some_of(table: Array) -> Array:
-    """Pieces of rows (N, Y) as they are, from all over a recording."""
+    """Unchanged pieces of rows (N, Y) from all over a recording."""
     begins = np.linspace(0, max(len(table) - PIECE, 0), PIECES).astype(int)
     return table[np.unique((begins[:, None] + np.arange(min(PIECE, len(table)))).ravel())]
 

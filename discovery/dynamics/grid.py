@@ -18,7 +18,7 @@ from discovery.recordings.blocks import block_means
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-MOST_NODES = 30_000  # of a recording as it is; beyond, it is coarsened
+MOST_NODES = 30_000  # of a recording; with more, it is coarsened
 COARSE_NODES = 8_000  # of a coarsened one, about; as many at most for its inputs' switches
 LONGEST_BLOCK = 120.0  # s, about; a recording of weeks has more nodes than these for its sake
 MOVED = 0.1  # of its span: a held input that moves so far within a block of a coarsened grid divides it
@@ -166,7 +166,7 @@ def make_grid(
         max_step: longest interval [s]; linear terms are exact whatever it is.
         coarse: blocks, about, where there are more nodes than `most`; default COARSE_NODES, and as many as
             keep a block within LONGEST_BLOCK.
-        most: nodes of a grid that is left as it is.
+        most: nodes of a grid that is not coarsened.
 
     Raises:
         UserError: an input without any value in the recording.

@@ -41,10 +41,10 @@ class Samples:
 
     def averaged(self, nodes: Array, shown: Callable[[Samples], Array] | None = None) -> Samples:
         """The channel by its means: over each interval between nodes (T,) where it is held, around each node
-        where it runs straight. One that runs straight between fewer stamps than nodes is left as it is.
+        where it runs straight. One that runs straight between fewer stamps than nodes is not changed.
 
         Args:
-            shown: the integral (T,) at the nodes as readings show it; default as it is.
+            shown: the integral (T,) at the nodes as readings show it; default the exact one.
         """
         if self.linear:
             if len(self.time) <= len(nodes):

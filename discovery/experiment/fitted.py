@@ -27,7 +27,7 @@ from discovery.recordings import Channel
 
 Array = NDArray[np.float64]
 _AT_BOUND = 1e-4  # share of a bound that counts as at it
-_NEGLIGIBLE = 0.01  # of the spread of an input: an offset so small is none
+_NEGLIGIBLE = 0.01  # of the spread of an input: a smaller offset is not reported
 
 
 @dataclass(frozen=True)

@@ -240,7 +240,7 @@ def diagnosis(experiment: Experiment, progress: Progress, fitted: Mapping[str, F
     """What the model of [mismatch] leaves out, where the experiment asks.
 
     Args:
-        fitted: models of the experiment; the proof compares with the one that was asked about as it stands.
+        fitted: models of the experiment; the proof compares with the one that is diagnosed.
     """
     wanted = experiment.form.mismatch
     if wanted is None:

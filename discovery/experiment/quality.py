@@ -27,7 +27,7 @@ def quality(experiment: Experiment) -> list[Finding]:
 
 
 def refuse(findings: Sequence[Finding]) -> None:
-    """Raises UserError where a recording cannot be used as it is."""
+    """Raises UserError where a recording cannot be used."""
     errors = [replace(one, severity="error") for one in findings if one.severity == "error"]
     if not errors:
         return

@@ -229,7 +229,7 @@ def _rows(c: Compiled, word: str) -> list[str]:
 
 
 def _first(k: int, delay: Delay, offset: int) -> str:
-    """A delayed input at the start: it was always as it is."""
+    """A delayed input at the start: it never changed before."""
     return f"""    for (k = {offset}; k < {offset + delay.length}u; ++k) {{ s->ring[k] = u[{delay.input}]; }}
     s->position[{k}] = 0; s->d[{k}] = u[{delay.input}];"""
 

@@ -80,7 +80,7 @@ class _Running:
 
 @dataclass
 class _AtStart:
-    """Memory at the first instant: the input was always as it is, a play rests in the middle."""
+    """Memory at the first instant: the input never changed before, a play rests in the middle."""
 
     inputs: Mapping[str, Node]
 

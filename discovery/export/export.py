@@ -87,7 +87,7 @@ def export_model(
         provenance: what else should be known about where the model comes from.
 
     Raises:
-        UsageError: an unknown target, or a step that is none.
+        UsageError: an unknown target, or an impossible step.
         UserError: a model that cannot be exported, or a target that is not equal; then nothing is written.
     """
     targets = (to,) if isinstance(to, str) else tuple(to)
@@ -240,7 +240,7 @@ def export_document(
 
     Args:
         out_dir: default a folder next to the document, with its name.
-        key: signs the document anew; without one it is copied as it is, with its signature.
+        key: signs the document anew; without one it is copied unchanged, with its signature.
 
     Raises:
         UsageError: an unknown target.

@@ -126,7 +126,7 @@ class Numbers:
     """`values` (N,), NaN where nothing was measured; `unit` that stands in the cells, or "".
 
     `wrong`: index of the first cell that is none of that, or None; `words`: the words of a switch that no
-    list knows, the one that stands for 0 first.
+    list knows, the word for 0 first.
     """
 
     values: Array

@@ -33,9 +33,9 @@ _SIMPLER = 1.03  # a simpler kind that is so near wins
 _FEWEST, _MOST = 600, 6000  # instants of a recording: enough to choose by
 _IN_TIME_SCALE = 10  # instants in the time in which readings forget half of what they were
 _ROUNDS = 20  # of Levenberg-Marquardt
-_LOST = 10.0  # times the error without a model: what is said of a model that runs away
+_LOST = 10.0  # times the error without a model: the score of a model that runs away
 
-# simplest first: name -> entry of an experiment file; INPUTS stands for the channels that drive the outputs
+# simplest first: name -> entry of an experiment file; INPUTS becomes the channels that drive the outputs
 CANDIDATES = {
     "regression": '{ kind = "regression" }',
     "reduced": '{ kind = "reduced", inputs = [INPUTS] }',

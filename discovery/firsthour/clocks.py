@@ -90,7 +90,7 @@ def _says_time(words: str) -> bool:
 def bookkeeping(name: str, unit: str, values: Array, seconds: Array, role: str) -> str:
     """What a column does that is neither measured nor acts on a machine, or "". A temperature never is such.
 
-    A column whose header names another unit than that of a time or a counter is none.
+    A column whose header names another unit than that of a time or a counter is not one.
     """
     known = np.isfinite(values)
     unit, words = unit.strip().lower(), fold(name)

@@ -42,7 +42,7 @@ def new(
         folder: what is written stands in it at the end, or nothing.
         sources: own tables. joins: for each of them the table of a second logger.
         statements: NAME=ROLE,UNIT of columns that a person knows.
-        room: column that stands for the air around the machine.
+        room: column used as the air around the machine.
         ask: asks a person about doubtful guesses; without, they are marked in the campaign file.
         again: the folder is there already; what a person wrote in it stays.
         quick: models are written without comparing them.

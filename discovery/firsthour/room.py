@@ -32,9 +32,9 @@ class Room:
 def unknown_room(
     runs: Sequence[OwnTable], guesses: Mapping[str, Guess], outputs: Sequence[str]
 ) -> tuple[Room | None, str]:
-    """What stands for the air around, and a sentence; no room, and "", where it was measured.
+    """The channel used as the air around, and a sentence; no room, and "", where it was measured.
 
-    Temperatures lose heat to the air, so a model of theirs has it as an unknown of each recording. For errors
+    Temperatures lose heat to the air, so a model of them has it as an unknown of each recording. For errors
     nothing stands in: a constant drives nothing.
 
     Args:

@@ -303,7 +303,7 @@ def _body(
         if cells == header:
             again += 1
             continue
-        if trailer and ragged is None:  # readings go on: what was taken for the end is a broken row
+        if trailer and ragged is None:  # readings go on: what looked like the end is a broken row
             ragged = trailer[0], -1
         kept.append(cells)
         numbers.append(line)

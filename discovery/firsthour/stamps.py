@@ -37,8 +37,8 @@ _INTERVAL = re.compile(
 class Clock:
     """`columns`: where the stamps stand; `seconds` (N,) since the first row; `about`: how they were read.
 
-    `order`: the rows as they follow each other in time, None: as they stand. `first`: ISO 8601 of the first
-    row, or "". `counted`: nothing says the unit of its numbers, they are as they stand.
+    `order`: the rows as they follow each other in time, None: as in the file. `first`: ISO 8601 of the first
+    row, or "". `counted`: nothing says the unit of its numbers, they are not converted.
     """
 
     columns: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""An engineer's table as it is: any encoding, mark and decimal sign, stamps of many kinds, wide or long."""
+"""An engineer's table in any form: encoding, mark and decimal sign, stamps of many kinds, wide or long."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Column:
     """`header`: as in the file. `name`: a word that expressions can use. `unit`: as the file names it, or "".
 
     `values` (N,), NaN where the cell is empty. `about`: words of the file that explain the name. `words`:
-    of a switch that no list knows, the one that stands for 0 first.
+    of a switch that no list knows, the word for 0 first.
     """
 
     header: str
@@ -76,7 +76,7 @@ class Column:
 class OwnTable:
     """`time` (N,) in s since the first row; `about_time`: how it was read; `notes`: what else was done.
 
-    `first`: ISO 8601 of the first row, or "". `counted`: nothing says the unit of `time`, it is as it stands;
+    `first`: ISO 8601 of the first row, or "". `counted`: nothing says the unit of `time`, no conversion;
     `clock`: name of its column. `above`: lines over the table.
     """
 

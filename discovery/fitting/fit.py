@@ -64,7 +64,7 @@ class Fit:
 
     @property
     def offsets(self) -> dict[str, dict[str, tuple[float, float]]]:
-        """By channel known only within a spread and by recording: what it is off by, and standard error."""
+        """Of each channel known only within a spread, by recording: estimated offset and standard error."""
         found: dict[str, dict[str, tuple[float, float]]] = {}
         for u, value, error in zip(self.problem.unknowns, self.theta, self.standard_errors, strict=True):
             if u.is_offset and u.recording is not None:
@@ -72,7 +72,7 @@ class Fit:
         return found
 
     def offset_in(self, recording: str) -> dict[str, float]:
-        """By channel known only within a spread: what it is off by in a recording that the fit has seen."""
+        """Of each channel known only within a spread: its estimated offset in a recording of the fit."""
         return {name: found[recording][0] for name, found in self.offsets.items() if recording in found}
 
     def summary(self) -> str:

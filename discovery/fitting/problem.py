@@ -104,7 +104,7 @@ class Problem:
         """The problem with the priors of its start values as a noise has them.
 
         Args:
-            found: spread of each state that is neither read nor given one; default as it is.
+            found: spread of each state that is neither read nor given one; default the stated one.
         """
         white = dict(zip(noise.outputs, noise.white, strict=True))
         unknowns = list(self.unknowns)

@@ -19,7 +19,7 @@ class Output:
 
     Args:
         header: first line of a new file.
-        resume_at: bytes of the file that a saved state stands for; None: a new file.
+        resume_at: bytes of the file at the time of a saved state; None: a new file.
         replay: lines after `resume_at` are made again, so they are cut off; if not, they are kept.
     """
 

@@ -117,7 +117,7 @@ def _write(body: str, folder: Path) -> None:
 
 @dataclass(frozen=True)
 class Saved:
-    """What a saved state says of itself: its instant [s], bytes of the output that it stands for, and the
+    """What a saved state says of itself: its instant [s], bytes of the output at that instant, and the
     clock it was saved with (see `Clock.saved`)."""
 
     time: float

@@ -63,7 +63,7 @@ class Session:
         self.clock, self.settings = clock, settings or Settings()
         self.shadow: Shadow | None = None
         self.resumed: float | None = None
-        self.resume_at: int | None = None  # bytes of the output that the restored state stands for
+        self.resume_at: int | None = None  # bytes of the output at the time of the restored state
         self.saved: float | None = None
         self.saving: Future[None] | None = None  # the last save, which may still be under way
         self.failing: set[str] = set()  # what cannot be written, and was reported

@@ -216,7 +216,7 @@ def _decays(problem: Problem, terms: Terms, i: int) -> Array:
 
 
 def _begin(problem: Problem, terms: Terms, others: Sequence[int]) -> tuple[Array, Array]:
-    """Mean (k,) and covariance (k, k) of the starts of a trajectory to come, from those of others.
+    """Mean (k,) and covariance (k, k) of the starts of a further trajectory, from those of others.
 
     The prior of a start counts as one more, the less the more others there are.
     """

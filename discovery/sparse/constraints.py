@@ -21,7 +21,7 @@ def matched(
 ) -> SparseOptions:
     """The options with keep, forbid and bounds written as the library writes its terms.
 
-    A temperature goes into a library as its difference from the room; its own name stands for that, too.
+    A temperature goes into a library as its difference from the room; its own name means that, too.
 
     Args:
         offered: terms of the library.

@@ -90,7 +90,7 @@ def _begun(
     outputs: Sequence[str],
     options: SparseOptions,
 ) -> Discovery:
-    """Masses with where they begin in a recording to come: those of all outputs are warm together."""
+    """Masses with their starts in a further recording: those of all outputs are warm together."""
     if not options.refine:
         return found
     return replace(found, model=starts_of(fit_model(found.model, campaign, recordings, outputs)))

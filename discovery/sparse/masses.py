@@ -138,12 +138,12 @@ def within(rules: Rules, responses: Sequence[Response]) -> list[Response]:
 
 
 def starts_of(fit: Fit) -> Model:
-    """The fitted model with where its masses begin in a recording to come: means, spreads, and how the start
-    of each follows those of the masses above it.
+    """The fitted model with the starts of its masses in a further recording: means, spreads, and how the
+    start of each follows those of the masses above it.
 
-    A recording may be cut out of what goes on; then the masses stand anywhere in their own range. That counts
-    as one start among those that were found: few cold starts do not say that all are cold. Masses are warm
-    together, so that the first reading alone says much of each. Starts are counted from the declared ones,
+    A recording may be cut out of a longer one; then the masses start anywhere in their range. That counts as
+    one start among those that were found: a few cold starts do not prove that all are cold. Masses are warm
+    together, so the first reading says much of each. Starts are counted from the declared ones,
     which follow the inputs where a mass begins in balance with them.
     """
     order = list(fit.problem.model.states)

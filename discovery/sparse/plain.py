@@ -78,7 +78,7 @@ def fit_plain(
 
     Args:
         inputs: channels u.
-        tried: settings of which the best on what is left out is taken; a single one is taken as it is.
+        tried: settings of which the best on what is left out is taken; a single one is not compared.
         seed: of the test functions.
     """
     grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}

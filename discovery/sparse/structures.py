@@ -157,7 +157,7 @@ def _law(into: str, variable: str, law: str, stable: bool) -> Candidate:
 
 
 def _expressions(words: Sequence[str], into: str, aliases: Mapping[str, str]) -> list[Candidate]:
-    """Expressions of the user; `y`, `rate` and `up` stand for the states."""
+    """Expressions of the user; `y`, `rate` and `up` are the states."""
     from discovery.sparse.options import FAMILIES
     from discovery.terms import Name, substitute
 

@@ -19,7 +19,7 @@ REFITS = 6  # claims that are refitted at each step
 
 
 def forward_selection(problem: Problem) -> Answer:
-    """The effects that forward selection adds; weights of BIC within a step stand for probabilities."""
+    """The effects that forward selection adds; weights of BIC within a step serve as probabilities."""
     context = problem.white
     current = score(context, (), context.white)
     assert current is not None  # the baseline alone has been fitted before

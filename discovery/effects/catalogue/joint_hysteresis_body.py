@@ -1,6 +1,6 @@
 """A body sticks in its seat: its growth reaches the errors with play.
 
-    play(T, width) stands for T in every error    [K]
+    play(T, width) replaces T in every error    [K]
 
 width in K: 0.5 to 2 um of friction over 3 to 8 um of growth for each kelvin. Source: Prandtl-Ishlinskii play
 operator. Limits: one width; the same at any rate, starts in the middle of its play.
