@@ -54,25 +54,11 @@ def new(
         UserError: the folder has a campaign already, or a file cannot be read.
     """
     there = (folder / "campaign.toml").exists()
-    if there and not again:
-        raise UserError(
-            f"{folder}: campaign.toml is there already; use --again to make model and experiment again "
-            "(what you "
-            "wrote stays), or name another folder"
-        )
-    if not sources and not (there and again):
-        raise UsageError("say --from FILE: which recording is the campaign made of?")
-    if joins and len(joins) != len(sources):
-        raise UsageError(f"{len(sources)} --from and {len(joins)} --join: say one --join for each --from")
+    _check_request(folder, sources, joins, there=there, again=again)
     if not sources:
         return _planned_again(folder, progress, quick=quick)
     said, clock = read_statements(statements)
-    progress("reading the files")
-    tables = [table for source in sources for table in read_tables(Path(source))]
-    if joins:
-        seconds = [table for source in joins for table in read_tables(Path(source))]
-        progress("finding the shift between the loggers")
-        tables = join_all(tables, seconds)
+    tables = _tables(sources, joins, progress)
     found = recorded(tables, clock)
     guesses = with_statements(found.seen, found.guesses, said, room)
     if ask is not None:
@@ -108,6 +94,32 @@ def new(
         "",
         *_next(folder, guesses, found),
     ]
+
+
+def _check_request(
+    folder: Path, sources: Sequence[Path], joins: Sequence[Path], *, there: bool, again: bool
+) -> None:
+    """Refuse what cannot be done: see the errors of `new`."""
+    if there and not again:
+        raise UserError(
+            f"{folder}: campaign.toml is there already; use --again to make model and experiment again "
+            "(what you wrote stays), or name another folder"
+        )
+    if not sources and not there:
+        raise UsageError("say --from FILE: which recording is the campaign made of?")
+    if joins and len(joins) != len(sources):
+        raise UsageError(f"{len(sources)} --from and {len(joins)} --join: say one --join for each --from")
+
+
+def _tables(sources: Sequence[Path], joins: Sequence[Path], progress: Progress) -> list[OwnTable]:
+    """The tables of all files, each joined with that of its second logger, if there is one."""
+    progress("reading the files")
+    tables = [table for source in sources for table in read_tables(Path(source))]
+    if not joins:
+        return tables
+    seconds = [table for source in joins for table in read_tables(Path(source))]
+    progress("finding the shift between the loggers")
+    return join_all(tables, seconds)
 
 
 def _planned_again(folder: Path, progress: Progress, *, quick: bool) -> list[str]:

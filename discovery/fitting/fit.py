@@ -173,12 +173,8 @@ def fit_model(
             problem = problem.spread(current, {name: new for name, (new, _) in spreads.items()})
         if settled:
             break
-    covariance, lost = covariance_of(problem, solution.jacobian, theta)
-    if noise is None and loss == "linear":
-        covariance = covariance * _excess(problem, solution)
-    if nuisance:  # their priors were counted `together` times: back to one
-        times = np.sqrt([together if u.is_nuisance else 1.0 for u in problem.unknowns])
-        covariance = covariance * np.outer(times, times)
+    excess = _excess(problem, solution) if noise is None and loss == "linear" else 1.0
+    covariance, lost = _covariance(problem, solution, together, excess)
     return Fit(
         problem,
         theta,
@@ -190,6 +186,20 @@ def fit_model(
         clock.perf_counter() - began,
         together,
     )
+
+
+def _covariance(
+    problem: Problem, solution: Solution, together: float, excess: float
+) -> tuple[Array, list[str]]:
+    """Covariance (U, U) of the unknowns, and a sentence for each parameter that is not determined.
+
+    Args:
+        together: how many times the priors of nuisances were counted; here they count once.
+        excess: factor on the variance of the readings.
+    """
+    covariance, lost = covariance_of(problem, solution.jacobian, solution.theta)
+    times = np.sqrt([together if u.is_nuisance else 1.0 for u in problem.unknowns])
+    return covariance * excess * np.outer(times, times), lost
 
 
 def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
