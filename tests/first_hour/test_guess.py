@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from discovery.errors import UserError
-from discovery.firsthour.guess import Guess, drives, guess, guess_all
+from discovery.firsthour.guess import Guess, drives, guess
 from discovery.firsthour.table import Column, read_own
+from discovery.firsthour.tableguess import guess_all
 
 CASES = [
     ("T_room", "", np.linspace(20, 23, 50), "ambient temperature", "degC"),
