@@ -373,7 +373,7 @@ def _in_play(context: Context, current: Scored) -> list[Setting]:
 def attempt(
     context: Context, current: Scored, others: Sequence[Hypothesis], claim: Score, goal: float = inf
 ) -> Scored | None:
-    """Refit with others and a claim with them, from the sizes that the scan gives; `goal`: as in `fit_model`."""
+    """Refit with others and a claim, from the sizes that the scan gives; `goal` as in `fit_model`."""
     h = claim.hypothesis
     sizes: dict[str, float] = {}
     if h.effect.amplitude.fixed is None:
