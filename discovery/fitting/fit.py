@@ -7,6 +7,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,6 +48,7 @@ class Fit:
     unidentified: tuple[str, ...]  # one sentence for each parameter that these recordings do not determine
     seconds: float
     together: float = 1.0  # readings that count as one against what is known of inputs with a spread
+    ended_early: bool = False  # it would not have come near its goal
 
     @property
     def model(self) -> Model:
@@ -113,6 +115,7 @@ def fit_model(
     begin: Fit | None = None,
     max_rounds: int = 60,
     tolerance: float = 1e-9,
+    goal: float = inf,
 ) -> Fit:
     """Fit the free parameters and start values of a model to recordings.
 
@@ -134,6 +137,7 @@ def fit_model(
         begin: a fit to begin from, of a model that has most of the unknowns; `guess` goes before it.
         max_rounds: of Levenberg-Marquardt.
         tolerance: relative change of the cost that ends them.
+        goal: the cost that is good enough to matter; a fit that would not reach it ends early.
 
     Raises:
         UserError: an input that a recording does not hold.
@@ -151,11 +155,11 @@ def fit_model(
     rounds = _ROUNDS if noise is None or nuisance else 1
     for k in range(rounds):
         most = max_rounds if k in (0, rounds - 1) else _ROUGH
-        solution = solve(problem, theta, current, loss, most, tolerance, together)
+        solution = solve(problem, theta, current, loss, most, tolerance, together, goal)
         theta = solution.theta
         if not np.isfinite(solution.jacobian).all():
             raise RunsAwayError(f"model '{model.name}' answers its parameters with numbers without bound")
-        if k == rounds - 1:
+        if k == rounds - 1 or solution.ended_early:
             break
         left = [problem.residual(t) for t in solution.trajectories]
         settled = True
@@ -185,6 +189,7 @@ def fit_model(
         tuple(lost),
         clock.perf_counter() - began,
         together,
+        solution.ended_early,
     )
 
 
