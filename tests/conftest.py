@@ -14,7 +14,6 @@ LONG = (
     "test_a_case_is_a_case_folder_with_a_key[two]",
     "test_a_notebook_runs[two_heaters]",
     "test_the_cutting_fluid_is_found_by_a_model_of_the_dry_machine",
-    "test_the_lines_for_a_notebook_run",
     "test_from_nothing_to_a_diagnosis_in_four_commands",
     "test_killed_at_any_instant_it_returns_to_the_same_offsets[instants0]",
     "test_simulated_machines_are_warned_of_once_in_fifty_recordings_at_most",

@@ -117,8 +117,7 @@ def test_a_fit_that_will_not_come_near_its_goal_ends_early(monkeypatch: pytest.M
     whole = fit_model(model(), r, ["r3"])
     free = fit_model(poor, r, ["r3"], noise=whole.noise)
     far, near = (
-        fit_model(poor, r, ["r3"], noise=whole.noise, goal=goal)
-        for goal in (whole.cost, 1.01 * free.cost)
+        fit_model(poor, r, ["r3"], noise=whole.noise, goal=goal) for goal in (whole.cost, 1.01 * free.cost)
     )
     assert far.ended_early
     assert far.cost > 2 * whole.cost
