@@ -97,7 +97,8 @@ def guessed(column: Column, found: Evidence, alike: Sequence[Evidence]) -> Guess
 
 def drives(guesses: Mapping[str, Guess]) -> list[str]:
     """What warms a machine: its heat loads, else its currents and speeds, else its voltages."""
-    return _stated(guesses) or [name for name, one in guesses.items() if one.unit in VOLTAGES]
+    causes = {name: one for name, one in guesses.items() if one.role not in ("error", "other output")}
+    return _stated(causes) or [name for name, one in causes.items() if one.unit in VOLTAGES]
 
 
 def squared(one: Guess) -> bool:

@@ -149,6 +149,13 @@ def test_a_voltage_drives_where_nothing_better_is_recorded() -> None:
     assert drives(_guessed(("voltage", "", 0, 9), ("door", "", 0, 1))) == ["voltage"]
 
 
+def test_what_answers_drives_nothing() -> None:
+    """The level of a tank in volts, and a current that is read as an output."""
+    for unit in ("V", "A"):
+        both = {n: Guess(f"other {n}", unit, "") for n in ("input", "output")}
+        assert drives(both) == ["input"]
+
+
 def test_a_flow_below_one_that_is_no_switch_is_asked_about() -> None:
     assert not _guessed(("flow", "", 0.1, 0.7))["flow"].sure  # a share, or litres a minute
     assert guess(Column("pump", "pump", "", np.arange(50.0) % 2)).sure
