@@ -23,7 +23,7 @@ from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, ChannelForm
 from discovery.recordings.valuecheck import below_zero
 
-REFERENCES = ("regression", "pysindy")  # what a user would pick: every experiment compares with them
+REFERENCES = ("discovered", "regression", "pysindy")  # every experiment compares with them
 HAND_BUILT = {"first_order": ("model.toml", 1), "two_masses": ("two_masses.toml", 2)}
 _FEW = 20  # readings of an output: fewer carry no model
 _QUIET = 3.0  # times its noise: an output that moves less says nothing
