@@ -293,27 +293,31 @@
     }
     caption.append(tools);
   }
-  const ranking = document.querySelector("tr[data-score]")?.closest("table");
-  if (ranking && ranking.querySelectorAll("tr[data-score]").length > 1) {
-    const rows = [...ranking.tBodies[0].rows], column = [...ranking.tHead.rows[0].cells].findIndex((c) => c.textContent === "rms against the best");
-    const name = (row) => row.cells[0].textContent, first = rows.map((row) => row.cells[column].textContent);
-    const tools = ranking.caption.querySelector(".tools"), label = document.createElement("label"), choice = document.createElement("select");
+  for (const table of document.querySelectorAll("table[data-against]")) {  // compare with a row, find a row
+    const { columns, heads, cells, texts } = JSON.parse(table.dataset.against), rows = [...table.tBodies[0].rows];
+    const name = (row) => (row.cells[0].querySelector("a") || row.cells[0].firstChild).textContent.trim();
+    const first = [table.tHead.rows[0], ...rows].map((row) => columns.map((column) => row.cells[column].textContent));
+    const tools = table.caption.querySelector(".tools"), label = document.createElement("label"), choice = document.createElement("select");
     label.className = "find"; label.append("Compare with ", choice);
-    for (const row of rows.filter((one) => one.dataset.score)) choice.add(new Option(name(row), name(row)));
+    rows.forEach((row) => choice.add(new Option(name(row))));
     choice.addEventListener("change", () => {
-      const aim = rows.find((row) => name(row) === choice.value), best = choice.selectedIndex === 0;
-      ranking.tHead.rows[0].cells[column].textContent = best ? "rms against the best" : `rms against ${choice.value}`;
-      rows.forEach((row, k) => {
-        const more = 100 * (Math.exp(row.dataset.score - aim.dataset.score) - 1);
-        const said = row === aim ? "reference" : !row.dataset.score ? "–" : `${more < 0 ? "−" : "+"}${Math.abs(more).toFixed(0)} %`;
-        row.cells[column].textContent = best ? first[k] : said;
+      const chosen = choice.selectedIndex, said = heads.map((head) => (chosen ? head.replace("{}", choice.value) : null));
+      columns.forEach((column, k) => {
+        table.tHead.rows[0].cells[column].textContent = said[k] ?? first[0][k];
+        rows.forEach((row, r) => {
+          row.cells[column].textContent = chosen ? texts[cells[chosen][r][k]] : first[r + 1][k];
+          row.cells[column].dataset.label = said[k] ?? first[0][k];
+        });
       });
     });
     tools.prepend(label);
     if (rows.length > 8) {
       const search = document.createElement("label"), text = document.createElement("input");
-      text.type = "search"; search.className = "find"; search.append("Find a model ", text);
-      text.addEventListener("input", () => rows.forEach((row) => { row.hidden = !row.textContent.toLowerCase().includes(text.value.trim().toLowerCase()); }));
+      text.type = "search"; search.className = "find"; search.append("Find ", text);
+      text.addEventListener("input", () => {
+        const wanted = text.value.trim().toLowerCase().split(/\s+/);
+        rows.forEach((row) => { row.hidden = !wanted.every((word) => row.textContent.toLowerCase().includes(word)); });
+      });
       tools.prepend(search);
     }
   }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any, TypeGuard
 
 from discovery.report.run import Run
@@ -62,15 +62,6 @@ def ratio(run: Run, model: str, other: str | None) -> float:
         if key in theirs and _positive(mine[key].get("rms")) and _positive(theirs[key].get("rms"))
     ]
     return math.exp(sum(logs) / len(logs)) if logs else math.nan
-
-
-def mean_log_rms(run: Run, model: str, shared: Collection[tuple[str, str]]) -> float | None:
-    """Mean logarithm of the rms over (recording, output) pairs; None where one is missing or zero."""
-    found = cells(run, model)
-    values = [found[key].get("rms") if key in found else None for key in shared]
-    if not values or not all(_positive(value) for value in values):
-        return None
-    return sum(math.log(value) for value in values if value) / len(values)
 
 
 def _positive(value: object) -> bool:

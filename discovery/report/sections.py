@@ -19,6 +19,7 @@ from discovery.report.ranking import is_discovered, ranked
 from discovery.report.run import Run
 from discovery.report.text import counted, number, percent
 
+_MOST_DETAILED = 6  # models with a section of their own
 _OFTEN = 0.2  # share of the repeated searches from which a term is listed
 
 
@@ -30,7 +31,7 @@ def detailed(run: Run) -> list[str]:
     wanted += [
         name for name, model in run.models.items() if model is subject or any(t.effect for t in model.terms)
     ]
-    return list(dict.fromkeys(wanted))
+    return list(dict.fromkeys(wanted))[:_MOST_DETAILED]
 
 
 def model(run: Run, name: str) -> dict[str, Any]:
