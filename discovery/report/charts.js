@@ -293,17 +293,34 @@
     }
     caption.append(tools);
   }
-  for (const table of document.querySelectorAll("table[data-against]")) {  // compare with a row, find a row
+  for (const table of document.querySelectorAll("table[data-against]")) {  // compare with a row, find rows, sort them
     const { columns, heads, cells, texts } = JSON.parse(table.dataset.against), rows = [...table.tBodies[0].rows];
     const name = (row) => (row.cells[0].querySelector("a") || row.cells[0].firstChild).textContent.trim();
-    const first = [table.tHead.rows[0], ...rows].map((row) => columns.map((column) => row.cells[column].textContent));
+    const head = [...table.tHead.rows[0].cells].map((cell) => {
+      const button = document.createElement("button");
+      button.type = "button"; button.className = "sort"; button.append(...cell.childNodes);
+      cell.append(button);
+      button.addEventListener("click", () => {
+        const up = cell.getAttribute("aria-sort") !== "ascending", at = cell.cellIndex;
+        const key = (row) => { const text = row.cells[at].textContent.trim().replace("−", "-"); return [parseFloat(text), text]; };
+        const order = (a, b) => {
+          const [x, s] = key(a), [y, t] = key(b);
+          return Number.isNaN(x) || Number.isNaN(y) ? Number.isNaN(x) - Number.isNaN(y) || s.localeCompare(t) : x - y;
+        };
+        for (const one of table.tHead.rows[0].cells) one.removeAttribute("aria-sort");
+        cell.setAttribute("aria-sort", up ? "ascending" : "descending");
+        table.tBodies[0].append(...[...rows].sort((a, b) => (up ? order(a, b) : order(b, a))));
+      });
+      return button;
+    });
+    const first = [[...head], ...rows.map((row) => row.cells)].map((cells) => columns.map((column) => cells[column].textContent));
     const tools = table.caption.querySelector(".tools"), label = document.createElement("label"), choice = document.createElement("select");
     label.className = "find"; label.append("Compare with ", choice);
     rows.forEach((row) => choice.add(new Option(name(row))));
     choice.addEventListener("change", () => {
       const chosen = choice.selectedIndex, said = heads.map((head) => (chosen ? head.replace("{}", choice.value) : null));
       columns.forEach((column, k) => {
-        table.tHead.rows[0].cells[column].textContent = said[k] ?? first[0][k];
+        head[column].textContent = said[k] ?? first[0][k];
         rows.forEach((row, r) => {
           row.cells[column].textContent = chosen ? texts[cells[chosen][r][k]] : first[r + 1][k];
           row.cells[column].dataset.label = said[k] ?? first[0][k];

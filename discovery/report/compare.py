@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -107,6 +109,8 @@ def merged(runs: Sequence[Run], folder: Path) -> Run:
     A recording counts as held out only where no run has fitted it.
     """
     labels, common = labels_of(runs), shared_recordings(runs)
+    places = [os.path.relpath(run.folder) for run in runs]
+    command = shlex.join(["discovery", "compare", *places]) if len(runs) <= _NAMED else ""
     fitted = {name for run in runs for name in run.results.get("fit", [])}
     models: dict[str, Any] = {}
     files: dict[str, Model] = {}
@@ -130,11 +134,7 @@ def merged(runs: Sequence[Run], folder: Path) -> Run:
         "input_units": _together(runs, "input_units"),
         "simulated": all(run.results.get("simulated") for run in runs),
         "models": models,
-        "inputs": {
-            f"{label}: {name}": digest
-            for label, run in zip(labels, runs, strict=True)
-            for name, digest in run.results.get("inputs", {}).items()
-        },
+        "command": command,
     }
     predictions = {
         name: _predictions(runs, labels, name)

@@ -135,7 +135,7 @@ def behind(lead: Lead | None) -> str:
     if lead is None or lead.ratio <= 0:
         return "–"
     more = [100 * (1 / one - 1) for one in (lead.ratio, lead.high, lead.low) if one > 0]
-    middle, *ends = (f"{one:+.0f}".replace("-", "−") for one in more)
+    middle, *ends = (f"{one:+.0f}".replace("-", "−") if abs(one) >= 0.5 else "0" for one in more)
     return (
         f"{middle} % ({ends[0]} to {ends[1]})" if lead.low < lead.high and len(ends) == 2 else f"{middle} %"
     )

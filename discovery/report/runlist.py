@@ -62,18 +62,22 @@ def run_list(runs: Sequence[Run], labels: Sequence[str], page: Path) -> Printed:
 def differences(chosen: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
     """What is not the same in two runs, from the chosen one to the other.
 
-    >>> differences({"fit": "a", "file x.csv": "1"}, {"fit": "a, b", "file x.csv": "2"})
-    ['fit: a → a, b', 'x.csv changed']
+    >>> differences({"fit": "a", "file x.csv": "1", "model m": "3 terms"}, {"fit": "a, b", "file x.csv": "2"})
+    ['fit: a → a, b', 'x.csv changed', 'without m']
     """
-    found = []
+    found: list[str] = []
     for key in dict.fromkeys([*chosen, *other]):
         before, after = chosen.get(key), other.get(key)
+        kind, _, name = key.partition(" ")
         if before == after:
             continue
-        if name := key.removeprefix("file ") if key.startswith("file ") else "":
-            found.append(
-                f"{name} {'added' if before is None else 'not used' if after is None else 'changed'}"
-            )
+        if kind == "file":
+            what = "added" if before is None else "not used" if after is None else "changed"
+            found.append(f"{name} {what}")
+        elif kind == "model" and before and after:
+            found.append(f"{name}: {before} → {after}")
+        elif kind == "model":
+            found.append(f"with {name}" if after else f"without {name}")
         else:
             found.append(f"{key}: {before or 'none'} → {after or 'none'}")
     return found
@@ -131,7 +135,7 @@ def _score(run: Run, model: str | None) -> str:
     if model is None:
         return "–"
     if is_error(run) and np.isfinite(removed := mean_improvement(run, model)):
-        return f"{number(removed, 2)} %"
+        return f"{number(removed, 2)}\u00a0%"
     scored = rms_by_unit(run, model).items()
     return ", ".join(f"{number(float(np.median(rms)), 2)} {unit}".strip() for unit, rms in scored) or "–"
 
@@ -144,7 +148,7 @@ def _verdict(run: Run) -> str:
         f"{words(str(one['effect']))} ({percent(one.get('probability'))})"
         for one in run.diagnosis.get("physics") or []
     ]
-    return listed(named) if named else str(run.diagnosis.get("verdict", "unknown"))
+    return listed(named).replace(" %", "\u00a0%") if named else str(run.diagnosis.get("verdict", "unknown"))
 
 
 def _about(run: Run) -> str:
@@ -172,10 +176,12 @@ def _facts(run: Run) -> dict[str, str]:
         "machine": str(results.get("campaign") or ""),
         "fit": ", ".join(results.get("fit") or []),
         "held out": ", ".join(results.get("held_out") or []),
-        "diagnosed model": str(diagnosis.get("model") or ""),
+        "diagnosed": str(diagnosis.get("model") or ""),
     }
     entries: Mapping[str, Mapping[str, Any]] = results.get("models", {})
     for name, entry in entries.items():
-        facts[name] = f"{number(entry.get('terms'))} terms, {number(entry.get('parameters'))} parameters"
+        facts[f"model {name}"] = (
+            f"{number(entry.get('terms'))} terms, {number(entry.get('parameters'))} parameters"
+        )
     facts |= {f"file {name}": str(digest) for name, digest in (results.get("inputs") or {}).items()}
     return facts | {name: str(one) for name, one in (results.get("versions") or {}).items()}
