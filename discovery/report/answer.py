@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from discovery.report.heat import subject
 from discovery.report.lead import Lead, lead_over
 from discovery.report.mismatch import NEAR, leads, sizes
 from discovery.report.ranking import (
@@ -51,7 +52,7 @@ class Answer:
 
 def answer(run: Run) -> Answer:
     """What the run says, in words and in few figures; missing physics comes first."""
-    models, missing = _models(run), _missing(run.diagnosis)
+    models, missing = _models(run), _missing(run)
     first = missing if leads(run) or not models.headline else models
     second = models if first is missing else missing
     return Answer(first, second)
@@ -71,7 +72,9 @@ def _models(run: Run) -> Part:
     rivals = [m for m in order[1:] if astray(run, m) == astray(run, best)]
     found = {m: lead for m in rivals if (lead := lead_over(run, best, m)) is not None}
     for rival, lead in list(found.items())[:1]:
-        points.append(f"Next is {_name(run, rival)}: the rms of “{best}” is {_against(lead)}.")
+        points.append(
+            f"Next is {_name(run, rival)}: over all outputs, the rms of “{best}” is {_against(lead)}."
+        )
     given = [m for m in found if origin(run, m) == "given"][:2]
     figures += [(_percent_less(found[m]), f"rms of {best} against {m}{_interval(found[m])}") for m in given]
     if is_error(run) and (worst := _worst(run, best)):
@@ -178,14 +181,15 @@ def _worst(run: Run, model: str) -> str:
     )
 
 
-def _missing(diagnosis: Mapping[str, Any] | None) -> Part:
+def _missing(run: Run) -> Part:
     """What the diagnosis says."""
+    diagnosis = run.diagnosis
     if not diagnosis:
         return Part()
     verdict = str(diagnosis.get("verdict", ""))
     found = diagnosis.get("physics") or []
     lead = _VERDICTS.get(verdict, f"{verdict.capitalize()}:")
-    sentence = f"{lead} “{diagnosis.get('model', 'the model')}”"
+    sentence = f"{lead} “{subject(run)}”"
     if found:
         sentence += f": {_grouped(found)}"
     worse = (diagnosis.get("improvement") or {}).get("contradicted_by") or []

@@ -104,7 +104,7 @@
         const x1 = Math.max(this.at(from), LEFT), x2 = Math.min(this.at(to), this.width - RIGHT);
         if (x2 > x1) element("title", {}, element("rect", { class: "shade", x: x1, y: top, width: x2 - x1, height }, svg), why);
       }
-      for (const tick of steps(low, high, height / 42, false)) {
+      for (const tick of steps(low, high, Math.max(4, height / 42), false)) {
         const y = area.y(tick);
         element("line", { class: Math.abs(tick) < 1e-12 && panel.zero ? "zero" : "grid", x1: LEFT, x2: this.width - RIGHT, y1: y, y2: y }, svg);
         element("text", { class: "tick", x: LEFT - 7, y: y + 4, "text-anchor": "end" }, svg, show(tick));

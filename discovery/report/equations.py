@@ -78,7 +78,7 @@ def _balance(model: Model, state: State, signs: Mapping[str, str]) -> str:
             if place == state.name:
                 body = mathml.stacked(mathml.lines(term.expression, signs))
                 if _is_sum(term.expression) and sign == "−":
-                    body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
+                    body = mathml.bracketed(body)
                 parts.append((sign, body, len(text(term.expression))))
     return _equation(left, parts)
 
@@ -89,7 +89,7 @@ def _summands(tree: Expression, signs: Mapping[str, str]) -> list[tuple[str, str
         left, right = tree.arguments
         body = mathml.stacked(mathml.lines(right, signs))
         if _is_sum(right):
-            body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
+            body = mathml.bracketed(body)
         return [*_summands(left, signs), ("+" if tree.function == "+" else "−", body, len(text(right)))]
     return [("+", mathml.stacked(mathml.lines(tree, signs)), len(text(tree)))]
 

@@ -94,6 +94,12 @@ def temperature(body: str) -> str:
     )
 
 
+def bracketed(body: str) -> str:
+    """A body in round brackets, which grow only around what is taller than a line."""
+    grows = "" if any(f"<{tall}" in body for tall in ("mfrac", "mtable", "msup")) else ' stretchy="false"'
+    return f"<mrow><mo{grows}>(</mo>{body}<mo{grows}>)</mo></mrow>"
+
+
 def expression(tree: Expression, symbols: Mapping[str, str] | None = None) -> str:
     """MathML of an expression tree; `symbols` gives names a symbol of their own."""
     return _write(tree, symbols or {})[0]
@@ -112,7 +118,7 @@ def lines(tree: Expression, symbols: Mapping[str, str] | None = None, room: int 
         left, right = tree.arguments
         body = expression(right, signs)
         if tree.function == "-" and getattr(right, "function", "") in ("+", "-"):
-            body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
+            body = bracketed(body)
         return [*lines(left, signs, room), f"<mo form='infix'>{_SIGN[tree.function]}</mo><mrow>{body}</mrow>"]
     if len(plain(tree)) <= room or (len(factors) == 1 and not _is_where(tree)):
         return [expression(tree, signs)]
@@ -126,7 +132,7 @@ def lines(tree: Expression, symbols: Mapping[str, str] | None = None, room: int 
         part = lines(factor, signs, room) if _is_where(factor) else [_write(factor, signs)[0]]
         body = "".join(part)
         if not _is_where(factor) and _write(factor, signs)[1] < (5 if index else 3):
-            body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
+            body = bracketed(body)
         size = len(plain(factor))
         if index and length + size > room:
             found.append("<mo form='infix'>·</mo>")
@@ -167,7 +173,7 @@ def _write(tree: Expression, symbols: Mapping[str, str]) -> tuple[str, int]:
 
     def within(inner: Expression, level: int) -> str:
         text, own = _write(inner, symbols)
-        return f"<mrow><mo>(</mo>{text}<mo>)</mo></mrow>" if own < level else f"<mrow>{text}</mrow>"
+        return bracketed(text) if own < level else f"<mrow>{text}</mrow>"
 
     match tree:
         case Number(value=value):

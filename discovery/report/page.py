@@ -233,4 +233,4 @@ def _eyebrow(run: Run) -> str:
 
 
 def _brief(names: Sequence[str]) -> str:
-    return listed(names) if len(names) < 5 else f"{len(names)} recordings"
+    return listed([f"“{name}”" for name in names]) if len(names) < 5 else f"{len(names)} recordings"

@@ -75,13 +75,18 @@ class Printed:
 
 
 def printed(table: tables.Table, left: Sequence[int] = ()) -> Printed:
-    """A table of the evaluation with a line above each new first cell."""
+    """A table of the evaluation; a line above each group of rows with the same first cell."""
     rows, before = [], None
+    grouped = len({row[0] for row in table.rows}) < len(table.rows)
     for row in table.rows:
         texts = [cell if isinstance(cell, str) else "" if cell is None else number(cell) for cell in row]
         new = texts[0] != before
         before = texts[0]
-        rows.append(Line(tuple(texts), "first") if new else Line(("", *texts[1:]), repeated=texts[0]))
+        rows.append(
+            Line(tuple(texts), "first" if grouped else "")
+            if new
+            else Line(("", *texts[1:]), repeated=texts[0])
+        )
     return Printed(table.title, table.header, tuple(rows), frozenset(left))
 
 
@@ -106,7 +111,7 @@ def summary(run: Run) -> Printed | None:
             for r in shown
         ]
         made = {one.lower(): one for one in (origin(run, model), kind(run, model))}.values()
-        size = [number(entry.get("terms")), number(entry.get("parameters"))]
+        size = [number(entry.get("terms") or None), number(entry.get("parameters"))]
         times = "best" if model == order[0] else behind(lead_over(run, order[0], model))
         look = "best" if model == order[0] else ""
         line = (model, ", ".join(made), *size, *figures, times, number(entry.get("seconds"), 2))

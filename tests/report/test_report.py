@@ -359,7 +359,7 @@ def test_a_comparison_counts_as_unseen_only_what_no_run_has_fitted(folder: Path,
     (other / "results.json").write_text(json.dumps(results))
     page = write_comparison(load_runs([folder, other]), tmp_path).read_text("utf-8")
     assert "discovered, second" in page
-    assert "compared on validation" in page
+    assert "compared on “validation”" in page
 
 
 def test_runs_of_two_machines_are_listed_but_their_models_are_not_mixed(folder: Path, tmp_path: Path) -> None:
