@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from discovery.evaluation import tables
 from discovery.report.lead import Lead, lead_over
@@ -22,7 +25,7 @@ from discovery.report.ranking import (
 from discovery.report.run import Run
 from discovery.report.text import number, with_unit
 
-_MOST_RECORDINGS = 4  # columns of the summary; the tables below have all
+_MOST_RECORDINGS = 4  # with a column each in the summary; of more, median and worst
 _AGAINST = "rms against the best"
 _MOST_COLUMNS = 8  # models with a column of their own
 _MOST_CHOSEN = 40  # models of which each can be the one to compare with
@@ -96,20 +99,20 @@ def summary(run: Run) -> Printed | None:
     if not order:
         return None
     recordings = list(dict.fromkeys(r for model in order for r, _ in cells(run, model)))
-    shown = recordings[:_MOST_RECORDINGS]
     removed = is_error(run)
     units = rms_units(run)
     what = "removed rms [%]" if removed else f"rms [{', '.join(units)}]"
+    few = len(recordings) <= _MOST_RECORDINGS
+    shown = recordings if few else [f"{word} of {len(recordings)} recordings" for word in ("median", "worst")]
     header = ("Model", "Kind", "Terms", "Parameters", *shown, _AGAINST, "Fit [s]")
     rows = []
     for model in order:
         entry = run.results["models"][model]
-        figures = [
-            number(mean_improvement(run, model, r), 2)
-            if removed
-            else ", ".join(number(mean_rms(run, model, r).get(unit)) for unit in units)
-            for r in shown
-        ]
+        each = [_scores(run, model, recording) for recording in recordings]
+        if not few:
+            worst = np.min if removed else np.max
+            each = [[float(of(found)) for found in zip(*each, strict=True)] for of in (np.median, worst)]
+        figures = [", ".join(number(one, 2 if removed else 3) for one in scores) for scores in each]
         made = {one.lower(): one for one in (origin(run, model), kind(run, model))}.values()
         size = [number(entry.get("terms") or None), number(entry.get("parameters"))]
         times = "best" if model == order[0] else behind(lead_over(run, order[0], model))
@@ -129,6 +132,14 @@ def summary(run: Run) -> Printed | None:
         )
         against = Against((header.index(_AGAINST),), ("rms against {}",), choices)
     return Printed(title, header, tuple(rows), frozenset({1}), against)
+
+
+def _scores(run: Run, model: str, recording: str) -> list[float]:
+    """On a recording: the mean removed rms [%] of errors, or the rms over the outputs of each unit."""
+    if is_error(run):
+        return [mean_improvement(run, model, recording)]
+    found = mean_rms(run, model, recording)
+    return [found.get(unit, math.nan) for unit in rms_units(run)]
 
 
 def behind(lead: Lead | None) -> str:

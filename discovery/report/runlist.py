@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from discovery.report.heat import subject
 from discovery.report.lead import Array, Lead, lead_of
 from discovery.report.printed import Against, Line, Printed, behind
 from discovery.report.ranking import cells, is_error, mean_improvement, ranked, rms_by_unit
@@ -171,12 +172,12 @@ def _report(run: Run, page: Path) -> str:
 
 def _facts(run: Run) -> dict[str, str]:
     """What can differ between two runs, by what it is called."""
-    results, diagnosis = run.results, run.diagnosis or {}
+    results = run.results
     facts = {
         "machine": str(results.get("campaign") or ""),
         "fit": ", ".join(results.get("fit") or []),
         "held out": ", ".join(results.get("held_out") or []),
-        "diagnosed": str(diagnosis.get("model") or ""),
+        "diagnosed": subject(run) if run.diagnosis else "",
     }
     entries: Mapping[str, Mapping[str, Any]] = results.get("models", {})
     for name, entry in entries.items():
