@@ -121,7 +121,8 @@ def _interval(lead: Lead) -> str:
     """The interval of a lead behind a caption; nothing where there is none."""
     if lead.low == lead.high:
         return ""
-    return f" (95 %: {100 * (lead.low - 1):.0f} to {100 * (lead.high - 1):.0f} %)".replace("-", "−")
+    low, high = (f"{100 * (end - 1) + 0.0:.0f}".replace("-0", "0") for end in (lead.low, lead.high))
+    return f" (95 %: {low} to {high} %)".replace("-", "−")
 
 
 def _removed(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:

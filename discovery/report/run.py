@@ -40,7 +40,9 @@ class Predictions:
 
 @dataclass(frozen=True)
 class Run:
-    """Everything that a report is made from. `inputs`: by recording and input, time [s] and value (K,)."""
+    """Everything that a report is made from. `inputs`: by recording and input, time [s] and value (K,) of
+    the curve; a held input is a curve of steps.
+    """
 
     folder: Path
     results: Mapping[str, Any]
@@ -130,13 +132,18 @@ def read_inputs(path: Path) -> dict[str, dict[str, tuple[Array, Array]]]:
     try:
         return {
             recording: {
-                name: (np.array(one["time"], dtype=float), np.array(one["value"], dtype=float))
+                name: _curve(np.array(one["time"], dtype=float), np.array(one["value"], dtype=float), one)
                 for name, one in inputs.items()
             }
             for recording, inputs in json.loads(read_text(path)).items()
         }
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise UserError(f"{path}: cannot be read ({error}); make the run again") from None
+
+
+def _curve(time: Array, value: Array, one: Mapping[str, Any]) -> tuple[Array, Array]:
+    """An input as it is drawn: a held one keeps its value until the next."""
+    return (np.repeat(time, 2)[1:], np.repeat(value, 2)[:-1]) if one.get("held") else (time, value)
 
 
 def read_predictions(path: Path) -> Predictions:

@@ -177,12 +177,14 @@ def _facts(run: Run) -> dict[str, str]:
         "machine": str(results.get("campaign") or ""),
         "fit": ", ".join(results.get("fit") or []),
         "held out": ", ".join(results.get("held_out") or []),
+        "outputs": ", ".join(run.outputs),
         "diagnosed": subject(run) if run.diagnosis else "",
     }
     entries: Mapping[str, Mapping[str, Any]] = results.get("models", {})
     for name, entry in entries.items():
-        facts[f"model {name}"] = (
-            f"{number(entry.get('terms'))} terms, {number(entry.get('parameters'))} parameters"
-        )
-    facts |= {f"file {name}": str(digest) for name, digest in (results.get("inputs") or {}).items()}
+        sizes = {word: entry.get(word) for word in ("terms", "parameters")}
+        facts[f"model {name}"] = ", ".join(f"{number(size)} {word}" for word, size in sizes.items() if size)
+    own = Path(str(results.get("command") or "").rpartition(" ")[2]).name  # the experiment: its name differs
+    files = results.get("inputs") or {}
+    facts |= {f"file {name}": str(digest) for name, digest in files.items() if name != own}
     return facts | {name: str(one) for name, one in (results.get("versions") or {}).items()}

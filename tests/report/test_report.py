@@ -68,7 +68,7 @@ class _Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         given = dict(attrs)
-        if tag not in ("meta", "link", "input", "br", "hr", "img", "rect", "line", "mspace"):
+        if tag not in ("meta", "link", "input", "br", "wbr", "hr", "img", "rect", "line", "mspace"):
             self.open.append(tag)
         if given.get("id"):
             self.ids.append(str(given["id"]))
@@ -172,18 +172,36 @@ def test_every_model_can_be_the_reference(folder: Path, page: str) -> None:
             assert said == "reference" if i == j else said.startswith(f"{more:+.0f} %".replace("-", "−"))
 
 
+def test_models_are_ranked_on_what_all_of_them_predict(folder: Path) -> None:
+    """A model of the easy outputs alone does not win by leaving out the hard one."""
+    run = load_run(folder)
+    models = json.loads(json.dumps(run.results["models"]))
+    for model in models.values():
+        for scores in model["recordings"].values():
+            scores["E_A0C"]["rms"] = 50.0
+    models["superposition"]["recordings"] = {
+        recording: {"E_Y0C": scores["E_Y0C"]}
+        for recording, scores in models["superposition"]["recordings"].items()
+    }
+    models["discovered"]["recordings"]["validation"]["E_A0C"]["rms"] = 5000.0
+    one = dataclasses.replace(run, results={**run.results, "models": models})
+    rms = {name: models[name]["recordings"]["validation"]["E_Y0C"]["rms"] for name in models}
+    assert ranked(one) == sorted(rms, key=lambda name: rms[name])
+
+
 def test_a_simulated_machine_is_said_first_and_inputs_are_drawn(tmp_path: Path) -> None:
     folder = sample.write_sample(tmp_path / "run")
     results = json.loads((folder / "results.json").read_text())
     (folder / "results.json").write_text(
         json.dumps(results | {"simulated": True, "input_units": {"pump": "1"}})
     )
-    inputs = {"validation": {"pump": {"time": [0, 3600], "value": [0, 1]}}}
+    inputs = {"validation": {"pump": {"time": [0, 1800, 3600], "value": [0, 1, 1], "held": True}}}
     (folder / "inputs.json").write_text(json.dumps(inputs))
     page = write_report(folder).read_text("utf-8")
     assert re.search(r'class="eyebrow">Simulated machine · ', page)
     (chart,) = (one for one in _data(page)["charts"] if one["key"] == "validation-inputs")
     assert chart["panels"][0]["label"] == "pump [-]"
+    assert chart["panels"][0]["series"][0]["y"] == [0, 0, 1, 1, 1]  # a step, not a ramp
     (folder / "inputs.json").write_text('{"validation": {"pump": [1]}}')
     with pytest.raises(UserError, match=r"inputs\.json: cannot be read"):
         write_report(folder)
