@@ -79,7 +79,7 @@ def _balance(model: Model, state: State, signs: Mapping[str, str]) -> str:
                 body = mathml.stacked(mathml.lines(term.expression, signs))
                 if _is_sum(term.expression) and sign == "−":
                     body = mathml.bracketed(body)
-                parts.append((sign, body, len(text(term.expression))))
+                parts.append((sign, body, mathml.extent(term.expression)))
     return _equation(left, parts)
 
 
@@ -90,8 +90,8 @@ def _summands(tree: Expression, signs: Mapping[str, str]) -> list[tuple[str, str
         body = mathml.stacked(mathml.lines(right, signs))
         if _is_sum(right):
             body = mathml.bracketed(body)
-        return [*_summands(left, signs), ("+" if tree.function == "+" else "−", body, len(text(right)))]
-    return [("+", mathml.stacked(mathml.lines(tree, signs)), len(text(tree)))]
+        return [*_summands(left, signs), ("+" if tree.function == "+" else "−", body, mathml.extent(right))]
+    return [("+", mathml.stacked(mathml.lines(tree, signs)), mathml.extent(tree))]
 
 
 def _equation(left: str, parts: list[tuple[str, str, int]]) -> str:

@@ -114,13 +114,13 @@ def lines(tree: Expression, symbols: Mapping[str, str] | None = None, room: int 
     """
     signs = symbols or {}
     factors = _factors(tree)
-    if len(plain(tree)) > room and isinstance(tree, Apply) and tree.function in ("+", "-"):
+    if extent(tree) > room and isinstance(tree, Apply) and tree.function in ("+", "-"):
         left, right = tree.arguments
         body = expression(right, signs)
         if tree.function == "-" and getattr(right, "function", "") in ("+", "-"):
             body = bracketed(body)
         return [*lines(left, signs, room), f"<mo form='infix'>{_SIGN[tree.function]}</mo><mrow>{body}</mrow>"]
-    if len(plain(tree)) <= room or (len(factors) == 1 and not _is_where(tree)):
+    if extent(tree) <= room or (len(factors) == 1 and not _is_where(tree)):
         return [expression(tree, signs)]
     if _is_where(tree):
         assert isinstance(tree, Apply)
@@ -133,7 +133,7 @@ def lines(tree: Expression, symbols: Mapping[str, str] | None = None, room: int 
         body = "".join(part)
         if not _is_where(factor) and _write(factor, signs)[1] < (5 if index else 3):
             body = bracketed(body)
-        size = len(plain(factor))
+        size = extent(factor)
         if index and length + size > room:
             found.append("<mo form='infix'>·</mo>")
             length = 0
@@ -144,6 +144,24 @@ def lines(tree: Expression, symbols: Mapping[str, str] | None = None, room: int 
         found[-1] += f"<mrow>{body}</mrow>"
         length += size
     return found
+
+
+def extent(tree: Expression) -> int:
+    """About how many characters wide an expression is printed; a fraction is as wide as its longer part.
+
+    >>> from discovery.terms import parse
+    >>> extent(parse("a*b")), extent(parse("(a + b)/300"))
+    (3, 5)
+    """
+    match tree:
+        case Apply(function="/", arguments=arguments):
+            return max(map(extent, arguments))
+        case Apply(function=function, arguments=arguments):
+            sign = {"**": 0, "*": 1, "neg": 1}.get(function, 3 if function in _SIGN else len(function) + 2)
+            return sum(map(extent, arguments)) + sign
+    if isinstance(tree, Name):  # an index is smaller
+        return 1 + round(0.7 * (len(tree.id) - 1))
+    return len(plain(tree))
 
 
 def stacked(rows: list[str]) -> str:

@@ -33,7 +33,7 @@ def section(run: Run) -> dict[str, Any] | None:
     tables = [_physics(d), _proof(d), _outputs(run, d), _windows(run, d), _rivals(d), _considered(d)]
     return {
         "about": _about(run, d),
-        "reasons": [_sentence(_in_words(str(one), d)) for one in d.get("reasons") or []],
+        "reasons": [_sentence(_in_words(str(one))) for one in d.get("reasons") or []],
         "tables": [table for table in tables if table.rows],
         "charts": heat_charts(run),
         "heat_note": _HEAT_NOTE,
@@ -50,11 +50,12 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
 
 
-def _in_words(text: str, d: Mapping[str, Any]) -> str:
-    """A text with the words of the catalogue as plain words."""
-    groups = ("physics", "alternatives", "considered", "closest")
-    for effect in {str(one["effect"]) for group in groups for one in d.get(group) or []}:
-        text = re.sub(rf"\b{re.escape(effect)}\b", words(effect), text)
+def _in_words(text: str) -> str:
+    """A text with the effects of the catalogue as plain words."""
+    from discovery.effects.catalogue import catalogue
+
+    for effect in sorted({one.word for one in catalogue().values()}, key=len, reverse=True):
+        text = re.sub(rf"\b{effect}\b", words(effect), text)
     return text
 
 

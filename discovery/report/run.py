@@ -179,8 +179,8 @@ _PRETTY = {"um": "µm", "um/m": "µm/m", "degC": "°C", "1": "", "delta_degC": "
 def pretty_unit(unit: str) -> str:
     """A unit as it is printed.
 
-    >>> pretty_unit("um/m"), pretty_unit("W/K"), pretty_unit("1")
-    ('µm/m', 'W/K', '')
+    >>> pretty_unit("um/m"), pretty_unit("W/K"), pretty_unit("1"), pretty_unit("degC/h")
+    ('µm/m', 'W/K', '', 'K/h')
     """
     return _PRETTY.get(
         unit,
@@ -189,5 +189,6 @@ def pretty_unit(unit: str) -> str:
         .replace("**", "^")
         .replace("*", "·")
         .replace("delta_degC", "K")
+        .replace("degC", "K")
         .replace("um", "µm"),
     )
