@@ -104,9 +104,11 @@ def _write(chart: Chart, folder: Path, font: str) -> list[Path]:
         figure = Figure(figsize=(WIDTH, _FIRST))
         FigureCanvasAgg(figure)  # measures the legend
         _draw(figure, chart)
-        FigureCanvasSVG(figure).print_svg(paths[0], metadata={"Date": None})
+        svg: Any = FigureCanvasSVG(figure)
+        svg.print_svg(paths[0], metadata={"Date": None})
         with mpl.rc_context({"font.sans-serif": [font]}):
-            FigureCanvasPdf(figure).print_pdf(paths[1], metadata={"CreationDate": None})
+            pdf: Any = FigureCanvasPdf(figure)
+            pdf.print_pdf(paths[1], metadata={"CreationDate": None})
     return paths
 
 
