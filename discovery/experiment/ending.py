@@ -4,6 +4,7 @@ next.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -156,11 +157,17 @@ def _next(
         return f"confirm or correct {which} in the campaign file, then `discovery new DIR --again`"
     if not run.held_out:
         return "hold out a recording: only that shows how well a model predicts"
-    if diagnosis and diagnosis.get("next_experiment"):
+    if (
+        diagnosis
+        and diagnosis.get("next_experiment")
+        and not (helps and diagnosis["verdict"] == "no mismatch")
+    ):
         return str(diagnosis["next_experiment"]).rstrip(".")
     if not helps:
         return "record the inputs that drive the machine, and let each one move on its own"
-    export = f"`discovery export {run.folder} --model {best} --to json`"
+    export = f"`discovery export {shlex.quote(str(run.folder))} --model {shlex.quote(str(best))} --to json`"
+    if diagnosis and diagnosis.get("model") == best:
+        return export
     return f'{export}, or diagnose it ([mismatch] model = "{best}")'
 
 

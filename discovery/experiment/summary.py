@@ -90,7 +90,8 @@ def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
         label = f"{run}: " if run else ""
         rows.append((f"{label}uncompensated", "", *(raw.get(y) for y in outputs)))
         for name, entry in entries.items():
-            size = f"{results['models'][name]['terms']} terms"
+            terms = results["models"][name]["terms"]
+            size = f"{terms} terms" if terms else ""
             rows.append((label + name, size, *(entry[y]["rms"] if y in entry else None for y in outputs)))
     units = {y: unit for one in runs.values() for y, unit in one.get("units", {}).items()}
     header = ("rms", "", *(f"{y} [{differences(units.get(y, ''))}]" for y in outputs))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from discovery.report.heat import subject
+from discovery.report.heat import diagnosed_key, subject
 from discovery.report.lead import Lead, lead_over
 from discovery.report.mismatch import NEAR, leads, sizes
 from discovery.report.ranking import (
@@ -25,6 +25,7 @@ from discovery.report.recommended import recommended
 from discovery.report.run import Run, pretty_unit
 from discovery.report.text import counted, listed, number, percent, words
 
+_CLEARLY = 0.95  # ratio of two rms from which one is clearly smaller
 _VERDICTS = {
     "no mismatch": "No missing physics was detected in",
     "missing physics": "Physics is missing in",
@@ -207,11 +208,24 @@ def _missing(run: Run) -> Part:
         points.append(
             f"These recordings do not exclude {listed([_effect(one) for one in rivals], 'or')} instead."
         )
+    points += _better(run) if verdict == "no mismatch" else []
     figures: list[tuple[str, str]] = []
     if found:
         proof, figures = _proof(diagnosis)
         points += proof
     return Part(f"{sentence}.", tuple(points), tuple(figures))
+
+
+def _better(run: Run) -> list[str]:
+    """That another model predicts clearly better than one in which nothing was detected."""
+    best, given = next(iter(ranked(run)), None), diagnosed_key(run)
+    lead = lead_over(run, best, given) if best and given and best != given else None
+    if best is None or lead is None or lead.high > _CLEARLY:
+        return []
+    return [
+        f"“{best}” predicts better than “{given}”: its rms is {_against(lead)}. No effect of the catalogue "
+        "explains the difference."
+    ]
 
 
 def _effect(one: Mapping[str, Any]) -> str:

@@ -6,7 +6,7 @@ import re
 import string
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -122,16 +122,13 @@ def small_font(charts: Sequence[Chart]) -> Iterator[str]:
 
     options = subset.Options(drop_tables=["GSUB", "GPOS", "GDEF", "kern", "FFTM", "PfEd"], glyph_names=True)
     whole = font_manager.findfont(font_manager.FontProperties(family=["sans-serif"]))
-    font = subset.load_font(whole, options)
+    manager, known = font_manager.fontManager, list(font_manager.fontManager.ttflist)
     cutter = subset.Subsetter(options)
     texts = [text for chart in charts for text in _texts(chart)]
     cutter.populate(text="".join([string.printable, "−×", *texts]))
-    cutter.subset(font)
-    name = f"{font['name'].getDebugName(1)} cut"
-    font["name"].setName(name, 1, 3, 1, 0x409)
-    manager = font_manager.fontManager
-    known = list(manager.ttflist)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, closing(subset.load_font(whole, options)) as font:
+        cutter.subset(font)
+        font["name"].setName(f"{font['name'].getDebugName(1)} cut", 1, 3, 1, 0x409)
         path = Path(folder) / "cut.ttf"
         font.save(path)
         manager.addfont(path)

@@ -89,10 +89,14 @@ class Run:
         return "µm/m" if output[:3] in ("E_A", "E_B", "E_C") else "µm" if output.startswith("E_") else ""
 
     def noise(self, output: str) -> float | None:
-        """Reading noise (standard deviation, unit of the output) that the diagnosis or the run found."""
-        detection = (self.diagnosis or {}).get("detection", {})
-        value = detection.get("noise", {}).get(output, self.results.get("noise", {}).get(output))
-        return float(value) if value else None
+        """Reading noise (standard deviation, unit of the output): stated in the campaign, else the least that
+        the diagnosis or a fit found, because what a model does not explain passes for noise.
+        """
+        if stated := self.results.get("noise", {}).get(output):
+            return float(stated)
+        parts = [(self.diagnosis or {}).get("detection", {}), *self.results.get("models", {}).values()]
+        found = [float(size) for part in parts if (size := (part.get("noise") or {}).get(output))]
+        return min(found, default=None)
 
     def band(self, model: str, output: str) -> float | None:
         """Half width of the 95 % prediction band of a model: 1.96 times its rms in cross-validation; with
