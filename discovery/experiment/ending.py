@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from discovery.report.heat import diagnosed_key
 from discovery.report.lead import Lead, lead_over
 from discovery.report.ranking import astray, cells, ranked, rms_by_unit
 from discovery.report.run import Run, load_run
@@ -166,7 +167,7 @@ def _next(
     if not helps:
         return "record the inputs that drive the machine, and let each one move on its own"
     export = f"`discovery export {shlex.quote(str(run.folder))} --model {shlex.quote(str(best))} --to json`"
-    if diagnosis and diagnosis.get("model") == best:
+    if diagnosed_key(run) == best:
         return export
     return f'{export}, or diagnose it ([mismatch] model = "{best}")'
 
