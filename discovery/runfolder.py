@@ -154,8 +154,8 @@ def _take_along(old: Path, new: Path) -> None:
                 _link(entry, new / entry.name)
     except OSError as error:
         raise UserError(
-            f"{old}: what stands there beside the results cannot be taken along ({error}); "
-            "nothing was changed, choose another place with --out"
+            f"{old}: other files in this folder cannot be kept ({error}); "
+            "nothing was changed. Choose another folder with --out"
         ) from None
 
 

@@ -26,9 +26,13 @@
     let step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw);
     if (isCount) step = Math.max(1, step);
     if (isHours && raw > 0.9) step = [1, 2, 3, 6, 12, 24, 48, 96, 168].find((k) => k >= raw) || step;
-    const found = [];
-    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; k++) found.push(k * step);
-    return found;
+    const ticks = () => {
+      const found = [];
+      for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; k++) found.push(k * step);
+      return found;
+    };
+    if (ticks().length < 3 && !isHours && !isCount) step /= 2;
+    return ticks();
   };
   const nearest = (xs, x) => {
     let low = 0, high = xs.length - 1;

@@ -15,7 +15,7 @@ from discovery.terms import Apply, Expression, Term, names, text
 
 @dataclass(frozen=True)
 class Value:
-    """A parameter as it is printed."""
+    """A parameter in print."""
 
     name: str
     symbol: str
@@ -138,7 +138,7 @@ def other_values(model: Model) -> list[Value]:
 
 
 def value(name: str, parameter: Parameter) -> Value:
-    """A parameter as it is printed: value, 95 % interval (or "given"), unit."""
+    """A parameter in print: value, 95 % interval (or "given"), unit."""
     symbol, unit = mathml.math(mathml.symbol(name)), pretty_unit(parameter.unit)
     if parameter.values:
         each = ", ".join(

@@ -152,7 +152,7 @@ def _draw(figure: Any, chart: Chart) -> None:
         ax.yaxis.set_label_coords(0.16 / WIDTH, 0.5, transform=_across(figure, ax))
     axes[-1].set_xlabel(chart.x_label)
     handles: dict[str, Any] = {}
-    for ax in axes:  # the first panel shows a curve as it is; those below it are thin
+    for ax in axes:  # curves of the first panel are thick, those below are thin
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     above = _legend(figure, handles) if len(handles) > 1 else 0.0

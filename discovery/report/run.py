@@ -146,7 +146,7 @@ def read_inputs(path: Path) -> dict[str, dict[str, tuple[Array, Array]]]:
 
 
 def _curve(time: Array, value: Array, one: Mapping[str, Any]) -> tuple[Array, Array]:
-    """An input as it is drawn: a held one keeps its value until the next."""
+    """The curve of an input: a held one keeps its value until the next."""
     return (np.repeat(time, 2)[1:], np.repeat(value, 2)[:-1]) if one.get("held") else (time, value)
 
 
@@ -181,7 +181,7 @@ _PRETTY = {"um": "µm", "um/m": "µm/m", "degC": "°C", "1": "", "delta_degC": "
 
 
 def pretty_unit(unit: str) -> str:
-    """A unit as it is printed.
+    """A unit in print.
 
     >>> pretty_unit("um/m"), pretty_unit("W/K"), pretty_unit("1"), pretty_unit("degC/h")
     ('µm/m', 'W/K', '', 'K/h')
