@@ -271,10 +271,12 @@
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   };
   const forms = {
-    CSV: (rows) => rows.map((row) => row.map((cell) => (/[",\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell)).join(",")).join("\n") + "\n",
+    // a byte order mark, so that Excel reads the units; a minus that programs read
+    CSV: (rows) => "\ufeff" + rows.map((row) => row.map((cell) => cell.replaceAll("−", "-")).map((cell) => (/[",\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell)).join(",")).join("\n") + "\n",
     LaTeX: (rows) => {
       const safe = (cell) => cell.replace(/[\\&%$#_{}~^]/g, (c) => ({ "\\": "\\textbackslash{}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}" })[c] || `\\${c}`)
-        .replaceAll("µ", "\\textmu{}").replaceAll("°", "\\textdegree{}").replaceAll("−", "$-$").replaceAll("→", "$\\to$").replaceAll("–", "--");
+        .replaceAll("µ", "\\textmu{}").replaceAll("°", "\\textdegree{}").replaceAll("−", "$-$").replaceAll("→", "$\\to$").replaceAll("–", "--")
+        .replace(/[²³·×±σ\u00a0“”]/g, (c) => ({ "²": "$^2$", "³": "$^3$", "·": "$\\cdot$", "×": "$\\times$", "±": "$\\pm$", "σ": "$\\sigma$", "\u00a0": "~", "“": "``", "”": "''" })[c]);
       const line = (row) => `${row.map(safe).join(" & ")} \\\\`;
       return ["\\begin{tabular}{l" + "r".repeat(rows[0].length - 1) + "}", "\\hline", line(rows[0]), "\\hline", ...rows.slice(1).map(line), "\\hline", "\\end{tabular}", ""].join("\n");
     },
