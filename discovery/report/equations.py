@@ -38,7 +38,7 @@ class Row:
     effect: str
 
 
-_LINE = 40  # characters of an equation in one line
+_LINE = 34
 _COLUMN = 32  # of a formula in the table of terms
 
 
