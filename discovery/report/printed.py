@@ -104,7 +104,7 @@ def summary(run: Run) -> Printed | None:
     what = "removed rms [%]" if removed else f"rms [{', '.join(units)}]"
     few = len(recordings) <= _MOST_RECORDINGS
     shown = recordings if few else [f"{word} of {len(recordings)} recordings" for word in ("median", "worst")]
-    header = ("Model", "Kind", "Terms", "Parameters", *shown, _AGAINST, "Fit [s]")
+    header = ("Model", "Terms", "Parameters", *shown, _AGAINST, "Fit [s]")
     rows = []
     for model in order:
         entry = run.results["models"][model]
@@ -117,8 +117,8 @@ def summary(run: Run) -> Printed | None:
         size = [number(entry.get("terms") or None), number(entry.get("parameters"))]
         times = "best" if model == order[0] else behind(lead_over(run, order[0], model))
         look = "best" if model == order[0] else ""
-        line = (model, ", ".join(made), *size, *figures, times, number(entry.get("seconds"), 2))
-        rows.append(Line(line, look))
+        line = (model, *size, *figures, times, number(entry.get("seconds"), 2))
+        rows.append(Line(line, look, about=", ".join(made)))
     title = f"{what}, {'mean over all errors' if removed else 'over all outputs of a unit'}"
     title = title[0].upper() + title[1:] if removed else title
     against = None
@@ -131,7 +131,7 @@ def summary(run: Run) -> Printed | None:
             for chosen in order
         )
         against = Against((header.index(_AGAINST),), ("rms against {}",), choices)
-    return Printed(title, header, tuple(rows), frozenset({1}), against)
+    return Printed(title, header, tuple(rows), frozenset(), against)
 
 
 def _scores(run: Run, model: str, recording: str) -> list[float]:
