@@ -78,7 +78,19 @@ class Printed:
 
 
 def printed(table: tables.Table, left: Sequence[int] = ()) -> Printed:
-    """A table of the evaluation; a line above each group of rows with the same first cell."""
+    """A table of the evaluation; a line above each group of rows with the same first cell. Columns of the
+    paper in which it prints nothing are left out.
+    """
+    empty = {
+        k
+        for k, head in enumerate(table.header)
+        if head.startswith("paper") and all(row[k] is None or row[k] == "" for row in table.rows)
+    }
+    table = replace(
+        table,
+        header=tuple(head for k, head in enumerate(table.header) if k not in empty),
+        rows=tuple(tuple(cell for k, cell in enumerate(row) if k not in empty) for row in table.rows),
+    )
     rows, before = [], None
     grouped = len({row[0] for row in table.rows}) < len(table.rows)
     for row in table.rows:
