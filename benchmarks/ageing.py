@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics.system import predict as model_outputs
+from discovery.dynamics import predict as model_outputs
 from discovery.export.document import Exported, from_document, render
 from discovery.export.makedocument import make_document
 from discovery.export.seal import open_seal

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.fitting import fit_model, predict_recording
 from discovery.fitting.starts import warm_start
 from discovery.models import Model

@@ -23,7 +23,7 @@ import numpy as np
 from discovery.evaluation.paper import TABLE_3
 from discovery.experiment import Experiment, load_experiment
 from discovery.experiment.fitted import predict
-from discovery.experiment.pipeline import starting_model
+from discovery.experiment.modelfits import starting_model
 from discovery.fitting import fit_model
 from discovery.recordings import load_campaign
 from discovery.virtual.machine import Machine
@@ -104,7 +104,7 @@ def ratio(found: Mapping[str, Scores], name: str, recording: str) -> list[float]
 
 
 def print_summary(errors: Sequence[str], all_found: Sequence[Mapping[str, Scores]]) -> None:
-    """Over all seeds: the ratio, and improvements beside the paper's, which are printed in whole percent."""
+    """Over all seeds: the ratio, and improvements next to the paper's, which are printed in whole percent."""
     fitted = list(all_found[0])
     for name in [name for name in DISCOVERED if name in fitted]:
         for recording in HELD_OUT:

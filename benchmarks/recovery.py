@@ -1,4 +1,4 @@
-"""How often the exact set of terms is found, how well their coefficients, beside plain PySINDy and its weak
+"""How often the exact set of terms is found, and its coefficients, next to plain PySINDy and its weak
 form.
 
     python benchmarks/recovery.py [--sets 25] [--peers]

@@ -33,7 +33,7 @@ RESOLUTION = {  # finer gives the same answer in more time
     "diagnosis/selection.py": "MOST REFITS RIVALS HOPE HALF FAR",
     "diagnosis/thresholds.py": "DRAWS BLOCKS",
 }
-SHOWN = {  # what is told beside an answer, not the answer
+SHOWN = {  # what is shown with an answer, not the answer
     "evidence/late.py": "TOLD SMALL",
     "diagnosis/description.py": "MOST_TERMS LAGS",
     "diagnosis/document.py": "CONSIDERED WRONG_READINGS",

@@ -50,8 +50,7 @@ def least(work: Callable[[], object], times: int) -> float:
 
 def free_run() -> Pair:
     """72 h of the five-body thermobalance of the machine, inputs every minute, a reading every hour."""
-    from discovery.dynamics import make_grid, make_system, simulate
-    from discovery.dynamics.system import predict
+    from discovery.dynamics import make_grid, make_system, predict, simulate
     from discovery.models.thermobalance import thermobalance
     from tests.dynamics.test_against_scipy import thermobalance_by_hand, wet_day
 

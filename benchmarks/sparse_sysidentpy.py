@@ -100,7 +100,7 @@ def main(folder: Path) -> None:
             )
         print(
             f"{int(path.stem) + 1} systems: same inputs in {same} of {outputs} outputs, "
-            f"{terms / outputs:.1f} terms an output, median rms unseen {np.median(left):.2f} um, "
+            f"{terms / outputs:.1f} terms an output, median rms held out {np.median(left):.2f} um, "
             f"{(clock.process_time() - began) / outputs:.1f} s an output",
             flush=True,
         )

@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.errors import UserError
 from discovery.fitting import predict_recording
 from discovery.frames import campaign_from_frames
@@ -232,7 +232,7 @@ def report_random(count: int, first: int) -> None:
         print(
             f"{done} systems: exact set in {exact}, outputs {outputs_exact} of {2 * done}; {extra} too many "
             f"beside {true} true terms, {zero} intervals hold zero; median off: gains {off[0]}, time "
-            f"constants {off[1]}; median rms unseen: {rms}{same}; {clock.process_time() - began:.0f} s",
+            f"constants {off[1]}; median rms held out: {rms}{same}; {clock.process_time() - began:.0f} s",
             flush=True,
         )
 

@@ -21,7 +21,7 @@ say_one_thread()  # nothing above imports numpy
 
 @contextmanager
 def _terminated_like_interrupted() -> Iterator[None]:
-    """SIGTERM unwinds as Ctrl-C does, so that what stands half-written beside its place is taken away."""
+    """SIGTERM unwinds as Ctrl-C does, so that half-written files are removed."""
     if threading.current_thread() is not threading.main_thread():  # signals cannot be caught elsewhere
         yield
         return
@@ -46,7 +46,7 @@ def _leave_fits_behind() -> None:
 
 def _interrupted(error: BaseException | None) -> bool:
     """Whether an interrupt is behind a failure: one that comes while a compiled kernel hands back its result
-    is told by Python as a SystemError.
+    is reported by Python as a SystemError.
     """
     while isinstance(error, SystemError):
         error = error.__cause__ or error.__context__

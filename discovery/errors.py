@@ -1,4 +1,4 @@
-"""The one exception that a user sees, and two kinds of it that somebody has to tell apart."""
+"""The one exception that a user sees, and two kinds of it that callers have to distinguish."""
 
 
 class UserError(Exception):

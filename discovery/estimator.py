@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
-from discovery.dynamics import make_grid
-from discovery.dynamics.system import inputs_of, predict
+from discovery.dynamics import make_grid, predict
+from discovery.dynamics.system import inputs_of
 from discovery.errors import UserError
 from discovery.fitting import fit_model, predict_recording
 from discovery.frames import campaign_from_frames

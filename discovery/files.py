@@ -22,7 +22,7 @@ _WORD = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
 _DOTTED = rf"{_WORD}(?:\s*\.\s*{_WORD})*"
 _HEADER = re.compile(rf"\s*(\[\[?)\s*({_DOTTED})\s*\]")
 _TABLES = (".csv", ".csv.gz", ".parquet")
-_KINDS = {  # the keys that tell a file of each kind, and the command that takes it
+_KINDS = {  # the keys that identify a file of each kind, and the command that takes it
     "a campaign": ({"channels", "recordings"}, "check {path}"),
     "an experiment": ({"campaign", "models"}, "run {path}"),
     "a model": ({"states", "terms"}, "check CAMPAIGN --model {path}"),

@@ -92,7 +92,7 @@ def prediction_frame(
     what the model predicts (NAME|model) and what is left over (NAME|left)."""
     import pandas as pd
 
-    from discovery.dynamics.system import predict
+    from discovery.dynamics import predict
     from discovery.fitting import predict_recording
 
     trajectory = predict_recording(model, campaign, recording, list(outputs))

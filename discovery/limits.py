@@ -48,7 +48,7 @@ def regular(path: str | os.PathLike[str]) -> Path:
 
 
 def read_whole(path: str | os.PathLike[str], most: int = MOST_TEXT) -> bytes:
-    """The bytes of a regular file as they are.
+    """The unchanged bytes of a regular file.
 
     Raises:
         UserError: as `regular`, or larger than `most` bytes.
@@ -134,7 +134,7 @@ def _blocks(path: Path) -> Iterator[bytes]:
 
 
 def _reason(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error or "damaged")
+    return str(getattr(error, "strerror", None) or error) or "damaged"
 
 
 def _size(count: int) -> str:

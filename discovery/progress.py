@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Lock
 
-Progress = Callable[[str], None]  # told what begins
+Progress = Callable[[str], None]  # called with what begins
 
 _TOO_SOON = 5.0  # s, before which nothing is said of the time left
 _SHARE = 0.1  # done, at least, before it is

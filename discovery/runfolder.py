@@ -59,7 +59,7 @@ def _read(folder: Path, name: str) -> dict[str, Any]:
 
 @contextmanager
 def staged(folder: Path) -> Iterator[Path]:
-    """A temporary folder beside `folder` that takes its place when the block ends well, and vanishes when
+    """A temporary folder next to `folder` that takes its place when the block ends well, and vanishes when
     not.
 
     What a run owns in `folder` is replaced as a whole; everything else there (exports, figures, notes) is
@@ -69,7 +69,7 @@ def staged(folder: Path) -> Iterator[Path]:
     """
     _refuse_foreign(folder)
     place = folder.resolve()  # behind a link the results change, not the link
-    with beside(folder) as temporary:
+    with temporary_folder(folder) as temporary:
         yield temporary
         if place.exists():
             _take_along(place, temporary)
@@ -77,8 +77,8 @@ def staged(folder: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def beside(folder: Path) -> Iterator[Path]:
-    """A temporary folder beside `folder` that vanishes at the end, whatever happens. What a killed process
+def temporary_folder(folder: Path) -> Iterator[Path]:
+    """A temporary folder next to `folder` that vanishes at the end, whatever happens. What a killed process
     left of such a folder is cleared away first.
 
     Raises UserError: it cannot be written.
@@ -100,7 +100,7 @@ def beside(folder: Path) -> Iterator[Path]:
 
 
 def _mark(place: Path) -> str:
-    """What the temporary folders of this computer beside a place begin with; the number of a process
+    """What the temporary folders of this computer next to a place begin with; the number of a process
     follows.
     """
     host = re.sub(r"[^\w-]", "_", platform.node())

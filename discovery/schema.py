@@ -49,7 +49,7 @@ def sentences(schema: type[BaseModel], data: Any, error: ValidationError) -> lis
     """Every mistake in `data`: the key where it stands, and the rest of the sentence.
 
     Unknown keys come first, since a misspelt key is often the cause of a missing one. Of the branches of a
-    union that all complain about one value, the first is told.
+    union that all complain about one value, only the first is reported.
     """
     details = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
     told: dict[tuple[Key, str | int | None], tuple[Key, str]] = {}

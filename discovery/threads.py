@@ -35,7 +35,7 @@ def jobs() -> int:
 
 
 def use_jobs(count: int | None) -> None:
-    """For this process and its children: so many fits at a time; None leaves it as it is."""
+    """For this process and its children: so many fits at a time; None changes nothing."""
     if count is not None:
         os.environ[JOBS] = str(count)
 

@@ -5,6 +5,7 @@ into a fit.
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -249,7 +250,7 @@ def test_files_mixed_up_are_called_by_their_kind(
     ("old", "new", "words"),
     [
         ('fit = ["a", "b"]', 'fit = ["a", "bb"]', ["line 4", "fit", "no recording 'bb'", "did you mean 'b'"]),
-        ('held_out = ["c"]', 'held_out = ["b"]', ["line 5", "'b' stands in fit too"]),
+        ('held_out = ["c"]', 'held_out = ["b"]', ["line 5", "'b' is also in fit"]),
         ('held_out = ["c"]', 'held_out = ["d"]', ["line 5", "no recording 'd'"]),
         ('fit = ["a", "b"]', "fit = []", ["line 4", "at least 1"]),
         ('fit = ["a", "b"]', 'fit = "a"', ["line 4", "fit: should be a list", "not 'a'"]),
@@ -433,7 +434,10 @@ def test_the_command_line(folder: Path) -> None:
     done = runner.invoke(app, ["run", str(folder / "experiment.toml"), "--out", str(folder / "out")])
     assert done.exit_code == 0, done.output
     assert "report.html" in done.output
-    assert runner.invoke(app, ["compare", str(folder / "out"), str(folder / "out")]).exit_code == 0
+    shutil.copytree(folder / "out", folder / "copy")
+    compared = runner.invoke(app, ["compare", str(folder / "out"), str(folder / "copy")])
+    assert compared.exit_code == 0
+    assert "copy differs from out: none" in compared.output
     failed = runner.invoke(app, ["run", str(folder / "nothing.toml")])
     assert failed.exit_code == 1
     assert "no such file" in failed.output

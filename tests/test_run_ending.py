@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from discovery.cli import app
 from discovery.experiment import load_experiment
-from discovery.experiment.pipeline import fit_of
+from discovery.experiment.modelfits import fit_of
 from tests.small import write_small
 
 EXPERIMENT = """

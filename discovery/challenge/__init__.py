@@ -1,1 +1,1 @@
-"""The challenge: many concealed cases, sealed, solved without the answers, scored, beside other methods."""
+"""The challenge: many concealed cases, sealed, solved without the answers, scored against other methods."""

@@ -105,7 +105,7 @@ def markdown(tallies: Mapping[str, Tally], seal: Mapping[str, Any]) -> str:
     parts = [
         f"{len(ours.scored)} concealed cases, sealed {seal['sealed']} (answers {seal['answers'][:16]}…, "
         f"version {seal['version']}, commit {str(seal['commit'])[:10]}). "
-        "In brackets: what the workbench is ahead of each other method (− behind).",
+        "In brackets: the lead of the workbench over each other method (− behind).",
         _table(rows(tallies)),
         f"False alarms: {quiet.hits:g} of {quiet.count}; with 95 % certainty the rate is below "
         f"{100 * quiet.upper():.1f} %.",
@@ -176,7 +176,7 @@ def _table(cells: Sequence[Sequence[str]]) -> str:
 
 
 def summary(tallies: Mapping[str, Tally]) -> list[str]:
-    """What the terminal shows besides the table: every wrong answer."""
+    """What the terminal shows below the table: every wrong answer."""
     return [
         f"{s.case}: {s.judgement.word}; truth {told(s.key)}, said {said(s)}"
         for s in wrong(tallies[WORKBENCH])

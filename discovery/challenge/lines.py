@@ -42,7 +42,7 @@ LINES: Sequence[Line] = (
     _of("truth in the stated set, of those named", lambda t: t.stated, +1, 97.0),
     _of("measuring chain: right fault", lambda t: t.measuring_right, +1),
     _of("two effects: found, of all of them", lambda t: t.two_found, +1),
-    _of("named beside the truth, of those named", lambda t: t.extra, -1),
+    _of("named in addition to the truth, of those named", lambda t: t.extra, -1),
     _of("right body stated first", lambda t: t.body_first, +1),
     Line("closable gap removed, median where named", lambda t: _percent(t.explained), +1, "%", 90.0),
     Line("closable gap removed, median of all", lambda t: _percent(t.explained_all), +1, "%"),

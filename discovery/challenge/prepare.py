@@ -99,7 +99,7 @@ def prepare(
 def practise(
     folder: Path, families: Sequence[str], count: int, seed: int, jobs: int, progress: Progress
 ) -> None:
-    """Write cases to practise on: folders `case_01`, ... and `keys.json` beside them, nothing sealed.
+    """Write cases to practise on: folders `case_01`, ... and `keys.json` in the same place, nothing sealed.
 
     Raises:
         UserError: `folder` holds something else already.
@@ -121,7 +121,7 @@ def write_case(folder: Path, case: Case) -> None:
 
 
 def adopt(folder: Path, source: Path) -> dict[str, Any]:
-    """Take over cases that exist: folders with an experiment.toml, keys beside them.
+    """Take over cases that exist: folders with an experiment.toml, and their keys in the same place.
 
     Returns:
         The seal.

@@ -16,7 +16,7 @@ from discovery.diagnosis.scored import Scored, score, scored
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.experiment import Experiment, load_experiment
-from discovery.experiment.pipeline import starting_model
+from discovery.experiment.modelfits import starting_model
 from discovery.fitting import Fit
 from discovery.fitting.noise import white_noise
 from discovery.models import Model
@@ -70,7 +70,7 @@ class Problem:
     def improvement(self, repaired: Fit | None, chosen: Sequence[Hypothesis]) -> Answer:
         """`improvement` of diagnosis.json for a repaired model with `chosen` in it; nothing without one.
 
-        The noise floor is that of the everyday noise beside these effects, as in the workbench's own proof.
+        The noise floor is the everyday noise with these effects in the model, as in the workbench's proof.
         """
         if repaired is None:
             return {"held_out": {}, "explained": None}

@@ -1,6 +1,6 @@
 """A process that solves one case: `python -m discovery.challenge.solve CASE_FOLDER OUT_FOLDER METHOD...`.
 
-It is told the folder of the case, where to write, and which methods; nothing leads from there to the answers.
+It gets the folder of the case, where to write, and which methods; nothing leads from there to the answers.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""What to do next: the experiment that would tell two answers apart, or confirm one."""
+"""What to do next: the experiment that would separate two answers, or confirm one."""

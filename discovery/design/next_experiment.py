@@ -1,4 +1,4 @@
-"""The next experiment: which pattern of inputs would tell two models apart, and how long it takes."""
+"""The next experiment: which pattern of inputs would separate two models, and how long it takes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from discovery.design.separation import separation
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.thresholds import BELIEF
 from discovery.dynamics import Trajectory, make_system, simulate
-from discovery.dynamics.grid import Grid, Samples
+from discovery.dynamics.grid import Grid
+from discovery.dynamics.samples import Samples
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise
 from discovery.models import Model
@@ -58,7 +59,7 @@ def next_experiment(
     Args:
         other: a rival, or, for a confirmation, the answer without its effects: the refitted baseline is bent
             to stand in for them, and would differ most where they do not act.
-        known: parameters that the recording would determine anew, with what they may be off by.
+        known: parameters that the recording would determine anew, with the size of their errors.
     """
     length = min(LONGEST, max(float(g.time[-1] - g.time[0]) for g in context.grids.values()))
     results: list[tuple[Array, str, Trajectory, Trajectory]] = []
@@ -100,7 +101,7 @@ def next_experiment(
 
 
 def _read(context: Context) -> set[str]:
-    """States that a measured output shows as they are: they have their sensor."""
+    """States that a measured output shows directly: they have their sensor."""
     shown = {n: context.model.outputs.get(n, Name(n)) for n in context.outputs}
     return {y.id for y in shown.values() if isinstance(y, Name)}
 

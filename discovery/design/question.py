@@ -43,7 +43,7 @@ def ask(context: Context, found: Search, verdict: Verdict) -> str:
         for n in shown
         for r in n.rivals
         if r.below <= RIVAL and not (r.hypothesis.recording and n.hypothesis.recording)
-    ]  # no pattern tells two events of the past apart
+    ]  # no pattern separates two events of the past
     answer = verdict.answer
     rival = _rival_model(found, answer, rivals[0]) if rivals else None
     claims = [n.hypothesis for n in shown]
@@ -58,7 +58,7 @@ def ask(context: Context, found: Search, verdict: Verdict) -> str:
 def aim(shown: Sequence[Hypothesis], rival: Hypothesis | None, answered: bool) -> Aim:
     """What can be asked about what was named, or, where nothing was, about what came closest.
 
-    An event of one recording does not act in another one: there, only the laws beside it can be confirmed.
+    An event of one recording does not act in another one; only the laws found with it can be confirmed.
     """
     if answered and rival:
         return APART
@@ -91,7 +91,7 @@ def _called(shown: Sequence[Hypothesis]) -> str:
 
 
 def _without(best: Scored) -> Model:
-    """The model with its effects switched off and everything else as it is with them."""
+    """The model with its effects switched off and everything else unchanged."""
     return best.fit.model.with_values({name: 0.0 for h in best.hypotheses for name in h.amplitudes})
 
 

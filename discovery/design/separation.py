@@ -1,4 +1,4 @@
-"""How far an experiment to come would set two models apart: log evidence as its readings come in."""
+"""How well a future experiment would separate two models: log evidence as its readings come in."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Trajectory, sensitivities
-from discovery.dynamics.system import flows, predict
+from discovery.dynamics import Trajectory, predict, sensitivities
+from discovery.dynamics.trajectory import flows
 from discovery.evidence.events import heat_steps
 from discovery.fitting import Noise
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.proof import FreeRuns, Improvement, improvement
 from discovery.diagnosis.scored import ENOUGH, Scored, with_effects
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
 from discovery.evaluation.crossvalidation import Fold, folds
@@ -29,11 +29,11 @@ def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> 
     None where nothing can be left out, or where recordings left out can say nothing of an effect because it
     does not act in all of them.
     """
-    told = [h for h in chosen if h.recording is None] if len(context.recordings) > 1 else []
-    sets = [tuple(o for o in answer.hypotheses if o.key != h.key) for h in told]
+    lasting = [h for h in chosen if h.recording is None] if len(context.recordings) > 1 else []
+    sets = [tuple(o for o in answer.hypotheses if o.key != h.key) for h in lasting]
     tasks = [
         (effects, fold)
-        for effects in ([answer.hypotheses, *sets] if told else [])
+        for effects in ([answer.hypotheses, *sets] if lasting else [])
         for fold in folds(context.campaign, context.recordings, blocks=0)
     ]
     left: dict[frozenset[Key], dict[str, Array]] = {}
@@ -42,7 +42,7 @@ def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> 
         left.setdefault(frozenset(o.key for o in effects), {}).update(part)
     found: dict[Key, Improvement | None] = dict.fromkeys(h.key for h in chosen)
     one = np.ones(len(context.outputs))
-    for h in told:
+    for h in lasting:
         without, with_it = left[answer.keys - {h.key}], left[answer.keys]
         runs = [
             FreeRuns(without[run], with_it.get(run), 1.0, one) for run in context.recordings if run in without

@@ -13,8 +13,7 @@ from math import copysign, inf, isfinite, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Trajectory
-from discovery.dynamics.system import predict
+from discovery.dynamics import Trajectory, predict
 from discovery.errors import RunsAwayError
 from discovery.evidence.outliers import find_outliers, without
 from discovery.evidence.process_noise import noise_in_free_runs

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +91,7 @@ class Scored:
     def level(self, k: int) -> float:
         """Log marginal likelihood under one noise setting."""
         if (self.sizes < 0).any():  # what presses against zero does not act
-            return -np.inf
+            return -inf
         return float(log_sum_exp(np.array([self._level(g, k) for g in self._forms(k)])))
 
     def _forms(self, k: int) -> tuple[Grams, ...]:
@@ -113,7 +114,7 @@ class Scored:
     def drawn(self, k: int, weights: Array, widths: Array) -> Array:
         """(D,) `level` under a noise setting for many draws at once: (D, B) weights, (D,) prior widths."""
         if (self.sizes < 0).any():
-            return np.full(len(weights), -np.inf)
+            return np.full(len(weights), -inf)
         found = []
         for gram in self._forms(k):
             level, step, variance = gram.drawn(weights, widths)
@@ -159,6 +160,7 @@ def refit(
     noise: Noise,
     start: Fit | None = None,
     sizes: Mapping[str, float] | None = None,
+    goal: float = inf,
 ) -> Fit:
     """The model with effects added, everything fitted to the recordings of the context.
 
@@ -180,6 +182,7 @@ def refit(
         begin=start or context.baseline,
         max_rounds=25,
         tolerance=ENOUGH,
+        goal=goal,
     )
 
 
@@ -206,12 +209,16 @@ def score(
     noise: Noise,
     start: Fit | None = None,
     sizes: Mapping[str, float] | None = None,
+    goal: float = inf,
 ) -> Scored | None:
     """Refit with a set of effects and score it; None where the model runs away: what it cannot run with is no
     explanation.
+
+    Args:
+        goal: as in `fit_model`.
     """
     try:
-        fit = refit(context, chosen, noise, start, sizes)
+        fit = refit(context, chosen, noise, start, sizes, goal)
     except RunsAwayError:
         return None
     return scored(context, chosen, fit)
@@ -364,14 +371,12 @@ def _in_play(context: Context, current: Scored) -> list[Setting]:
 
 
 def attempt(
-    context: Context, current: Scored, others: Sequence[Hypothesis], claim: Score | None
+    context: Context, current: Scored, others: Sequence[Hypothesis], claim: Score, goal: float = inf
 ) -> Scored | None:
-    """Refit with others and a claim with them, from the sizes that the scan gives."""
-    if claim is None:
-        return score(context, others, current.noise, current.fit)
+    """Refit with others and a claim, from the sizes that the scan gives; `goal` as in `fit_model`."""
     h = claim.hypothesis
     sizes: dict[str, float] = {}
     if h.effect.amplitude.fixed is None:
         low = 0.0 if h.effect.amplitude.sign > 0 else -h.effect.amplitude.most
         sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
-    return score(context, (*others, h), current.noise, current.fit, sizes)
+    return score(context, (*others, h), current.noise, current.fit, sizes, goal)

@@ -15,6 +15,8 @@ from discovery.diagnosis.context import Context
 from discovery.diagnosis.scored import Scan, Scored, attempt, light, scan_model, score, scored
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score
+from discovery.fitting import Noise
+from discovery.fitting.solve import cost_under
 from discovery.threads import side_by_side
 
 MOST = 6  # effects at once
@@ -22,7 +24,7 @@ REFITS = 5  # claims that are refitted at each step
 RIVALS = 3  # ... in the place of another one
 HOPE = 4.0  # log odds below those of the model without it from which a claim is not refitted
 HALF = 0.6  # of the best log odds: claims that reach it are refitted
-FAR = 40.0  # log evidence below the best from which a model is not scored again
+FAR = 40.0  # log evidence below the best from which a model is not scored again, and refits end early
 
 Keys = frozenset[Key]
 
@@ -31,13 +33,14 @@ Keys = frozenset[Key]
 class Search:
     """The course of a search under one context.
 
-    `tried`: the best refit of each set of effects; `scans`: of each model taken up; `first`: claims of an
-    earlier search under another noise.
+    `tried`: the best refit of each set of effects; `lost`: sets that run away or press against zero;
+    `scans`: of each model taken up; `first`: claims of an earlier search under another noise.
     """
 
     context: Context
     tell: Callable[[str], None] = lambda _: None
     tried: dict[Keys, Scored] = field(default_factory=dict)
+    lost: set[Keys] = field(default_factory=set)
     scans: dict[Keys, Scan] = field(default_factory=dict)
     first: tuple[Score, ...] = ()
 
@@ -111,14 +114,13 @@ class Search:
         for h in current.hypotheses if scan else ():
             others = tuple(o for o in current.hypotheses if o.key != h.key)
             without = self.tried.get(frozenset(o.key for o in others)) or score(
-                self.context, others, current.noise, current.fit
+                self.context, others, current.noise, current.fit, goal=self._goal(current.noise)
             )
             if scan is None or without is None:
                 continue
             own = current.evidence - self.keep(without).evidence
-            reached = (
-                own if own < inf else -inf
-            )  # what is left has a size of the wrong sign: nothing is reached
+            # an infinite gain: what is left has a size of the wrong sign, so that nothing is reached
+            reached = own if own < inf else -inf
             pool = _hopeful(scan.without[h.key], RIVALS, reached)
             best = self._refitted(without, others, [*pool, *_alike(h, scan.without[h.key])])
             if max(best.evidence, without.evidence) > current.evidence:
@@ -129,19 +131,27 @@ class Search:
         """The best refit with one of some claims added to others; `start` where none is better."""
         own = [o.key for o in others]
         keys = [frozenset((*own, claim.hypothesis.key)) for claim in pool]
-        fresh = {k: claim for k, claim in zip(keys, pool, strict=True) if k not in self.tried}
+        known = {*self.tried, *self.lost}
+        fresh = {k: claim for k, claim in zip(keys, pool, strict=True) if k not in known}
+        goal = self._goal(start.noise) if fresh else inf
 
         def tried(claim: Score) -> Scored | None:
-            one = attempt(self.context, start, others, claim)
+            one = attempt(self.context, start, others, claim, goal)
             return one if one is not None and one.evidence > -inf else None  # the evidence is found here
 
         found = dict(zip(fresh, side_by_side(tried, list(fresh.values())), strict=True))
+        self.lost |= {key for key, one in found.items() if one is None}
         best = start
         for key in dict.fromkeys(keys):
-            one = found[key] if key in found else self.tried[key]
+            one = found[key] if key in found else self.tried.get(key)
             if one is not None and self.keep(one).evidence > best.evidence:
                 best = one
         return best
+
+    def _goal(self, noise: Noise) -> float:
+        """Cost of a fit under a noise from which it may take part in the answer."""
+        best = self.best.fit
+        return FAR + cost_under(best.problem, best.theta, best.trajectories, noise)
 
 
 def _alike(h: Hypothesis, claims: Sequence[Score]) -> list[Score]:

@@ -104,14 +104,13 @@ def _proved(
     """Those that make free runs better outside the fit, and why each other one is not named."""
     kept, idle = tuple(chosen), dict[Key, str]()
     while kept:
-        whole = found.tried.get(_keys(kept), answer)
+        whole = _only(context, found, answer, kept) or answer
         proofs = left_out(context, whole, [n.hypothesis for n in kept])
         more = {n.hypothesis.key: text for n in kept if (text := _idle(n.hypothesis, proofs))}
         if not more:
             break
         idle |= more
         kept = tuple(n for n in kept if n.hypothesis.key not in more)
-        _alone(context, found, answer, kept)
     return kept, idle
 
 
@@ -129,8 +128,8 @@ def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None
 
 def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> list[Named]:
     """Those without which a model of them alone would be short: each one has to add evidence of its own, and
-    more than by chance next to large effects. Log evidence of G on average varies by sqrt(2 G): it is half
-    of a squared distance in standard deviations, one of which is by chance.
+    more than by chance next to large effects. A log evidence of G varies by sqrt(2 G) from one set of
+    readings to another: it is half of the square of a distance known within one standard deviation.
     """
     kept = list(chosen)
     least = max(thresholds.SHORT, ABOVE95 * sqrt(2 * max(found.gain, 0.0)))
@@ -144,17 +143,21 @@ def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Na
 
 
 def _alone(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> float:
-    """Log evidence of a model with these effects and no other."""
-    keys = _keys(chosen)
-    if keys not in found.tried:
+    """Log evidence of a model with these effects and no other; -inf where it runs away."""
+    model = _only(context, found, answer, chosen)
+    return -inf if model is None else model.evidence
+
+
+def _only(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> Scored | None:
+    """The model with these effects and no other, fitted where the search has not been; None where it runs
+    away.
+    """
+    keys = frozenset(n.hypothesis.key for n in chosen)
+    if keys not in found.tried or found.tried[keys].fit.ended_early:
         one = score(context, [n.hypothesis for n in chosen], answer.noise, answer.fit)
         if one is not None:
             found.keep(one)
-    return found.tried[keys].evidence if keys in found.tried else -inf
-
-
-def _keys(chosen: Sequence[Named]) -> frozenset[Key]:
-    return frozenset(n.hypothesis.key for n in chosen)
+    return found.tried.get(keys)
 
 
 def idle(verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:
@@ -215,7 +218,7 @@ def _nothing(context: Context, found: Search, answer: Scored, candidates: tuple[
 def _apart(found: Search, answer: Scored, rest: Sequence[Named]) -> tuple[str, ...]:
     """A sentence for each effect of the answer that is not sure enough to be named."""
     return tuple(
-        f"{n.hypothesis.effect.word} at {n.hypothesis.where} may act, too (probability {n.probability:.2f}, "
+        f"{n.hypothesis.effect.word} at {n.hypothesis.where} is possible (probability {n.probability:.2f}, "
         f"log evidence {_added(found, answer, n.hypothesis):.0f})"
         for n in rest
     )

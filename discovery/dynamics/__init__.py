@@ -1,15 +1,11 @@
 """Dynamics: trajectories and the sensitivities of all parameters and candidate terms, with one kernel."""
 
 from discovery.dynamics.grid import Grid, make_grid
+from discovery.dynamics.prediction import outputs, predict
 from discovery.dynamics.sensitivity import Column, sensitivities
-from discovery.dynamics.system import (
-    System,
-    Trajectory,
-    make_system,
-    outputs,
-    simulate,
-    start_values,
-)
+from discovery.dynamics.starts import start_values
+from discovery.dynamics.system import System, make_system
+from discovery.dynamics.trajectory import Trajectory, simulate
 
 __all__ = [
     "Column",
@@ -19,6 +15,7 @@ __all__ = [
     "make_grid",
     "make_system",
     "outputs",
+    "predict",
     "sensitivities",
     "simulate",
     "start_values",

@@ -21,19 +21,19 @@ _HARMONICS = np.arange(1, 200)  # of the error of a step: without noise they add
 class Means:
     """How readings (R, Y) are means of several.
 
-    `counts` (R, Y): independent readings in each. `beside` (2, R, Y): weights of the model at the nodes
+    `counts` (R, Y): independent readings in each. `neighbours` (2, R, Y): weights of the model at the nodes
     before and behind in its mean over their stamps; the rest is of the node itself. `single` (N, Y): some of
     the readings themselves.
     """
 
     counts: Array
-    beside: Array
+    neighbours: Array
     single: Array
 
     def part(self, rows: slice, columns: Sequence[int]) -> Means:
         """Of some readings and outputs alone."""
         return Means(
-            self.counts[rows][:, columns], self.beside[:, rows][:, :, columns], self.single[:, columns]
+            self.counts[rows][:, columns], self.neighbours[:, rows][:, :, columns], self.single[:, columns]
         )
 
 
@@ -86,7 +86,7 @@ def averaged(time: Array, table: Array, first: Ints, counts: Sequence[Array | No
 
 
 def some_of(table: Array) -> Array:
-    """Pieces of rows (N, Y) as they are, from all over a recording."""
+    """Unchanged pieces of rows (N, Y) from all over a recording."""
     begins = np.linspace(0, max(len(table) - PIECE, 0), PIECES).astype(int)
     return table[np.unique((begins[:, None] + np.arange(min(PIECE, len(table)))).ravel())]
 
@@ -94,7 +94,7 @@ def some_of(table: Array) -> Array:
 def independent(counts: Array, single: Array) -> Array:
     """Readings (R, Y) that means of `counts` are worth, by single ones (N, Y).
 
-    A sensor whose noise d is small beside the steps s of its numbers is off by the same in all readings of a
+    A sensor whose noise d is below the steps s of its numbers is off by the same in all readings of a
     block: of the variance d^2 + s^2/12 of one, the mean of many keeps
     s^2 / (2 pi^2) sum exp(-4 pi^2 k^2 d^2 / s^2) / k^2 (Widrow & Kollar, Quantization Noise, 2008, ch. 16).
     What it does not keep is seen from one reading to the next, and says how large d is.
@@ -125,7 +125,7 @@ def _kept(noise: float) -> float:
     return float(fade.sum()) / (2 * np.pi**2)
 
 
-def as_readings_show(nodes: Array, integral: Array, index: Ints, shown: Array, beside: Array) -> Array:
+def as_readings_show(nodes: Array, integral: Array, index: Ints, shown: Array, neighbours: Array) -> Array:
     """The integral (T,) of an input at the nodes, moved so that it shows in means as it does in the readings.
 
     An input that moves within a block shows in a mean of readings as the mean of its integral over their
@@ -136,16 +136,16 @@ def as_readings_show(nodes: Array, integral: Array, index: Ints, shown: Array, b
         integral: (T,) at the nodes.
         index: (R,) nodes of the readings.
         shown: (R,) means of the integral over the stamps of the readings.
-        beside: (2, R) weights of the nodes before and behind.
+        neighbours: (2, R) weights of the nodes before and behind.
     """
     from scipy.linalg import solve_banded
 
     bands = np.zeros((3, len(nodes)))
     bands[1] = 1.0
-    bands[1, index] = 1.0 - beside.sum(axis=0)
-    left, right = beside[0] != 0, beside[1] != 0
-    bands[2, index[left] - 1] = beside[0, left]
-    bands[0, index[right] + 1] = beside[1, right]
+    bands[1, index] = 1.0 - neighbours.sum(axis=0)
+    left, right = neighbours[0] != 0, neighbours[1] != 0
+    bands[2, index[left] - 1] = neighbours[0, left]
+    bands[0, index[right] + 1] = neighbours[1, right]
     wanted = integral.copy()
     wanted[index] = shown
     return np.asarray(solve_banded((1, 1), bands, wanted))

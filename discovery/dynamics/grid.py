@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -11,72 +11,17 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import series
 from discovery.dynamics.averaging import Means, as_readings_show, averaged, independent, some_of
-from discovery.errors import UserError
-from discovery.recordings import Campaign
+from discovery.dynamics.samples import Samples, read_samples
+from discovery.recordings import Campaign, Recording
 from discovery.recordings.blocks import block_means
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-MOST_NODES = 30_000  # of a recording as it is; beyond, it is coarsened
+MOST_NODES = 30_000  # of a recording; with more, it is coarsened
 COARSE_NODES = 8_000  # of a coarsened one, about; as many at most for its inputs' switches
 LONGEST_BLOCK = 120.0  # s, about; a recording of weeks has more nodes than these for its sake
-_SAME = 1e-6  # of its span: means of a held input that differ by less are one
 MOVED = 0.1  # of its span: a held input that moves so far within a block of a coarsened grid divides it
-
-
-@dataclass(frozen=True)
-class Samples:
-    """A channel as it was recorded: stamps (N,) in s, values (N,), whether it runs straight between them."""
-
-    time: Array
-    value: Array
-    linear: bool
-
-    def at(self, time: Array, side: str = "right") -> Array:
-        """Values at instants; `side` says on which side of a jump of a held channel to stand."""
-        if self.linear:
-            return np.interp(time, self.time, self.value)
-        index = np.searchsorted(self.time, time, side="right" if side == "right" else "left") - 1
-        return self.value[np.clip(index, 0, None)]
-
-    def integral(self, time: Array) -> Array:
-        """Integral of a channel from its first stamp."""
-        mean = 0.5 * (self.value[:-1] + self.value[1:]) if self.linear else self.value[:-1]
-        sums = np.concatenate(([0.0], np.cumsum(mean * np.diff(self.time))))
-        index = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, None)
-        last = 0.5 * (self.value[index] + self.at(time)) if self.linear else self.value[index]
-        return np.asarray(sums[index] + last * (time - self.time[index]))
-
-    def averaged(self, nodes: Array, shown: Callable[[Samples], Array] | None = None) -> Samples:
-        """The channel by its means: over each interval between nodes (T,) where it is held, around each node
-        where it runs straight. One that runs straight between fewer stamps than nodes is left as it is.
-
-        Args:
-            shown: the integral (T,) at the nodes as readings show it; default as it is.
-        """
-        if self.linear:
-            if len(self.time) <= len(nodes):
-                return self
-            return Samples(
-                nodes, self.means(np.r_[nodes[0], 0.5 * (nodes[1:] + nodes[:-1]), nodes[-1]]), True
-            )
-        mean = self.means(nodes)
-        if shown is not None:
-            seen = np.clip(np.diff(shown(self)) / np.diff(nodes), self.value.min(), self.value.max())
-            mean = np.where(np.abs(seen - mean) < _SAME * np.ptp(self.value), mean, seen)
-        return Samples(nodes[:-1], mean, False)
-
-    def means(self, edges: Array) -> Array:
-        """Mean between each two edges; exactly the value where it stays one, so that what is constant in the
-        recording is constant to the last bit and equal intervals share their transition matrices.
-        """
-        changes = np.concatenate(([0], np.cumsum(np.diff(self.value) != 0)))
-        first = np.clip(np.searchsorted(self.time, edges[:-1], side="right") - 1, 0, None)
-        # straight lines reach to the stamp behind the edge
-        last = np.searchsorted(self.time, edges[1:], side="left") - (0 if self.linear else 1)
-        same = changes[first] == changes[np.clip(last, 0, len(changes) - 1)]
-        return np.where(same, self.value[first], np.diff(self.integral(edges)) / np.diff(edges))
 
 
 @dataclass(frozen=True)
@@ -177,7 +122,7 @@ class Grid:
         before, here, behind = (
             shown[np.searchsorted(self.looked_at, np.clip(self.read + k, 0, last))] for k in (-1, 0, 1)
         )
-        left, right = self.means.beside.reshape(2, *here.shape[:2], *[1] * (here.ndim - 2))
+        left, right = self.means.neighbours.reshape(2, *here.shape[:2], *[1] * (here.ndim - 2))
         return np.asarray(here + left * (before - here) + right * (behind - here))
 
     @cached_property
@@ -221,14 +166,14 @@ def make_grid(
         max_step: longest interval [s]; linear terms are exact whatever it is.
         coarse: blocks, about, where there are more nodes than `most`; default COARSE_NODES, and as many as
             keep a block within LONGEST_BLOCK.
-        most: nodes of a grid that is left as it is.
+        most: nodes of a grid that is not coarsened.
 
     Raises:
         UserError: an input without any value in the recording.
     """
     data = campaign.recordings[recording]
     outputs = tuple(outputs)
-    samples = _samples(campaign, recording, inputs)
+    samples = read_samples(campaign, recording, inputs)
     stamps = np.zeros(len(data.time), dtype=bool)
     for name, one in samples.items():
         if np.ptp(one.value) > 0:
@@ -243,65 +188,59 @@ def make_grid(
     rows = np.flatnonzero(stamps)
     logged = {n: float(np.median(np.diff(s.time))) for n, s in samples.items() if len(s.time) > 1}
     spread = {name: s for name in samples if (s := campaign.channels[name].spread) > 0}
-    counts = [data.counts.get(name) for name in outputs]
-    if len(rows) <= most:
-        time, read = _divided(data.time[rows], max_step), data.time[taken]
-        index = np.searchsorted(time, read)
-        means = None
-        if data.counts:
-            number = np.column_stack([np.ones(len(taken)) if n is None else n for n in counts])[taken]
-            means = Means(number, np.zeros((2, *number.shape)), table[taken])
-        return Grid(
-            recording, time, samples, outputs, index, table[taken], spread, logged=logged, means=means
-        )
-    if coarse is None:
-        coarse = max(COARSE_NODES, round(float(np.ptp(data.time)) / LONGEST_BLOCK))
+    read = np.flatnonzero(taken[rows])
+    stamped = Grid(recording, data.time[rows], samples, outputs, read, table[taken], spread, logged=logged)
+    if len(rows) > most:
+        if coarse is None:
+            coarse = max(COARSE_NODES, round(float(np.ptp(data.time)) / LONGEST_BLOCK))
+        return _coarsened(stamped, data, rows, table, coarse, max_step)
+    time, means = _divided(stamped.time, max_step), None
+    if data.counts:
+        counts = [data.counts.get(name, np.ones(len(taken))) for name in outputs]
+        number = np.column_stack(counts)[taken]
+        means = Means(number, np.zeros((2, *number.shape)), table[taken])
+    return replace(stamped, time=time, read=np.searchsorted(time, data.time[taken]), means=means)
+
+
+def _coarsened(
+    stamped: Grid, data: Recording, rows: Ints, table: Array, coarse: int, max_step: float
+) -> Grid:
+    """The grid with readings and inputs as means over blocks of rows.
+
+    Args:
+        stamped: the grid with a node at each of `rows`, the stamps of inputs and readings.
+        table: (N, Y) of the outputs at all stamps of the recording.
+        coarse: blocks, about.
+    """
+    samples, taken = stamped.samples, np.isfinite(table).any(axis=1)
     base = np.isin(rows, np.append(rows[:: -(-len(rows) // coarse)], rows[-1]))
     switched = _switches(rows, base, samples.values(), data.time, coarse)
     first = rows[base | switched]
     read = np.where(taken, 0.0, np.nan)  # as one more output, read whenever any is
-    found = averaged(data.time, np.column_stack([table, read]), first, [*(counts or [None]), None])
+    counts = [data.counts.get(name) for name in stamped.outputs] or [None]
+    found = averaged(data.time, np.column_stack([table, read]), first, [*counts, None])
     empty = ~np.isin(np.arange(len(first)), found.blocks)
     bound = switched[base | switched] | empty | np.append(True, empty[:-1])
     bound[-1] = True
     time = _divided(np.union1d(data.time[first[bound]], found.time), max_step)
     index = np.searchsorted(time, found.time)
-    beside = found.weights(time, index)
+    neighbours = found.weights(time, index)
 
     def shown(one: Samples) -> Array:
-        means = block_means(data.time, one.integral(data.time) + read, np.append(first, len(taken)))
-        return as_readings_show(time, one.integral(time), index, means.mean[found.blocks], beside[:, :, -1])
+        integral = one.integral(data.time) + read
+        means = block_means(data.time, integral, np.append(first, len(table))).mean[found.blocks]
+        return as_readings_show(time, one.integral(time), index, means, neighbours[:, :, -1])
 
-    single = some_of(table[taken])
-    number = found.counts[:, :-1]
-    number = number if data.counts else independent(number, single)
-    return Grid(
-        recording,
-        time,
-        {name: s.averaged(time, shown) for name, s in samples.items()},
-        outputs,
-        index,
-        found.readings[:, :-1],
-        spread,
+    single, number = some_of(table[taken]), found.counts[:, :-1]
+    return replace(
+        stamped,
+        time=time,
+        samples={name: s.averaged(time, shown) for name, s in samples.items()},
+        read=index,
+        readings=found.readings[:, :-1],
         instants=len(rows),
-        logged=logged,
-        means=Means(number, beside[:, :, :-1], single),
+        means=Means(number if data.counts else independent(number, single), neighbours[:, :, :-1], single),
     )
-
-
-def _samples(campaign: Campaign, recording: str, inputs: Iterable[str]) -> dict[str, Samples]:
-    """Inputs as they were recorded. Raises UserError: one without any value."""
-    data, samples = campaign.recordings[recording], {}
-    for name in inputs:
-        values = data.values.get(name)
-        known = np.isfinite(values) if values is not None else np.zeros(len(data.time), dtype=bool)
-        if values is None or not known.any():
-            raise UserError(
-                f"{campaign.path}: recording '{recording}' has no value of '{name}', "
-                "which the model needs as an input"
-            )
-        samples[name] = Samples(data.time[known], values[known], campaign.channels[name].between == "linear")
-    return samples
 
 
 def _divided(time: Array, max_step: float) -> Array:

@@ -9,17 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import kernel
-from discovery.dynamics.system import (
-    Trajectory,
-    balanced,
-    first_values,
-    memories,
-    output_matrix,
-    outputs,
-    rates_at_start,
-    shifted,
-    starts_follow,
-)
+from discovery.dynamics.prediction import output_matrix, outputs
+from discovery.dynamics.starts import balanced, first_values, memories, rates_at_start, starts_follow
+from discovery.dynamics.system import shifted
+from discovery.dynamics.trajectory import Trajectory
 from discovery.terms import evaluate, names
 
 Array = NDArray[np.float64]

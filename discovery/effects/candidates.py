@@ -94,7 +94,7 @@ def _bound(variable: str, channel: str, scene: Scene) -> Expression:
 
 
 def _choices(variable: str, effect: Effect, model: Model, scene: Scene) -> list[str]:
-    """Channels that may stand for a variable of a formula."""
+    """Channels that a variable of a formula may be."""
     there = [n for n in scene.channels if n not in model.states and n not in model.outputs]
     if variable in ROLE_OF:
         fits = [n for n in there if scene.channels[n].role == ROLE_OF[variable]]
@@ -141,7 +141,7 @@ def _stands(channel: str, spot: Spot, model: Model, effect: Effect) -> bool:
 
 @dataclass(frozen=True)
 class _Naming:
-    """Names that the parameters of a hypothesis get in a model, and what stands for those of the formula."""
+    """Names that the parameters of a hypothesis get in a model, and what replaces those of the formula."""
 
     amplitudes: tuple[str, ...]
     shapes: Mapping[str, float]
@@ -149,7 +149,7 @@ class _Naming:
     known: Mapping[str, Expression]
 
     def sized(self, effect: Effect, k: int = 0) -> dict[str, Expression]:
-        """What stands for each variable, with the k-th amplitude as the size."""
+        """What replaces each variable, with the k-th amplitude as the size."""
         size: Expression = Name(self.amplitudes[k])
         if self.switch:
             size = Apply("*", (Name(self.switch), size))
@@ -270,7 +270,7 @@ def _flow(
 def _changed(
     effect: Effect, formula: Expression, naming: _Naming, spot: Spot, term: Term, inputs: set[str]
 ) -> Term:
-    """What a term changes by: the formula where it speaks of the term, else the term with a channel replaced
+    """What a term changes by: the formula where it names the term, else the term with a channel replaced
     by the formula, less the term.
     """
     known = naming.sized(effect)
@@ -293,7 +293,7 @@ def _changed(
 
 
 def _units(h: Hypothesis, model: Model, channels: Mapping[str, Channel]) -> dict[str, str]:
-    """Unit of each parameter at its place: um of the catalogue stands for the unit of the output, W for what
+    """Unit of each parameter at its place: um of the catalogue means the unit of the output, W for what
     enters the state (a rate, where it has no capacity).
     """
     outputs = tuple(h.shown)

@@ -39,7 +39,7 @@ Place = Literal[
 ]
 TERM_PLACES = ("fluid terms", "cooling terms", "loss terms", "air terms", "input temperature")
 
-# Variables that a formula may use, and the role of the channel that stands for each
+# Variables that a formula may use, and the role of the channel that each is
 ROLE_OF = {
     "ambient": "ambient temperature",
     "fluid": "fluid temperature",
@@ -51,10 +51,19 @@ ROLE_OF = {
     "height": "nozzle height",
     "other_input": "other input",
 }
-# Variables that any recorded input may stand for: as it is, or over the largest value that was recorded;
+# Variables that may be any recorded input: its value, or its share of the largest recorded value;
 # `rate` is such a level of a flow
 INPUT, LEVEL, RATE = "input", "level", "rate"
 TERM = "term"  # the term of the model that an effect changes
+DRIVING = (  # roles of the inputs that an error may follow by a law of its own
+    "heat load",
+    "cooling power",
+    "rotation speed",
+    "fluid flow",
+    "nozzle height",
+    "nozzle side",
+    "other input",
+)
 
 _RATIO = 3.0  # between neighbouring values of a shape in a search: signatures of both are much alike
 _REACH = 2.0  # standard deviations of a prior that a search covers

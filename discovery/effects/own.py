@@ -92,8 +92,8 @@ class EffectForm(Strict):
 
     `formula` is a heat flow into `body` (out of `other`, for two bodies) with `amplitude` as a factor; the
     variables are body, other, y (for outputs), ambient, fluid, flow, speed, load, cooling, coolant, height
-    and other_input; `input` (as it is) and `level` (over its largest value) are any recorded input of the
-    `roles`, `rate` the level of a flow. At terms of the model, `term` is the term that changes.
+    and other_input; `input` (its value) and `level` (its share of the largest value) are any recorded input
+    of the `roles`, `rate` the level of a flow. At terms of the model, `term` is the term that changes.
     """
 
     word: str = Field(pattern="^[a-z][a-z0-9_]*$", description="its name in results")
@@ -111,7 +111,7 @@ class EffectForm(Strict):
     )
     sign: Literal[-1, 0, 1] = Field(1, description="sign of the amplitude, 0 where physics leaves it open")
     shapes: dict[str, ShapeForm] = {}
-    roles: list[Role] = Field([], description="of the inputs that `input` and `level` may stand for")
+    roles: list[Role] = Field([], description="of the inputs that `input` and `level` may be")
     acts: Literal["always", "in one recording", "from a recording on"] | None = Field(
         None, description="default: in one recording where its place or an instant says so, else always"
     )
@@ -169,7 +169,7 @@ class EffectForm(Strict):
                 f"{where}: '{name}' means nothing in its formula; known: {', '.join(sorted(known))}"
             )
         if self.amplitude not in used:
-            raise UserError(f"{where}: the amplitude '{self.amplitude}' does not stand in the formula")
+            raise UserError(f"{where}: the amplitude '{self.amplitude}' is not in the formula")
         at_terms = self.place in (*TERM_PLACES, "inputs of a recording")
         replaces = at_terms and TERM not in used  # then it is what a channel becomes, no change
         if not replaces and not _is_a_factor(self.amplitude, formula):
@@ -178,5 +178,5 @@ class EffectForm(Strict):
                 f"write it as {self.amplitude}*(...)"
             )
         if used & {INPUT, LEVEL} and not at_terms and not self.roles:
-            raise UserError(f"{where}: say under `roles` which inputs '{INPUT}' and '{LEVEL}' may stand for")
+            raise UserError(f"{where}: say under `roles` which inputs '{INPUT}' and '{LEVEL}' may be")
         return formula

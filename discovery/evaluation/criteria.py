@@ -3,7 +3,7 @@
     P_V = max |e_k|        M_V = 1/N sum e_k        Q_M = 1/N sum (e_k - M_V)^2
 
 (Tables 1 and 3 of "Compensation of cutting fluid influences on five axis machine tools"), with the root mean
-square and R2 beside them. The mean alone is a weak criterion: a model may be right on average and wrong all
+square and R2 added. The mean alone is a weak criterion: a model may be right on average and wrong all
 day.
 """
 

@@ -61,8 +61,8 @@ EQUATION = {"superposition": "8", "reduced": "9"}  # kind of model -> equation o
 def parts_of_the_paper(campaign: Campaign, fit: Sequence[str], held_out: Sequence[str]) -> dict[str, str]:
     """Which recording plays which part of the paper: "test cycle", "2. test cycle", "left side", "100 mm".
 
-    The left nozzle is told by a channel of role nozzle side or by its name, the 100 mm by a nozzle height of
-    100.
+    The left nozzle is recognised by a channel of role nozzle side or by its name, the 100 mm by a nozzle
+    height of 100.
     """
     left = [name for name in held_out if "left" in name.lower() or _constant(campaign, name, "nozzle side")]
     high = [

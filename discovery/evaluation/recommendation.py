@@ -34,7 +34,7 @@ class Against:
 
     @property
     def tie(self) -> bool:
-        """Whether the recordings do not tell the two apart."""
+        """Whether the recordings do not distinguish the two."""
         return self.low <= 0.0 <= self.high
 
 
@@ -49,7 +49,7 @@ class Recommendation:
 
     @property
     def ties(self) -> tuple[str, ...]:
-        """Models that the recordings do not tell from the best one."""
+        """Models that the recordings do not distinguish from the best one."""
         return tuple(one.model for one in self.others if one.tie)
 
 

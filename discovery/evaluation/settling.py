@@ -2,8 +2,8 @@
 
     y(t) = y_end - (y_end - y_0) exp(-t/tau)
 
-One time constant is a summary, not a law: a table of several bodies has several. So the time after which the
-readings stay within a tenth of the whole change of its end stands beside it.
+One time constant is a summary, not a law: a table of several bodies has several. So the table
+also gives the time after which the readings stay within a tenth of the whole change of its end.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Tables 1 and 3 of the paper: the same layout, our figures with the paper's beside them."""
+"""Tables 1 and 3 of the paper: the same layout, our figures next to the paper's."""
 
 from __future__ import annotations
 

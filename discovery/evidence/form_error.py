@@ -17,8 +17,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Column, Trajectory, sensitivities
-from discovery.dynamics.system import predict
+from discovery.dynamics import Column, Trajectory, predict, sensitivities
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.signatures import signatures
 from discovery.fitting import Fit

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, sensitivities
-from discovery.dynamics.system import flows
+from discovery.dynamics.trajectory import flows
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Fit, Noise
 from discovery.fitting.noise import resolution

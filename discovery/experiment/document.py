@@ -1,4 +1,4 @@
-"""results.json: its schema. Numbers have six significant digits; what is none is null."""
+"""results.json: its schema. Numbers have six significant digits; a missing one is null."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class ModelResults(Strict):
     recordings: dict[str, dict[str, Scores]] = Field(description="by recording and output")
     cross_validation: dict[str, dict[str, Number]] = Field(description="rms where the fit has not been")
     values: dict[str, Estimate]
-    noise: dict[str, Number] = Field(description="reading noise of each output that the fit reckoned with")
+    noise: dict[str, Number] = Field(description="reading noise of each output that the fit used")
     notes: list[str]
     budgets: dict[str, Budgets] | None = Field(
         None, description="by recording, of a model with heat capacities"

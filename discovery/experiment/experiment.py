@@ -171,7 +171,7 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
     both = [name for name in form.fit if name in form.held_out]
     if both:
         raise _mistake(
-            path, ("held_out",), f"'{both[0]}' stands in fit too; what is fitted cannot be held out"
+            path, ("held_out",), f"'{both[0]}' is also in fit; a fitted recording cannot be held out"
         )
     for name in outputs:
         if name not in measured:

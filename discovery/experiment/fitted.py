@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics.system import predict as model_outputs
+from discovery.dynamics import predict as model_outputs
 from discovery.errors import RunsAwayError
 from discovery.evaluation import evaluate
 from discovery.evaluation.budget import Budget, budget
@@ -27,7 +27,7 @@ from discovery.recordings import Channel
 
 Array = NDArray[np.float64]
 _AT_BOUND = 1e-4  # share of a bound that counts as at it
-_NEGLIGIBLE = 0.01  # of the spread of an input: an offset so small is none
+_NEGLIGIBLE = 0.01  # of the spread of an input: a smaller offset is not reported
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
     notes = []
     for name, found in fit.offsets.items():
         if max(abs(value) for value, _ in found.values()) < _NEGLIGIBLE * channels[name].spread:
-            continue  # no reading speaks against what was given
+            continue  # no reading contradicts what was given
         low, high = (pick(found, key=lambda r: found[r][0]) for pick in (min, max))
         unit = differences(channels[name].unit)
         most = f" to {found[high][0]:+.2g} {unit} in '{high}'" if high != low else ""

@@ -169,7 +169,7 @@ class PaperForm(Strict):
     reduced: str = Field(description="model of eq. (9): table 3, figure 9")
     wet: str | None = Field(None, description="warm-up under cutting fluid, figure 3")
     dry: str | None = Field(None, description="the same warm-up without fluid, figure 3")
-    compensated: list[str] = Field([], description="recordings gone through with active compensation")
+    compensated: list[str] = Field([], description="recordings replayed with active compensation")
     speeding: list[str] = Field([], description="models that differ in eq. (6) alone")
     dry_load: str | None = Field(None, description="eq. (8) with the load from a dry machine")
     cooling: str | None = Field(None, description="eq. (8) with the axis cooling power as u_2")
@@ -218,7 +218,7 @@ class ExperimentForm(Strict):
 
 
 def own_recordings(entry: ModelEntry) -> list[tuple[str, str]]:
-    """What a model says of recordings of its own, beside those that all are fitted to: word and recording."""
+    """Recordings that one model is fitted to, other than those common to all: word and recording."""
     alone = [("separate", name) for names in separate(entry).values() for name in names]
     return alone + [("also", name) for name in getattr(entry, "also", ())]
 

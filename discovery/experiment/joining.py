@@ -1,4 +1,4 @@
-"""A diagnosis in the folder of a run: the run's other models stay beside what the diagnosis found.
+"""A diagnosis in the folder of a run: the run's other models stay, next to what the diagnosis found.
 
 What the diagnosis makes (diagnosis, diagnosed model, repaired model) replaces what has its name, and a
 repaired model goes with the diagnosis it came from. The other models stay where they are models of the same
@@ -23,7 +23,7 @@ from discovery.runfolder import RESULTS, read_results
 
 
 def check_joins(folder: Path, experiment: Experiment, diagnosed: str) -> None:
-    """Can a diagnosis of the model `diagnosed` stand beside the models in `folder`?
+    """Can a diagnosis of the model `diagnosed` join the models in `folder`?
 
     Raises:
         UserError: other models stand there, of other recordings.

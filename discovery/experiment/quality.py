@@ -17,7 +17,7 @@ _SHOWN = 3  # errors in the sentence that refuses them
 
 
 def quality(experiment: Experiment) -> list[Finding]:
-    """What is wrong with the recordings that the experiment uses, beside each other and by themselves."""
+    """What is wrong with the recordings that the experiment uses, alone and compared with each other."""
     used = {path.resolve() for path in input_files(experiment).values()}
     return [
         one
@@ -27,7 +27,7 @@ def quality(experiment: Experiment) -> list[Finding]:
 
 
 def refuse(findings: Sequence[Finding]) -> None:
-    """Raises UserError where a recording cannot be used as it is."""
+    """Raises UserError where a recording cannot be used."""
     errors = [replace(one, severity="error") for one in findings if one.severity == "error"]
     if not errors:
         return
@@ -35,8 +35,7 @@ def refuse(findings: Sequence[Finding]) -> None:
     rest = f"\n  and {len(lines) - _SHOWN} more" if len(lines) > _SHOWN else ""
     told = "".join(f"\n  {line}" for line in lines[:_SHOWN])
     raise UserError(
-        "the recordings cannot be used as they are; mend them, or say --force to run all the "
-        f"same:{told}{rest}"
+        f"the recordings cannot be used; correct them, or say --force to run all the same:{told}{rest}"
     )
 
 

@@ -57,7 +57,7 @@ def write_run(
     Args:
         verb: of the command that made it.
         findings: of the recordings, where they were looked at before.
-        further: what results.json holds beside the models: "role_matrix", "paper".
+        further: what results.json holds in addition to the models: "role_matrix", "paper".
     """
     found = quality(experiment) if findings is None else findings
     document = results_document(verb, experiment, fitted, seconds, found, further)

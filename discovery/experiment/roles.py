@@ -20,7 +20,7 @@ from discovery.errors import RunsAwayError, UserError
 from discovery.experiment.experiment import Experiment
 from discovery.experiment.fitted import Fitted
 from discovery.experiment.form import ModelEntry
-from discovery.experiment.pipeline import fit_entry
+from discovery.experiment.modelfits import fit_entry
 from discovery.models import Model
 from discovery.progress import Progress, silent
 from discovery.terms import names

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid, make_system, simulate
-from discovery.dynamics.grid import Samples
-from discovery.dynamics.system import predict
+from discovery.dynamics import Grid, make_system, predict, simulate
+from discovery.dynamics.samples import Samples
 from discovery.export.compiled import compile_model
 from discovery.export.makedocument import exportable
 from discovery.export.ranges import sampled_inputs

@@ -25,7 +25,8 @@ _CALL = {"exp": "R_EXP", "log": "R_LOG", "sqrt": "R_SQRT", "tanh": "R_TANH", "ab
 _COMPARE = ("<", "<=", ">", ">=", "==", "!=")
 
 
-# Files that stand beside those of a model, in C or in an FMU, and headers that they include: no model's.
+# Other files in the folder of a model, in C or in an FMU, and headers that they include: no model may
+# have these names.
 _TAKEN = frozenset(
     {"replay", "instance", "fmi2", "fmi3", "math", "stdbool", "stddef", "stdint", "stdio", "stdlib"}
     | {"string", "time", *(f"fmi{v}{part}" for v in (2, 3) for part in ("functions", "functiontypes"))}
@@ -228,7 +229,7 @@ def _rows(c: Compiled, word: str) -> list[str]:
 
 
 def _first(k: int, delay: Delay, offset: int) -> str:
-    """A delayed input at the start: it was always as it is."""
+    """A delayed input at the start: it never changed before."""
     return f"""    for (k = {offset}; k < {offset + delay.length}u; ++k) {{ s->ring[k] = u[{delay.input}]; }}
     s->position[{k}] = 0; s->d[{k}] = u[{delay.input}];"""
 

@@ -7,15 +7,8 @@ from dataclasses import fields
 
 from discovery.export.document import Exported
 from discovery.export.guarding import (
-    CONFIRM_S,
-    FADE_FROM,
-    FADE_TO,
-    FAR_S,
-    FURTHER,
-    LEAK,
-    MEAN_S,
+    CONSTANTS,
     MEANING,
-    TOGETHER,
     GuardNumbers,
     compensated,
     guard_numbers,
@@ -60,20 +53,10 @@ def settings(exported: Exported, prefix: str) -> tuple[str, str]:
 
 def guard_source(exported: Exported, prefix: str) -> str:
     """The guarded tick: `<prefix>_begin` and `<prefix>_tick`."""
-    constants = {
-        "CONFIRM_S": CONFIRM_S,
-        "FAR_S": FAR_S,
-        "TOGETHER": TOGETHER,
-        "FURTHER": FURTHER,
-        "LEAK": LEAK,
-        "MEAN_S": MEAN_S,
-        "FADE_FROM": FADE_FROM,
-        "FADE_TO": FADE_TO,
-    }
     return templated(
         "guard.c",
         prefix,
         SETTINGS=settings(exported, prefix)[1],
         PLACES="".join(f"{k}, " for k in compensated(exported)),
-        **{name: real(value) for name, value in constants.items()},
+        **{name: real(value) for name, value in CONSTANTS.items()},
     )

@@ -80,7 +80,7 @@ class _Running:
 
 @dataclass
 class _AtStart:
-    """Memory at the first instant: the input was always as it is, a play rests in the middle."""
+    """Memory at the first instant: the input never changed before, a play rests in the middle."""
 
     inputs: Mapping[str, Node]
 
@@ -190,7 +190,7 @@ def _rates(
 
 
 def _said(term: Term) -> str:
-    """A term in words, for a comment beside its number."""
+    """A term in words, for the comment next to its number."""
     leaving = f", out of {term.source}" if term.source is not None else ""
     return f"{term.name}: {text(term.expression)}, into {term.into}{leaving}"
 

@@ -1,4 +1,4 @@
-"""The exported model: one JSON document that is the master of every target, and the `Model` it stands for."""
+"""The exported model: one JSON document that is the master of every target, and the `Model` in it."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ def export_model(
         provenance: what else should be known about where the model comes from.
 
     Raises:
-        UsageError: an unknown target, or a step that is none.
+        UsageError: an unknown target, or an impossible step.
         UserError: a model that cannot be exported, or a target that is not equal; then nothing is written.
     """
     targets = (to,) if isinstance(to, str) else tuple(to)
@@ -114,15 +114,23 @@ def export_model(
     exported = from_document(body, seal, model.name)
     inputs = sampled_inputs(campaign, recordings[0], exported.compiled.inputs, step_s)
     reference = make_reference(exported.compiled, inputs)
-    stem = identifier(model.name)
+    files, proofs = _files(exported, data, reference, targets)
+    write_files(out_dir, files)
+    return Export(tuple(out_dir / name for name in files), proofs, found)
+
+
+def _files(
+    exported: Exported, data: bytes, reference: Reference, targets: Sequence[str]
+) -> tuple[dict[str, str | bytes], tuple[Proof, ...]]:
+    """Files of a document and its targets by name, and the proofs that the targets agree with the model."""
+    stem = identifier(exported.model.name)
     files: dict[str, str | bytes] = {f"{stem}.json": data}
     proofs: list[Proof] = []
     for target in dict.fromkeys(targets):
         made, proved = _TARGETS[target](exported, reference, stem)
         files |= made
         proofs += proved
-    write_files(out_dir, files)
-    return Export(tuple(out_dir / name for name in files), tuple(proofs), found)
+    return files, tuple(proofs)
 
 
 Made = tuple[dict[str, str | bytes], list[Proof]]
@@ -231,8 +239,8 @@ def export_document(
     Its recordings are not at hand: the reference inputs run through its trained ranges.
 
     Args:
-        out_dir: default a folder beside the document that bears its name.
-        key: signs the document anew; without one it is copied as it is, with its signature.
+        out_dir: default a folder next to the document, with its name.
+        key: signs the document anew; without one it is copied unchanged, with its signature.
 
     Raises:
         UsageError: an unknown target.
@@ -243,16 +251,10 @@ def export_document(
     exported = read_document(path)
     data = render(exported.document, key) if key is not None else path.read_bytes()
     reference = make_reference(exported.compiled, _through_the_ranges(exported))
-    stem = identifier(exported.model.name)
-    files: dict[str, str | bytes] = {f"{stem}.json": data}
-    proofs: list[Proof] = []
-    for target in dict.fromkeys(targets):
-        made, proved = _TARGETS[target](exported, reference, stem)
-        files |= made
-        proofs += proved
+    files, proofs = _files(exported, data, reference, targets)
     out_dir = out_dir or path.with_suffix("")
     write_files(out_dir, files)
-    return Export(tuple(out_dir / name for name in files), tuple(proofs), None)
+    return Export(tuple(out_dir / name for name in files), proofs, None)
 
 
 def _through_the_ranges(exported: Exported, hours: float = 12.0) -> Array:

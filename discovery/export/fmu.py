@@ -96,7 +96,7 @@ def fmu_bytes(exported: Exported, version: int) -> bytes:
 
 
 def _compiled(version: int, command: Sequence[str], library: Path) -> bytes:
-    """A shared library of the sources beside it, without a warning."""
+    """A shared library of the sources in the same folder, without a warning."""
     whole = [command[0], *CFLAGS, "-shared", *command[1:], "-o", str(library)]
     done = subprocess.run(whole, cwd=library.parent, capture_output=True, text=True, check=False)
     if done.returncode:

@@ -18,6 +18,16 @@ FAR_S = 4 * 3600.0  # ... and so long where physics does not allow it
 FURTHER = 1.25  # times as far outside the training as before: a new step of a held input
 MEAN_S = 1800.0  # s over which a held input is averaged; after `age` the mean stands in for it, not a moment
 LEAK = 0.2  # seconds forgotten for each second in which a held input is back inside its training
+CONSTANTS = {  # as the templates of the targets name them
+    "FADE_FROM": FADE_FROM,
+    "FADE_TO": FADE_TO,
+    "CONFIRM_S": CONFIRM_S,
+    "TOGETHER": TOGETHER,
+    "FAR_S": FAR_S,
+    "FURTHER": FURTHER,
+    "MEAN_S": MEAN_S,
+    "LEAK": LEAK,
+}
 
 
 @dataclass(frozen=True)

@@ -154,7 +154,7 @@ def _term(term: Term) -> dict[str, Any]:
 
 
 def _knowledge(known: Knowledge) -> dict[str, Any]:
-    """`first`: standard deviations, which stay as they are when an update changes the covariance."""
+    """`first`: standard deviations, which do not change when an update changes the covariance."""
     return {
         "residual": dict(known.residual),
         "slow_share": known.slow_share,

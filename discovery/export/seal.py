@@ -80,7 +80,7 @@ def _json(data: bytes) -> dict[str, Any]:
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         found = dict(pairs)
         if len(found) != len(pairs):
-            raise ValueError("a key stands twice")
+            raise ValueError("a key appears twice")
         return found
 
     def refuse(word: str) -> float:
@@ -121,7 +121,7 @@ def require_trusted(seal: Seal, trusted: Ed25519PublicKey, place: str | Path) ->
 
 
 def private_key(path: Path) -> Ed25519PrivateKey:
-    """The private key of a PEM file; made, with its public half beside it (`.pub`), when there is none yet.
+    """The private key of a PEM file; made, with its public half (`.pub`), when there is none yet.
 
     Raises:
         UserError: a file that holds no Ed25519 key.
@@ -160,8 +160,7 @@ def public_key(path: Path) -> Ed25519PublicKey:
 
     if not path.exists():
         raise UserError(
-            f"{path}: there is no such key; it stands as KEY.pub beside the key given to "
-            "`discovery export --sign KEY`"
+            f"{path}: there is no such key; `discovery export --sign KEY` writes it next to KEY, as KEY.pub"
         )
     try:
         found = form.load_pem_public_key(path.read_bytes())

@@ -1,4 +1,4 @@
-"""Files made anew beside what a person wrote: a file that nobody changed is replaced, another one is kept."""
+"""Files written again: one that nobody changed is replaced, one that a person changed is kept."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SEAL = "# Unchanged: "  # and a hash of the rest: nobody has edited the file si
 
 
 def sealed(text: str) -> str:
-    """A text with a first line that tells whether somebody changes it."""
+    """A text with a first line that shows later whether somebody changed it."""
     return f"{_SEAL}{_hash(text)}\n{text}"
 
 
@@ -36,9 +36,9 @@ def touched(folder: Path) -> ExperimentForm | None:
 def rewrite(folder: Path, made: Plan) -> list[str]:
     """Write models and experiment of a plan; lines about what was kept.
 
-    A model that a person changed stays; the new one stands beside it. In an experiment that a person changed,
-    the models of the plan are renewed and names that are no outputs any more taken out; the rest, remarks
-    too, stays as it is.
+    A model that a person changed stays; the new one gets a file of its own. In an experiment that a person
+    changed, the models of the plan are renewed and names that are no longer outputs are removed; the rest,
+    remarks included, does not change.
     """
     notes = []
     models = dict(made.models)

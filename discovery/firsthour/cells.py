@@ -126,7 +126,7 @@ class Numbers:
     """`values` (N,), NaN where nothing was measured; `unit` that stands in the cells, or "".
 
     `wrong`: index of the first cell that is none of that, or None; `words`: the words of a switch that no
-    list knows, the one that stands for 0 first.
+    list knows, the word for 0 first.
     """
 
     values: Array
@@ -217,7 +217,7 @@ def read_numbers(cells: Sequence[str], comma: bool | None) -> Numbers:
     unit = max(units, key=lambda u: units[u]) if units and sum(units.values()) > len(known) / 2 else ""
     words = [cell for cell in known if cell in strange or cell.casefold() in SWITCHES]
     if wrong is not None and len(words) == 2 and all(map(is_empty, known.keys() - set(words))):
-        # one of the two may be known: what is beside "on" is off
+        # one of the two may be known: the word next to "on" is off
         first, second = sorted(words, key=lambda w: (SWITCHES.get(w.casefold(), 0.5), words.index(w)))
         values = np.array([math.nan if is_empty(c) else float(c == second) for c in cells])
         return Numbers(values, "", None, (first, second))

@@ -12,12 +12,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.errors import UserError
 from discovery.evaluation.crossvalidation import Fold, folds, masked
 from discovery.experiment import Experiment
 from discovery.experiment.form import ModelEntry
-from discovery.experiment.pipeline import fit_of
+from discovery.experiment.modelfits import fit_of
 from discovery.fitting import predict_recording
 from discovery.models import Model
 from discovery.progress import Progress, silent
@@ -33,9 +33,9 @@ _SIMPLER = 1.03  # a simpler kind that is so near wins
 _FEWEST, _MOST = 600, 6000  # instants of a recording: enough to choose by
 _IN_TIME_SCALE = 10  # instants in the time in which readings forget half of what they were
 _ROUNDS = 20  # of Levenberg-Marquardt
-_LOST = 10.0  # times the error without a model: what is said of a model that runs away
+_LOST = 10.0  # times the error without a model: the score of a model that runs away
 
-# simplest first: name -> entry of an experiment file; INPUTS stands for the channels that drive the outputs
+# simplest first: name -> entry of an experiment file; INPUTS becomes the channels that drive the outputs
 CANDIDATES = {
     "regression": '{ kind = "regression" }',
     "reduced": '{ kind = "reduced", inputs = [INPUTS] }',
@@ -43,8 +43,8 @@ CANDIDATES = {
     "two_masses": '{ file = "two_masses.toml" }',
     "discovered": '{ kind = "sindy", bootstraps = 0 }',
 }
-# what stands beside them to compare with, and is not tried here
-BESIDE = {"pysindy": '{ kind = "pysindy" }'}
+# in every experiment for comparison, but never the first model
+NOT_TRIED = {"pysindy": '{ kind = "pysindy" }'}
 
 
 @dataclass(frozen=True)

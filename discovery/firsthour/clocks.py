@@ -1,4 +1,4 @@
-"""Columns that tell the time once more, or keep the books: counters, numbers of rows and devices."""
+"""Columns that repeat the time or number things: counters, numbers of rows and devices."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from discovery.firsthour.vocabulary import fold
 
 Array = NDArray[np.float64]
 
-_FEWEST = 5  # readings, to speak of a proportion
+_FEWEST = 5  # readings, to call two columns proportional
 _EXACT = 0.01  # of a step
 _STEADY = 0.999  # correlation with the time
 _NAMED = 0.99  # the same, where the name says that it is a clock: it may be rounded
@@ -31,7 +31,7 @@ _ID = re.compile(
 
 
 def is_clock(name: str, values: Array, seconds: Array) -> bool:
-    """Whether a column tells the time once more, or counts the rows."""
+    """Whether a column repeats the time, or counts the rows."""
     words = fold(name)
     if not np.isfinite(values).all() or not (np.diff(values) > 0).all():
         return False
@@ -90,7 +90,7 @@ def _says_time(words: str) -> bool:
 def bookkeeping(name: str, unit: str, values: Array, seconds: Array, role: str) -> str:
     """What a column does that is neither measured nor acts on a machine, or "". A temperature never is such.
 
-    A column whose header names another unit than that of a time or a counter is none.
+    A column whose header names another unit than that of a time or a counter is not one.
     """
     known = np.isfinite(values)
     unit, words = unit.strip().lower(), fold(name)

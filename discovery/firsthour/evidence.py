@@ -41,7 +41,7 @@ _PRIOR = {
     "fan": -3.0,
 }
 _PLACE_PRIOR = {"body": 0.0, "air": -4.0, "fluid": -4.5, "coolant": -4.5}
-_HEAD = 1.25  # the last word of a name is what the others tell about: a coolant flow is a flow
+_HEAD = 1.25  # the last word of a name is what the others describe: a coolant flow is a flow
 _ROLES = {
     ("temperature", "body"): "temperature",
     ("temperature", "air"): "ambient temperature",
@@ -94,7 +94,7 @@ class Evidence:
         return max(QUANTITIES, key=lambda q: self.odds[q])
 
     def why(self, role: str) -> str:
-        """The two pieces that speak most for a role."""
+        """The two strongest pieces of evidence for a role."""
         keys = {key for pair, of in _ROLES.items() if of == role for key in pair} or {"other", "state", "fan"}
         if role == OTHER:
             keys |= {"current", "voltage", "torque", "position"}
@@ -142,7 +142,7 @@ def evidence(
 
 
 def is_set_point_word(name: str) -> bool:
-    """Whether a name says that a column is what a controller is told to hold."""
+    """Whether a name says that a column is the set point of a controller."""
     return any(word.gloss == SET_POINT for word in words_of(name))
 
 

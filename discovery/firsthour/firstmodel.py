@@ -23,8 +23,8 @@ def first_model(
     """Text of a model file.
 
     A temperature loses heat to the room and is warmed by the loads; loads and outputs that are numbered alike
-    belong together. An error (no temperature) decays and is driven by each input. A second mass stands behind
-    each temperature, or beside each error. A diagnosis then says what is missing.
+    belong together. An error (no temperature) decays and is driven by each input. A second mass is coupled
+    to each temperature, or adds to each error. A diagnosis then says what is missing.
 
     Args:
         room: channel of the air around, if there is one.

@@ -21,7 +21,7 @@ _RIDGE = 1e-4
 def strongest(
     campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], inputs: Sequence[str]
 ) -> list[str]:
-    """At most five of the inputs, taken one after the other by what each explains beside those before it.
+    """At most five of the inputs, chosen one after the other by what each adds to those before it.
 
     Args:
         recordings: to fit; nothing else is looked at.

@@ -131,7 +131,7 @@ def _numbered(name: str, cells: Sequence[str]) -> bool:
 
 
 def _moves(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Whether a column holds numbers that differ for one name and neither count nor tell the time."""
+    """Whether a column holds numbers that differ for one name and are neither a counter nor a clock."""
     numbers = [cell for cell in cells if is_number(cell)]
     if len(numbers) < len(cells) / 2 or any(is_stamp(c) for c in cells[:20] if not is_empty(c)):
         return False

@@ -79,7 +79,7 @@ CLOCKS = re.compile(
 )
 _DATE = re.compile(r"\b(date|datum|data|fecha|dato|dia|tag|jour|giorno)\b|дата|日付|日期")
 DEGREES = ("degC", "degF", "K")
-# letters that stand for a quantity in formulas, by the unit of one letter behind them: F_N, U_V, x_m
+# symbols of quantities in formulas, by the unit of one letter behind them: F_N, U_V, x_m
 _SYMBOLS = {"N": "f", "V": "u e", "A": "i", "W": "p q", "C": "t", "K": "t", "F": "t", "m": "x y z s h l"}
 
 
@@ -107,7 +107,7 @@ def time_unit(written: str) -> str | None:
 
 
 def unit_of(written: str) -> tuple[str, str | None]:
-    """A unit as it is written, mended where loggers leave out a sign (W/m2), and as one of the list, or
+    """A unit as written, corrected where loggers leave out a sign (W/m2), and as one of the list, or
     None.
     """
     spelled = re.sub(

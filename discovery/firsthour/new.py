@@ -19,7 +19,7 @@ from discovery.firsthour.table import OwnTable, read_tables
 from discovery.firsthour.texts import campaign_text, clock_doubt, csv_text
 from discovery.progress import Progress, silent
 from discovery.recordings.campaignfile import CampaignForm
-from discovery.runfolder import beside
+from discovery.runfolder import temporary_folder
 
 
 def new(
@@ -42,7 +42,7 @@ def new(
         folder: what is written stands in it at the end, or nothing.
         sources: own tables. joins: for each of them the table of a second logger.
         statements: NAME=ROLE,UNIT of columns that a person knows.
-        room: column that stands for the air around the machine.
+        room: column used as the air around the machine.
         ask: asks a person about doubtful guesses; without, they are marked in the campaign file.
         again: the folder is there already; what a person wrote in it stays.
         quick: models are written without comparing them.
@@ -54,25 +54,11 @@ def new(
         UserError: the folder has a campaign already, or a file cannot be read.
     """
     there = (folder / "campaign.toml").exists()
-    if there and not again:
-        raise UserError(
-            f"{folder}: campaign.toml is there already; use --again to make model and experiment again "
-            "(what you "
-            "wrote stays), or name another folder"
-        )
-    if not sources and not (there and again):
-        raise UsageError("say --from FILE: which recording is the campaign made of?")
-    if joins and len(joins) != len(sources):
-        raise UsageError(f"{len(sources)} --from and {len(joins)} --join: say one --join for each --from")
+    _check_request(folder, sources, joins, there=there, again=again)
     if not sources:
         return _planned_again(folder, progress, quick=quick)
     said, clock = read_statements(statements)
-    progress("reading the files")
-    tables = [table for source in sources for table in read_tables(Path(source))]
-    if joins:
-        seconds = [table for source in joins for table in read_tables(Path(source))]
-        progress("finding the shift between the loggers")
-        tables = join_all(tables, seconds)
+    tables = _tables(sources, joins, progress)
     found = recorded(tables, clock)
     guesses = with_statements(found.seen, found.guesses, said, room)
     if ask is not None:
@@ -88,7 +74,7 @@ def new(
     air, about_room = unknown_room(runs[:-1], guesses, outputs)
     kept = _written(folder) if there else {}
     names = list(found.recordings)
-    with beside(folder) as temporary:
+    with temporary_folder(folder) as temporary:
         for name, table in found.recordings.items():
             write_atomic(temporary / f"{name}.csv", csv_text(table))
         text = campaign_text(folder.resolve().name, found, guesses, air, about_room, kept)
@@ -110,6 +96,32 @@ def new(
     ]
 
 
+def _check_request(
+    folder: Path, sources: Sequence[Path], joins: Sequence[Path], *, there: bool, again: bool
+) -> None:
+    """Refuse what cannot be done: see the errors of `new`."""
+    if there and not again:
+        raise UserError(
+            f"{folder}: campaign.toml is there already; use --again to make model and experiment again "
+            "(what you wrote stays), or name another folder"
+        )
+    if not sources and not there:
+        raise UsageError("say --from FILE: which recording is the campaign made of?")
+    if joins and len(joins) != len(sources):
+        raise UsageError(f"{len(sources)} --from and {len(joins)} --join: say one --join for each --from")
+
+
+def _tables(sources: Sequence[Path], joins: Sequence[Path], progress: Progress) -> list[OwnTable]:
+    """The tables of all files, each joined with that of its second logger, if there is one."""
+    progress("reading the files")
+    tables = [table for source in sources for table in read_tables(Path(source))]
+    if not joins:
+        return tables
+    seconds = [table for source in joins for table in read_tables(Path(source))]
+    progress("finding the shift between the loggers")
+    return join_all(tables, seconds)
+
+
 def _planned_again(folder: Path, progress: Progress, *, quick: bool) -> list[str]:
     """Models and experiment of a campaign whose roles a person has corrected."""
     campaign = read_toml(folder / "campaign.toml", CampaignForm)
@@ -117,7 +129,7 @@ def _planned_again(folder: Path, progress: Progress, *, quick: bool) -> list[str
     before = touched(folder)
     if before is not None:
         names = [*(n for n in names if n not in before.held_out), *(n for n in names if n in before.held_out)]
-    with beside(folder) as temporary:
+    with temporary_folder(folder) as temporary:
         for recording in campaign.recordings.values():
             source = (folder / recording.file).resolve()
             if source.is_file():

@@ -12,7 +12,7 @@ import numpy as np
 
 from discovery.experiment import load_experiment
 from discovery.files import read_toml, write_atomic
-from discovery.firsthour.choosing import BESIDE, CANDIDATES, Score, choose
+from discovery.firsthour.choosing import CANDIDATES, NOT_TRIED, Score, choose
 from discovery.firsthour.firstmodel import first_model, usual_inputs
 from discovery.firsthour.guess import Guess, drives
 from discovery.firsthour.inputs import strongest
@@ -23,7 +23,7 @@ from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, ChannelForm
 from discovery.recordings.valuecheck import below_zero
 
-COMPARED = ("regression", "pysindy")  # what a user would pick: they stand in every experiment
+REFERENCES = ("discovered", "regression", "pysindy")  # every experiment compares with them
 HAND_BUILT = {"first_order": ("model.toml", 1), "two_masses": ("two_masses.toml", 2)}
 _FEW = 20  # readings of an output: fewer carry no model
 _QUIET = 3.0  # times its noise: an output that moves less says nothing
@@ -83,7 +83,7 @@ def plan(
     write_atomic(folder / "experiment.toml", trial)
     experiment = load_experiment(folder / "experiment.toml")  # whatever is wrong with it is said now
     scores = [] if quick else choose(experiment, progress)
-    lines |= BESIDE
+    lines |= NOT_TRIED
     return _decided(title, names, outputs, scores, lines, files, campaign, guesses, fit)
 
 
@@ -137,8 +137,9 @@ def _decided(
     ]
     mismatch = next((name for name in HAND_BUILT if name in helping), None)
     if helping:
-        beside = [name for name in COMPARED if name in lines]
-        chosen = list(dict.fromkeys([helping[0], *([mismatch] if mismatch else []), *helping[:3], *beside]))
+        references = [name for name in REFERENCES if name in lines]
+        best = [helping[0], *([mismatch] if mismatch else []), *helping[:3]]
+        chosen = list(dict.fromkeys([*best, *references]))
         said = [
             f"first model: {helping[0]}; on {how} left out of its fit, its rms is {scores[0].ratio:.0%} of "
             f"the rms without a model ({', '.join(told[1:])})"
@@ -169,8 +170,8 @@ def _unchosen(
 ) -> Plan:
     """The simple model and a discovered one, not compared."""
     simple = "first_order" if files else next(iter(lines))
-    beside = [name for name in COMPARED if name in lines]
-    chosen = dict.fromkeys((simple, "discovered", *beside))
+    references = [name for name in REFERENCES if name in lines]
+    chosen = dict.fromkeys((simple, "discovered", *references))
     models = {name: lines[name].replace(", bootstraps = 0", "") for name in chosen}
     remarks = ["Not compared (--quick): `discovery new DIR --again` chooses by what each predicts."]
     mismatch = simple if files else None

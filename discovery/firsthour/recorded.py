@@ -12,11 +12,12 @@ from discovery.errors import UserError
 from discovery.firsthour.clocks import bookkeeping, counts_up, tells_time
 from discovery.firsthour.evidence import is_set_point_word
 from discovery.firsthour.filenames import constants, file_hints
-from discovery.firsthour.guess import TEMPERATURES, Guess, guess, guess_all
+from discovery.firsthour.guess import TEMPERATURES, Guess, guess
 from discovery.firsthour.measures import DEGREES, TIME_UNITS, known_unit
 from discovery.firsthour.odds import probabilities
 from discovery.firsthour.stamps import stated_interval
 from discovery.firsthour.table import Array, Column, OwnTable
+from discovery.firsthour.tableguess import guess_all
 from discovery.firsthour.vocabulary import SET_POINT, words_of
 from discovery.recordings.timeunit import time_odds
 from discovery.recordings.units import UnitError, conversion
@@ -107,7 +108,7 @@ def _renewed(
     hints: Mapping[str, Sequence[tuple[str, Mapping[str, float]]]],
     guesses: Mapping[str, Guess],
 ) -> dict[str, Guess]:
-    """Guesses once more beside the columns that were kept: a column that was left out says nothing of
+    """Guesses again from the columns that were kept: a column that was left out says nothing of
     them.
     """
     again = guess_all(kept, hints)

@@ -32,9 +32,9 @@ class Room:
 def unknown_room(
     runs: Sequence[OwnTable], guesses: Mapping[str, Guess], outputs: Sequence[str]
 ) -> tuple[Room | None, str]:
-    """What stands for the air around, and a sentence; no room, and "", where it was measured.
+    """The channel used as the air around, and a sentence; no room, and "", where it was measured.
 
-    Temperatures lose heat to the air, so a model of theirs has it as an unknown of each recording. For errors
+    Temperatures lose heat to the air, so a model of them has it as an unknown of each recording. For errors
     nothing stands in: a constant drives nothing.
 
     Args:
@@ -47,7 +47,7 @@ def unknown_room(
     if not any(guesses[name].role == "temperature" for name in outputs):
         return None, (
             "no room temperature was recorded, and none is made up: what the air does to the errors stays in "
-            "them. Record it, or name a stand-in with --room COLUMN"
+            "them. Record it, or name a substitute with --room COLUMN"
         )
     cold = [degrees for run in runs for degrees in [_cold_start(run, guesses)] if degrees is not None]
     if cold and len(cold) == len(runs):
@@ -60,7 +60,7 @@ def unknown_room(
         f"no room temperature was recorded: {ROOM} is an unknown of each recording, believed to be "
         f"{room.degrees:g} degC within {room.spread:g} K ({why}). A fit estimates it; better record "
         "it, or name "
-        "a stand-in with --room COLUMN"
+        "a substitute with --room COLUMN"
     )
 
 

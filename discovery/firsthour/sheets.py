@@ -210,7 +210,7 @@ def _header(
     """Where the names stand, the units below or above them, and what stands over a group of names."""
     if first == 0:
         raise UserError(
-            f"{path}, line {head[0][0]}: numbers where the names of the columns should stand; "
+            f"{path}, line {head[0][0]}: numbers where the names of the columns should be; "
             f"put a line of {width} names above them, such as time,heater,T1"
         )
     end = len(head) if first is None else first
@@ -303,7 +303,7 @@ def _body(
         if cells == header:
             again += 1
             continue
-        if trailer and ragged is None:  # readings go on: what was taken for the end is a broken row
+        if trailer and ragged is None:  # readings go on: what looked like the end is a broken row
             ragged = trailer[0], -1
         kept.append(cells)
         numbers.append(line)

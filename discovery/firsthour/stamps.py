@@ -1,4 +1,4 @@
-"""The clock of an engineer's table: which columns tell the time, and in which unit.
+"""The clock of an engineer's table: which columns hold the time, and in which unit.
 
 Where nothing says the unit, evidence does: how long thermal recordings last, how often loggers read, how
 quickly temperatures move. What is left open is asked (see `asking`).
@@ -37,8 +37,8 @@ _INTERVAL = re.compile(
 class Clock:
     """`columns`: where the stamps stand; `seconds` (N,) since the first row; `about`: how they were read.
 
-    `order`: the rows as they follow each other in time, None: as they stand. `first`: ISO 8601 of the first
-    row, or "". `counted`: nothing says the unit of its numbers, they are as they stand.
+    `order`: the rows as they follow each other in time, None: as in the file. `first`: ISO 8601 of the first
+    row, or "". `counted`: nothing says the unit of its numbers, they are not converted.
     """
 
     columns: tuple[int, ...]
@@ -204,7 +204,7 @@ def _forward(
         return seconds, None, []
     if (steps <= 0).all():
         order = np.arange(len(seconds))[::-1]
-        return seconds[::-1] - seconds[-1], order, ["the newest row stood first: the rows were turned round"]
+        return seconds[::-1] - seconds[-1], order, ["the newest row came first: the rows were reversed"]
     if series is not None:
         order = np.argsort(seconds, kind="stable")
         return seconds[order] - seconds[order[0]], order, []

@@ -1,4 +1,4 @@
-"""An engineer's table as it is: any encoding, mark and decimal sign, stamps of many kinds, wide or long."""
+"""An engineer's table in any form: encoding, mark and decimal sign, stamps of many kinds, wide or long."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Column:
     """`header`: as in the file. `name`: a word that expressions can use. `unit`: as the file names it, or "".
 
     `values` (N,), NaN where the cell is empty. `about`: words of the file that explain the name. `words`:
-    of a switch that no list knows, the one that stands for 0 first.
+    of a switch that no list knows, the word for 0 first.
     """
 
     header: str
@@ -76,7 +76,7 @@ class Column:
 class OwnTable:
     """`time` (N,) in s since the first row; `about_time`: how it was read; `notes`: what else was done.
 
-    `first`: ISO 8601 of the first row, or "". `counted`: nothing says the unit of `time`, it is as it stands;
+    `first`: ISO 8601 of the first row, or "". `counted`: nothing says the unit of `time`, no conversion;
     `clock`: name of its column. `above`: lines over the table.
     """
 
@@ -99,7 +99,7 @@ class OwnTable:
 def read_own(path: Path) -> OwnTable:
     """Read a CSV (plain or gzip, any encoding), Excel workbook or Parquet file; of several sheets the first.
 
-    Columns without any number, and columns that count the rows or tell the time again, are left out.
+    Columns without any number, and columns that count the rows or repeat the time, are left out.
 
     Raises:
         UserError: no regular file, no header, a ragged row, no column of time, or cells that are no numbers.
@@ -157,7 +157,7 @@ def _table(sheet: Sheet) -> OwnTable:
 
 def _spread(clock: Clock) -> tuple[Array, list[str]]:
     same = int(np.sum(np.diff(clock.seconds) == 0))
-    said = [f"{same} rows bear the stamp of the row before: spread evenly"] if same else []
+    said = [f"{same} rows have the time of the row before: spread evenly"] if same else []
     return spread_evenly(clock.seconds), said
 
 

@@ -3,7 +3,7 @@
 A column has a quantity (what is measured) and a place (where). A word raises the odds of some quantities and
 places; nothing else decides (see `evidence`). To teach a word, add it to a row.
 
-A word stands for itself; `~word` may also be a part of a longer one, as in German compounds. Words of other
+A word means itself; `~word` may also be a part of a longer one, as in German compounds. Words of other
 scripts are always looked for inside. Names are folded before: small letters, ae oe ue ss, no accents.
 """
 
@@ -36,7 +36,7 @@ QUANTITIES = (
 PLACES = ("body", "air", "fluid", "coolant")
 SET_POINT, CELL = "set point", "cell"
 
-# gloss (what stands for a word of another script in the name of a channel), log odds, words
+# gloss (what replaces a word of another script in the name of a channel), log odds, words
 _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     # quantities
     (

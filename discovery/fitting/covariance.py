@@ -1,4 +1,4 @@
-"""How well a fit knows its numbers: their covariance, and what these recordings do not tell."""
+"""How well a fit knows its numbers: their covariance, and what these recordings do not determine."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ Array = NDArray[np.float64]
 
 Z95 = 1.959963984540054  # standard deviations of a normal distribution: 95 % lie within
 ABOVE95 = 1.6448536269514722  # ... and 5 % above
-_UNSEEN = 1e-4  # share of a column's length that the other unknowns leave; below it readings do not tell it
+_UNSEEN = 1e-4  # share of a column's length that the other unknowns leave; below it, it is not determined
 
 
 def covariance_of(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array, list[str]]:
-    """Gauss-Newton covariance (U, U) and a sentence for each parameter that the readings do not tell.
+    """Gauss-Newton covariance (U, U) and a sentence for each parameter that the readings do not determine.
 
     Args:
         jacobian: (N, U) of whitened residuals and priors.
@@ -31,9 +31,9 @@ def covariance_of(problem: Problem, jacobian: Array, theta: Array) -> tuple[Arra
     seen = length > 0
     scaled = jacobian[:, seen] / length[seen]
     size, direction = np.linalg.eigh(scaled.T @ scaled)
-    told = size > 1e-12 * size.max(initial=0.0)
-    inverse = (direction[:, told] / size[told]) @ direction[:, told].T
-    blind = np.sum(direction[:, ~told] ** 2, axis=1) > 1e-6  # takes part in a combination that nothing tells
+    known = size > 1e-12 * size.max(initial=0.0)
+    inverse = (direction[:, known] / size[known]) @ direction[:, known].T
+    blind = np.sum(direction[:, ~known] ** 2, axis=1) > 1e-6  # part of a combination that nothing determines
     covariance = np.zeros((total, total))
     index = np.flatnonzero(seen)
     covariance[np.ix_(index, index)] = inverse / np.outer(length[seen], length[seen])

@@ -7,6 +7,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,9 +45,10 @@ class Fit:
     noise: Noise
     trajectories: tuple[Trajectory, ...]
     cost: float  # half the sum of squared whitened residuals and priors
-    unidentified: tuple[str, ...]  # one sentence for each parameter that these recordings do not tell
+    unidentified: tuple[str, ...]  # one sentence for each parameter that these recordings do not determine
     seconds: float
     together: float = 1.0  # readings that count as one against what is known of inputs with a spread
+    ended_early: bool = False  # it would not have come near its goal
 
     @property
     def model(self) -> Model:
@@ -64,7 +66,7 @@ class Fit:
 
     @property
     def offsets(self) -> dict[str, dict[str, tuple[float, float]]]:
-        """By channel known only within a spread and by recording: what it is off by, and standard error."""
+        """Of each channel known only within a spread, by recording: estimated offset and standard error."""
         found: dict[str, dict[str, tuple[float, float]]] = {}
         for u, value, error in zip(self.problem.unknowns, self.theta, self.standard_errors, strict=True):
             if u.is_offset and u.recording is not None:
@@ -72,7 +74,7 @@ class Fit:
         return found
 
     def offset_in(self, recording: str) -> dict[str, float]:
-        """By channel known only within a spread: what it is off by in a recording that the fit has seen."""
+        """Of each channel known only within a spread: its estimated offset in a recording of the fit."""
         return {name: found[recording][0] for name, found in self.offsets.items() if recording in found}
 
     def summary(self) -> str:
@@ -113,6 +115,7 @@ def fit_model(
     begin: Fit | None = None,
     max_rounds: int = 60,
     tolerance: float = 1e-9,
+    goal: float = inf,
 ) -> Fit:
     """Fit the free parameters and start values of a model to recordings.
 
@@ -134,6 +137,7 @@ def fit_model(
         begin: a fit to begin from, of a model that has most of the unknowns; `guess` goes before it.
         max_rounds: of Levenberg-Marquardt.
         tolerance: relative change of the cost that ends them.
+        goal: the cost that is good enough to matter; a fit that would not reach it ends early.
 
     Raises:
         UserError: an input that a recording does not hold.
@@ -151,11 +155,11 @@ def fit_model(
     rounds = _ROUNDS if noise is None or nuisance else 1
     for k in range(rounds):
         most = max_rounds if k in (0, rounds - 1) else _ROUGH
-        solution = solve(problem, theta, current, loss, most, tolerance, together)
+        solution = solve(problem, theta, current, loss, most, tolerance, together, goal)
         theta = solution.theta
         if not np.isfinite(solution.jacobian).all():
             raise RunsAwayError(f"model '{model.name}' answers its parameters with numbers without bound")
-        if k == rounds - 1:
+        if k == rounds - 1 or solution.ended_early:
             break
         left = [problem.residual(t) for t in solution.trajectories]
         settled = True
@@ -173,12 +177,8 @@ def fit_model(
             problem = problem.spread(current, {name: new for name, (new, _) in spreads.items()})
         if settled:
             break
-    covariance, lost = covariance_of(problem, solution.jacobian, theta)
-    if noise is None and loss == "linear":
-        covariance = covariance * _excess(problem, solution)
-    if nuisance:  # their priors were counted `together` times: back to one
-        times = np.sqrt([together if u.is_nuisance else 1.0 for u in problem.unknowns])
-        covariance = covariance * np.outer(times, times)
+    excess = _excess(problem, solution) if noise is None and loss == "linear" else 1.0
+    covariance, lost = _covariance(problem, solution, together, excess)
     return Fit(
         problem,
         theta,
@@ -189,7 +189,22 @@ def fit_model(
         tuple(lost),
         clock.perf_counter() - began,
         together,
+        solution.ended_early,
     )
+
+
+def _covariance(
+    problem: Problem, solution: Solution, together: float, excess: float
+) -> tuple[Array, list[str]]:
+    """Covariance (U, U) of the unknowns, and a sentence for each parameter that is not determined.
+
+    Args:
+        together: how many times the priors of nuisances were counted; here they count once.
+        excess: factor on the variance of the readings.
+    """
+    covariance, lost = covariance_of(problem, solution.jacobian, solution.theta)
+    times = np.sqrt([together if u.is_nuisance else 1.0 for u in problem.unknowns])
+    return covariance * excess * np.outer(times, times), lost
 
 
 def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:

@@ -13,11 +13,12 @@ from discovery.dynamics import (
     Trajectory,
     make_grid,
     make_system,
+    predict,
     sensitivities,
     simulate,
     start_values,
 )
-from discovery.dynamics.system import inputs_of, predict, shifted, uncertain
+from discovery.dynamics.system import inputs_of, shifted, uncertain
 from discovery.fitting.problem import read_spread
 from discovery.models import Model, State, expanded
 from discovery.recordings import Campaign
@@ -43,8 +44,8 @@ def predict_recording(
     Args:
         outputs: measured channels.
         white: (Y,) reading noise that weighs the first reading against the declared start; default 1 um each.
-        known: what a fit found inputs off by in this recording (`Fit.offset_in`); the first reading corrects
-            only the others.
+        known: offsets of inputs that a fit found in this recording (`Fit.offset_in`); the first reading
+            corrects only the others.
     """
     model = expanded(model, campaign.channels)
     grid = grid or make_grid(campaign, recording, inputs_of(model, campaign, outputs), outputs)

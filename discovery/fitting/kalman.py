@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
 from discovery.dynamics.kernel import between, driven
+from discovery.dynamics.prediction import output_matrix
 from discovery.dynamics.sensitivity import moved_in_time
-from discovery.dynamics.system import flows, output_matrix
+from discovery.dynamics.trajectory import flows
 from discovery.fitting.noise import Noise
 
 Array = NDArray[np.float64]

@@ -15,12 +15,13 @@ from discovery.dynamics import (
     Trajectory,
     make_grid,
     make_system,
+    predict,
     sensitivities,
     simulate,
     start_values,
 )
 from discovery.dynamics.sensitivity import moved_in_time
-from discovery.dynamics.system import inputs_of, predict, shifted, uncertain
+from discovery.dynamics.system import inputs_of, shifted, uncertain
 from discovery.fitting.noise import Noise
 from discovery.models import Model, Parameter, State, expanded
 from discovery.recordings import Campaign
@@ -63,7 +64,7 @@ class Unknown:
 
     @property
     def key(self) -> tuple[str, str | None, bool, bool, bool]:
-        """What tells it from the others."""
+        """What distinguishes it from the others."""
         return self.name, self.recording, self.is_start, self.is_offset, self.is_late
 
     @property
@@ -103,7 +104,7 @@ class Problem:
         """The problem with the priors of its start values as a noise has them.
 
         Args:
-            found: spread of each state that is neither read nor given one; default as it is.
+            found: spread of each state that is neither read nor given one; default the stated one.
         """
         white = dict(zip(noise.outputs, noise.white, strict=True))
         unknowns = list(self.unknowns)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discovery.dynamics.system import outputs as model_outputs
+from discovery.dynamics import outputs as model_outputs
 from discovery.fitting.fit import fit_model
 from discovery.fitting.heldout import predict_recording
 from discovery.fitting.starts import warm_start

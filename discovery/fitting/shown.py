@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.printed import printed
 
 if TYPE_CHECKING:

@@ -7,7 +7,9 @@ a trial step that is refused costs a free run and no sensitivities.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -26,6 +28,7 @@ _DAMPING = 1e-4  # of the first step, relative to the diagonal of the normal equ
 _EASE, _TIGHTEN = 0.1, 5.0  # factors of the damping after a step that is taken, or refused
 _HOPELESS = 1e10  # damping at which no shorter step helps any more
 _STILL = 1e-11  # relative change of the unknowns below which the search has ended
+_PACE = 4  # steps whose mean gain says whether a search comes near its goal
 _FAR = 0.5  # what a step has to take off the cost for the whitening filters to be made anew behind it
 
 
@@ -37,6 +40,7 @@ class Solution:
     trajectories: tuple[Trajectory, ...]
     jacobian: Array  # (N, U) of whitened residuals and priors
     cost: float  # half the sum of their squares
+    ended_early: bool = False  # it would not have come near its goal
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,7 @@ def solve(
     max_rounds: int,
     tolerance: float,
     together: float = 1.0,
+    goal: float = inf,
 ) -> Solution:
     """The unknowns (U,) with the least cost under a noise, sought from `theta` (U,).
 
@@ -69,6 +74,8 @@ def solve(
         max_rounds: of linearisation.
         tolerance: relative change of the cost that ends the search.
         together: readings that count as one against the priors (`Problem.prior_rows`).
+        goal: the cost that is good enough to matter: a search that would not reach it at the pace of its last
+            steps ends.
 
     Raises:
         RunsAwayError: the model does not stay finite where the search begins.
@@ -80,7 +87,8 @@ def solve(
     now = _whitened(problem, x, noise, together, runs, filters)
     cost, damping = _cost(now.residual, loss), _DAMPING
     jacobian = _jacobian(problem, x, noise, together, now, filters)
-    for _ in range(max_rounds if len(x) else 0):
+    course, late = [cost], False
+    for left in range(max_rounds if len(x) else 0, 0, -1):
         weight, slope = _weights(now.residual, loss)
         rows = jacobian * weight[:, None]
         gram, gradient = rows.T @ rows, jacobian.T @ slope
@@ -114,9 +122,18 @@ def solve(
             now = _whitened(problem, x, noise, together, now.trajectories, filters)
         cost = _cost(now.residual, loss)
         jacobian = _jacobian(problem, x, noise, together, now, filters)
-        if done:
+        course.append(cost)
+        late = len(course) > _PACE and cost - left * (course[-1 - _PACE] - cost) / _PACE > goal
+        if done or late:
             break
-    return Solution(x, now.trajectories, jacobian, 0.5 * float(now.residual @ now.residual))
+    return Solution(x, now.trajectories, jacobian, 0.5 * float(now.residual @ now.residual), late)
+
+
+def cost_under(problem: Problem, theta: Array, trajectories: Sequence[Trajectory], noise: Noise) -> float:
+    """What a search under a noise would have to beat to be better than unknowns (U,) and their free runs."""
+    runs = tuple(trajectories)
+    now = _whitened(problem, theta, noise, 1.0, runs, _filters(runs, noise))
+    return _cost(now.residual, "linear")
 
 
 def _trajectories(problem: Problem, x: Array, near: _Run | None) -> tuple[Trajectory, ...]:

@@ -41,7 +41,7 @@ def check_models(campaign: Path, models: Sequence[Path]) -> Iterator[str]:
 
 
 def check_model(model: Model, channels: Mapping[str, str], path: Path | str) -> None:
-    """Refuse a model file that would be taken for something else than it says.
+    """Refuse a model file that would be read as something else than it says.
 
     Args:
         channels: of the campaign, each with the unit of its values.

@@ -84,7 +84,7 @@ def speed_new(rpm: float, variant: Speeding = "none") -> float:
 
     As "printed" the heat transfer doubles between 750 and 760 rpm and is 16.6 times larger at 1200 rpm, more
     than the fluid can carry: doubtful, though the law behind it, h ~ (Omega - 750)^0.556, is tame. "1.5"
-    replaces the exponent 5 by 1.5 (1.55 times at 1200 rpm). "none", the default, leaves the speed as it is.
+    replaces the exponent 5 by 1.5 (1.55 times at 1200 rpm). "none", the default, does not change the speed.
 
     >>> [f"{speed_new(1000, variant):.4g}" for variant in ("printed", "1.5", "none")]
     ['3.906e+12', '1.656e+04', '1000']

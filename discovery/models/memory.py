@@ -83,7 +83,7 @@ def check_start(start: Expression, where: str) -> None:
     if remembers(start):
         raise UserError(
             f"{where}: '{text(start)[:60]}' needs what was before the recording; "
-            f"a start knows the first instant alone: take {', '.join(f'{f}()' for f in MEMORY)} away"
+            f"a start knows only the first instant: take {', '.join(f'{f}()' for f in MEMORY)} away"
         )
 
 

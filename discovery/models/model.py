@@ -161,7 +161,7 @@ def in_time_unit(model: Model) -> Model:
 
 
 def shown_states(model: Model, outputs: Collection[str]) -> dict[str, str]:
-    """States that an output shows as they are: state -> output."""
+    """States that an output shows directly: state -> output."""
     shown = {name: model.outputs.get(name, Name(name)) for name in outputs}
     return {e.id: name for name, e in reversed(shown.items()) if isinstance(e, Name) and e.id in model.states}
 

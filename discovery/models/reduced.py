@@ -16,7 +16,7 @@ from discovery.recordings import Channel
 from discovery.terms import Apply, Name, Term
 
 TIME_UNIT = "h"  # rates per hour: a machine's poles are then between 0.1 and 10
-POLE_MAX = -0.01  # 1/h: slower than 100 h is a drift that no recording tells from an offset
+POLE_MAX = -0.01  # 1/h: slower than 100 h is a drift that no recording separates from an offset
 
 
 def reduced(inputs: Sequence[str], outputs: Sequence[str], channels: Mapping[str, Channel]) -> Model:

@@ -1,4 +1,4 @@
-"""Regression on the inputs as they are, without memory: what a user would pick first.
+"""Regression on the inputs, without memory: what a user would pick first.
 
 y = b0 + sum_k b_k u_k
 """

@@ -45,7 +45,7 @@ def superposition(inputs: Sequence[str], outputs: Sequence[str], channels: Mappi
             parameters[pole] = Parameter(-0.5, f"1/{TIME_UNIT}", max=POLE_MAX)
             parameters[gain] = Parameter(0.0, rate_unit(unit, of))
             parameters[zero] = Parameter(-REFERENCE if of == "degC" else 0.0, of, fixed=k > 0)
-            # The first influence takes up the first reading as it is. Free starts would be free offsets of
+            # The first influence absorbs the first reading. Free starts would be free offsets of
             # whichever influence turns out slow, found in the fit and missing in every prediction.
             start = Name(output) if k == 0 else Number(0.0)
             states[state] = State(state, unit, None, start, 0.0, 1.0 / TIME_UNITS[TIME_UNIT])

@@ -35,7 +35,7 @@ def dimension(unit: str) -> Dimension:
 
 
 def known(unit: str) -> bool:
-    """Whether a unit has a meaning; none at all is a wildcard."""
+    """Whether a unit has a meaning; an empty one is a wildcard."""
     try:
         parse_unit(unit or "1")
     except ValueError:

@@ -32,7 +32,7 @@ LEVER_M = 0.25  # a tilt is corrected by a linear axis at the rim of the table: 
 
 @dataclass(frozen=True)
 class Active:
-    """A recording gone through with active compensation; `time` (N,) in s.
+    """A recording replayed with active compensation; `time` (N,) in s.
 
     `measured[error]` (N,): on the compensated machine, NaN where not read. `applied[error]` (N,): correction
     that the controller took off. `reconstructed[error]` (N,): the uncompensated error, from these two alone.

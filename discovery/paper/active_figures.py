@@ -85,7 +85,7 @@ def section_4(m: Material) -> Chapter | None:
 
 
 def _gone_through(m: Material, name: str) -> tuple[dict[str, Active], list[str]]:
-    """Each recording to compensate, gone through with the exported model; what there is to say."""
+    """Each recording to compensate, replayed with the exported model, and remarks."""
     wanted = m.form.compensated
     if not wanted:
         return {}, []

@@ -1,4 +1,4 @@
-"""Equations (1) to (6) of the paper: variants of eq. (6), validity, what nozzle height and flow tell."""
+"""Equations (1) to (6) of the paper: variants of eq. (6), validity, what nozzle height and flow show."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def equation_6(m: Material) -> Chapter:
         shows.append(
             f"Eq. (6) changes what is left by at most {max(span) - min(span):.2g} (of {min(span):.2g}, "
             f"at {where}): "
-            "above 750 rpm the table follows the fluid whichever factor stands before h."
+            "above 750 rpm the table follows the fluid whichever factor h has."
         )
     shows.append(
         f"As printed, eq. (6) makes h {curves['as printed'][-1] / curves['off'][-1]:.1f} times larger at "
@@ -83,7 +83,7 @@ def equation_6(m: Material) -> Chapter:
         tuple(tables),
         shows=tuple(shows),
         not_shown=(
-            "The coefficient and exponents of eq. (1) rest on the paper alone. ν_f is read as the "
+            "The coefficient and exponents of eq. (1) come only from the paper. ν_f is read as the "
             "kinematic viscosity.",
             "The plant's own film law is another one, so no variant can be 'the true one' here.",
         ),
@@ -131,11 +131,11 @@ def nozzle(m: Material) -> Chapter | None:
             continue
         for name, what in (("b", "nozzle height"), ("m", "fluid velocity V_j")):
             p = widened(fit.model.parameters[name], fit.together)
-            told = told_apart(p)
-            rows.append((recording, what, p.value, p.low, p.high, "identified" if told else "not identified"))
+            word = "identified" if identified(p) else "not identified"
+            rows.append((recording, what, p.value, p.low, p.high, word))
             shows.append(
                 f"{recording}: the exponent of the {what} is {p.value:.2f} ({_interval(p)})"
-                + ("." if told else ": this recording does not tell it from no influence.")
+                + ("." if identified(p) else ": not identified.")
             )
     return Chapter(
         "nozzle",
@@ -170,10 +170,10 @@ def widened(p: Parameter, together: float) -> Parameter:
     return replace(p, low=p.value - far * (p.value - p.low), high=p.value + far * (p.high - p.value))
 
 
-def told_apart(p: Parameter) -> bool:
-    """Whether an exponent is told from no influence: its 95 % interval leaves zero out.
+def identified(p: Parameter) -> bool:
+    """Whether an exponent is identified: its 95 % interval excludes zero.
 
-    >>> told_apart(Parameter(0.4, low=0.3, high=0.5)), told_apart(Parameter(0.4, low=-0.3, high=1.1))
+    >>> identified(Parameter(0.4, low=0.3, high=0.5)), identified(Parameter(0.4, low=-0.3, high=1.1))
     (True, False)
     """
     return p.low is not None and p.high is not None and (p.low > 0.0 or p.high < 0.0)

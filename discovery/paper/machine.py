@@ -116,7 +116,7 @@ def figure_3(m: Material) -> Chapter | None:
         tuple(charts),
         shows,
         (
-            "The paper prints curves only, no time constants, so none of its figures stands beside these.",
+            "The paper prints curves only, no time constants, so there is none to compare with these.",
             "A single time constant summarises several bodies; an empty cell means not settled, or no change "
             "beyond the scatter of the readings.",
         ),

@@ -1,4 +1,4 @@
-"""paper.html: the paper figure by figure and table by table, simulated beside measured."""
+"""paper.html: the paper figure by figure and table by table, simulated next to measured."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _IN_ORDER: tuple[tuple[str, Callable[[Material], Chapter | None]], ...] = (
 NOT_REPEATED = (
     "Figures 1, 4, 5 and 8 (nozzle positions) are drawings and photographs. Figure 2 shows temperatures "
     "here, no images.",
-    "Every recording comes from a simulated machine. The figures of the paper stand beside ours to "
+    "Every recording comes from a simulated machine. The figures of the paper are given next to ours to "
     "compare their size; "
     "no parameter was set to meet them.",
 )

@@ -157,9 +157,9 @@ def how_to_read(
     sensors: dict[str, list[tuple[Channel, float, float]]] = {}
     for name, one in made.items():
         sensors.setdefault(wanted[name], []).append((one, to[name].factor, to[name].offset))
-    beside = {wanted[c]: wanted[error] for c, error in pairs.items() if c in made and error in made}
+    only_at = {wanted[c]: wanted[error] for c, error in pairs.items() if c in made and error in made}
     held = {wanted[c] for c, one in made.items() if one.between == "held" and not one.measured}
-    return How(frozenset(held - beside.keys()), beside, sensors)
+    return How(frozenset(held - only_at.keys()), only_at, sensors)
 
 
 def _conversion(path: Path, name: str, form: ChannelForm) -> Conversion:

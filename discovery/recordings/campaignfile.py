@@ -54,7 +54,7 @@ class ChannelForm(Strict):
     corrects: str | None = Field(
         None,
         description="of an applied correction: the error to whose readings it is added; "
-        "default: the one whose name stands in its own",
+        "default: the one whose name is part of its own",
     )
     sign: Literal[1, -1] = Field(
         1,

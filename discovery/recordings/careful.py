@@ -26,7 +26,7 @@ _EXPORT = "export it with a comma between the columns and a point in numbers"
 
 @dataclass
 class _Troubles:
-    """Findings about one file; the same trouble in many cells is told once, by its first and a count."""
+    """Findings about one file; the same trouble in many cells is one finding, with a count."""
 
     file: Path
     found: list[Finding] = field(default_factory=list)

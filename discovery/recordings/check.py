@@ -123,7 +123,7 @@ def _recording_findings(
     conversions: Mapping[str, Conversion],
     pairs: Mapping[str, str],
 ) -> tuple[list[Finding], str | None, Seen | None]:
-    """Findings, what tells whether another recording holds the same readings, and the recording."""
+    """Findings, a fingerprint of the readings (equal for equal recordings), and the recording."""
     recording = form.recordings[name]
     file = path.parent / recording.file
     wanted = wanted_columns(recording, form.channels)
@@ -155,7 +155,7 @@ def _recording_findings(
 
 
 def _plausible(channel: Channel, values: Array) -> Array:
-    """Values without those that are told one by one: a comparison of recordings is not about them."""
+    """Values without those that have a finding of their own: a comparison of recordings is not about them."""
     known = np.flatnonzero(np.isfinite(values))
     wrong = known[odd_readings(channel, values[known])]
     found = np.where(np.isfinite(values), values, np.nan)

@@ -19,7 +19,7 @@ def is_instant(text: str) -> bool:
 
 
 def parse_instant(text: str) -> datetime:
-    """An ISO 8601 instant. Raises ValueError when it is none."""
+    """An ISO 8601 instant. Raises ValueError for any other text."""
     return datetime.fromisoformat(text.strip())
 
 

@@ -50,7 +50,7 @@ def _mistake(
 ) -> str | None:
     if error is None:
         known = ", ".join(errors) or "there is none"
-        return f'it is not said which error it corrects; write corrects = "NAME" of an error ({known})'
+        return f'the error that it corrects is not given; write corrects = "NAME" of an error ({known})'
     if error not in errors:
         return f"'{error}' is no channel of role error; {suggest(error, errors)}"
     if error in taken:

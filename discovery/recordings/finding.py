@@ -11,7 +11,7 @@ _NAMED = 4  # files that a folded line names
 
 @dataclass(frozen=True)
 class Finding:
-    """`error`: the recording cannot be used as it is; `warning`: it can, but somebody should look."""
+    """`error`: the recording cannot be used; `warning`: it can, but somebody should look."""
 
     severity: Severity
     file: Path

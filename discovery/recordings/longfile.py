@@ -29,13 +29,13 @@ PIECE = 2**18  # rows that are read at a time
 class How:
     """What the columns of a file are.
 
-    `held`: columns that keep their value to the next stamp. `beside`: columns that are wanted where another
-    one was read (a correction at the readings of its error). `sensors`: channels of a column, with the factor
-    and offset to their unit.
+    `held`: columns that keep their value to the next stamp. `only_at`: columns that are wanted only where
+    another one was read (a correction at the readings of its error). `sensors`: channels of a column, with
+    the factor and offset to their unit.
     """
 
     held: frozenset[str] = frozenset()
-    beside: Mapping[str, str] = field(default_factory=dict)
+    only_at: Mapping[str, str] = field(default_factory=dict)
     sensors: Mapping[str, Sequence[tuple[Channel, float, float]]] = field(default_factory=dict)
 
     def clean(self, column: str, values: Array) -> int:
@@ -67,10 +67,10 @@ class _Mean(NamedTuple):
 
 @dataclass
 class Reduction:
-    """Rows as they come in, and blocks of them; `held` and `beside` as in `How`."""
+    """Rows as they come in, and blocks of them; `held` and `only_at` as in `How`."""
 
     held: frozenset[str]
-    beside: Mapping[str, str]
+    only_at: Mapping[str, str]
     every: int = 1
     rows: int = 0
     waiting: list[Piece] = field(default_factory=list)
@@ -110,7 +110,7 @@ class Reduction:
         from discovery.recordings.blocks import block_means, held_means
 
         new: dict[str, _Mean] = {}
-        full = {n: self._filled(n, values[n]) for n in self.beside}
+        full = {n: self._filled(n, values[n]) for n in self.only_at}
         for name, column in values.items():
             if name in self.held:
                 mean, last = held_means(time, column, first, self.last.get(name, np.nan), end)
@@ -120,7 +120,7 @@ class Reduction:
             else:
                 wanted = column
                 if name in full:
-                    wanted = np.where(np.isfinite(values[self.beside[name]]), full[name], np.nan)
+                    wanted = np.where(np.isfinite(values[self.only_at[name]]), full[name], np.nan)
                 counts, stamp, _, mean = block_means(time, wanted, first)
                 new[name] = _Mean(counts, stamp, mean)
         self.begin = np.append(self.begin, time[first[:-1]])

@@ -67,7 +67,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         return
     words = _logger_words(read)
     limits = ROLES[channel.role].ranges.get(channel.unit)
-    told = np.zeros(0, dtype=np.intp)  # what lies outside its range is told already
+    told = np.zeros(0, dtype=np.intp)  # what lies outside its range has a finding already
     if limits is not None:
         told = np.flatnonzero((read < limits.usual[0]) | (read > limits.usual[1]))
     words = np.setdiff1d(words, told)

@@ -160,7 +160,7 @@ def _reduced(
     """Columns of the batches of a long file; means where there are too many rows."""
     import pyarrow as pa
 
-    clock, reduction = Clock(), Reduction(how.held, how.beside)
+    clock, reduction = Clock(), Reduction(how.held, how.only_at)
     left_out: dict[str, int] = {}
     for batch in batches:
         if not batch.num_rows:

@@ -103,7 +103,7 @@ def parse_unit(unit: str) -> "pint.Unit":
 
 
 def short(name: str) -> str:
-    """A unit as it is written.
+    """A unit as written.
 
     >>> short("kilowatt"), short("degree_Fahrenheit")
     ('kW', 'degF')

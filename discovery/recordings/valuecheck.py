@@ -48,7 +48,7 @@ def below_zero(column: Array) -> Lines:
 
 
 def load_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
-    """A heat load that is counted below zero: a discharge, a brake, a sign turned round.
+    """A heat load that is counted below zero: a discharge, a brake, a reversed sign.
 
     What a controller sends, in percent or steps, may heat and cool in turn; watts of heat may not.
     """
@@ -88,7 +88,7 @@ def frozen_findings(file: Path, lines: Lines, channel: Channel, column: Array) -
     if lengths[longest] > _STANDS * np.log(known.size) / changes + FEW:
         first, last = known[ends[longest] - lengths[longest] + 1], known[ends[longest]]
         what = (
-            f"'{channel.name}' stands still at {column[first]:g} for {lengths[longest]} readings,"
+            f"'{channel.name}' stays at {column[first]:g} for {lengths[longest]} readings,"
             f" up to line {lines[last]}, and changes every {1 / changes:.2g} readings elsewhere"
         )
         yield Finding(

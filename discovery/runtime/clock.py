@@ -60,7 +60,7 @@ class Clock:
         return stamp - self.ahead
 
     def saved(self) -> dict[str, float | str | None]:
-        """For a saved state: what tells after a restart how long ago it was saved."""
+        """For a saved state: what shows after a restart how long ago it was saved."""
         return {"inside": self.now(), "steady": self.steady(), "boot": self.boot}
 
     def resume(self, saved: dict[str, float | str | None]) -> None:

@@ -90,7 +90,7 @@ def compensate_rows(
     """Ticks over the rows of a CSV file, or of standard input (`-`), to `out` or standard output.
 
     With `folder` the state is kept there: a restart goes on after the last state saved, and `out` is cut to
-    what that state stands for, so that no line is lost and none stands twice. `out` is opened with the first
+    the tick of that state, so that no line is lost or written twice. `out` is opened with the first
     tick, `folder` with the first row: inputs that cannot be read leave both as they were.
 
     SIGTERM and SIGINT end the run in state OFF, saved; SIGUSR1 is an operator's acknowledge.

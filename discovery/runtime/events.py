@@ -1,4 +1,4 @@
-"""Events: what happened to a compensation, why, and what to do. Each is told once."""
+"""Events: what happened to a compensation, why, and what to do. Each is reported once."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def state_event(
     readings: Mapping[str, Reading],
     now: float,
 ) -> Event:
-    """What a change of state tells: what is wrong with which input, and what to do."""
+    """Event of a change of state: what is wrong with which input, and what to do."""
     found = [
         why(guard, faults[guard.spec.name], readings.get(guard.spec.name))
         for guard in guards

@@ -18,7 +18,7 @@ from discovery.export.stepper import Snapshot, Stepper
 
 Array = NDArray[np.float64]
 
-LONGEST_S = 24 * 3600.0  # of a gap that is gone through again
+LONGEST_S = 24 * 3600.0  # of a gap that is computed again
 
 
 @dataclass

@@ -296,7 +296,7 @@ def _mean(logs: Sequence[float]) -> float:
 def _change(
     linear: _Linear, wide: Array, parameters: Sequence[str], old: NDArray[np.bool_]
 ) -> dict[str, tuple[float, float]]:
-    """Change of each parameter that ages where all others stay as they are, and its standard deviation where
+    """Change of each parameter that ages where all others do not change, and its standard deviation where
     they do not. Wear goes on while it is measured, so the last readings count most.
     """
     fade = np.exp(-linear.age / MEMORY_S)

@@ -162,7 +162,7 @@ def _tell_jump(clock: Clock, session: Session) -> None:
 
 
 def _under_offsets(form: ConnectionForm, session: Session, seen: Seen) -> None:
-    """Measured errors are what the offsets leave: beside each stands what the offsets took off."""
+    """Measured errors are what the offsets leave: each is stored with what the offsets took off."""
     if form.errors_are == "left":
         for name, offset in zip(session.compensator.names, session.compensator.offsets, strict=True):
             if name in form.errors and name in seen.readings:
@@ -185,7 +185,7 @@ async def _reconnect(link: Link, session: Session) -> None:
         session.failing.discard("connection")
         session.tell(link.clock.now(), "connected", "the server answers again")
     except UserError as error:
-        if "connection" not in session.failing:  # told once, tried for ever
+        if "connection" not in session.failing:  # reported once, tried for ever
             session.failing.add("connection")
             session.tell(link.clock.now(), "not connected", str(error))
 
@@ -239,7 +239,7 @@ def compensate_opcua(
         _listen(asked)
         if not await _first_connection(link, seconds, asked, say):
             return Punctuality()
-        with ThreadPoolExecutor(max_workers=1) as beside:
+        with ThreadPoolExecutor(max_workers=1) as background:
             try:
                 session = Session(
                     exported,
@@ -249,7 +249,7 @@ def compensate_opcua(
                     settings=Settings(tick_s=form.tick_s),
                     rule=rule,
                     save_every_s=exported.compiled.step_s,
-                    beside=beside,
+                    background=background,
                     clock=clock,
                     learn=learn,
                     say=say,

@@ -20,7 +20,7 @@ class ConnectionForm(Strict):
     """A connection file (TOML); paths are relative to it."""
 
     url: str = Field(description="opc.tcp://host:port/...; no user or password in it")
-    application_uri: str = Field(CLIENT_URI, description="as it stands in the own certificate")
+    application_uri: str = Field(CLIENT_URI, description="as in the own certificate")
     certificate: str = Field(description="own certificate (DER or PEM)")
     private_key: str = Field(description="own private key (PEM)")
     server_certificate: str = Field(description="certificate that the server must have (DER or PEM)")

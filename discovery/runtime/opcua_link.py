@@ -142,7 +142,7 @@ class Link:
         return Reading(_content(value), at, value.StatusCode.is_good())
 
     async def offsets(self) -> dict[str, float]:
-        """The offsets that stand at the server now: where a compensation without a saved state begins."""
+        """The offsets at the server now: a compensation without a saved state begins there."""
         found = {}
         for name, node_id in self.form.offsets.items():
             found[name] = number(await self.client.get_node(node_id).read_value())

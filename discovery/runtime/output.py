@@ -1,7 +1,7 @@
 """The output file: as safe as the state that says what was written to it.
 
 Lines are flushed to the disk before the state is saved, and cut to what the state says after a restart: no
-line is lost, none stands twice. A full disk keeps lines in memory until there is room again.
+line is lost or written twice. A full disk keeps lines in memory until there is room again.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class Output:
 
     Args:
         header: first line of a new file.
-        resume_at: bytes of the file that a saved state stands for; None: a new file.
+        resume_at: bytes of the file at the time of a saved state; None: a new file.
         replay: lines after `resume_at` are made again, so they are cut off; if not, they are kept.
     """
 

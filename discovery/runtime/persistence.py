@@ -63,7 +63,7 @@ class Lock:
 def save(
     compensator: Compensator,
     folder: Path,
-    beside: Executor | None = None,
+    background: Executor | None = None,
     *,
     more: Mapping[str, Any] | None = None,
     first: Callable[[], object] = lambda: None,
@@ -73,7 +73,7 @@ def save(
     A crash at any instant leaves at least one whole copy.
 
     Args:
-        beside: writes in a thread of its own (one worker), so that a slow disk delays no tick.
+        background: writes in a thread of its own (one worker), so that a slow disk delays no tick.
         more: what else belongs to the state (see `Saved`).
         first: what has to be on the disk before the state says so.
 
@@ -86,8 +86,8 @@ def save(
         first()
         _write(body, folder)
 
-    if beside is not None:
-        return beside.submit(work)
+    if background is not None:
+        return background.submit(work)
     done: Future[None] = Future()
     try:
         work()
@@ -117,7 +117,7 @@ def _write(body: str, folder: Path) -> None:
 
 @dataclass(frozen=True)
 class Saved:
-    """What a saved state says of itself: its instant [s], bytes of the output that it stands for, and the
+    """What a saved state says of itself: its instant [s], bytes of the output at that instant, and the
     clock it was saved with (see `Clock.saved`)."""
 
     time: float

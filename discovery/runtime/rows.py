@@ -49,7 +49,7 @@ def csv_rows(
     reading. Cells are separated by commas, semicolons or tabs; with the latter two a decimal comma is read.
 
     Args:
-        needed: where columns that are needed are missing, `say` is told.
+        needed: columns that are needed; `say` reports those that are missing.
         dropped: counts the rows that are left out: no time, damaged, out of order, doubled.
         oldest_s: age [s] at which a value is too old for the model; rows further apart are not in seconds.
 

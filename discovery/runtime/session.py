@@ -34,7 +34,7 @@ class Session:
 
     Args:
         model, folder, trusted: file of the model, folder of its memory, key that must have signed it.
-        beside: a thread that writes the state, so that a slow disk delays no tick.
+        background: a thread that writes the state, so that a slow disk delays no tick.
         clock: the steady clock of a live source; None: the stamps of the readings are the only clock.
         now: instant [s] of the first tick, where it is known; a saved state from after it is refused.
 
@@ -52,21 +52,21 @@ class Session:
         settings: Settings | None = None,
         rule: Rule | None = None,
         save_every_s: float = 600.0,
-        beside: Executor | None = None,
+        background: Executor | None = None,
         clock: Clock | None = None,
         learn: Learner | None = None,
         now: float | None = None,
         say: Say = lambda _: None,
     ) -> None:
-        self.folder, self.say, self.save_every_s, self.beside = folder, say, save_every_s, beside
+        self.folder, self.say, self.save_every_s, self.background = folder, say, save_every_s, background
         self.learn, self.rule = learn, rule or Rule()
         self.clock, self.settings = clock, settings or Settings()
         self.shadow: Shadow | None = None
         self.resumed: float | None = None
-        self.resume_at: int | None = None  # bytes of the output that the restored state stands for
+        self.resume_at: int | None = None  # bytes of the output at the time of the restored state
         self.saved: float | None = None
         self.saving: Future[None] | None = None  # the last save, which may still be under way
-        self.failing: set[str] = set()  # what cannot be written, and was told
+        self.failing: set[str] = set()  # what cannot be written, and was reported
         self.opens: Callable[[], Output] | None = None  # the output, with the first tick
         self.output: Output | None = None
         self.found: Tick | None = None  # the last tick
@@ -268,7 +268,7 @@ class Session:
         candidate = offer(self.folder, data)
         rule = Rule(hours=self.rule.hours, most_um=None)
         self.shadow = begin_shadow(candidate, self.settings, rule)
-        self.tell(now, "shadow run", f"revision {candidate.revision} runs beside the one at work")
+        self.tell(now, "shadow run", f"revision {candidate.revision} runs in the shadow of the one at work")
 
     def save(self, now: float) -> None:
         """Write the state to disk, unless the save before is still under way; what the output holds first."""
@@ -285,9 +285,9 @@ class Session:
             "clock": self.clock.saved() if self.clock is not None else {},
         }
         first = output.sync if output is not None else lambda: None
-        self.saving = save(self.compensator, self.folder, self.beside, more=more, first=first)
+        self.saving = save(self.compensator, self.folder, self.background, more=more, first=first)
         self.saved = now
-        if self.beside is None:
+        if self.background is None:
             self._hear(now)
 
     def close(self, now: float) -> None:
@@ -303,7 +303,7 @@ class Session:
             self.lock.close()
 
     def _hear(self, now: float) -> None:
-        """What became of the last save; the first of several that fail is told, the compensation goes on."""
+        """What became of the last save; only the first of several failures is reported."""
         if self.saving is None:
             return
         with suppress(BaseException):

@@ -27,7 +27,7 @@ class Rule:
 
 @dataclass
 class Shadow:
-    """A candidate beside the model at work: the same readings, offsets that nobody sees."""
+    """A candidate in the shadow of the model at work: the same readings, but its offsets are not used."""
 
     compensator: Compensator
     rule: Rule

@@ -19,7 +19,7 @@ ACTIVE, PREVIOUS, CANDIDATE, REFUSED = "active.json", "previous.json", "candidat
 
 @dataclass(frozen=True)
 class Models:
-    """What works, and what is tried beside it."""
+    """The model at work, and the candidate that is tried in its shadow."""
 
     active: Exported
     candidate: Exported | None

@@ -48,7 +48,7 @@ class Update:
                 "runs it in the shadow of the one at work first"
             )
             return lines
-        lines.append(f"the model stays as it is: {_why(self.comparison)}")
+        lines.append(f"the model is kept: {_why(self.comparison)}")
         return lines
 
 
@@ -59,7 +59,7 @@ def _why(found: Comparison) -> str:
         case "input sensor":
             return f"the sensor of {found.what} is off, which no parameter may hide; check it"
         case "undecided":
-            return f"{found.what}: these recordings do not tell them apart; measure more often, wet and dry"
+            return f"{found.what}: these recordings do not distinguish them; measure more often, wet and dry"
         case "something else":
             return (
                 "something changed that wear does not; add what the diagnosis names, and fit the model again"
@@ -108,7 +108,7 @@ def revision_of(
 
 
 def next_name(path: Path) -> Path:
-    """Where the next revision of a model goes: beside it."""
+    """Path of the next revision of a model, in the same folder."""
     revision = read_document(path).revision + 1
     stem = path.stem.removesuffix(f".r{revision - 1}")
     return path.with_name(f"{stem}.r{revision}{path.suffix}")

@@ -47,7 +47,7 @@ def discover_masses(
 ) -> Discovery:
     """Choose the inputs and time constants of one output and fit their numbers.
 
-    Where the masses begin in a recording to come is told by those of all outputs together: see `starts_of`.
+    Where the masses begin in a further recording follows from all outputs together: see `starts_of`.
     """
     import pysindy
 

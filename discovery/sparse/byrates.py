@@ -53,8 +53,8 @@ def discover_rates(
         tolerance: default of the standard errors by which a sparser set may be worse on what was left out.
         plain: coefficients of a model that competes at any rate: where little is recorded the way down from
             all candidates may miss it.
-        easy: coefficients of terms of the first order: where the readings hardly tell, one of them stands for
-            a term of a higher order.
+        easy: coefficients of terms of the first order: where the readings hardly decide, one of them
+            replaces a term of a higher order.
     """
     full = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids, rough_noise(data))
     noise = white_noise(data.outputs, stated_noise(data), list(full.residuals().values()))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from discovery.fitting.noise import readings_as_one
 from discovery.sparse.folds import Ints, bootstraps, choose
 from discovery.sparse.gram import Gram
+from discovery.sparse.masses import next_start
 from discovery.sparse.problem import Problem, equal_shares
 from discovery.sparse.pursuit import POINTS
 from discovery.sparse.search import Search, Terms, on_grid
@@ -215,7 +216,7 @@ def _decays(problem: Problem, terms: Terms, i: int) -> Array:
 
 
 def _begin(problem: Problem, terms: Terms, others: Sequence[int]) -> tuple[Array, Array]:
-    """Mean (k,) and covariance (k, k) of the starts of a trajectory to come, from those of others.
+    """Mean (k,) and covariance (k, k) of the starts of a further trajectory, from those of others.
 
     The prior of a start counts as one more, the less the more others there are.
     """
@@ -223,22 +224,18 @@ def _begin(problem: Problem, terms: Terms, others: Sequence[int]) -> tuple[Array
     variance = np.full(count, problem.start_sd**2)
     if problem.zeroed:
         variance[-1] = problem.zero_sd**2
+    prior = np.zeros(count), np.diag(variance)
     if not others:
-        return np.zeros(count), np.diag(variance)
+        return prior
     theta = on_grid(terms, problem.families)
-    starts, within = [np.zeros(count)], [np.diag(variance)]
+    seen: list[tuple[Array, Array]] = []
     for i in others:
         known = np.isfinite(problem.readings[i])
         decays = _decays(problem, terms, i)[known]
         left = (problem.readings[i] - problem.columns[i] @ theta)[known]
-        covariance = np.linalg.inv(decays.T @ decays + np.diag(1 / variance))
-        starts.append(covariance @ (decays.T @ left))
-        within.append(covariance)
-    weights = np.r_[1 / len(others), np.ones(len(others))]
-    weights = weights / weights.sum()
-    mean = weights @ np.array(starts)
-    apart = np.array(starts) - mean
-    return mean, (weights * apart.T) @ apart + np.tensordot(weights, np.array(within), 1)
+        covariance = np.asarray(np.linalg.inv(decays.T @ decays + np.diag(1 / variance)), dtype=np.float64)
+        seen.append((covariance @ (decays.T @ left), covariance))
+    return next_start(seen, prior)
 
 
 def _costs(problem: Problem, terms: Terms) -> tuple[float, tuple[float, ...]]:

@@ -21,7 +21,7 @@ def matched(
 ) -> SparseOptions:
     """The options with keep, forbid and bounds written as the library writes its terms.
 
-    A temperature goes into a library as its difference from the room; its own name stands for that, too.
+    A temperature goes into a library as its difference from the room; its own name means that, too.
 
     Args:
         offered: terms of the library.
@@ -39,7 +39,7 @@ def matched(
         if not found and not (key == "forbid" and options.form == "auto"):
             raise UnknownTermError(
                 f"{path}: the discovery has '{word}' under {key}, which is no term of its library; write it "
-                f"as it stands there: {', '.join(dict.fromkeys(offered))}"
+                f"as the library does: {', '.join(dict.fromkeys(offered))}"
             )
         return found
 

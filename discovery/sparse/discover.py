@@ -55,7 +55,7 @@ def discover(
     Args:
         recordings: names of the recordings to fit.
         outputs: measured channels.
-        progress: told in a few words what is being done.
+        progress: called with a few words on what is being done.
         folder: where a relative baseline file is looked for; default the campaign's folder.
 
     Raises:
@@ -90,7 +90,7 @@ def _begun(
     outputs: Sequence[str],
     options: SparseOptions,
 ) -> Discovery:
-    """Masses with where they begin in a recording to come: those of all outputs are warm together."""
+    """Masses with their starts in a further recording: those of all outputs are warm together."""
     if not options.refine:
         return found
     return replace(found, model=starts_of(fit_model(found.model, campaign, recordings, outputs)))

@@ -21,7 +21,7 @@ TEMPERATURES = (AMBIENT, "fluid temperature", "coolant temperature")
 
 @dataclass(frozen=True)
 class Inputs:
-    """Channels that may drive a model, by role, and the temperature that stands for zero."""
+    """Channels that may drive a model, by role, and the temperature that is their zero."""
 
     by_role: dict[str, tuple[str, ...]]
     reference: float  # degC
@@ -123,7 +123,7 @@ def make_drives(inputs: Inputs, campaign: Campaign, library: Sequence[str] | Non
 
 
 def mass_drives(inputs: Inputs, words: Sequence[str] = ("linear", "wet")) -> list[str]:
-    """Expressions of the inputs: temperatures from the reference, the others as they are; heat gated by the
+    """Expressions of the inputs: temperatures from the reference, the others unchanged; heat gated by the
     pump.
     """
     warm = [f"{name} - {inputs.reference:g}" for name in (*inputs.of(*TEMPERATURES), *inputs.bodies)]

@@ -55,7 +55,7 @@ def candidates(
     if unused:
         raise UserError(
             f"{campaign.path}: the discovery bounds '{sorted(unused)[0]}', which is no term of its library; "
-            f"write it as it stands there: {', '.join(sorted({c.label for c in found}))}"
+            f"write it as the library does: {', '.join(sorted({c.label for c in found}))}"
         )
     return [c for c in _unique(found) if c.label not in options.forbid]
 

@@ -56,7 +56,7 @@ def make_folds(blocks: Blocks, whole: bool = True) -> list[Ints]:
 
     Args:
         whole: leave out whole recordings where there are several. Else a quarter of each: recordings that
-            were made for different things do not tell each other's part of a model.
+            were made for different things do not determine each other's part of a model.
     """
     recordings = int(blocks.recording.max()) + 1
     if recordings == 1 or not whole:
@@ -78,8 +78,8 @@ def choose(errors: Array, tolerance: float) -> int:
     """The sparsest row whose error on what was left out is within `tolerance` standard errors of the best.
 
     The standard error is that of the paired difference over blocks, of the logarithms and of the squares
-    alike: logarithms hold where recordings of different violence stand side by side, squares where what
-    tells happens in few blocks.
+    alike: logarithms hold where recordings of different violence stand side by side, squares where the
+    informative events happen in few blocks.
 
     Args:
         errors: (sizes, B) mean squared error of each left-out block, sparsest model first.

@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid
-from discovery.dynamics.system import predict
+from discovery.dynamics import Grid, predict
 from discovery.errors import RunsAwayError
 from discovery.fitting import Fit, predict_recording
 from discovery.sparse.folds import make_folds
@@ -52,6 +51,6 @@ def left_out(data: RateData, fit_of: FitOf, whole: bool = True) -> Array:
                     errors[b] = np.nanmean(here) if np.isfinite(here).any() else np.nan
         except RunsAwayError:  # a sparse model that runs away is a bad model
             errors[fold] = np.inf
-    # a block without a reading says nothing: it must not tell the sizes apart
+    # a block without a reading says nothing: it must not decide between the sizes
     silent = np.array([not has_reading(data, b) for b in range(blocks.count)])
     return np.where(np.isfinite(errors), errors, np.where(silent, 1.0, RAN_AWAY))

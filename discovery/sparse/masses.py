@@ -24,7 +24,7 @@ from discovery.terms import Number, Term, evaluate, parse, text
 Array = NDArray[np.float64]
 
 _AT = 1e-3  # share of a bound that counts as at it
-_OWN = 1e-4  # of the variance of a start, which the starts of other masses never tell
+_OWN = 1e-4  # share of the variance of a start that the starts of other masses never explain
 QUICKER = 10.0  # times below the grid that the time constant of a fit may go
 
 
@@ -138,12 +138,12 @@ def within(rules: Rules, responses: Sequence[Response]) -> list[Response]:
 
 
 def starts_of(fit: Fit) -> Model:
-    """The fitted model with where its masses begin in a recording to come: means, spreads, and how the start
-    of each follows those of the masses above it.
+    """The fitted model with the starts of its masses in a further recording: means, spreads, and how the
+    start of each follows those of the masses above it.
 
-    A recording may be cut out of what goes on; then the masses stand anywhere in their own range. That counts
-    as one start among those that were found: few cold starts do not say that all are cold. Masses are warm
-    together, so that the first reading alone says much of each. Starts are counted from the declared ones,
+    A recording may be cut out of a longer one; then the masses start anywhere in their range. That counts as
+    one start among those that were found: a few cold starts do not prove that all are cold. Masses are warm
+    together, so the first reading says much of each. Starts are counted from the declared ones,
     which follow the inputs where a mass begins in balance with them.
     """
     order = list(fit.problem.model.states)
@@ -166,26 +166,38 @@ def starts_of(fit: Fit) -> Model:
 
 
 def _population(fit: Fit) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n) of how far the masses begin from their declared starts: of those that
-    were found, each with what the fit does not know of it, and of all instants of the recordings.
+    """Mean (n,) and covariance (n, n) of the masses' starts in a further recording, from the declared ones.
+
+    Known are the starts that the fit found, each with its covariance; a recording that is cut out of a longer
+    one starts anywhere in the range of the masses.
     """
     order = list(fit.problem.model.states)
     away = [one.x - _begun(one) for one in fit.trajectories]
     every = np.concatenate(away)
-    count = len(away)
-    starts = np.array([*(one[0] for one in away), every.mean(axis=0)])
-    within = [
-        *(_unknown(fit, one) for one in fit.trajectories),
-        np.cov(every.T, bias=True).reshape(len(order), -1),
-    ]
-    # the more recordings have shown how they begin, the less counts what has not been seen
-    weights = np.r_[np.ones(count), 1 / count] / (count + 1 / count)
-    mean = weights @ starts
-    apart = starts - mean
-    return mean, (weights * apart.T) @ apart + np.tensordot(weights, np.array(within), 1)
+    anywhere = every.mean(axis=0), np.cov(every.T, bias=True).reshape(len(order), -1)
+    seen = [(one[0], _start_covariance(fit, run)) for one, run in zip(away, fit.trajectories, strict=True)]
+    return next_start(seen, anywhere)
 
 
-def _unknown(fit: Fit, trajectory: Trajectory) -> Array:
+def next_start(seen: Sequence[tuple[Array, Array]], unseen: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Mean (n,) and covariance (n, n) of the start values in a further recording.
+
+    A mixture: each recording that was seen has weight 1, and whatever was not seen has weight 1/count, so it
+    counts less the more recordings have shown how they begin.
+
+    Args:
+        seen: mean and covariance of the start of each recording, at least one.
+        unseen: mean and covariance of a start unlike all of them.
+    """
+    means, covariances = (np.array(both) for both in zip(unseen, *seen, strict=True))
+    weights = np.r_[1 / len(seen), np.ones(len(seen))]
+    weights = weights / weights.sum()
+    mean = weights @ means
+    apart = means - mean
+    return mean, (weights * apart.T) @ apart + np.tensordot(weights, covariances, 1)
+
+
+def _start_covariance(fit: Fit, trajectory: Trajectory) -> Array:
     """Covariance (n, n) of the starts that the fit found in a recording."""
     order, recording = list(fit.problem.model.states), trajectory.system.grid.recording
     place = {u.name: k for k, u in enumerate(fit.problem.unknowns) if u.is_start and u.recording == recording}

@@ -178,7 +178,7 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
 
 
 def features_of(library: FilteredInputs, terms: Terms) -> list[Feature]:
-    """The features that a set stands for, in its order."""
+    """The features of a set, in its order."""
     return [library.feature_at(int(f), float(p)) for f, p in zip(terms.family, terms.place, strict=True)]
 
 

@@ -54,7 +54,7 @@ class SparseOptions(Strict):
     )
     hidden: Literal["auto", "own", "rate", "upstream"] = Field(
         "auto",
-        description='what stands behind an output in rates: "own": nothing; "rate": its rate is a hidden '
+        description='what is behind an output in rates: "own": nothing; "rate": its rate is a hidden '
         'state (a mass on a spring); "upstream": a hidden body empties into it (a tank above a tank); '
         '"auto": what predicts best',
     )

@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid, make_grid
-from discovery.dynamics.system import predict
+from discovery.dynamics import Grid, make_grid, predict
 from discovery.errors import RunsAwayError
 from discovery.fitting import Fit, predict_recording
 from discovery.fitting.held import held_fit
@@ -79,7 +78,7 @@ def fit_plain(
 
     Args:
         inputs: channels u.
-        tried: settings of which the best on what is left out is taken; a single one is taken as it is.
+        tried: settings of which the best on what is left out is taken; a single one is not compared.
         seed: of the test functions.
     """
     grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discovery.dynamics import Grid, make_grid
-from discovery.dynamics.system import predict
+from discovery.dynamics import Grid, make_grid, predict
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise, predict_recording
 from discovery.models import Model
@@ -151,9 +150,9 @@ def has_reading(data: RateData, block: int) -> bool:
 
 
 def nearer(data: RateData, first: Model, second: Model) -> Model:
-    """The first model unless the second one, as they stand, runs far nearer to the readings.
+    """The second model if its start values run far nearer to the readings, otherwise the first.
 
-    Start values from the weak form may belong to a model that runs away: no fit comes back from there.
+    Start values from the weak form may belong to a model that runs away; no fit recovers from there.
     """
     return second if _missed(data, first) > _FAR**2 * _missed(data, second) else first
 

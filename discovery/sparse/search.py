@@ -136,7 +136,7 @@ class Search:
         return self.refined(terms.family[rest], terms.place[rest], pole)
 
     def shrunk(self, terms: Terms) -> Terms:
-        """The set without the term whose loss costs least: theta_j^2 / (S^-1)_jj at the places as they are.
+        """The set without the term whose loss costs least: theta_j^2 / (S^-1)_jj at fixed places.
 
         A coefficient at a bound of zero costs nothing and goes first.
         """

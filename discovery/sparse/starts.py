@@ -19,9 +19,9 @@ def started(
     channel: Mapping[str, str],
     constants: Mapping[str, float] | None = None,
 ) -> list[Candidate]:
-    """Candidates with start values from the weak form; `channel` says which readings stand for each state.
+    """Candidates with start values from the weak form; `channel` says which readings show each state.
 
-    Hidden masses keep theirs: the weak form sees what is measured alone.
+    Hidden masses keep their start values: the weak form sees only what is measured.
     """
     placed: dict[Candidate, float] = {}
     for state, output in channel.items():

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 FLOWS = ("linear", "sqrt")  # laws from which a chain of two bodies begins
 WORDS = ("linear", "square", "cubic", "drag", "sqrt")
 FREE, UP, DOWN = (-np.inf, np.inf), (0.0, np.inf), (-np.inf, 0.0)
-FINER = 10.0  # times the distance of two readings: quicker rates are not told from steps
+FINER = 10.0  # times the distance of two readings: quicker rates look like steps
 REST = 0.1  # spread of the start of a hidden state, as a share of its size
 
 
@@ -96,7 +96,7 @@ def upstream(
         h: State(h, measured.unit, None, parse(start), REST * float(np.std(seen)), 1.0 / TIME_UNITS[unit]),
     }
     known = seen if level is None else level
-    wide = float(np.ptp(known))  # where none of the readings tells the start, it is near its values
+    wide = float(np.ptp(known))  # where no reading shows the start, it is near its values
     low, high = float(known.min()) - wide, float(known.max()) + wide
     parameters = {start: Parameter(float(known[0]), measured.unit, low, high)}
     found = _driven(data, h, [output], words)
@@ -157,7 +157,7 @@ def _law(into: str, variable: str, law: str, stable: bool) -> Candidate:
 
 
 def _expressions(words: Sequence[str], into: str, aliases: Mapping[str, str]) -> list[Candidate]:
-    """Expressions of the user; `y`, `rate` and `up` stand for the states."""
+    """Expressions of the user; `y`, `rate` and `up` are the states."""
     from discovery.sparse.options import FAMILIES
     from discovery.terms import Name, substitute
 

@@ -79,9 +79,9 @@ def discover_temperatures(
 def _room(outputs: Sequence[str], inputs: Inputs, count: int) -> tuple[str, dict[str, State]]:
     """The temperature of the room: its channel where it moves, else a constant of each of `count` recordings.
 
-    Where the sensors start near what is known of the room they stand in it at rest, and their mean tells the
-    room's temperature of that day. A single recording does not tell it from steady heat: its readings would
-    pull it away from where free runs, which see the first reading alone, begin.
+    Sensors that start near the known temperature of the room are at rest in it, and their mean is the room's
+    temperature of that day. A single recording does not separate it from steady heat: its readings would
+    pull it away from where free runs begin, which see only the first reading.
     """
     if air := inputs.of(AMBIENT):
         return air[0], {}

@@ -76,7 +76,7 @@ def half_widths(grids: Sequence[Grid], output: str, noise: float, order: int = 1
 
     White noise of a reading every d seconds makes noise^2 d int w'^2 (w''^2) of the target. Held inputs put
     as much information into wide windows, which balance the laws alone, as ringing puts into narrow ones,
-    which tell the inertia: a few of those that have a share of the most are worth a trial.
+    which show the inertia: a few of those that have a share of the most are worth a trial.
     """
     spans = [float(g.time[-1] - g.time[0]) for g in grids]
     reading = min(float(np.median(np.diff(g.time[g.read]))) for g in grids if len(g.read) > 1)

@@ -26,7 +26,7 @@ class Assembly:
     Args:
         rough: standard deviation of the logarithm of the baseline's start values.
         refine: times as many cells in every body.
-        spread: times the usual spread of a dimension; 0: every dimension as it is written.
+        spread: times the usual spread of a dimension; 0: every dimension as written.
     """
 
     def __init__(

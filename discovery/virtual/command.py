@@ -70,29 +70,29 @@ def orders_of(
 def record_orders(
     out: Path, title: str, orders: Sequence[Order], *, reveal: bool, envelope: bool
 ) -> Iterator[str]:
-    """Write the campaign and, with `envelope`, the answers beside it; yields what was done, line by line.
+    """Write the campaign and, with `envelope`, the answers next to it; yields what was done, line by line.
 
     Raises UserError: `out` holds a campaign of other recordings, or cannot be written.
     """
     _refuse_another_campaign(out, orders)
     answers = write_campaign(out, title, orders)
     yield f"{len(orders)} recording{'s' if len(orders) > 1 else ''} and campaign.toml in {out}"
-    beside = out.resolve().parent / f"{out.resolve().name}.answer.json"
+    envelope_file = out.resolve().parent / f"{out.resolve().name}.answer.json"
     if not any(a["effects"] or a["faults"] for a in answers):
         if envelope:  # an answer to recordings that were just replaced would be a lie
-            beside.unlink(missing_ok=True)
+            envelope_file.unlink(missing_ok=True)
             (out / "answer.json").unlink(missing_ok=True)
         return
     if envelope:
-        write_answers(beside, answers)
-        yield f"what is concealed stands in {beside}"
+        write_answers(envelope_file, answers)
+        yield f"what is concealed is in {envelope_file}"
     if reveal:
         write_answers(out / "answer.json", answers)
-        yield f"the answer stands in {out / 'answer.json'}"
+        yield f"the answer is in {out / 'answer.json'}"
 
 
 def _refuse_another_campaign(out: Path, orders: Sequence[Order]) -> None:
-    """The same recordings may be taken again; beside others, the campaign file would be theirs no more."""
+    """The same recordings may be taken again; others would no longer fit the campaign file."""
     there = out / "campaign.toml"
     if not there.exists():
         return

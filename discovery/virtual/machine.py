@@ -35,7 +35,7 @@ def felt(name: str, role: str, of: str = "", sd: float = 0.03, decimals: int = 2
 
 
 def logged(name: str, role: str, unit: str, decimals: int = 0) -> Channel:
-    """An input that the log shows as it is."""
+    """An input that the log shows unchanged."""
     return Channel(name, role, unit, decimals, lambda run: run[name])
 
 
@@ -78,7 +78,7 @@ class Words:
     speed: str = ""
     top_speed: float = 1.0  # rpm
     power: str = ""
-    cooling: str = ""  # channel of a cooling power that the baseline takes as it is
+    cooling: str = ""  # channel of a cooling power that the baseline uses unchanged
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discovery.dynamics import System, make_grid, make_system, sensitivities, simulate, start_values
-from discovery.dynamics.system import inputs_of, predict
+from discovery.dynamics import System, make_grid, make_system, predict, sensitivities, simulate, start_values
+from discovery.dynamics.system import inputs_of
 from discovery.errors import RunsAwayError
 from discovery.models import Model, expanded
 from discovery.recordings import Campaign, Recording

@@ -1,4 +1,4 @@
-"""Random inputs by seed: what a machine is told to do and what the room does."""
+"""Random inputs by seed: the commands of a machine and the room around it."""
 
 from __future__ import annotations
 

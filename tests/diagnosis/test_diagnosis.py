@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from discovery.diagnosis import Diagnosis, diagnose
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.fitting import predict_recording
 from discovery.models import Model, Parameter, read_model, write_model
 from discovery.models.reduced import reduced

@@ -10,8 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from discovery.dynamics import make_grid, make_system, simulate
-from discovery.dynamics.system import predict
+from discovery.dynamics import make_grid, make_system, predict, simulate
 from discovery.models import Model, Parameter, State
 from discovery.models.thermobalance import thermobalance
 from discovery.recordings import Campaign, Channel, Recording

@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from discovery.dynamics import make_grid, make_system, sensitivities, simulate
+from discovery.dynamics import make_grid, make_system, predict, sensitivities, simulate
 from discovery.dynamics.averaging import independent
-from discovery.dynamics.grid import COARSE_NODES, MOST_NODES, Samples
-from discovery.dynamics.system import predict
+from discovery.dynamics.grid import COARSE_NODES, MOST_NODES
+from discovery.dynamics.samples import Samples
 from discovery.fitting import fit_model
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from discovery.dynamics import make_grid, make_system, simulate
+from discovery.dynamics import make_grid, make_system, predict, simulate
 from discovery.dynamics.series import lag_ends, play
-from discovery.dynamics.system import predict
 from discovery.errors import UserError
 from discovery.models import Model, Parameter
 from discovery.recordings import Campaign, Channel, Recording

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from discovery.dynamics import make_grid, make_system, simulate
-from discovery.dynamics.system import predict
+from discovery.dynamics import make_grid, make_system, predict, simulate
 from discovery.errors import RunsAwayError
 from discovery.fitting import fit_model
 from discovery.models import Model, Parameter, State

@@ -10,8 +10,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from discovery.dynamics import Column, System, make_grid, make_system, sensitivities, simulate, start_values
-from discovery.dynamics.system import predict
+from discovery.dynamics import (
+    Column,
+    System,
+    make_grid,
+    make_system,
+    predict,
+    sensitivities,
+    simulate,
+    start_values,
+)
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, evaluate, parse

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import truncnorm
 
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.effects.catalogue import Effect, Shape, catalogue
 from discovery.effects.form import INPUT, LEVEL, RATE, ROLE_OF, TERM, TERM_PLACES
 from discovery.effects.hypothesis import Hypothesis

@@ -17,7 +17,8 @@ from discovery.effects.not_offered import not_offered
 from discovery.effects.own import EffectForm
 from discovery.errors import UserError
 from discovery.experiment import diagnose, load_experiment
-from discovery.experiment.pipeline import diagnosis, fit_entry
+from discovery.experiment.modelfits import fit_entry
+from discovery.experiment.pipeline import diagnosis
 from discovery.models import read_model, write_model
 from discovery.progress import silent
 from tests import machine
@@ -163,7 +164,7 @@ def test_a_time_without_a_middle_is_any_that_the_recordings_show() -> None:
 
 MISTAKES = {
     "k_rub*sped": "effect 'rub': 'sped' means nothing in its formula; known: .*speed",
-    "0.1*speed": "effect 'rub': the amplitude 'k_rub' does not stand in the formula",
+    "0.1*speed": "effect 'rub': the amplitude 'k_rub' is not in the formula",
     "k_rub*speed*(": "effect 'rub'",
     "k_rub*__import__('os')": "effect 'rub'",
     "k_rub*delay(body, t_free)": "effect 'rub': 'delay.body, t_free.' is not of an input",

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from discovery.diagnosis.repair import written
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import TERM_PLACES

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from discovery.dynamics import make_grid, make_system, simulate
-from discovery.dynamics.system import predict
+from discovery.dynamics import make_grid, make_system, predict, simulate
 from discovery.effects.catalogue import Effect, catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.signatures import signatures

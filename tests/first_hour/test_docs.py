@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
 import shlex
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -75,8 +77,18 @@ def _the_readme_agrees_with(results: dict[str, Any]) -> None:
     assert at["repaired"]["rms"] < float(rms[1])
 
 
-@pytest.mark.usefixtures("place")
-def test_the_lines_for_a_notebook_run(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_lines_for_a_notebook_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On every second reading of the heaters, in less than half the time."""
+    board = tmp_path / "datasets" / "tclab"
+    board.mkdir(parents=True)
+    for path in (ROOT / "datasets" / "tclab").glob("*.csv.gz"):
+        header, *rows = gzip.decompress(path.read_bytes()).splitlines(keepends=True)
+        (board / path.name).write_bytes(gzip.compress(b"".join([header, *rows[::2]])))
+    shutil.copy(ROOT / "datasets" / "tclab" / "campaign.toml", board)
+    (tmp_path / "experiments").symlink_to(ROOT / "experiments")
+    monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     for block in _blocks("docs/python.md", "python"):
         exec(compile(block, "docs/python.md", "exec"), names)

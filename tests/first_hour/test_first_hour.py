@@ -42,7 +42,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_from_nothing_to_a_diagnosis_in_four_commands(desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(desk)
     commands = [
-        "new rig --from monday.csv --from tuesday.csv",
+        "new rig --quick --from monday.csv --from tuesday.csv",  # the tutorial compares the models
         "check rig",
         "diagnose rig/experiment.toml --out answer",
         "explain conduction_path",
@@ -95,7 +95,9 @@ def test_values_in_fahrenheit_arrive_in_celsius(one: Path) -> None:
 def test_a_room_that_nobody_measured_is_an_unknown_with_a_spread(desk: Path) -> None:
     from discovery.recordings import load_campaign
 
-    result = CliRunner().invoke(app, ["new", str(desk / "room"), "--from", str(desk / "tuesday.csv")])
+    result = CliRunner().invoke(
+        app, ["new", str(desk / "room"), "--quick", "--from", str(desk / "tuesday.csv")]
+    )
     assert "no room temperature was recorded: T_env is an unknown of each recording" in " ".join(
         result.output.split()
     )
@@ -191,7 +193,9 @@ def test_where_no_power_is_recorded(tmp_path: Path, header: str, term: str | Non
 
     rows = [f"{k},{k // 10 % 2},{20 + k / 9}" for k in range(60)]
     (tmp_path / "run.csv").write_text("\n".join([header, *rows]), "utf-8")
-    result = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), "--from", str(tmp_path / "run.csv")])
+    result = CliRunner().invoke(
+        app, ["new", str(tmp_path / "rig"), "--quick", "--from", str(tmp_path / "run.csv")]
+    )
     assert result.exit_code == 0, result.output
     assert ("what heats the machine" in result.output) is hint
     load_experiment(tmp_path / "rig" / "experiment.toml")
@@ -229,7 +233,7 @@ def test_a_coolant_with_a_flow_can_be_offered_as_convection(tmp_path: Path) -> N
     assert result.exit_code == 0, result.output
     [line] = [one for one in result.output.splitlines() if one.startswith("  T_coolant")]
     assert "fluid temperature, degC ? " in line
-    assert "taken for the fluid of flow" in line
+    assert "assumed to be the fluid of flow" in line
     experiment = load_experiment(tmp_path / "rig" / "experiment.toml")
     model = experiment.model_file("first_order")
     assert {"T_coolant", "flow"} <= set(model.inputs)

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from discovery.errors import UserError
-from discovery.firsthour.guess import Guess, drives, guess, guess_all
+from discovery.firsthour.guess import Guess, drives, guess
 from discovery.firsthour.table import Column, read_own
+from discovery.firsthour.tableguess import guess_all
 
 CASES = [
     ("T_room", "", np.linspace(20, 23, 50), "ambient temperature", "degC"),
@@ -148,6 +149,13 @@ def test_a_voltage_drives_where_nothing_better_is_recorded() -> None:
     assert drives(_guessed(("voltage", "", 0, 9), ("door", "", 0, 1))) == ["voltage"]
 
 
+def test_what_answers_drives_nothing() -> None:
+    """The level of a tank in volts, and a current that is read as an output."""
+    for unit in ("V", "A"):
+        both = {n: Guess(f"other {n}", unit, "") for n in ("input", "output")}
+        assert drives(both) == ["input"]
+
+
 def test_a_flow_below_one_that_is_no_switch_is_asked_about() -> None:
     assert not _guessed(("flow", "", 0.1, 0.7))["flow"].sure  # a share, or litres a minute
     assert guess(Column("pump", "pump", "", np.arange(50.0) % 2)).sure
@@ -262,7 +270,7 @@ def test_clocks_of_many_kinds(tmp_path: Path, lines: list[str], last: float) -> 
 def test_rows_of_one_stamp_are_spread(tmp_path: Path) -> None:
     table = read_own(_file(tmp_path, "time,T1", *(f"{k // 4},{k}" for k in range(40))))
     np.testing.assert_allclose(np.diff(table.time), 0.25)
-    assert "30 rows bear the stamp of the row before" in table.notes[0]
+    assert "30 rows have the time of the row before" in table.notes[0]
 
 
 def test_what_a_logger_writes_above_and_between(tmp_path: Path) -> None:

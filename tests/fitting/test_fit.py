@@ -108,6 +108,23 @@ def test_outliers_pull_less_with_a_robust_loss() -> None:
     assert abs(found[1] - clean) < 0.3 * abs(found[0] - clean)
 
 
+def test_a_fit_that_will_not_come_near_its_goal_ends_early(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the heat a model cannot reach what the whole one leaves. With a goal in reach, the end is the
+    same as without one. One step is enough here to judge the pace: so simple a fit takes few."""
+    monkeypatch.setattr("discovery.fitting.solve._PACE", 1)
+    r = campaign(recording(3))
+    poor = replace(model(g=Parameter(0.0, fixed=True)), terms=model().terms[::2])
+    whole = fit_model(model(), r, ["r3"])
+    free = fit_model(poor, r, ["r3"], noise=whole.noise)
+    far, near = (
+        fit_model(poor, r, ["r3"], noise=whole.noise, goal=goal) for goal in (whole.cost, 1.01 * free.cost)
+    )
+    assert far.ended_early
+    assert far.cost > 2 * whole.cost
+    assert not near.ended_early
+    assert near.cost == pytest.approx(free.cost)
+
+
 def test_bounds_hold() -> None:
     fitted = fit_model(model(g=Parameter(0.005, "1", 0.0, 0.01)), campaign(recording(0)), ["r0"]).model
     assert fitted.parameters["g"].value == pytest.approx(0.01, abs=1e-6)

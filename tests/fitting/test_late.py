@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid, make_grid
-from discovery.dynamics.system import predict
+from discovery.dynamics import Grid, make_grid, predict
 from discovery.fitting import Noise, fit_model, make_problem
 from discovery.fitting.kalman import make_filter
 from discovery.models import Model, Parameter, State

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from discovery.dynamics import make_grid, make_system, sensitivities, simulate, start_values
-from discovery.dynamics.system import predict, shifted
+from discovery.dynamics import make_grid, make_system, predict, sensitivities, simulate, start_values
+from discovery.dynamics.system import shifted
 from discovery.fitting import fit_model, make_problem, predict_recording
 from discovery.fitting.fit import written_with
 from discovery.fitting.noise import readings_as_one

@@ -12,7 +12,7 @@ import pytest
 from discovery.errors import UserError
 from discovery.experiment import load_experiment, run
 from discovery.models import Parameter
-from discovery.paper.film import told_apart
+from discovery.paper.film import identified
 from tests.small import EXPERIMENT, write_small
 
 PAPER = """
@@ -88,9 +88,9 @@ def test_a_model_that_the_page_names_must_be_there(path: Path) -> None:
         load_experiment(path)
 
 
-def test_an_exponent_is_told_apart_by_its_interval() -> None:
-    assert told_apart(Parameter(0.5, low=0.4, high=0.6))
-    assert told_apart(Parameter(-0.5, low=-0.6, high=-0.4))
-    assert not told_apart(Parameter(0.5, low=-0.1, high=1.1))
-    assert not told_apart(Parameter(0.5))
-    assert not told_apart(Parameter(0.5, low=-np.inf, high=np.inf))
+def test_an_exponent_is_identified_by_its_interval() -> None:
+    assert identified(Parameter(0.5, low=0.4, high=0.6))
+    assert identified(Parameter(-0.5, low=-0.6, high=-0.4))
+    assert not identified(Parameter(0.5, low=-0.1, high=1.1))
+    assert not identified(Parameter(0.5))
+    assert not identified(Parameter(0.5, low=-np.inf, high=np.inf))

@@ -87,7 +87,7 @@ def test_nothing_is_wrong(write: Write) -> None:
             with_column(
                 1, [f"{20 + i % 7}" for i in range(40)] + ["20"] * 160 + [f"{20 + i % 7}" for i in range(40)]
             ),
-            "warning: fit.csv, line 42: 'T_env' stands still at 20 for 161 readings, up to line 202",
+            "warning: fit.csv, line 42: 'T_env' stays at 20 for 161 readings, up to line 202",
         ),
         (
             with_column(1, ["20", "20.1"] * 20 + ["-28"] + ["20.1", "20"] * 10),

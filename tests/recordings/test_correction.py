@@ -118,7 +118,7 @@ SECOND = 'E_Z0T = { role = "error", unit = "um/m", column = "E_Y0C" }\n\n[rec'
     ("text", "said"),
     [
         (ONE.replace('um" }', 'um", corrects = "E_Y0" }'), "corr.corrects: 'E_Y0' is no channel of role"),
-        (ONE.replace("[rec", SECOND), "corr: it is not said which error it corrects; write corrects ="),
+        (ONE.replace("[rec", SECOND), "corr: the error that it corrects is not given; write corrects ="),
         (
             ONE.replace("[rec", SECOND).replace('um" }', 'um", corrects = "E_Z0T" }'),
             "a correction in um cannot belong to 'E_Z0T' in um/m; mend its unit",

@@ -131,7 +131,7 @@ def test_a_save_that_fails_is_told_once_and_nothing_stops(
             folder=tmp_path / "memory",
             settings=settings,
             save_every_s=60.0,
-            beside=pool if threaded else None,
+            background=pool if threaded else None,
             say=said.append,
         )
         told = []

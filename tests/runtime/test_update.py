@@ -11,8 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
-from discovery.dynamics import make_grid, make_system, simulate
-from discovery.dynamics.system import predict
+from discovery.dynamics import make_grid, make_system, predict, simulate
 from discovery.errors import UserError
 from discovery.export.document import Exported, read_document, write_document
 from discovery.models import Model
@@ -254,7 +253,7 @@ def test_the_command(machine: Campaign, fitted: Model, at_work: Path) -> None:
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
     assert "d0: nothing" in done.output
-    assert "the model stays as it is" in done.output
+    assert "the model is kept" in done.output
 
 
 def test_what_cannot_be_told_apart_is_not_signed() -> None:

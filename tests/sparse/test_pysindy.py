@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from discovery.experiment import load_experiment
 from discovery.experiment.form import ExperimentForm
-from discovery.experiment.pipeline import starting_model
+from discovery.experiment.modelfits import starting_model
 from discovery.files import read_toml
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.sparse import SparseOptions, discover
@@ -108,10 +109,14 @@ def test_the_demonstrations_reach_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "term"), [("black_box", "lag(P_drive, "), ("discovered", "pump*(T_fluid - table)")]
+    ("name", "outputs", "term"),
+    [
+        ("black_box", ("E_Z0T", "E_R0T"), "lag(P_drive, "),
+        ("discovered", ("E_Y0C", "E_Z0T", "E_R0T", "E_A0C"), "pump*(T_fluid - table)"),
+    ],
 )
 def test_what_the_demonstration_discovers_comes_out_of_pysindy(
-    monkeypatch: pytest.MonkeyPatch, name: str, term: str
+    monkeypatch: pytest.MonkeyPatch, name: str, outputs: tuple[str, ...], term: str
 ) -> None:
     coefficients: list[Array] = []
     original = pysindy.SINDy.fit
@@ -122,7 +127,7 @@ def test_what_the_demonstration_discovers_comes_out_of_pysindy(
         return fitted
 
     monkeypatch.setattr(pysindy.SINDy, "fit", spied)
-    experiment = load_experiment(Path("experiments/nmv5000.toml"))
+    experiment = replace(load_experiment(Path("experiments/nmv5000.toml")), outputs=outputs)
     entry = experiment.form.models[name].model_copy(update={"bootstraps": 0})
     _, report = starting_model(experiment.seen_by(entry), name, entry)
     assert report is not None

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics.system import predict
+from discovery.dynamics import predict
 from discovery.fitting import fit_model, predict_recording
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording

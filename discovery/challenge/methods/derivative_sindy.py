@@ -14,7 +14,7 @@ from discovery.challenge.methods.named import named_entry
 from discovery.challenge.problem import Answer, Problem
 from discovery.diagnosis.scored import refit
 from discovery.dynamics import Trajectory
-from discovery.dynamics.system import output_matrix
+from discovery.dynamics.prediction import output_matrix
 from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis
 from discovery.errors import RunsAwayError

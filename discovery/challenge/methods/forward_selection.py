@@ -1,6 +1,6 @@
 """Forward selection by BIC with white residuals: the classical way through the same catalogue.
 
-Each step refits the claims that the residual speaks for most and keeps the one with the lowest BIC, until
+Each step refits the claims that the residual supports most and keeps the one with the lowest BIC, until
 none lowers it (Bacher & Madsen, Energy and Buildings 43, 2011, with BIC in place of their likelihood-ratio
 test).
 """
@@ -19,7 +19,7 @@ REFITS = 6  # claims that are refitted at each step
 
 
 def forward_selection(problem: Problem) -> Answer:
-    """The effects that forward selection adds; weights of BIC within a step stand for probabilities."""
+    """The effects that forward selection adds; weights of BIC within a step serve as probabilities."""
     context = problem.white
     current = score(context, (), context.white)
     assert current is not None  # the baseline alone has been fitted before

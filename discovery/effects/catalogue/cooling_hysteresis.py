@@ -3,7 +3,7 @@
     P_cool in the model's terms becomes play(P_cool, width)
 
 width in W, 10 to 400: the dead band of the chiller (0.5 to 2 K) seen in cooling power. Source: on/off
-control about a set point. Limits: play stands for the loop of many cycles, not for the sawtooth of a
+control about a set point. Limits: play describes the loop of many cycles, not for the sawtooth of a
 single one, which readings every 5 to 15 minutes alias; +-0.5 K is below detection on most machines.
 """
 

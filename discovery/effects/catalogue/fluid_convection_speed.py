@@ -4,7 +4,7 @@
 
 hN in W/K at 1000 rpm, 5 to 100; m_film of 0.1 (eq. (1) of the paper) to 1. Source: film on a rotating disk.
 Limits: the law of a well wetted table is nearly invisible, on weakly coupled bodies it is not; zero at
-standstill, so that `fluid_convection` may stand beside it.
+standstill, so that `fluid_convection` can act together with it.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape

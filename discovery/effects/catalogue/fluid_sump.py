@@ -1,6 +1,6 @@
 """The fluid that wets the bodies is a mixed volume behind the sensor: it follows with a first-order lag.
 
-    t_sump T_mix' = T_fluid - T_mix;  T_mix stands for T_fluid in every wet term of the model
+    t_sump T_mix' = T_fluid - T_mix;  T_mix replaces T_fluid in every wet term of the model
 
 t_sump in s: C/UA of the fluid on the machine, 0.3 to 6 h. Source: heat balance of a stirred volume.
 Limits: settled at the first instant; heat that comes back from the bodies is not part of it.

@@ -1,6 +1,6 @@
 """The fluid arrives warmer than its sensor shows, and the more so the longer the pump has worked.
 
-    T_fluid + rise d stands for T_fluid in every wet term of the model;  t_sump d' = pump - d,  d(0) = 0
+    T_fluid + rise d replaces T_fluid in every wet term of the model;  t_sump d' = pump - d,  d(0) = 0
 
 rise in K, 1 to 4: what pump and machine put into the fluid over what it loses, 0.5 to 1 kW over 60 to
 100 W/K, as far as a sensor elsewhere in the tank misses it; t_sump in s: C/UA of the fluid, 3 to 6 h.

@@ -6,7 +6,7 @@ r_in in 1/h at the largest value that was recorded, of either sign. Source: Newt
 whose states are the errors. Limits: in proportion to the input; towards zero error.
 """
 
-from discovery.effects.form import Amplitude, Effect, Example
+from discovery.effects.form import DRIVING, Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="input_exchange",
@@ -18,14 +18,6 @@ EFFECT = Effect(
     signature="an error follows faster, or slower, while a recorded input is on",
     confused_with=("input_path",),
     source="Newton's law of cooling in the form of eq. (7) of Mayr et al. 2015",
-    roles=(
-        "heat load",
-        "cooling power",
-        "rotation speed",
-        "fluid flow",
-        "nozzle height",
-        "nozzle side",
-        "other input",
-    ),
+    roles=DRIVING,
     examples=(Example({"r_in": 0.5, "level": 1.0, "body": 20.0}, -10.0),),
 )

@@ -7,7 +7,7 @@ recordings can show. Source: sums of first-order responses, eq. (8) of Mayr et a
 constant; settled at the first instant.
 """
 
-from discovery.effects.form import Amplitude, Effect, Example, Shape
+from discovery.effects.form import DRIVING, Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="input_path",
@@ -20,14 +20,6 @@ EFFECT = Effect(
     signature="one error follows a recorded input with a time constant that the model does not have",
     confused_with=("second_thermal_mass", "sensor_lag"),
     source="Mayr et al. 2015, eq. (8): an error is a sum of first-order responses to its inputs",
-    roles=(
-        "heat load",
-        "cooling power",
-        "rotation speed",
-        "fluid flow",
-        "nozzle height",
-        "nozzle side",
-        "other input",
-    ),
+    roles=DRIVING,
     examples=(Example({"k_path": 10.0, "level": 1.0, "t_path": 600.0}, 6.321, {"level": 0.0}, 600.0),),
 )

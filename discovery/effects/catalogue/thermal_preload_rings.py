@@ -3,7 +3,7 @@
     q = P_k n/1000 (T - T_other)    [W], into the first body alone
 
 P_k in W/K at 1000 rpm, 1 to 10: 1 to 5 % of the friction torque per kelvin between the rings. Source:
-bearing preload study, Lubricants 12:185. Limits: the mean temperatures of two bodies stand for the rings.
+bearing preload study, Lubricants 12:185. Limits: the rings have the mean temperatures of two bodies.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example

@@ -13,15 +13,8 @@ from collections.abc import Mapping, Sequence
 from discovery import __version__
 from discovery.export.document import Exported
 from discovery.export.guarding import (
-    CONFIRM_S,
-    FADE_FROM,
-    FADE_TO,
-    FAR_S,
-    FURTHER,
-    LEAK,
-    MEAN_S,
+    CONSTANTS,
     MEANING,
-    TOGETHER,
     compensated,
 )
 from discovery.export.identifiers import comment, formula, identifier, identifiers
@@ -64,17 +57,7 @@ def st_text(exported: Exported, precision: str = "double") -> str:
 
 
 def _guard(name: str, kind: str) -> str:
-    numbers = {
-        "FURTHER": FURTHER,
-        "FADE_FROM": FADE_FROM,
-        "FADE_TO": FADE_TO,
-        "LEAK": LEAK,
-        "MEAN_S": MEAN_S,
-        "FAR_S": FAR_S,
-        "CONFIRM_S": CONFIRM_S,
-        "TOGETHER": TOGETHER,
-    }
-    words = {word: literal(value, kind) for word, value in numbers.items()}
+    words = {word: literal(value, kind) for word, value in CONSTANTS.items()}
     return templated("guard.st", NAME=name, KIND=kind, **words)
 
 

@@ -108,7 +108,7 @@ class _Writer:
                 depth += (token == "(") - (token == ")")
 
     def instance(self, name: str) -> str:
-        """A call of an instance: its arguments have names already, which stay as they are."""
+        """A call of an instance: its arguments have names already, which are kept."""
         self.at += 1
         word, depth = f"#{name}(", 1
         while depth:

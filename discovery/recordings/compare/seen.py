@@ -1,4 +1,4 @@
-"""A recording as the comparison sees it: canonical units, readings as they are, whatever is wrong with
+"""A recording as the comparison sees it: canonical units, unchanged readings, whatever is wrong with
 them.
 """
 

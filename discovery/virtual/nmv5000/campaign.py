@@ -1,4 +1,4 @@
-"""The campaign of the repository: the recordings that the paper speaks of, drawn once."""
+"""The campaign of the repository: the recordings that the paper describes, drawn once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Test cycles by seed: what the machine is told to do and what the room does, with the hours before a
+"""Test cycles by seed: the commands of the machine and the room around it, with the hours before a
 recording.
 
 R-Test readings need the table at rest: every reading is a stop of two minutes, with the sensors read in its
@@ -82,7 +82,7 @@ def make_cycle(
 
 
 def _readings(rng: Draw, n: int, first: int) -> tuple[Array, NDArray[np.bool_]]:
-    """Instants every 10 to 15 min on the grid, and the steps in which the table stands for them."""
+    """Instants every 10 to 15 min on the grid, and the steps in which the table stops for them."""
     gaps = rng.integers(60, 91, size=n // 60 + 1)
     at = np.concatenate([[0], np.cumsum(gaps)])
     at = at[at <= n - 6]

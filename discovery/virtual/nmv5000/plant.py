@@ -7,7 +7,7 @@ temperature; hose and sump; coolant loop with a chiller that switches. Friction 
 and preload; films are centrifugal where the table turns and a wall jet where it rests; they evaporate and
 are dragged along.
 
-Every number is a dimension of such a machine or a constant of a formula, with its source beside it. None
+Every number is a dimension of such a machine or a constant of a formula, with its source next to it. None
 was fitted, neither to the paper's tables nor to a model.
 """
 

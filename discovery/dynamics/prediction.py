@@ -1,0 +1,63 @@
+"""What a trajectory shows: its outputs, and how they depend on its states."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics.trajectory import Trajectory
+from discovery.errors import RunsAwayError, UserError
+from discovery.terms import Dual, evaluate
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+def outputs(trajectory: Trajectory, wrt: frozenset[str] = frozenset()) -> list[Dual]:
+    """Outputs of the grid on all nodes (values (T,)), with derivatives by the names of `wrt`."""
+    system = trajectory.system
+    env = trajectory.at_nodes()
+    found = []
+    for name in system.grid.outputs:
+        expression = system.model.outputs.get(name)
+        if expression is not None:
+            found.append(evaluate(expression, env, wrt, system.nodes))
+        elif name in system.states:
+            found.append(Dual(env[name], {name: 1.0} if name in wrt else {}))
+        else:
+            raise UserError(
+                f"model '{system.model.name}' has no output '{name}'; give it one under [outputs]"
+            )
+    return found
+
+
+def predict(trajectory: Trajectory) -> Array:
+    """Outputs at the reading instants, (R, Y).
+
+    Raises:
+        RunsAwayError: one that is not finite where it was read.
+    """
+    grid = trajectory.system.grid
+    count = len(grid.time)
+    shown = [np.broadcast_to(dual.value, (count,))[grid.looked_at] for dual in outputs(trajectory)]
+    columns = grid.at_readings(np.column_stack(shown)).T
+    for name, column, seen in zip(grid.outputs, columns, grid.measured.T, strict=True):
+        lost = seen & ~np.isfinite(column)
+        if lost.any():
+            raise RunsAwayError(
+                f"model '{trajectory.system.model.name}': the output '{name}' is not a finite number "
+                f"{grid.time[grid.read][lost][0]:.0f} s after the start of recording '{grid.recording}'; "
+                "check what it divides by and what log(), sqrt() and ** are taken of"
+            )
+    return np.ascontiguousarray(columns.T)
+
+
+def output_matrix(trajectory: Trajectory, nodes: Ints | None = None) -> Array:
+    """dy/dx at the reading instants, or other nodes (R,): (R, Y, n)."""
+    system = trajectory.system
+    read, count = system.grid.read if nodes is None else nodes, len(system.grid.time)
+    out = np.zeros((len(read), len(system.grid.outputs), len(system.states)))
+    for y, dual in enumerate(outputs(trajectory, frozenset(system.states))):
+        for name, partial in dual.partials.items():
+            out[:, y, system.states.index(name)] = np.broadcast_to(partial, (count,))[read]
+    return out

@@ -1,0 +1,85 @@
+"""Inputs as they were recorded: their values, integrals and means."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.errors import UserError
+from discovery.recordings import Campaign
+
+Array = NDArray[np.float64]
+
+_SAME = 1e-6  # of its span: means of a held input that differ by less are one
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A channel as it was recorded: stamps (N,) in s, values (N,), whether it runs straight between them."""
+
+    time: Array
+    value: Array
+    linear: bool
+
+    def at(self, time: Array, side: str = "right") -> Array:
+        """Values at instants; `side` says on which side of a jump of a held channel to stand."""
+        if self.linear:
+            return np.interp(time, self.time, self.value)
+        index = np.searchsorted(self.time, time, side="right" if side == "right" else "left") - 1
+        return self.value[np.clip(index, 0, None)]
+
+    def integral(self, time: Array) -> Array:
+        """Integral of a channel from its first stamp."""
+        mean = 0.5 * (self.value[:-1] + self.value[1:]) if self.linear else self.value[:-1]
+        sums = np.concatenate(([0.0], np.cumsum(mean * np.diff(self.time))))
+        index = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, None)
+        last = 0.5 * (self.value[index] + self.at(time)) if self.linear else self.value[index]
+        return np.asarray(sums[index] + last * (time - self.time[index]))
+
+    def averaged(self, nodes: Array, shown: Callable[[Samples], Array] | None = None) -> Samples:
+        """The channel by its means: over each interval between nodes (T,) where it is held, around each node
+        where it runs straight. One that runs straight between fewer stamps than nodes is not changed.
+
+        Args:
+            shown: the integral (T,) at the nodes as readings show it; default the exact one.
+        """
+        if self.linear:
+            if len(self.time) <= len(nodes):
+                return self
+            return Samples(
+                nodes, self.means(np.r_[nodes[0], 0.5 * (nodes[1:] + nodes[:-1]), nodes[-1]]), True
+            )
+        mean = self.means(nodes)
+        if shown is not None:
+            seen = np.clip(np.diff(shown(self)) / np.diff(nodes), self.value.min(), self.value.max())
+            mean = np.where(np.abs(seen - mean) < _SAME * np.ptp(self.value), mean, seen)
+        return Samples(nodes[:-1], mean, False)
+
+    def means(self, edges: Array) -> Array:
+        """Mean between each two edges; exactly the value where it stays one, so that what is constant in the
+        recording is constant to the last bit and equal intervals share their transition matrices.
+        """
+        changes = np.concatenate(([0], np.cumsum(np.diff(self.value) != 0)))
+        first = np.clip(np.searchsorted(self.time, edges[:-1], side="right") - 1, 0, None)
+        # straight lines reach to the stamp behind the edge
+        last = np.searchsorted(self.time, edges[1:], side="left") - (0 if self.linear else 1)
+        same = changes[first] == changes[np.clip(last, 0, len(changes) - 1)]
+        return np.where(same, self.value[first], np.diff(self.integral(edges)) / np.diff(edges))
+
+
+def read_samples(campaign: Campaign, recording: str, inputs: Iterable[str]) -> dict[str, Samples]:
+    """Inputs of a recording by name. Raises UserError: an input without any value."""
+    data, samples = campaign.recordings[recording], {}
+    for name in inputs:
+        values = data.values.get(name)
+        known = np.isfinite(values) if values is not None else np.zeros(len(data.time), dtype=bool)
+        if values is None or not known.any():
+            raise UserError(
+                f"{campaign.path}: recording '{recording}' has no value of '{name}', "
+                "which the model needs as an input"
+            )
+        samples[name] = Samples(data.time[known], values[known], campaign.channels[name].between == "linear")
+    return samples

@@ -1,0 +1,121 @@
+"""Where the states of a system begin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics.grid import Grid, first_interval
+from discovery.dynamics.memory import Memory
+from discovery.dynamics.system import System
+from discovery.errors import RunsAwayError, UserError
+from discovery.terms import evaluate
+from discovery.terms.dual import Value
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 30  # of Newton on the balance
+_TOLERANCE = 1e-8  # largest change of a state in its unit, relative to 1 + its size
+
+
+def start_values(
+    system: System, values: Mapping[str, float], moved: Mapping[str, float] | None = None
+) -> Array:
+    """Start values (n,): an expression at the first instant, or the balance of the state's terms there.
+
+    Args:
+        moved: shifts of start values by name. States whose starts follow move along, and memories are
+            settled anew.
+    """
+    known: dict[str, float] = {**first_values(system.grid), **values}
+    out = np.zeros(len(system.states))
+    for i, name in enumerate(system.states):
+        start = system.model.states[name].start
+        if start is None:
+            continue
+        try:
+            out[i] = float(np.mean(evaluate(start, known, memory=None).value))
+        except KeyError as missing:
+            raise UserError(
+                f"model '{system.model.name}': the start of state '{name}' needs {missing}, "
+                f"which recording '{system.grid.recording}' does not give"
+            ) from None
+    free = balanced(system)
+    out = _balanced(system, values, out, free)
+    if moved:
+        out += starts_follow(system) @ np.array([moved.get(name, 0.0) for name in system.states])
+    return _balanced(system, values, out, memories(system, free)) if moved else out
+
+
+def starts_follow(system: System) -> Array:
+    """Shift of each start value (rows) when that of another state moves by one (columns), (n, n)."""
+    found = np.eye(len(system.states))
+    for i, state in enumerate(system.model.states.values()):
+        for other, part in state.start_with.items():
+            found[i] += part * found[system.states.index(other)]
+    return found
+
+
+def balanced(system: System) -> list[int]:
+    """Indices of the states that start in the balance of their terms."""
+    return [i for i, name in enumerate(system.states) if system.model.states[name].start is None]
+
+
+def memories(system: System, free: Sequence[int]) -> list[int]:
+    """The states among `free` that hold the memory of a lag()."""
+    return [i for i in free if system.model.states[system.states[i]].memory]
+
+
+def rates_at_start(
+    system: System, values: Mapping[str, float], start: Array, wrt: Sequence[str]
+) -> tuple[Array, Array]:
+    """Rates (n,) of the states at the first instant, and their derivatives (n, M) by the names of `wrt`."""
+    rates, slopes = np.zeros(len(system.states)), np.zeros((len(system.states), len(wrt)))
+    env, wanted = at_start(system, values, start), frozenset(wrt)
+    memory = Memory(first_interval(system.grid), True)
+    for dual, i, j in zip(system.rates(env, wanted, memory), system.into, system.source, strict=True):
+        for k, sign in ((i, 1.0), (j, -1.0)):
+            if k >= 0:
+                rates[k] += sign * system.scale[k] * float(np.ravel(dual.value)[0])
+                for name, partial in dual.partials.items():
+                    slopes[k, wrt.index(name)] += sign * system.scale[k] * float(np.ravel(partial)[0])
+    return rates, slopes
+
+
+def at_start(system: System, values: Mapping[str, float], start: Array) -> dict[str, Value]:
+    """States, channels and parameters at the first instant, ready for `evaluate`; series of one interval."""
+    ends: dict[str, Value] = {name: series[:2] for name, series in system.grid.ends.items()}
+    return {**ends, **values, **dict(zip(system.states, start.tolist(), strict=True))}
+
+
+def _balanced(system: System, values: Mapping[str, float], start: Array, free: Sequence[int]) -> Array:
+    """The start values (n,) with some states in the balance of their terms, given the others."""
+    names = [system.states[i] for i in free]
+    for _ in range(_ROUNDS if free else 0):
+        rates, slopes = rates_at_start(system, values, start, names)
+        if not (np.isfinite(rates).all() and np.isfinite(slopes).all()):
+            raise RunsAwayError(
+                f"model '{system.model.name}' has no finite rate at the start of recording "
+                f"'{system.grid.recording}'; check its parameters and start values"
+            )
+        # a state that cannot balance (the integral of its input) keeps its start
+        change = np.linalg.lstsq(slopes[free], -rates[free], rcond=1e-10)[0]
+        if not np.all(np.isfinite(change)):
+            break
+        start[free] += change
+        if np.max(np.abs(change)) < _TOLERANCE * (1.0 + np.max(np.abs(start[free]))):
+            break
+    return start
+
+
+def first_values(grid: Grid) -> dict[str, float]:
+    """Channels at the first instant, outputs at their first reading."""
+    first = {name: float(series[0]) for name, series in grid.nodes.items()}
+    for i, name in enumerate(grid.outputs):
+        read = grid.readings[:, i]
+        read = read[np.isfinite(read)]
+        if len(read):
+            first[name] = float(read[0])
+    return first

@@ -1,0 +1,175 @@
+"""The free run of a model on a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import kernel
+from discovery.dynamics.grid import interleaved
+from discovery.dynamics.starts import start_values
+from discovery.dynamics.system import System
+from discovery.errors import RunsAwayError
+from discovery.terms import Dual
+from discovery.terms.dual import Value
+
+Array = NDArray[np.float64]
+
+_FAR = 1e50  # in any unit: beyond it a model has run away, before its squares overflow
+_ROUNDS = 30  # of Newton on the trajectory
+_TOLERANCE = 1e-8  # largest change of a state in its unit, relative to 1 + its size
+_CLOSE = 1e-6  # change from which one step of Newton ends it
+_HELPS = 0.3  # factor by which steps with an old linearisation have to become shorter
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Solution of a system: states on all nodes and the linearisation around them."""
+
+    system: System
+    values: Mapping[str, float]
+    x: Array  # (T, n)
+    a: Array  # (K, n, n) state matrices
+    which: NDArray[np.int64]
+    e: Array
+    w0: Array
+    w1: Array
+
+    def at_ends(self) -> dict[str, Array | float]:
+        """States, channels and parameters at the interval ends, ready for `evaluate`."""
+        return {**self.system.grid.ends, **self.values, **_state_ends(self.system, self.x)}
+
+    def at_nodes(self) -> dict[str, Array | float]:
+        """States, channels and parameters at the nodes, ready for `evaluate`."""
+        states = {name: self.x[:, i] for i, name in enumerate(self.system.states)}
+        return {**self.system.grid.nodes, **self.values, **states}
+
+
+def simulate(
+    system: System,
+    values: Mapping[str, float],
+    start: Array | None = None,
+    near: Trajectory | None = None,
+) -> Trajectory:
+    """Free run of a model on a recording.
+
+    Nonlinear terms are solved by Newton's method on the whole trajectory. Most of its time goes into the
+    exponentials of a new linearisation, so the last one is used again as long as its steps help.
+
+    Args:
+        values: parameter values by name.
+        start: (n,) start values; default the declared ones.
+        near: a run close by, to begin from (nonlinear terms only).
+
+    Raises:
+        RunsAwayError: the trajectory does not stay finite.
+    """
+    first = start_values(system, values) if start is None else start
+    last = None if system.affine else near
+    x = last.x if last else np.tile(first, (len(system.grid.time), 1))
+    before = 1.0
+    for _ in range(1 if system.affine else _ROUNDS):
+        with np.errstate(all="ignore"):
+            x = _nearer(system, values, first, last, x) if last else x
+            a, g0, g1 = _linearise(system, values, x)
+        which, e, w0, w1 = kernel.transitions(a, system.grid.step)
+        new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
+        if not np.all(np.abs(new) < _FAR):
+            raise RunsAwayError(
+                f"model '{system.model.name}' diverges on recording '{system.grid.recording}'; "
+                "check signs, bounds and start values of its parameters"
+            )
+        change = _change(x, new)
+        x, last = new, Trajectory(system, dict(values), new, a, which, e, w0, w1)
+        # the next step shrinks at least as much as this one did, and the first one to less than its square
+        if change * min(1.0, change / before) < _TOLERANCE:
+            break
+        before = change
+    assert last is not None
+    return last
+
+
+def _nearer(system: System, values: Mapping[str, float], first: Array, last: Trajectory, x: Array) -> Array:
+    """A trajectory (T, n) nearer to the solution, by steps with the last linearisation."""
+    before = np.inf
+    for _ in range(_ROUNDS):
+        g0, g1 = _left_over(_state_rates(system, _term_rates(system, values, x)), last.a, x)
+        new = kernel.trajectory(last.which, last.e, last.w0, last.w1, g0, g1, first)
+        change = _change(x, new)
+        if not change < _HELPS * before:  # also NaN
+            return x
+        x, before = new, change
+        if change < _CLOSE:
+            return x
+    return x
+
+
+def _change(old: Array, new: Array) -> float:
+    """Largest change of a state in its unit, relative to 1 + its size."""
+    return float(np.max(np.abs(new - old) / (1.0 + np.abs(new)), initial=0.0))
+
+
+def _linearise(system: System, values: Mapping[str, float], x: Array) -> tuple[Array, Array, Array]:
+    """State matrices (K, n, n) around a trajectory, forcing left over at both interval ends (K, n) each."""
+    a = np.zeros((len(system.grid.step), *2 * (len(system.states),)))
+    found = _term_rates(system, values, x, frozenset(system.states))
+    for dual, i, j in zip(found, system.into, system.source, strict=True):
+        for name, partial in dual.partials.items():
+            s = system.states.index(name)
+            mean = _interval_means(partial)
+            a[:, i, s] += system.scale[i] * mean
+            if j >= 0:
+                a[:, j, s] -= system.scale[j] * mean
+    return a, *_left_over(_state_rates(system, found), a, x)
+
+
+def _term_rates(
+    system: System, values: Mapping[str, float], x: Array, wrt: frozenset[str] = frozenset()
+) -> list[Dual]:
+    """Rate of each term at both ends of each interval (2K,), with derivatives by some names."""
+    return system.rates({**system.grid.ends, **values, **_state_ends(system, x)}, wrt, system.ends)
+
+
+def _state_rates(system: System, found: Sequence[Dual]) -> Array:
+    """Rate of each state at both ends of each interval (2K, n): the sum of its terms."""
+    rates = np.zeros((2 * len(system.grid.step), len(system.states)))
+    for dual, i, j in zip(found, system.into, system.source, strict=True):
+        rates[:, i] += system.scale[i] * dual.value
+        if j >= 0:
+            rates[:, j] -= system.scale[j] * dual.value
+    return rates
+
+
+def _left_over(rates: Array, a: Array, x: Array) -> tuple[Array, Array]:
+    """Forcing (K, n) at the left and right interval ends: what the state matrices leave of the rates."""
+    left = rates[0::2] - np.matmul(a, x[:-1, :, None])[:, :, 0]
+    right = rates[1::2] - np.matmul(a, x[1:, :, None])[:, :, 0]
+    return left, right
+
+
+def _interval_means(ends: Value) -> Value:
+    """Means (K,) over the intervals of a series at their ends (2K,); a constant is its own mean."""
+    return 0.5 * (ends[0::2] + ends[1::2]) if isinstance(ends, np.ndarray) and ends.ndim else float(ends)
+
+
+def flows(trajectory: Trajectory) -> Array:
+    """Size (K, n) of the flow through each state in each interval: the root of its summed squared terms.
+
+    In W at a body, otherwise in the unit of the state per time unit.
+    """
+    system = trajectory.system
+    squares = np.zeros((len(system.grid.step), len(system.states)))
+    found = _term_rates(system, trajectory.values, trajectory.x)
+    for dual, i, j in zip(found, system.into, system.source, strict=True):
+        mean = _interval_means(np.square(dual.value))
+        squares[:, i] += mean
+        if j >= 0:
+            squares[:, j] += mean
+    return np.sqrt(squares)
+
+
+def _state_ends(system: System, x: Array) -> dict[str, Array]:
+    return {name: interleaved(x[:-1, i], x[1:, i]) for i, name in enumerate(system.states)}

@@ -1,0 +1,252 @@
+"""What the columns of a table probably are: each by itself (`guess`), then by what else is in the table."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.firsthour.evidence import OTHER
+from discovery.firsthour.guess import (
+    CURRENTS,
+    NEXT,
+    TEMPERATURES,
+    VOLTAGES,
+    Guess,
+    evidence_of,
+    guess,
+    guessed,
+)
+from discovery.firsthour.measures import DEGREES
+from discovery.firsthour.odds import likely, probabilities
+from discovery.firsthour.shapes import shape
+from discovery.firsthour.table import Column
+from discovery.firsthour.unitodds import temperature_odds
+from discovery.firsthour.vocabulary import CELL, fold, words_of
+from discovery.recordings.correction import corrected_by_name
+from discovery.recordings.valuecheck import below_zero
+
+Array = NDArray[np.float64]
+Hints = Mapping[str, Sequence[tuple[str, Mapping[str, float]]]]
+
+_HELD = 0.5  # share of readings that repeat the one before: what is set, not measured
+_ONE_OF_SEVERAL = re.compile(r"\d+|(?<![^\W\d_])(d ?)?[xyz](?![^\W\d_])")
+_PUSHES = ("torque", "current", "signal", "flow", "power", "speed")
+
+
+def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str, Guess]:
+    """Role and unit of each column by name, and which error a correction belongs to."""
+    hints = hints or {}
+    found = {column.name: evidence_of(column, hints.get(column.name, ())) for column in columns}
+    guesses = {
+        column.name: guessed(
+            column, found[column.name], [found[other.name] for other in _alike(column, columns)]
+        )
+        for column in columns
+    }
+    guesses = _one_scale(columns, guesses)
+    guesses = _one_unit(columns, guesses)
+    guesses = _the_fluid(_one_room(columns, guesses))
+    guesses = _corrections(columns, _signed(columns, _answers(columns, guesses)))
+    if any(one.role == "error" for one in guesses.values()):
+        for name, one in guesses.items():
+            if one.role == "temperature" and one.unit in DEGREES:
+                why = f"{one.why}; a sensor on the machine is an input of the errors"
+                guesses[name] = replace(one, role=OTHER, why=why)
+    return guesses
+
+
+def _alike(column: Column, columns: Sequence[Column]) -> list[Column]:
+    """Columns of one unit whose names differ in a number or an axis alone, this one among them."""
+
+    def kind(one: Column) -> tuple[str, str]:
+        return _ONE_OF_SEVERAL.sub("#", fold(one.header)), one.unit
+
+    return [other for other in columns if kind(other) == kind(column)]
+
+
+def _one_scale(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Temperatures without a unit share one: that of those that name theirs, else the likeliest for all."""
+    found = dict(guesses)
+    heat = [c for c in columns if guesses[c.name].role in TEMPERATURES]
+    named = {guesses[c.name].unit for c in heat if c.unit}
+    bare = [c for c in heat if not c.unit]
+    if not bare:
+        return found
+    forms = {c.name: form for c in bare if (form := shape(c.values)) is not None}
+    rooms = [f for n, f in forms.items() if guesses[n].role == TEMPERATURES[0]]
+    odds = temperature_odds([f for n, f in forms.items() if guesses[n].role != TEMPERATURES[0]])
+    for unit, value in temperature_odds(rooms, air=True).items():
+        odds[unit] += value if rooms else 0.0
+    for unit in named:
+        odds[unit] = odds.get(unit, 0.0) + 3.0
+    shares = probabilities(odds)
+    unit, chance = likely(odds)
+    for name in forms:
+        form, one = forms[name], guesses[name]
+        alone = temperature_odds([form], air=one.role == TEMPERATURES[0])
+        if alone[unit] < max(alone.values()) - 8.0:  # one of several in kelvin
+            continue
+        why = f"{one.why.rpartition('; ')[0] or one.why}; {form.low:.4g} to {form.high:.4g} taken in {unit}"
+        rivals = tuple((u, p) for u, p in shares.items() if u != unit and p > NEXT)
+        found[name] = replace(one, unit=unit, unit_chance=chance, unit_rivals=rivals, why=why)
+    return found
+
+
+def _one_unit(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Loads that differ in their number alone have one unit, guessed from all their values; so has one
+    that is never on that of its neighbour.
+    """
+    found = dict(guesses)
+    bare = [column for column in columns if _is_load(guesses[column.name]) and not column.unit]
+    for column in bare:
+        alike = [c.values for c in bare if re.sub(r"\d", "", c.name) == re.sub(r"\d", "", column.name)]
+        one, other = guesses[column.name], guess(replace(column, values=np.concatenate(alike)))
+        if other.unit != one.unit and _is_load(other):
+            why = f"{one.why}, but {other.unit} with those of its kind"
+            found[column.name] = replace(one, unit=other.unit, unit_chance=other.unit_chance, why=why)
+    on = {c.name: np.nan_to_num(c.values).any() for c in columns}
+    units = [found[name].unit for name, one in found.items() if _is_load(one) and on[name]]
+    for column in bare:
+        if units and not on[column.name]:
+            one = found[column.name]
+            found[column.name] = replace(one, unit=units[0], why=f"{one.why}, in {units[0]} as the others")
+    return found
+
+
+def _is_load(one: Guess) -> bool:
+    return one.role in ("heat load", "cooling power")
+
+
+def _answers(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Where no error and no temperature is measured: what never holds its value answers to what somebody
+    sets, and what a controller sends is no heat. A voltage that answers a current is that of a cell.
+    """
+    found = dict(guesses)
+    holds = {c.name: _held(c.values) for c in columns if found[c.name].role != "applied correction"}
+    if any(one.role in TEMPERATURES or one.role == "error" for one in guesses.values()):
+        cell = any(word.gloss == CELL for c in columns for word in words_of(c.header))
+        return _cell(found, holds) if cell else found
+    for name, one in guesses.items():
+        if one.quantity == "signal" and one.role == "heat load" and not any(map(_is_heat, guesses.values())):
+            found[name] = replace(one, role=OTHER, why=f"{one.why}; nothing here is heated")
+    if True not in holds.values():  # all move: what pushes drives what moves
+        pushes = [name for name, one in found.items() if one.quantity in _PUSHES and one.role == OTHER]
+        for name, one in found.items():
+            if pushes and one.role == OTHER and one.quantity not in _PUSHES and holds.get(name) is False:
+                found[name] = one.doubtful(f"taken to answer to {pushes[0]}", role="other output")
+        return found
+    for name, held in holds.items():
+        if held is False and found[name].role == OTHER:
+            why = "it never holds its value, as what somebody sets does; nothing else is measured"
+            found[name] = found[name].doubtful(why, role="other output")
+    return found
+
+
+def _is_heat(one: Guess) -> bool:
+    return one.role == "heat load" and one.quantity != "signal"
+
+
+def _cell(guesses: Mapping[str, Guess], holds: Mapping[str, bool | None]) -> dict[str, Guess]:
+    """A current that is set, a voltage that is not, and no error: the voltage is what is measured."""
+    found = dict(guesses)
+    currents = [n for n, one in guesses.items() if one.unit in CURRENTS and holds.get(n)]
+    voltages = [n for n, one in guesses.items() if one.unit in VOLTAGES and holds.get(n) is False]
+    if len(currents) == 1 and not any(one.role == "error" for one in guesses.values()):
+        for name in voltages:
+            why = f"it answers to {currents[0]}, which is set"
+            found[name] = guesses[name].doubtful(why, role="other output")
+    return found
+
+
+def _held(values: Array) -> bool | None:
+    """Whether most readings repeat the one before them; None where nothing moves."""
+    known = values[np.isfinite(values)]
+    if not known.size or known.min() == known.max():
+        return None
+    return bool(np.mean(np.diff(known) == 0) > _HELD)
+
+
+def _air(column: Column) -> tuple[float, int]:
+    """How clearly a column is the air around a machine, the clearest is the least."""
+    words = words_of(column.header)
+    says = max((word.says.get("air", 0.0) for word in words), default=0.0)
+    more = sum("air" not in word.says and word.gloss != "temp" for word in words)
+    named = sum(len(word.said) for word in words)
+    rest = max(0, len(re.sub(r"[\W\d_]", "", fold(column.header))) - named)
+    return -says, more + (rest > 0)
+
+
+def _one_room(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Of several columns that may be the air around, the clearest is; the other rooms are what is measured.
+
+    So are rooms if nothing else is measured.
+    """
+    air = {c.name: _air(c) for c in columns if guesses[c.name].role == "ambient temperature"}
+    found = dict(guesses)
+    if not air:
+        return found
+    clear = {name for name, (says, _) in air.items() if says <= -8.0}
+    clearest = min(air, key=lambda name: air[name])
+    measured = any(one.role in ("temperature", "error") for one in guesses.values())
+    why = f"{clearest} is the air around"
+    if (not measured and not clear and len(set(air.values())) == 1 and len(air) > 1) or (
+        not measured and not clear and len(air) == 1
+    ):
+        clearest, why = "", "nothing else is measured"
+    for name, (_, more) in air.items():
+        if name in clear:
+            continue
+        if name != clearest:
+            found[name] = guesses[name].doubtful(why, role="temperature")
+        elif more:
+            found[name] = guesses[name].doubtful("other words in its name may mean another place")
+    return found
+
+
+def _the_fluid(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Where a flow is recorded and no temperature of a fluid, the one coolant is that fluid.
+
+    Apart, the two would never meet: no convection to the fluid could be offered.
+    """
+    found = dict(guesses)
+    flows, fluids, coolants = (
+        [name for name, one in guesses.items() if one.role == role]
+        for role in ("fluid flow", "fluid temperature", "coolant temperature")
+    )
+    if flows and not fluids and len(coolants) == 1:
+        [name] = coolants
+        why = f"assumed to be the fluid of {flows[0]}, as the file has no other"
+        found[name] = guesses[name].doubtful(why, role="fluid temperature")
+    return found
+
+
+def _corrections(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Which error each applied correction belongs to; without an error it is an input like others."""
+    found, stated = dict(guesses), {column.name: column.unit for column in columns}
+    errors = [name for name, one in guesses.items() if one.role == "error"]
+    corrections = [name for name, one in guesses.items() if one.role == "applied correction"]
+    for name in corrections:
+        one, error = guesses[name], corrected_by_name(name, errors, only=len(corrections) == 1)
+        if not errors:
+            found[name] = one.doubtful("but there is no error that it could correct", role=OTHER)
+        elif error is None:
+            found[name] = one.doubtful(f'say which error it corrects: corrects = "{errors[0]}"')
+        else:
+            why = f"it is added to {error} (what was added to the position needs sign = -1)"
+            unit = one.unit if stated[name] else guesses[error].unit
+            found[name] = one.doubtful(why, unit=unit, corrects=error)
+    return found
+
+
+def _signed(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Heat loads with readings below zero: a discharge, a brake, or heat that is taken away."""
+    found = dict(guesses)
+    for column in columns:
+        one, known = guesses[column.name], column.values[np.isfinite(column.values)]
+        if one.role == "heat load" and (rows := below_zero(known)).size:
+            found[column.name] = one.doubtful("below zero", below_zero=rows.size / known.size)
+    return found
