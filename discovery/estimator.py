@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from inspect import signature
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
@@ -50,7 +51,8 @@ def discover(
         outputs: columns that are to be predicted.
         channels: column -> {"role": ..., "unit": ...} as in a campaign file; a column without an entry is
             another input or output without a unit.
-        options: as in an experiment file (`form`, `library`, `bounds`, `keep`, `optimiser`, ...).
+        options: as in an experiment file (`form`, `library`, `bounds`, `keep`, `optimiser`, ...); `optimiser`
+            may also be an optimiser of PySINDy, as in `pysindy.STLSQ(threshold=0.05)`.
 
     Raises:
         UserError: a column that is missing, an option that does not fit.
@@ -62,10 +64,37 @@ def discover(
     for output in outputs:
         if output not in first:
             raise UserError(f"no column '{output}'; {suggest(output, [str(c) for c in first.columns])}")
+    known = list(SparseDiscovery().get_params())
+    for name in options:
+        if name not in known:
+            raise UserError(f"no option '{name}'; {suggest(name, known)}")
     found = SparseDiscovery(channels=channels, **options)
     inputs = [str(c) for c in first.columns if c not in outputs]
     x = _stacked({name: frame[inputs] for name, frame in recordings.items()})
     return found.fit(x, _stacked({name: frame[list(outputs)] for name, frame in recordings.items()}))
+
+
+def _is_text(one: Any) -> bool:
+    return isinstance(one, str)
+
+
+def _named(optimiser: Any) -> dict[str, Any]:
+    """An optimiser of PySINDy as the options name it.
+
+    Raises UserError: it is something else.
+    """
+    import pysindy
+
+    kind = type(optimiser)
+    if getattr(pysindy, kind.__name__, None) is not kind or not hasattr(optimiser, "get_params"):
+        raise UserError(
+            f"optimiser: {kind.__name__} is no optimiser of the package pysindy; give 'search', "
+            "'pysindy:STLSQ' or pysindy.STLSQ(...). Your own optimiser works in a SINDy of your own, with "
+            "our library (docs/discovery.md)"
+        )
+    taken = signature(kind).parameters
+    arguments = {k: v for k, v in optimiser.get_params(deep=False).items() if k in taken and v is not None}
+    return {"optimiser": f"pysindy:{kind.__name__}", "optimiser_arguments": arguments}
 
 
 class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
@@ -99,7 +128,7 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         keep: Sequence[str] = (),
         forbid: Sequence[str] = (),
         bounds: Mapping[str, tuple[float, float]] | None = None,
-        optimiser: str = "search",
+        optimiser: Any = "search",
         optimiser_arguments: Mapping[str, Any] | None = None,
         tolerance: float | None = None,
         bootstraps: int = 0,
@@ -144,7 +173,8 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return self
 
     def predict(self, X: Any, first: Any = None) -> Array:
-        """Free run (T,) or (T, outputs): no reading is used but the first one, where it is given.
+        """Free run as an array (T,), or (T, outputs) for several: no reading is used but the first one, where
+        it is given.
 
         Args:
             first: (outputs,) reading at the first instant of each recording; default that of the fit.
@@ -199,10 +229,10 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             lines.append(
                 f"  {name:<{max(map(len, table.index), default=0)}}  {p.value:.5g}{unit}  {interval}"
             )
-        lines += ["", "Terms: how much more is left without each on what was left out"]
+        lines += ["", "Terms: increase of the rms on left-out data without each one"]
         for group in self.discovery_.report["groups"]:
             of = ", ".join(group["outputs"])
-            lines.append(f"  {of}: rms on what was left out {group['left_out_rms']:.4g} reading noises")
+            lines.append(f"  {of}: rms on left-out data {group['left_out_rms']:.4g} times the reading noise")
             lines += [f"    {label}  {100 * cost:+.1f} %" for label, cost in group.get("costs", {}).items()]
         return "\n".join(lines)
 
@@ -211,6 +241,14 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
         own = {k: v for k, v in self.get_params(deep=False).items() if k not in ("channels", "step")}
         given = {k: v for k, v in own.items() if v is not None}
+        library = given.get("library", ())
+        if isinstance(library, str) or not (isinstance(library, Sequence) and all(map(_is_text, library))):
+            raise UserError(
+                "library: name families or expressions as texts, as in ['linear', 'sqrt', 'y*u']; a library "
+                "of PySINDy works in a SINDy of your own, with our SparseSearch (docs/discovery.md)"
+            )
+        if not isinstance(self.optimiser, str):
+            given |= _named(self.optimiser)
         try:
             return SparseOptions.model_validate(given)
         except ValidationError as error:

@@ -155,7 +155,7 @@ def _take_along(old: Path, new: Path) -> None:
     except OSError as error:
         raise UserError(
             f"{old}: other files in this folder cannot be kept ({error}); "
-            "nothing was changed, choose another place with --out"
+            "nothing was changed. Choose another folder with --out"
         ) from None
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+import pysindy
 import pytest
 from sklearn.base import clone
+from sklearn.linear_model import Ridge
 from sklearn.model_selection import GridSearchCV, TimeSeriesSplit
 
 import discovery
@@ -74,12 +76,31 @@ def test_clone_and_grid_search_work_on_arrays() -> None:
     assert search.predict(x).shape == y.shape
 
 
+def test_an_optimiser_of_pysindy_is_taken_as_it_is() -> None:
+    """Named or given as an object, the same optimiser finds the same model."""
+    given, named = (
+        discover({"a": frame(0, 300)}, ["E"], CHANNELS, form="masses", max_terms=3, **options)
+        for options in (
+            {"optimiser": pysindy.STLSQ(threshold=0.05)},
+            {"optimiser": "pysindy:STLSQ", "optimiser_arguments": {"threshold": 0.05}},
+        )
+    )
+    assert given.equations() == named.equations()
+    assert "P" in "".join(given.equations())
+
+
 def test_mistakes_are_one_sentence() -> None:
     one = frame(0, 100)
     with pytest.raises(UserError, match="no column 'F'"):
         discover(one, ["F"])
     with pytest.raises(UserError, match="max_terms"):
         discover(one, ["E"], max_terms=0)
+    with pytest.raises(UserError, match="no option 'libary'; did you mean 'library'"):
+        discover(one, ["E"], libary=["linear"])
+    with pytest.raises(UserError, match="Ridge is no optimiser of the package pysindy"):
+        discover(one, ["E"], optimiser=Ridge())
+    with pytest.raises(UserError, match="as texts, as in"):
+        discover(one, ["E"], library=pysindy.PolynomialLibrary(2))
     with pytest.raises(UserError, match="100 rows"):
         SparseDiscovery().fit(one[["P"]], one["E"][:50])
     with pytest.raises(UserError, match="no frame"):

@@ -5,6 +5,7 @@ into a fit.
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
-from discovery.errors import RunsAwayError, UserError
+from discovery.errors import RunsAwayError, UsageError, UserError
 from discovery.experiment import load_experiment, run
 from discovery.experiment.fitted import offset_notes
 from discovery.experiment.summary import comparison, rms_table
@@ -23,6 +24,7 @@ from discovery.fitting import Fit
 from discovery.models import read_model
 from discovery.recordings import Channel, load_campaign
 from discovery.recordings.check import check_campaign
+from discovery.report.compare import load_runs
 from discovery.report.ranking import ranked
 from discovery.report.run import load_run
 from tests.small import CAMPAIGN, EXPERIMENT, MODEL, write_recording, write_small
@@ -384,14 +386,17 @@ def test_runs_side_by_side(folder: Path) -> None:
     first = run(folder / "experiment.toml", folder / "one")
     (folder / "experiment.toml").write_text(EXPERIMENT.replace('fit = ["a", "b"]', 'fit = ["a"]'))
     second = run(folder / "experiment.toml", folder / "two")
-    text = "\n".join(comparison([first, second]))
+    text = "\n".join(comparison(load_runs([first, second])))
     assert "Recording 'c' (held out)" in text
     for out in (first, second):
-        assert f"{out}: one_body" in text
-    with pytest.raises(UserError, match="two or more runs"):
-        list(comparison([first]))
-    with pytest.raises(UserError, match=r"no results\.json"):
-        list(comparison([first, folder]))
+        assert f"{out.name}: one_body" in text
+    assert "two differs from one: fit: a, b → a" in text
+    assert [one.folder for one in load_runs([folder], against=second)] == [second, first]
+    (folder / "empty").mkdir()
+    with pytest.raises(UsageError, match="two or more runs"):
+        load_runs([first])
+    with pytest.raises(UserError, match="empty: no run is there"):
+        load_runs([first, folder / "empty"])
 
 
 def test_a_run_without_a_recording_has_no_say_in_what_it_was() -> None:
@@ -429,7 +434,10 @@ def test_the_command_line(folder: Path) -> None:
     done = runner.invoke(app, ["run", str(folder / "experiment.toml"), "--out", str(folder / "out")])
     assert done.exit_code == 0, done.output
     assert "report.html" in done.output
-    assert runner.invoke(app, ["compare", str(folder / "out"), str(folder / "out")]).exit_code == 0
+    shutil.copytree(folder / "out", folder / "copy")
+    compared = runner.invoke(app, ["compare", str(folder / "out"), str(folder / "copy")])
+    assert compared.exit_code == 0
+    assert "copy differs from out: none" in compared.output
     failed = runner.invoke(app, ["run", str(folder / "nothing.toml")])
     assert failed.exit_code == 1
     assert "no such file" in failed.output

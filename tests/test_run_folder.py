@@ -19,7 +19,7 @@ from discovery.errors import UserError
 from discovery.experiment import diagnose, load_experiment, run
 from discovery.experiment.form import ExportForm
 from discovery.experiment.inputfiles import input_files
-from discovery.experiment.summary import comparison, summary
+from discovery.experiment.summary import summary
 from discovery.export import export_run, replay
 from discovery.report.run import load_run
 from discovery.targets import TARGETS
@@ -236,7 +236,6 @@ def test_a_model_is_discovered_once_and_then_diagnosed(folder: Path, monkeypatch
 READERS: dict[str, list[Callable[[Path], object]]] = {
     "results.json": [
         lambda folder: list(summary(folder)),
-        lambda folder: list(comparison([folder, folder])),
         load_run,
         lambda folder: export_run(folder, "m", "json"),
     ],

@@ -147,20 +147,30 @@ def diagnose(
 
 
 def compare(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN", help="Folders of results.")],
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN RUN", help="Folders of results, or one folder that holds them: runs."),
+    ],
     out: Annotated[
         Path | None, typer.Option("--out", help="Also write a page: FILE.html, or a folder.")
     ] = None,
+    against: Annotated[
+        Path | None, typer.Option("--against", metavar="RUN", help="Run to compare with [the first].")
+    ] = None,
 ) -> None:
-    """Compare the models of several runs: rms of each error and recording."""
-    from discovery.experiment.summary import comparison
+    """Compare runs: list them, say how each differs from one of them, and set their models side by side.
 
-    for line in comparison(runs):
+    The rms of two runs is compared on the held-out recordings of both, with a 95 % interval. The page has a
+    search field and lets you choose the run to compare with.
+    """
+    from discovery.experiment.summary import comparison
+    from discovery.report.compare import load_runs, write_comparison
+
+    loaded = load_runs(runs, against)
+    for line in comparison(loaded):
         typer.echo(line)
     if out:
-        from discovery.report import write_comparison
-
-        typer.echo(write_comparison(runs, out))
+        typer.echo(write_comparison(loaded, out))
 
 
 def report(

@@ -4,6 +4,7 @@ next.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from discovery.report.heat import diagnosed_key
 from discovery.report.lead import Lead, lead_over
 from discovery.report.ranking import astray, cells, ranked, rms_by_unit
 from discovery.report.run import Run, load_run
@@ -156,11 +158,17 @@ def _next(
         return f"confirm or correct {which} in the campaign file, then `discovery new DIR --again`"
     if not run.held_out:
         return "hold out a recording: only that shows how well a model predicts"
-    if diagnosis and diagnosis.get("next_experiment"):
+    if (
+        diagnosis
+        and diagnosis.get("next_experiment")
+        and not (helps and diagnosis["verdict"] == "no mismatch")
+    ):
         return str(diagnosis["next_experiment"]).rstrip(".")
     if not helps:
         return "record the inputs that drive the machine, and let each one move on its own"
-    export = f"`discovery export {run.folder} --model {best} --to json`"
+    export = f"`discovery export {shlex.quote(str(run.folder))} --model {shlex.quote(str(best))} --to json`"
+    if diagnosed_key(run) == best:
+        return export
     return f'{export}, or diagnose it ([mismatch] model = "{best}")'
 
 

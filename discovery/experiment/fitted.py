@@ -145,12 +145,12 @@ def bound_notes(model: Model) -> list[str]:
     """A sentence for each number that stands at a bound other than zero: the readings ask for more."""
     notes = []
     for name, p in model.parameters.items():
-        for bound, which in ((p.min, "least"), (p.max, "greatest")):
+        for bound, which in ((p.min, "lower"), (p.max, "upper")):
             near = _AT_BOUND * max(abs(bound), 1e-12) if np.isfinite(bound) else 0.0
             if near and bound != 0 and not p.fixed and abs(p.value - bound) <= near:
                 notes.append(
-                    f"{name} stands at its {which} allowed value, {bound:.4g} {p.unit}: the readings ask for "
-                    "more; allow it, or ask what the model lacks"
+                    f"{name} is at its {which} limit, {bound:.4g} {p.unit}: change the limit in the model, "
+                    "or diagnose what the model lacks"
                 )
     return notes
 

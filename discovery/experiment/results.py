@@ -115,8 +115,9 @@ def results_document(
 
 
 def inputs_over_time(experiment: Experiment) -> dict[str, dict[str, dict[str, Any]]]:
-    """By recording and input: `time` [s] and `value`, lowest and highest of each bin. Constant inputs are not
-    listed.
+    """By recording and input: `time` [s] and `value`, and whether it is `held` between them. Of a held input
+    the changes are listed, of others (and of too many changes) the lowest and highest of each bin; constant
+    inputs are not.
     """
     found: dict[str, dict[str, dict[str, Any]]] = {}
     for name in (*experiment.fit, *experiment.held_out):
@@ -124,9 +125,20 @@ def inputs_over_time(experiment: Experiment) -> dict[str, dict[str, dict[str, An
         for channel, values in one.values.items():
             known = values[np.isfinite(values)]
             if is_input(experiment.campaign.channels[channel].role) and known.size and np.ptp(known) > 0:
-                time, value = thinned(one.time, values, _SHOWN)
-                found.setdefault(name, {})[channel] = {"time": time, "value": value}
+                held = experiment.campaign.channels[channel].between == "held"
+                time, value = _changes(one.time, values) if held else (one.time, values)
+                time, value = thinned(time, value, _SHOWN)
+                found.setdefault(name, {})[channel] = {"time": time, "value": value, "held": held}
     return found
+
+
+def _changes(time: Array, value: Array) -> tuple[Array, Array]:
+    """Where a held input changes, with the first and the last instant."""
+    known = np.isfinite(value)
+    time, value = time[known], value[known]
+    keep = np.flatnonzero(np.diff(value)) + 1
+    index = np.unique([0, *keep, len(value) - 1])
+    return time[index], value[index]
 
 
 def recommended(experiment: Experiment, fitted: Mapping[str, Fitted]) -> dict[str, dict[str, Any]]:

@@ -7,13 +7,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from discovery.errors import UsageError
 from discovery.evaluation.rolematrix import matrix
 from discovery.evaluation.tables import Table, as_text
 from discovery.models.units import differences
+from discovery.report.compare import labels_of, shared_recordings
+from discovery.report.run import Run
+from discovery.report.runlist import run_list
 from discovery.runfolder import read_results
 
 MOST_NOTES = 5  # of a model, in the terminal
+_MOST_TABLES = 4  # runs whose models are printed one by one
 _PARTS = {"fitted": "fit", "held out": "held_out"}
 
 
@@ -51,17 +54,24 @@ def remarks(folder: Path) -> Iterator[str]:
         yield f"{many}{worst}; {check} lists what is wrong with the recordings"
 
 
-def comparison(folders: Sequence[Path]) -> Iterator[str]:
-    """Models of several runs side by side, one table for each recording that any of them predicted.
-
-    Raises UsageError: fewer than two runs; UserError: a folder without results.
+def comparison(runs: Sequence[Run]) -> Iterator[str]:
+    """Runs and how they differ from the first; of a few, also the rms of every model on each recording that
+    all share.
     """
-    if len(folders) < 2:
-        raise UsageError("compare takes two or more runs, as in `discovery compare runs/one runs/two`")
-    runs = {str(folder): read_results(folder) for folder in folders}
-    recordings = dict.fromkeys(name for one in runs.values() for name in (*one["fit"], *one["held_out"]))
-    for recording in recordings:
-        yield as_text(rms_table(runs, recording))
+    labels, listing = labels_of(runs), run_list(runs, labels_of(runs), Path())
+    yield as_text(Table(listing.title, listing.header[:-1], tuple(row.cells[:-1] for row in listing.rows)))
+    yield ""
+    for row in listing.rows[1:]:
+        yield f"{row.cells[0]} differs from {labels[0]}: {row.cells[-1]}"
+    yield ""
+    if len(runs) > _MOST_TABLES:
+        return
+    shared = shared_recordings(runs)
+    if not shared:
+        yield "These runs share no recording, so their models are not compared side by side."
+    for recording in shared:
+        results = {label: run.results for label, run in zip(labels, runs, strict=True)}
+        yield as_text(rms_table(results, recording))
         yield ""
 
 
@@ -80,7 +90,8 @@ def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
         label = f"{run}: " if run else ""
         rows.append((f"{label}uncompensated", "", *(raw.get(y) for y in outputs)))
         for name, entry in entries.items():
-            size = f"{results['models'][name]['terms']} terms"
+            terms = results["models"][name]["terms"]
+            size = f"{terms} terms" if terms else ""
             rows.append((label + name, size, *(entry[y]["rms"] if y in entry else None for y in outputs)))
     units = {y: unit for one in runs.values() for y, unit in one.get("units", {}).items()}
     header = ("rms", "", *(f"{y} [{differences(units.get(y, ''))}]" for y in outputs))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from discovery.report.heat import diagnosed_key, subject
 from discovery.report.lead import Lead, lead_over
 from discovery.report.mismatch import NEAR, leads, sizes
 from discovery.report.ranking import (
@@ -24,6 +25,7 @@ from discovery.report.recommended import recommended
 from discovery.report.run import Run, pretty_unit
 from discovery.report.text import counted, listed, number, percent, words
 
+_CLEARLY = 0.95  # ratio of two rms from which one is clearly smaller
 _VERDICTS = {
     "no mismatch": "No missing physics was detected in",
     "missing physics": "Physics is missing in",
@@ -51,7 +53,7 @@ class Answer:
 
 def answer(run: Run) -> Answer:
     """What the run says, in words and in few figures; missing physics comes first."""
-    models, missing = _models(run), _missing(run.diagnosis)
+    models, missing = _models(run), _missing(run)
     first = missing if leads(run) or not models.headline else models
     second = models if first is missing else missing
     return Answer(first, second)
@@ -71,7 +73,9 @@ def _models(run: Run) -> Part:
     rivals = [m for m in order[1:] if astray(run, m) == astray(run, best)]
     found = {m: lead for m in rivals if (lead := lead_over(run, best, m)) is not None}
     for rival, lead in list(found.items())[:1]:
-        points.append(f"Next is {_name(run, rival)}: the rms of “{best}” is {_against(lead)}.")
+        points.append(
+            f"Next is {_name(run, rival)}: over all outputs, the rms of “{best}” is {_against(lead)}."
+        )
     given = [m for m in found if origin(run, m) == "given"][:2]
     figures += [(_percent_less(found[m]), f"rms of {best} against {m}{_interval(found[m])}") for m in given]
     if is_error(run) and (worst := _worst(run, best)):
@@ -118,7 +122,8 @@ def _interval(lead: Lead) -> str:
     """The interval of a lead behind a caption; nothing where there is none."""
     if lead.low == lead.high:
         return ""
-    return f" (95 %: {100 * (lead.low - 1):.0f} to {100 * (lead.high - 1):.0f} %)".replace("-", "−")
+    low, high = (f"{100 * (end - 1) + 0.0:.0f}".replace("-0", "0") for end in (lead.low, lead.high))
+    return f" (95 %: {low} to {high} %)".replace("-", "−")
 
 
 def _removed(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
@@ -178,14 +183,15 @@ def _worst(run: Run, model: str) -> str:
     )
 
 
-def _missing(diagnosis: Mapping[str, Any] | None) -> Part:
+def _missing(run: Run) -> Part:
     """What the diagnosis says."""
+    diagnosis = run.diagnosis
     if not diagnosis:
         return Part()
     verdict = str(diagnosis.get("verdict", ""))
     found = diagnosis.get("physics") or []
     lead = _VERDICTS.get(verdict, f"{verdict.capitalize()}:")
-    sentence = f"{lead} “{diagnosis.get('model', 'the model')}”"
+    sentence = f"{lead} “{subject(run)}”"
     if found:
         sentence += f": {_grouped(found)}"
     worse = (diagnosis.get("improvement") or {}).get("contradicted_by") or []
@@ -202,11 +208,24 @@ def _missing(diagnosis: Mapping[str, Any] | None) -> Part:
         points.append(
             f"These recordings do not exclude {listed([_effect(one) for one in rivals], 'or')} instead."
         )
+    points += _better(run) if verdict == "no mismatch" else []
     figures: list[tuple[str, str]] = []
     if found:
         proof, figures = _proof(diagnosis)
         points += proof
     return Part(f"{sentence}.", tuple(points), tuple(figures))
+
+
+def _better(run: Run) -> list[str]:
+    """That another model predicts clearly better than one in which nothing was detected."""
+    best, given = next(iter(ranked(run)), None), diagnosed_key(run)
+    lead = lead_over(run, best, given) if best and given and best != given else None
+    if best is None or lead is None or lead.high > _CLEARLY:
+        return []
+    return [
+        f"“{best}” predicts better than “{given}”: its rms is {_against(lead)}. No effect of the catalogue "
+        "explains the difference."
+    ]
 
 
 def _effect(one: Mapping[str, Any]) -> str:

@@ -26,9 +26,13 @@
     let step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw);
     if (isCount) step = Math.max(1, step);
     if (isHours && raw > 0.9) step = [1, 2, 3, 6, 12, 24, 48, 96, 168].find((k) => k >= raw) || step;
-    const found = [];
-    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; k++) found.push(k * step);
-    return found;
+    const ticks = () => {
+      const found = [];
+      for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; k++) found.push(k * step);
+      return found;
+    };
+    if (ticks().length < 3 && !isHours && !isCount) step /= 2;
+    return ticks();
   };
   const nearest = (xs, x) => {
     let low = 0, high = xs.length - 1;
@@ -104,7 +108,7 @@
         const x1 = Math.max(this.at(from), LEFT), x2 = Math.min(this.at(to), this.width - RIGHT);
         if (x2 > x1) element("title", {}, element("rect", { class: "shade", x: x1, y: top, width: x2 - x1, height }, svg), why);
       }
-      for (const tick of steps(low, high, height / 42, false)) {
+      for (const tick of steps(low, high, Math.max(4, height / 42), false)) {
         const y = area.y(tick);
         element("line", { class: Math.abs(tick) < 1e-12 && panel.zero ? "zero" : "grid", x1: LEFT, x2: this.width - RIGHT, y1: y, y2: y }, svg);
         element("text", { class: "tick", x: LEFT - 7, y: y + 4, "text-anchor": "end" }, svg, show(tick));
@@ -267,10 +271,12 @@
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   };
   const forms = {
-    CSV: (rows) => rows.map((row) => row.map((cell) => (/[",\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell)).join(",")).join("\n") + "\n",
+    // a byte order mark, so that Excel reads the units; a minus that programs read
+    CSV: (rows) => "\ufeff" + rows.map((row) => row.map((cell) => cell.replaceAll("−", "-")).map((cell) => (/[",\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell)).join(",")).join("\n") + "\n",
     LaTeX: (rows) => {
       const safe = (cell) => cell.replace(/[\\&%$#_{}~^]/g, (c) => ({ "\\": "\\textbackslash{}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}" })[c] || `\\${c}`)
-        .replaceAll("µ", "\\textmu{}").replaceAll("°", "\\textdegree{}").replaceAll("−", "$-$").replaceAll("→", "$\\to$").replaceAll("–", "--");
+        .replaceAll("µ", "\\textmu{}").replaceAll("°", "\\textdegree{}").replaceAll("−", "$-$").replaceAll("→", "$\\to$").replaceAll("–", "--")
+        .replace(/[²³·×±σ\u00a0“”]/g, (c) => ({ "²": "$^2$", "³": "$^3$", "·": "$\\cdot$", "×": "$\\times$", "±": "$\\pm$", "σ": "$\\sigma$", "\u00a0": "~", "“": "``", "”": "''" })[c]);
       const line = (row) => `${row.map(safe).join(" & ")} \\\\`;
       return ["\\begin{tabular}{l" + "r".repeat(rows[0].length - 1) + "}", "\\hline", line(rows[0]), "\\hline", ...rows.slice(1).map(line), "\\hline", "\\end{tabular}", ""].join("\n");
     },
@@ -293,27 +299,48 @@
     }
     caption.append(tools);
   }
-  const ranking = document.querySelector("tr[data-score]")?.closest("table");
-  if (ranking && ranking.querySelectorAll("tr[data-score]").length > 1) {
-    const rows = [...ranking.tBodies[0].rows], column = [...ranking.tHead.rows[0].cells].findIndex((c) => c.textContent === "rms against the best");
-    const name = (row) => row.cells[0].textContent, first = rows.map((row) => row.cells[column].textContent);
-    const tools = ranking.caption.querySelector(".tools"), label = document.createElement("label"), choice = document.createElement("select");
+  for (const table of document.querySelectorAll("table[data-against]")) {  // compare with a row, find rows, sort them
+    const { columns, heads, cells, texts } = JSON.parse(table.dataset.against), rows = [...table.tBodies[0].rows];
+    const name = (row) => (row.cells[0].querySelector("a") || row.cells[0].firstChild).textContent.trim();
+    const head = [...table.tHead.rows[0].cells].map((cell) => {
+      const button = document.createElement("button");
+      button.type = "button"; button.className = "sort"; button.append(...cell.childNodes);
+      cell.append(button);
+      button.addEventListener("click", () => {
+        const up = cell.getAttribute("aria-sort") !== "ascending", at = cell.cellIndex;
+        const key = (row) => { const text = row.cells[at].textContent.trim().replace("−", "-"); return [parseFloat(text), text]; };
+        const order = (a, b) => {
+          const [x, s] = key(a), [y, t] = key(b);
+          return Number.isNaN(x) || Number.isNaN(y) ? Number.isNaN(x) - Number.isNaN(y) || s.localeCompare(t) : x - y;
+        };
+        for (const one of table.tHead.rows[0].cells) one.removeAttribute("aria-sort");
+        cell.setAttribute("aria-sort", up ? "ascending" : "descending");
+        table.tBodies[0].append(...[...rows].sort((a, b) => (up ? order(a, b) : order(b, a))));
+      });
+      return button;
+    });
+    const first = [[...head], ...rows.map((row) => row.cells)].map((cells) => columns.map((column) => cells[column].textContent));
+    const tools = table.caption.querySelector(".tools"), label = document.createElement("label"), choice = document.createElement("select");
     label.className = "find"; label.append("Compare with ", choice);
-    for (const row of rows.filter((one) => one.dataset.score)) choice.add(new Option(name(row), name(row)));
+    rows.forEach((row) => choice.add(new Option(name(row))));
     choice.addEventListener("change", () => {
-      const aim = rows.find((row) => name(row) === choice.value), best = choice.selectedIndex === 0;
-      ranking.tHead.rows[0].cells[column].textContent = best ? "rms against the best" : `rms against ${choice.value}`;
-      rows.forEach((row, k) => {
-        const more = 100 * (Math.exp(row.dataset.score - aim.dataset.score) - 1);
-        const said = row === aim ? "reference" : !row.dataset.score ? "–" : `${more < 0 ? "−" : "+"}${Math.abs(more).toFixed(0)} %`;
-        row.cells[column].textContent = best ? first[k] : said;
+      const chosen = choice.selectedIndex, said = heads.map((head) => (chosen ? head.replace("{}", choice.value) : null));
+      columns.forEach((column, k) => {
+        head[column].textContent = said[k] ?? first[0][k];
+        rows.forEach((row, r) => {
+          row.cells[column].textContent = chosen ? texts[cells[chosen][r][k]] : first[r + 1][k];
+          row.cells[column].dataset.label = said[k] ?? first[0][k];
+        });
       });
     });
     tools.prepend(label);
     if (rows.length > 8) {
       const search = document.createElement("label"), text = document.createElement("input");
-      text.type = "search"; search.className = "find"; search.append("Find a model ", text);
-      text.addEventListener("input", () => rows.forEach((row) => { row.hidden = !row.textContent.toLowerCase().includes(text.value.trim().toLowerCase()); }));
+      text.type = "search"; search.className = "find"; search.append("Find ", text);
+      text.addEventListener("input", () => {
+        const wanted = text.value.trim().toLowerCase().split(/\s+/);
+        rows.forEach((row) => { row.hidden = !wanted.every((word) => row.textContent.toLowerCase().includes(word)); });
+      });
       tools.prepend(search);
     }
   }

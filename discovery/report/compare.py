@@ -1,54 +1,120 @@
-"""The same page across runs: their models side by side on the recordings that they share."""
+"""One page on several runs: a list of them, and their models side by side on the recordings they share."""
 
 from __future__ import annotations
 
+import os
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from discovery.errors import UserError
+from discovery.errors import UsageError, UserError
 from discovery.files import write_atomic
 from discovery.models import Model
 from discovery.report.page import render
 from discovery.report.run import Array, Predictions, Run, load_run
+from discovery.report.runlist import run_list
+from discovery.report.text import listed
+from discovery.runfolder import DIAGNOSIS, RESULTS
+
+_NAMED = 3  # runs that a title names
 
 
-def write_comparison(run_dirs: Sequence[Path], out: Path) -> Path:
-    """Write one page on the models of several runs.
+def write_comparison(runs: Sequence[Run], out: Path) -> Path:
+    """Write one page on several runs: a list of them, and their models on the recordings that all share.
 
-    A recording counts as unseen only where no run has fitted it. Each run is called by the name of its
-    experiment, or of its folder where two experiments have the same name.
-
-    Raises:
-        UserError: fewer than two runs, runs without a common recording, or a run that cannot be read.
+    Args:
+        runs: from `load_runs`; the others are compared with the first, until the reader chooses another one.
+        out: the page, or its folder.
     """
-    if len(run_dirs) < 2:
-        raise UserError("a comparison needs two runs or more; name their folders")
-    out = Path(out)
     path = out if out.suffix == ".html" else out / "comparison.html"
-    write_atomic(path, render(merged([load_run(Path(folder)) for folder in run_dirs], path.parent)))
+    listing = run_list(runs, labels_of(runs), path.parent)
+    write_atomic(path, render(merged(runs, path.parent), listing))
     return path
 
 
-def merged(runs: Sequence[Run], folder: Path) -> Run:
-    """One run that holds the models of all, on the recordings that all have."""
-    labels = [run.name for run in runs]
-    if len(set(labels)) < len(labels):
-        labels = [run.folder.resolve().name for run in runs]
-    if len(set(labels)) < len(labels):
-        labels = [f"run {number}" for number, _ in enumerate(runs, start=1)]
-    common = [name for name in _recordings(runs[0]) if all(name in _recordings(run) for run in runs)]
-    if not common:
-        each = "; ".join(
-            f"{label}: {', '.join(_recordings(run))}" for label, run in zip(labels, runs, strict=True)
+def load_runs(folders: Sequence[Path], against: Path | None = None) -> list[Run]:
+    """The runs in some folders, or within one folder that holds them.
+
+    Args:
+        against: the run to compare with, which comes first.
+
+    Raises:
+        UsageError: fewer than two runs.
+        UserError: a run that cannot be read.
+    """
+    wanted = [*([Path(against)] if against else []), *map(Path, folders)]
+    found = {folder: _within(folder) for folder in wanted}
+    places = list(dict.fromkeys(place for inside in found.values() for place in inside))
+    if len(places) < 2 and len(found) < 2:
+        raise UsageError(
+            "compare takes two or more runs, as in `discovery compare runs/one runs/two`, or a folder that "
+            "holds them, as in `discovery compare runs`"
         )
-        raise UserError(f"the runs share no recording ({each}); compare runs of one campaign")
+    for folder, inside in found.items():
+        if not inside:
+            raise UserError(f"{folder}: no run is there; name the folder of a finished `discovery run`")
+    if len(places) < 2:
+        raise UserError(f"{places[0]}: a run cannot be compared with itself; name another one, too")
+    return [load_run(place) for place in places]
+
+
+def _within(folder: Path) -> list[Path]:
+    """A run, or all runs within a folder, by name."""
+    if any((folder / name).exists() for name in (RESULTS, DIAGNOSIS)):
+        return [folder]
+    found = {path.parent for name in (RESULTS, DIAGNOSIS) for path in folder.rglob(name)}
+    return sorted(one for one in found if not one.name.startswith("."))  # .NAME: is being written
+
+
+def labels_of(runs: Sequence[Run]) -> list[str]:
+    """What each run is called: by its experiment, or by its folder where two would be called the same."""
+    folders = [run.folder.resolve() for run in runs]
+    for labels in ([run.name for run in runs], [folder.name for folder in folders]):
+        if len(set(labels)) == len(labels):
+            return labels
+    return ["/".join(folder.parts[-2:]) for folder in folders]
+
+
+def shared_recordings(runs: Sequence[Run]) -> list[str]:
+    """Recordings that all runs have predicted, with the same readings: those of another machine may have the
+    same name.
+    """
+    return [
+        name
+        for name in _recordings(runs[0])
+        if all(name in _recordings(run) and _same(runs[0], run, name) for run in runs)
+    ]
+
+
+def _same(one: Run, other: Run, recording: str) -> bool:
+    if recording not in one.predictions or recording not in other.predictions:
+        return one.results.get("campaign") == other.results.get("campaign")
+    a, b = one.predictions[recording], other.predictions[recording]
+    both = [output for output in a.readings if output in b.readings]
+    return bool(both) and all(np.array_equal(_read(a, output), _read(b, output)) for output in both)
+
+
+def _read(data: Predictions, output: str) -> Array:
+    """Times and values of the readings of an output, (2, N)."""
+    known = np.isfinite(data.readings[output])
+    return np.stack([data.time[known], data.readings[output][known]])
+
+
+def merged(runs: Sequence[Run], folder: Path) -> Run:
+    """One run that holds the models of all, on the recordings that all have; no model where they have none.
+
+    A recording counts as held out only where no run has fitted it.
+    """
+    labels, common = labels_of(runs), shared_recordings(runs)
+    places = [os.path.relpath(run.folder) for run in runs]
+    command = shlex.join(["discovery", "compare", *places]) if len(runs) <= _NAMED else ""
     fitted = {name for run in runs for name in run.results.get("fit", [])}
     models: dict[str, Any] = {}
     files: dict[str, Model] = {}
-    for label, run in zip(labels, runs, strict=True):
+    for label, run in zip(labels, runs, strict=True) if common else ():
         for name, entry in run.results.get("models", {}).items():
             scores = {
                 recording: entry["recordings"][recording]
@@ -58,19 +124,17 @@ def merged(runs: Sequence[Run], folder: Path) -> Run:
             models[f"{name}, {label}"] = {**entry, "kind": entry.get("kind", name), "recordings": scores}
         files |= {f"{name}, {label}": model for name, model in run.models.items()}
     results = {
-        "experiment": f"comparison of {' and '.join(labels)}",
+        "experiment": f"comparison of {listed(labels) if len(runs) <= _NAMED else f'{len(runs)} runs'}",
         "fit": [name for name in common if name in fitted],
         "held_out": [name for name in common if name not in fitted],
         "units": _together(runs, "units"),
+        "roles": _together(runs, "roles"),
         "noise": _together(runs, "noise"),
         "parts": {part: name for part, name in _together(runs, "parts").items() if name in common},
-        "simulated": any(run.results.get("simulated") for run in runs),
+        "input_units": _together(runs, "input_units"),
+        "simulated": all(run.results.get("simulated") for run in runs),
         "models": models,
-        "inputs": {
-            f"{label}: {name}": digest
-            for label, run in zip(labels, runs, strict=True)
-            for name, digest in run.results.get("inputs", {}).items()
-        },
+        "command": command,
     }
     predictions = {
         name: _predictions(runs, labels, name)

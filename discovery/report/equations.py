@@ -15,7 +15,7 @@ from discovery.terms import Apply, Expression, Term, names, text
 
 @dataclass(frozen=True)
 class Value:
-    """A parameter as it is printed."""
+    """A parameter in print."""
 
     name: str
     symbol: str
@@ -38,7 +38,7 @@ class Row:
     effect: str
 
 
-_LINE = 40  # characters of an equation in one line
+_LINE = 34
 _COLUMN = 32  # of a formula in the table of terms
 
 
@@ -78,8 +78,8 @@ def _balance(model: Model, state: State, signs: Mapping[str, str]) -> str:
             if place == state.name:
                 body = mathml.stacked(mathml.lines(term.expression, signs))
                 if _is_sum(term.expression) and sign == "−":
-                    body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
-                parts.append((sign, body, len(text(term.expression))))
+                    body = mathml.bracketed(body)
+                parts.append((sign, body, mathml.extent(term.expression)))
     return _equation(left, parts)
 
 
@@ -89,9 +89,9 @@ def _summands(tree: Expression, signs: Mapping[str, str]) -> list[tuple[str, str
         left, right = tree.arguments
         body = mathml.stacked(mathml.lines(right, signs))
         if _is_sum(right):
-            body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
-        return [*_summands(left, signs), ("+" if tree.function == "+" else "−", body, len(text(right)))]
-    return [("+", mathml.stacked(mathml.lines(tree, signs)), len(text(tree)))]
+            body = mathml.bracketed(body)
+        return [*_summands(left, signs), ("+" if tree.function == "+" else "−", body, mathml.extent(right))]
+    return [("+", mathml.stacked(mathml.lines(tree, signs)), mathml.extent(tree))]
 
 
 def _equation(left: str, parts: list[tuple[str, str, int]]) -> str:
@@ -138,7 +138,7 @@ def other_values(model: Model) -> list[Value]:
 
 
 def value(name: str, parameter: Parameter) -> Value:
-    """A parameter as it is printed: value, 95 % interval (or "given"), unit."""
+    """A parameter in print: value, 95 % interval (or "given"), unit."""
     symbol, unit = mathml.math(mathml.symbol(name)), pretty_unit(parameter.unit)
     if parameter.values:
         each = ", ".join(

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import string
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +16,7 @@ from discovery.errors import UserError
 from discovery.report.chart import Chart, Panel, Series
 from discovery.report.page import charts_of
 from discovery.report.run import load_run
+from discovery.threads import jobs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,6 +39,7 @@ STYLE: Any = {
     "font.size": 8,
     "axes.linewidth": 0.6,
     "axes.grid": True,
+    "axes.axisbelow": True,
     "grid.linewidth": 0.4,
     "grid.color": "#d8dde3",
     "lines.linewidth": 1.0,
@@ -45,9 +50,11 @@ STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "discovery",
     "pdf.fonttype": 42,
-    "figure.constrained_layout.use": True,
 }
+_WORTH = 12  # charts from which another process is worth its start
 WIDTH = 3.5  # inches, one column of a journal
+_LEFT, _RIGHT, _BOTTOM, _TOP, _GAP = 0.58, 0.06, 0.4, 0.06, 0.1  # inches around and between panels
+_FIRST, _NEXT = 1.35, 0.68  # inches, height of the panels
 
 
 def write_figures(run_dir: Path) -> list[Path]:
@@ -56,10 +63,6 @@ def write_figures(run_dir: Path) -> list[Path]:
     Raises:
         UserError: no results there, or nothing in them that can be drawn.
     """
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     run = load_run(Path(run_dir))
     charts = charts_of(run)
     if not charts:
@@ -68,46 +71,120 @@ def write_figures(run_dir: Path) -> list[Path]:
         )
     folder = run.folder / "figures"
     folder.mkdir(exist_ok=True)
-    written = []
+    parts = min(jobs(), max(1, len(charts) // _WORTH))
+    if parts == 1:
+        return _write_all(charts, folder)
+    from joblib import Parallel, delayed  # processes: matplotlib is not made for threads
+
+    work = [delayed(_write_all)(charts[k::parts], folder) for k in range(parts)]
+    written = {path for part in Parallel(n_jobs=parts)(work) for path in part}
+    return [path for chart in charts for path in _paths(chart, folder) if path in written]
+
+
+def _write_all(charts: Sequence[Chart], folder: Path) -> list[Path]:
+    with small_font(charts) as font:
+        return [path for chart in charts for path in _write(chart, folder, font)]
+
+
+def _paths(chart: Chart, folder: Path) -> list[Path]:
+    name = re.sub(r"[^\w.-]+", "_", chart.key)
+    return [folder / f"{name}.{form}" for form in ("svg", "pdf")]
+
+
+def _write(chart: Chart, folder: Path, font: str) -> list[Path]:
+    """A chart as SVG and PDF."""
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    paths = _paths(chart, folder)
     with mpl.rc_context(STYLE):
-        for chart in charts:
-            figure = Figure(figsize=(WIDTH, 1.9 + 0.9 * (len(chart.panels) - 1)))
-            FigureCanvasAgg(figure)  # measures the legend
-            _draw(figure, chart)
-            name = re.sub(r"[^\w.-]+", "_", chart.key)
-            for form in ("svg", "pdf"):
-                path = folder / f"{name}.{form}"
-                figure.savefig(path, metadata={"Date": None} if form == "svg" else {"CreationDate": None})
-                written.append(path)
-    return written
+        figure = Figure(figsize=(WIDTH, _FIRST))
+        FigureCanvasAgg(figure)  # measures the legend
+        _draw(figure, chart)
+        svg: Any = FigureCanvasSVG(figure)
+        svg.print_svg(paths[0], metadata={"Date": None})
+        with mpl.rc_context({"font.sans-serif": [font]}):
+            pdf: Any = FigureCanvasPdf(figure)
+            pdf.print_pdf(paths[1], metadata={"CreationDate": None})
+    return paths
+
+
+@contextmanager
+def small_font(charts: Sequence[Chart]) -> Iterator[str]:
+    """Name of a font with the characters of these charts alone. A PDF embeds the glyphs that it uses; cutting
+    them out of a whole font for each chart takes longer than drawing it.
+    """
+    from fontTools import subset
+    from matplotlib import font_manager
+
+    options = subset.Options(drop_tables=["GSUB", "GPOS", "GDEF", "kern", "FFTM", "PfEd"], glyph_names=True)
+    whole = font_manager.findfont(font_manager.FontProperties(family=["sans-serif"]))
+    manager, known = font_manager.fontManager, list(font_manager.fontManager.ttflist)
+    cutter = subset.Subsetter(options)
+    texts = [text for chart in charts for text in _texts(chart)]
+    cutter.populate(text="".join([string.printable, "−×", *texts]))
+    with tempfile.TemporaryDirectory() as folder, closing(subset.load_font(whole, options)) as font:
+        cutter.subset(font)
+        font["name"].setName(f"{font['name'].getDebugName(1)} cut", 1, 3, 1, 0x409)
+        path = Path(folder) / "cut.ttf"
+        font.save(path)
+        manager.addfont(path)
+        try:
+            yield manager.ttflist[-1].name
+        finally:
+            manager.ttflist[:] = known
+
+
+def _texts(chart: Chart) -> list[str]:
+    panels = [text for panel in chart.panels for text in (panel.label, *(one.name for one in panel.series))]
+    return [chart.x_label, *chart.marks, *panels]
 
 
 def _draw(figure: Any, chart: Chart) -> None:
-    ratios = [2.0] + [1.0] * (len(chart.panels) - 1)
-    axes = figure.subplots(len(chart.panels), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+    """Panels of one size below each other, a legend above them; equal margins, so that figures align."""
+    heights = [_FIRST] + [_NEXT] * (len(chart.panels) - 1)
+    axes = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     for ax, panel in zip(axes, chart.panels, strict=True):
         _panel(ax, panel, chart)
+        ax.yaxis.set_label_coords(0.16 / WIDTH, 0.5, transform=_across(figure, ax))
     axes[-1].set_xlabel(chart.x_label)
     handles: dict[str, Any] = {}
-    for ax in axes:  # the first panel shows a curve as it is; those below it are thin
+    for ax in axes:  # curves of the first panel are thick, those below are thin
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    if len(handles) > 1:
-        _legend(figure, handles)
+    above = _legend(figure, handles) if len(handles) > 1 else 0.0
+    whole = above + _TOP + sum(heights) + _GAP * (len(heights) - 1) + _BOTTOM
+    figure.set_size_inches(WIDTH, whole)
+    figure.subplots_adjust(
+        left=_LEFT / WIDTH,
+        right=1 - _RIGHT / WIDTH,
+        bottom=_BOTTOM / whole,
+        top=1 - (above + _TOP) / whole,
+        hspace=_GAP / (sum(heights) / len(heights)),
+    )
 
 
-def _legend(figure: Any, handles: Mapping[str, Any]) -> None:
-    """A legend above the panels with as many columns as the width holds; the figure grows by its height."""
+def _across(figure: Any, ax: Axes) -> Any:
+    """Horizontal in widths of the figure, vertical in heights of the panel."""
+    from matplotlib.transforms import blended_transform_factory
+
+    return blended_transform_factory(figure.transFigure, ax.transAxes)
+
+
+def _legend(figure: Any, handles: Mapping[str, Any]) -> float:
+    """A legend at the top with as many columns as the width holds; its height in inches."""
     for columns in range(min(3, len(handles)), 0, -1):
         legend = figure.legend(
-            handles.values(), handles.keys(), loc="outside upper center", ncols=columns, columnspacing=1.2
+            handles.values(), handles.keys(), loc="upper center", ncols=columns, columnspacing=1.2
         )
         box = legend.get_window_extent(figure.canvas.get_renderer())
         if box.width < 0.98 * figure.bbox.width or columns == 1:
             break
         legend.remove()
-    width, height = figure.get_size_inches()
-    figure.set_size_inches(width, height + box.height / figure.dpi)
+    return float(box.height / figure.dpi)
 
 
 def _panel(ax: Axes, panel: Panel, chart: Chart) -> None:

@@ -17,7 +17,9 @@ def network(run: Run) -> dict[str, str] | None:
     """The thermal network of the diagnosed (else the first thermal) model; its bodies show where physics is
     missing.
     """
-    thermal = [m for m in (diagnosed(run), *run.models.values()) if m is not None and _is_thermal(m)]
+    added = named_places(run)
+    first = repaired(run) if added else diagnosed(run)
+    thermal = [m for m in (first, diagnosed(run), *run.models.values()) if m is not None and _is_thermal(m)]
     if not thermal:
         return None
     model = thermal[0]
@@ -30,7 +32,13 @@ def network(run: Run) -> dict[str, str] | None:
     shares = {k: float(v) for k, v in (location.get("states") or {}).items() if k in model.states}
     if (run.diagnosis or {}).get("verdict") == "no mismatch":
         note, svg = "", drawing(model, {})
-    elif any(shares.values()):  # the same weights as the answer has; the heat below is of no cause
+    elif added:  # what the answer names, with its probability
+        note = (
+            "Orange: bodies where the answer places missing physics, with its probability. Orange lines: the "
+            "heat paths that the repair adds."
+        )
+        svg = drawing(model, {k: v for k, v in added.items() if k in model.states}, "")
+    elif any(shares.values()):
         note = "The darker a body, the more probable it is that physics is missing there."
         svg = drawing(model, shares, "")
     elif any(watts.values()):
@@ -44,6 +52,15 @@ def network(run: Run) -> dict[str, str] | None:
         "svg": svg,
         "title": "Where physics is missing" if note else "The thermal network",
     }
+
+
+def named_places(run: Run) -> dict[str, float]:
+    """By state: the probability of the surest effect that the diagnosis names there."""
+    found: dict[str, float] = {}
+    for one in (run.diagnosis or {}).get("physics") or []:
+        for state in one.get("states") or []:
+            found[state] = max(found.get(state, 0.0), float(one.get("probability") or 0.0))
+    return found
 
 
 def _is_thermal(model: Model) -> bool:
@@ -108,6 +125,17 @@ def diagnosed(run: Run) -> Model | None:
     """The fitted model that the diagnosis is about, by the name of its file or its own."""
     key = diagnosed_key(run)
     return None if key is None else run.models[key]
+
+
+def subject(run: Run) -> str:
+    """What the page calls the model that the diagnosis is about."""
+    return diagnosed_key(run) or str((run.diagnosis or {}).get("model", "the model"))
+
+
+def repaired(run: Run) -> Model | None:
+    """The model that the diagnosis has repaired; None where the run did not keep it."""
+    entries = run.results.get("models", {})
+    return next((m for key, m in run.models.items() if entries.get(key, {}).get("kind") == "repaired"), None)
 
 
 def diagnosed_key(run: Run) -> str | None:

@@ -8,7 +8,9 @@ readings would give too narrow an interval.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,32 +43,63 @@ def lead_over(run: Run, model: str, other: str | None) -> Lead | None:
     middle = ratio(run, model, other)
     if not math.isfinite(middle):
         return None
-    pairs = []  # of each recording and output: sums of squares by block, of the two
+    pairs = []
     for recording, output in cells(run, model):
         predictions = run.predictions.get(recording)
         if predictions is None or output not in predictions.models.get(model, {}):
             continue
         mine = predictions.left_over(model, output)
         if other is None:
-            theirs = _without(run, predictions.readings[output], output)
+            pairs.append((mine, _without(run, predictions.readings[output], output)))
         elif output in predictions.models.get(other, {}):
-            theirs = predictions.left_over(other, output)
-        else:
-            continue
+            pairs.append((mine, predictions.left_over(other, output)))
+    return lead_of(pairs, middle)
+
+
+def lead_of(pairs: Sequence[tuple[Array, Array]], middle: float | None = None) -> Lead:
+    """The lead of a model from its residuals and those of another one.
+
+    Args:
+        pairs: of each recording and output, both residuals (N,); NaN where nothing was read.
+        middle: ratio of the rms; else from `pairs`.
+
+    Raises:
+        ValueError: neither `middle` nor residuals to compute it from.
+    """
+    means, blocks = [], []  # of each pair: log ratio of the rms; sums of squares by block (B, 2)
+    for mine, theirs in pairs:
         both = np.isfinite(mine) & np.isfinite(theirs)
-        if both.sum() >= _BLOCKS:
-            pieces = np.array_split(np.flatnonzero(both), _BLOCKS)
-            pairs.append(np.array([[np.sum(mine[p] ** 2), np.sum(theirs[p] ** 2)] for p in pieces]))
-    if not pairs:
+        squares = np.stack([mine[both] ** 2, theirs[both] ** 2], axis=1)
+        if squares.size and middle is None:
+            means.append(float(_log_ratio(squares.sum(axis=0))))
+        if len(squares) >= _BLOCKS:
+            starts = [piece[0] for piece in np.array_split(np.arange(len(squares)), _BLOCKS)]
+            blocks.append(np.add.reduceat(squares, starts, axis=0))
+    if middle is None:
+        if not means:
+            raise ValueError("no residuals to compare")
+        middle = math.exp(sum(means) / len(means))
+    if not blocks:
         return Lead(middle, middle, middle, float(middle < 1))
-    rng = np.random.default_rng(0)
-    logs = np.zeros(_DRAWS)
-    for blocks in pairs:
-        drawn = blocks[rng.integers(0, len(blocks), (_DRAWS, len(blocks)))].sum(axis=1)
-        logs += 0.5 * np.log(np.maximum(drawn[:, 0], 1e-300) / np.maximum(drawn[:, 1], 1e-300)) / len(pairs)
+    logs = sum(_log_ratio(_drawn(k) @ one) for k, one in enumerate(blocks)) / len(blocks)
     found = np.exp(logs)
     low, high = np.percentile(found, [2.5, 97.5])
     return Lead(middle, float(low), float(high), float(np.mean(found < 1)))
+
+
+def _log_ratio(squares: Array) -> Array:
+    """Logarithm of the ratio of two rms from their sums of squares (..., 2)."""
+    found: Array = 0.5 * np.diff(np.log(np.maximum(squares, 1e-300)), axis=-1)[..., 0]
+    return -found
+
+
+@cache
+def _drawn(number: int) -> Array:
+    """How often each block of a pair is drawn, (draws, blocks); independent draws for each pair."""
+    rng = np.random.default_rng(0)
+    for _ in range(number + 1):
+        picks = rng.integers(0, _BLOCKS, (_DRAWS, _BLOCKS))
+    return np.stack([np.sum(picks == block, axis=1) for block in range(_BLOCKS)], axis=1) * 1.0
 
 
 def _without(run: Run, readings: Array, output: str) -> Array:

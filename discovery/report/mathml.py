@@ -94,6 +94,12 @@ def temperature(body: str) -> str:
     )
 
 
+def bracketed(body: str) -> str:
+    """A body in round brackets, which grow only around what is taller than a line."""
+    grows = "" if any(f"<{tall}" in body for tall in ("mfrac", "mtable", "msup")) else ' stretchy="false"'
+    return f"<mrow><mo{grows}>(</mo>{body}<mo{grows}>)</mo></mrow>"
+
+
 def expression(tree: Expression, symbols: Mapping[str, str] | None = None) -> str:
     """MathML of an expression tree; `symbols` gives names a symbol of their own."""
     return _write(tree, symbols or {})[0]
@@ -108,13 +114,13 @@ def lines(tree: Expression, symbols: Mapping[str, str] | None = None, room: int 
     """
     signs = symbols or {}
     factors = _factors(tree)
-    if len(plain(tree)) > room and isinstance(tree, Apply) and tree.function in ("+", "-"):
+    if extent(tree) > room and isinstance(tree, Apply) and tree.function in ("+", "-"):
         left, right = tree.arguments
         body = expression(right, signs)
         if tree.function == "-" and getattr(right, "function", "") in ("+", "-"):
-            body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
+            body = bracketed(body)
         return [*lines(left, signs, room), f"<mo form='infix'>{_SIGN[tree.function]}</mo><mrow>{body}</mrow>"]
-    if len(plain(tree)) <= room or (len(factors) == 1 and not _is_where(tree)):
+    if extent(tree) <= room or (len(factors) == 1 and not _is_where(tree)):
         return [expression(tree, signs)]
     if _is_where(tree):
         assert isinstance(tree, Apply)
@@ -126,8 +132,8 @@ def lines(tree: Expression, symbols: Mapping[str, str] | None = None, room: int 
         part = lines(factor, signs, room) if _is_where(factor) else [_write(factor, signs)[0]]
         body = "".join(part)
         if not _is_where(factor) and _write(factor, signs)[1] < (5 if index else 3):
-            body = f"<mrow><mo>(</mo>{body}<mo>)</mo></mrow>"
-        size = len(plain(factor))
+            body = bracketed(body)
+        size = extent(factor)
         if index and length + size > room:
             found.append("<mo form='infix'>·</mo>")
             length = 0
@@ -138,6 +144,24 @@ def lines(tree: Expression, symbols: Mapping[str, str] | None = None, room: int 
         found[-1] += f"<mrow>{body}</mrow>"
         length += size
     return found
+
+
+def extent(tree: Expression) -> int:
+    """About how many characters wide an expression is printed; a fraction is as wide as its longer part.
+
+    >>> from discovery.terms import parse
+    >>> extent(parse("a*b")), extent(parse("(a + b)/300"))
+    (3, 5)
+    """
+    match tree:
+        case Apply(function="/", arguments=arguments):
+            return max(map(extent, arguments))
+        case Apply(function=function, arguments=arguments):
+            sign = {"**": 0, "*": 1, "neg": 1}.get(function, 3 if function in _SIGN else len(function) + 2)
+            return sum(map(extent, arguments)) + sign
+    if isinstance(tree, Name):  # an index is smaller
+        return 1 + round(0.7 * (len(tree.id) - 1))
+    return len(plain(tree))
 
 
 def stacked(rows: list[str]) -> str:
@@ -167,7 +191,7 @@ def _write(tree: Expression, symbols: Mapping[str, str]) -> tuple[str, int]:
 
     def within(inner: Expression, level: int) -> str:
         text, own = _write(inner, symbols)
-        return f"<mrow><mo>(</mo>{text}<mo>)</mo></mrow>" if own < level else f"<mrow>{text}</mrow>"
+        return bracketed(text) if own < level else f"<mrow>{text}</mrow>"
 
     match tree:
         case Number(value=value):

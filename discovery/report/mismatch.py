@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
-from discovery.report.heat import heat_charts, heat_unit
+from discovery.report.heat import heat_charts, heat_unit, subject
 from discovery.report.printed import Line, Printed
 from discovery.report.ranking import rms_unit
 from discovery.report.run import Run, pretty_unit
@@ -31,8 +32,8 @@ def section(run: Run) -> dict[str, Any] | None:
         return None
     tables = [_physics(d), _proof(d), _outputs(run, d), _windows(run, d), _rivals(d), _considered(d)]
     return {
-        "about": _about(d),
-        "reasons": [_sentence(str(one)) for one in d.get("reasons") or []],
+        "about": _about(run, d),
+        "reasons": [_sentence(_in_words(str(one))) for one in d.get("reasons") or []],
         "tables": [table for table in tables if table.rows],
         "charts": heat_charts(run),
         "heat_note": _HEAT_NOTE,
@@ -49,8 +50,17 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
 
 
-def _about(d: Mapping[str, Any]) -> str:
-    text = f"Verdict on “{d.get('model', 'the model')}”: {d.get('verdict', 'unknown')}."
+def _in_words(text: str) -> str:
+    """A text with the effects of the catalogue as plain words."""
+    from discovery.effects.catalogue import catalogue
+
+    for effect in sorted({one.word for one in catalogue().values()}, key=len, reverse=True):
+        text = re.sub(rf"\b{effect}\b", words(effect), text)
+    return text
+
+
+def _about(run: Run, d: Mapping[str, Any]) -> str:
+    text = f"Verdict on “{subject(run)}”: {d.get('verdict', 'unknown')}."
     location = d.get("location") or {}
     if location.get("regime"):
         text += f" The mismatch appears where {location['regime']}."

@@ -13,9 +13,9 @@ from discovery import __version__
 from discovery.evaluation import paper
 from discovery.files import write_atomic
 from discovery.report import heat, mismatch, sections, series
-from discovery.report.answer import answer
+from discovery.report.answer import Answer, Part, answer
 from discovery.report.chart import Chart, payload
-from discovery.report.printed import is_paper, paper_tables, rms_tables, summary
+from discovery.report.printed import Printed, is_paper, paper_tables, rms_tables, summary
 from discovery.report.ranking import is_error, origin, ranked
 from discovery.report.recommended import table as best_by_output
 from discovery.report.run import Run, load_run
@@ -28,6 +28,13 @@ if TYPE_CHECKING:
 _HERE = Path(__file__).parent
 _BUDGET = 300_000  # numbers that all curves of a page may hold together, below 2 MB
 _MOST_CURVES = 6  # more of them cannot be distinguished
+_NOT_SHARED = Answer(
+    Part(
+        "These runs share no recording",
+        ("Only their list is shown. To compare models side by side, name runs of the same recordings.",),
+    ),
+    Part(),
+)
 
 
 def write_report(run_dir: Path) -> Path:
@@ -44,8 +51,8 @@ def write_report(run_dir: Path) -> Path:
     return path
 
 
-def render(run: Run) -> str:
-    """The page of a run as HTML."""
+def render(run: Run, runs: Printed | None = None) -> str:
+    """The page of a run as HTML; `runs`: the list that the page of several runs opens with."""
     order = shown_models(run)
     curves = series.prediction_charts(run, order)
     groups = [
@@ -64,7 +71,8 @@ def render(run: Run) -> str:
     view: dict[str, Any] = {
         "title": f"{run.name}: report",
         "eyebrow": _eyebrow(run),
-        "answer": answer(run),
+        "answer": answer(run) if run.results.get("models") or run.diagnosis else _NOT_SHARED,
+        "runs": runs,
         "predictions": groups,
         "shaded": any(chart.shades for chart in curves),
         "curves": _legend(run, order, curves),
@@ -145,6 +153,7 @@ def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
     missing = [("diagnosis", "Missing physics"), ("network", "Thermal network")]
     parts = [
+        ("runs", "Runs"),
         *(missing + compared if view["missing_first"] else compared + missing),
         ("models", ""),
         ("discovery", "Search for terms"),
@@ -224,4 +233,4 @@ def _eyebrow(run: Run) -> str:
 
 
 def _brief(names: Sequence[str]) -> str:
-    return listed(names) if len(names) < 5 else f"{len(names)} recordings"
+    return listed([f"“{name}”" for name in names]) if len(names) < 5 else f"{len(names)} recordings"

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from discovery.evaluation import tables
 from discovery.report.lead import Lead, lead_over
@@ -12,7 +16,6 @@ from discovery.report.ranking import (
     is_error,
     kind,
     mean_improvement,
-    mean_log_rms,
     mean_rms,
     origin,
     ranked,
@@ -22,7 +25,10 @@ from discovery.report.ranking import (
 from discovery.report.run import Run
 from discovery.report.text import number, with_unit
 
-_MOST_RECORDINGS = 4  # columns of the summary; the tables below have all
+_MOST_RECORDINGS = 4  # with a column each in the summary; of more, median and worst
+_AGAINST = "rms against the best"
+_MOST_COLUMNS = 8  # models with a column of their own
+_MOST_CHOSEN = 40  # models of which each can be the one to compare with
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,32 @@ class Line:
     cells: tuple[str, ...]
     look: str = ""
     repeated: str = ""  # the first cell, where it is printed only once for several rows
-    score: float | None = None  # of a model: mean logarithm of its rms, to compare with any other row
+    link: str = ""  # where the first cell leads
+    about: str = ""  # a second line below the first cell
+
+
+@dataclass(frozen=True)
+class Against:
+    """Columns whose cells depend on the row that the reader chooses to compare with.
+
+    Attributes:
+        columns: which, from 0, and `heads`: their heads, with {} for the name of the chosen row.
+        cells: by chosen row, then by row: a text for each of `columns`.
+    """
+
+    columns: tuple[int, ...]
+    heads: tuple[str, ...]
+    cells: tuple[tuple[tuple[str, ...], ...], ...]
+
+    @property
+    def packed(self) -> str:
+        """As JSON for the page; equal texts are stored once."""
+        texts: dict[str, int] = {}
+        rows = [
+            [[texts.setdefault(text, len(texts)) for text in row] for row in chosen] for chosen in self.cells
+        ]
+        content = {"columns": self.columns, "heads": self.heads, "cells": rows, "texts": list(texts)}
+        return json.dumps(content, separators=(",", ":"), ensure_ascii=False)
 
 
 @dataclass(frozen=True)
@@ -43,16 +74,34 @@ class Printed:
     header: tuple[str, ...]
     rows: tuple[Line, ...]
     left: frozenset[int] = field(default_factory=frozenset)
+    against: Against | None = None
 
 
 def printed(table: tables.Table, left: Sequence[int] = ()) -> Printed:
-    """A table of the evaluation with a line above each new first cell."""
+    """A table of the evaluation; a line above each group of rows with the same first cell. Columns of the
+    paper in which it prints nothing are left out.
+    """
+    empty = {
+        k
+        for k, head in enumerate(table.header)
+        if head.startswith("paper") and all(row[k] is None or row[k] == "" for row in table.rows)
+    }
+    table = replace(
+        table,
+        header=tuple(head for k, head in enumerate(table.header) if k not in empty),
+        rows=tuple(tuple(cell for k, cell in enumerate(row) if k not in empty) for row in table.rows),
+    )
     rows, before = [], None
+    grouped = len({row[0] for row in table.rows}) < len(table.rows)
     for row in table.rows:
         texts = [cell if isinstance(cell, str) else "" if cell is None else number(cell) for cell in row]
         new = texts[0] != before
         before = texts[0]
-        rows.append(Line(tuple(texts), "first") if new else Line(("", *texts[1:]), repeated=texts[0]))
+        rows.append(
+            Line(tuple(texts), "first" if grouped else "")
+            if new
+            else Line(("", *texts[1:]), repeated=texts[0])
+        )
     return Printed(table.title, table.header, tuple(rows), frozenset(left))
 
 
@@ -62,41 +111,59 @@ def summary(run: Run) -> Printed | None:
     if not order:
         return None
     recordings = list(dict.fromkeys(r for model in order for r, _ in cells(run, model)))
-    shared = set.intersection(*(set(cells(run, model)) for model in order))
-    shown = recordings[:_MOST_RECORDINGS]
     removed = is_error(run)
     units = rms_units(run)
     what = "removed rms [%]" if removed else f"rms [{', '.join(units)}]"
-    header = ("Model", "Kind", "Terms", "Parameters", *shown, "rms against the best", "Fit [s]")
+    few = len(recordings) <= _MOST_RECORDINGS
+    shown = recordings if few else [f"{word} of {len(recordings)} recordings" for word in ("median", "worst")]
+    header = ("Model", "Terms", "Parameters", *shown, _AGAINST, "Fit [s]")
     rows = []
     for model in order:
         entry = run.results["models"][model]
-        figures = [
-            number(mean_improvement(run, model, r), 2)
-            if removed
-            else ", ".join(number(mean_rms(run, model, r).get(unit)) for unit in units)
-            for r in shown
-        ]
+        each = [_scores(run, model, recording) for recording in recordings]
+        if not few:
+            worst = np.min if removed else np.max
+            each = [[float(of(found)) for found in zip(*each, strict=True)] for of in (np.median, worst)]
+        figures = [", ".join(number(one, 2 if removed else 3) for one in scores) for scores in each]
         made = {one.lower(): one for one in (origin(run, model), kind(run, model))}.values()
-        size = [number(entry.get("terms")), number(entry.get("parameters"))]
-        times = "best" if model == order[0] else _behind(lead_over(run, order[0], model))
+        size = [number(entry.get("terms") or None), number(entry.get("parameters"))]
+        times = "best" if model == order[0] else behind(lead_over(run, order[0], model))
         look = "best" if model == order[0] else ""
-        line = (model, ", ".join(made), *size, *figures, times, number(entry.get("seconds"), 2))
-        rows.append(Line(line, look, score=mean_log_rms(run, model, shared)))
+        line = (model, *size, *figures, times, number(entry.get("seconds"), 2))
+        rows.append(Line(line, look, about=", ".join(made)))
     title = f"{what}, {'mean over all errors' if removed else 'over all outputs of a unit'}"
-    return Printed(title[0].upper() + title[1:] if removed else title, header, tuple(rows), frozenset({1}))
+    title = title[0].upper() + title[1:] if removed else title
+    against = None
+    if 1 < len(order) <= _MOST_CHOSEN:
+        choices = tuple(
+            tuple(
+                ("reference" if model == chosen else behind(lead_over(run, chosen, model)),)
+                for model in order
+            )
+            for chosen in order
+        )
+        against = Against((header.index(_AGAINST),), ("rms against {}",), choices)
+    return Printed(title, header, tuple(rows), frozenset(), against)
 
 
-def _behind(lead: Lead | None) -> str:
-    """How much more rms than the best model has, with its 95 % interval.
+def _scores(run: Run, model: str, recording: str) -> list[float]:
+    """On a recording: the mean removed rms [%] of errors, or the rms over the outputs of each unit."""
+    if is_error(run):
+        return [mean_improvement(run, model, recording)]
+    found = mean_rms(run, model, recording)
+    return [found.get(unit, math.nan) for unit in rms_units(run)]
 
-    >>> _behind(Lead(0.8, 0.75, 0.9, 1.0)), _behind(None)
+
+def behind(lead: Lead | None) -> str:
+    """How much more rms than the model that leads (less: a minus), with its 95 % interval.
+
+    >>> behind(Lead(0.8, 0.75, 0.9, 1.0)), behind(None)
     ('+25 % (+11 to +33)', '–')
     """
     if lead is None or lead.ratio <= 0:
         return "–"
     more = [100 * (1 / one - 1) for one in (lead.ratio, lead.high, lead.low) if one > 0]
-    middle, *ends = (f"{one:+.0f}".replace("-", "−") for one in more)
+    middle, *ends = (f"{one:+.0f}".replace("-", "−") if abs(one) >= 0.5 else "0" for one in more)
     return (
         f"{middle} % ({ends[0]} to {ends[1]})" if lead.low < lead.high and len(ends) == 2 else f"{middle} %"
     )
@@ -135,7 +202,8 @@ def _in_units(run: Run, table: tables.Table) -> tables.Table:
 
 def rms_tables(run: Run) -> list[Printed]:
     """What each model leaves of temperatures: a row for each recording and output, held-out ones first."""
-    order, found = ranked(run), run.results.get("models", {})
+    every, found = ranked(run), run.results.get("models", {})
+    order = every[:_MOST_COLUMNS]
     rows, units = [], rms_units(run)
     for recording in dict.fromkeys([*run.held_out, *run.results.get("fit", [])]):
         for index, output in enumerate(run.outputs):
@@ -151,4 +219,5 @@ def rms_tables(run: Run) -> list[Printed]:
             )
     said = [with_unit(model, units[0]) if len(units) == 1 else model for model in order]
     header = ("Recording", "", "Output", *said)
-    return [Printed("rms of the residual", header, tuple(rows), frozenset({1, 2}))] if rows else []
+    title = "rms of the residual" + (f", best {len(order)} of {len(every)} models" if order != every else "")
+    return [Printed(title, header, tuple(rows), frozenset({1, 2}))] if rows else []

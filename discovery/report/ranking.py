@@ -45,10 +45,16 @@ def astray(run: Run, model: str) -> list[str]:
     return [r for r in run.held_out if r not in run.results["models"][model].get("recordings", {})]
 
 
-def ratio(run: Run, model: str, other: str | None) -> float:
+def ratio(
+    run: Run, model: str, other: str | None, within: Collection[tuple[str, str]] | None = None
+) -> float:
     """Geometric mean over held-out recordings and errors of rms(model)/rms(other); NaN: nothing is shared.
 
-    With `other` None it is the error without compensation. A ratio has no unit: um and um/m can be averaged.
+    A ratio has no unit: um and um/m can be averaged.
+
+    Args:
+        other: None for the error without compensation.
+        within: the (recording, output) pairs to use; all that the two share if None.
     """
     mine = cells(run, model)
     theirs = (
@@ -59,18 +65,12 @@ def ratio(run: Run, model: str, other: str | None) -> float:
     logs = [
         math.log(mine[key]["rms"] / theirs[key]["rms"])
         for key in mine
-        if key in theirs and _positive(mine[key].get("rms")) and _positive(theirs[key].get("rms"))
+        if key in theirs
+        and (within is None or key in within)
+        and _positive(mine[key].get("rms"))
+        and _positive(theirs[key].get("rms"))
     ]
     return math.exp(sum(logs) / len(logs)) if logs else math.nan
-
-
-def mean_log_rms(run: Run, model: str, shared: Collection[tuple[str, str]]) -> float | None:
-    """Mean logarithm of the rms over (recording, output) pairs; None where one is missing or zero."""
-    found = cells(run, model)
-    values = [found[key].get("rms") if key in found else None for key in shared]
-    if not values or not all(_positive(value) for value in values):
-        return None
-    return sum(math.log(value) for value in values if value) / len(values)
 
 
 def _positive(value: object) -> bool:
@@ -78,17 +78,18 @@ def _positive(value: object) -> bool:
 
 
 def ranked(run: Run) -> list[str]:
-    """Models, best first, by their rms on held-out recordings; those that run away on one, or have no score,
-    last.
+    """Models, best first, by their rms on the held-out recordings and outputs that all have; those that run
+    away on a recording, or have no score, last.
     """
     models = list(run.results.get("models", {}))
     if not models:
         return []
     reference = min(models, key=lambda model: len(astray(run, model)))  # shares the most with the others
-    scores = {model: ratio(run, model, reference) for model in models}
+    whole = [m for m in models if cells(run, m) and len(astray(run, m)) == len(astray(run, reference))]
+    shared = set.intersection(*(set(cells(run, m)) for m in whole)) if whole else set()
 
     def place(model: str) -> tuple[int, float]:
-        score = scores[model]
+        score = ratio(run, model, reference, shared if model in whole and shared else None)
         return len(astray(run, model)), score if math.isfinite(score) else math.inf
 
     return sorted(models, key=place)

@@ -25,7 +25,7 @@ def recommended(run: Run, best: str) -> str:
     if wins:
         parts.append(f"It is clearly the best for {listed(wins)}.")
     if ties:
-        parts.append(f"For {listed(ties)}, the recordings do not separate it from other models.")
+        parts.append(f"For {listed(ties)} alone, the recordings do not separate it from other models.")
     parts += [f"For {output}, “{found[output]['model']}” is better." for output in loses]
     return " ".join(parts)
 
@@ -55,7 +55,7 @@ def table(run: Run) -> Printed | None:
         "Best model",
         "rms",
         "Not separated from it",
-        "Lead over the next one (95 % interval)",
+        "Lead over the next separated one (95 % interval)",
     )
     return Printed(
         "Best model for each output, held-out recordings", header, tuple(rows), frozenset({1, 3, 4})

@@ -40,7 +40,9 @@ class Predictions:
 
 @dataclass(frozen=True)
 class Run:
-    """Everything that a report is made from. `inputs`: by recording and input, time [s] and value (K,)."""
+    """Everything that a report is made from. `inputs`: by recording and input, time [s] and value (K,) of
+    the curve; a held input is a curve of steps.
+    """
 
     folder: Path
     results: Mapping[str, Any]
@@ -87,10 +89,14 @@ class Run:
         return "µm/m" if output[:3] in ("E_A", "E_B", "E_C") else "µm" if output.startswith("E_") else ""
 
     def noise(self, output: str) -> float | None:
-        """Reading noise (standard deviation, unit of the output) that the diagnosis or the run found."""
-        detection = (self.diagnosis or {}).get("detection", {})
-        value = detection.get("noise", {}).get(output, self.results.get("noise", {}).get(output))
-        return float(value) if value else None
+        """Reading noise (standard deviation, unit of the output): stated in the campaign, else the least that
+        the diagnosis or a fit found, because what a model does not explain passes for noise.
+        """
+        if stated := self.results.get("noise", {}).get(output):
+            return float(stated)
+        parts = [(self.diagnosis or {}).get("detection", {}), *self.results.get("models", {}).values()]
+        found = [float(size) for part in parts if (size := (part.get("noise") or {}).get(output))]
+        return min(found, default=None)
 
     def band(self, model: str, output: str) -> float | None:
         """Half width of the 95 % prediction band of a model: 1.96 times its rms in cross-validation; with
@@ -130,13 +136,18 @@ def read_inputs(path: Path) -> dict[str, dict[str, tuple[Array, Array]]]:
     try:
         return {
             recording: {
-                name: (np.array(one["time"], dtype=float), np.array(one["value"], dtype=float))
+                name: _curve(np.array(one["time"], dtype=float), np.array(one["value"], dtype=float), one)
                 for name, one in inputs.items()
             }
             for recording, inputs in json.loads(read_text(path)).items()
         }
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise UserError(f"{path}: cannot be read ({error}); make the run again") from None
+
+
+def _curve(time: Array, value: Array, one: Mapping[str, Any]) -> tuple[Array, Array]:
+    """The curve of an input: a held one keeps its value until the next."""
+    return (np.repeat(time, 2)[1:], np.repeat(value, 2)[:-1]) if one.get("held") else (time, value)
 
 
 def read_predictions(path: Path) -> Predictions:
@@ -170,10 +181,10 @@ _PRETTY = {"um": "µm", "um/m": "µm/m", "degC": "°C", "1": "", "delta_degC": "
 
 
 def pretty_unit(unit: str) -> str:
-    """A unit as it is printed.
+    """A unit in print.
 
-    >>> pretty_unit("um/m"), pretty_unit("W/K"), pretty_unit("1")
-    ('µm/m', 'W/K', '')
+    >>> pretty_unit("um/m"), pretty_unit("W/K"), pretty_unit("1"), pretty_unit("degC/h")
+    ('µm/m', 'W/K', '', 'K/h')
     """
     return _PRETTY.get(
         unit,
@@ -182,5 +193,6 @@ def pretty_unit(unit: str) -> str:
         .replace("**", "^")
         .replace("*", "·")
         .replace("delta_degC", "K")
+        .replace("degC", "K")
         .replace("um", "µm"),
     )

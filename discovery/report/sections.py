@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,16 @@ import numpy as np
 from discovery import __version__
 from discovery.evaluation import rolematrix
 from discovery.evaluation.tables import budget_tables
+from discovery.models import Model
 from discovery.report import equations, heat, series
 from discovery.report.chart import Chart, Panel, Series
 from discovery.report.printed import Line, Printed, printed
-from discovery.report.ranking import is_discovered, ranked
+from discovery.report.ranking import is_discovered, is_error, ranked
 from discovery.report.run import Run
 from discovery.report.text import counted, number, percent
+from discovery.terms import names
 
+_MOST_DETAILED = 6  # models with a section of their own
 _OFTEN = 0.2  # share of the repeated searches from which a term is listed
 
 
@@ -30,12 +34,12 @@ def detailed(run: Run) -> list[str]:
     wanted += [
         name for name, model in run.models.items() if model is subject or any(t.effect for t in model.terms)
     ]
-    return list(dict.fromkeys(wanted))
+    return list(dict.fromkeys(wanted))[:_MOST_DETAILED]
 
 
 def model(run: Run, name: str) -> dict[str, Any]:
     """A model in detail: equations, terms with their numbers and shares, what is worth knowing."""
-    model = run.models[name]
+    model = _as_answered(run, run.models[name])
     entry = run.results.get("models", {}).get(name, {})
     shares = entry.get("shares") or {}
     sizes = {"state": model.states, "term": model.terms, "free parameter": model.free}
@@ -51,12 +55,27 @@ def model(run: Run, name: str) -> dict[str, Any]:
         "equations": equations.equations(model),
         "rows": equations.rows(model, shares),
         "shares": bool(shares),
-        "share_note": "Share of the effect: change of the outputs without the term, to first order. "
+        "share_note": "Share: how much the outputs change without the term, to first order. "
         "All terms together are 100 %.",
         "others": equations.other_values(model),
         "capacities": equations.capacities(model),
         "notes": entry.get("notes") or [],
     }
+
+
+def _as_answered(run: Run, model: Model) -> Model:
+    """The model with the intervals of the answer at the effects that the diagnosis has added: those allow for
+    other explanations, too.
+    """
+    stated = {
+        name: p for one in (run.diagnosis or {}).get("physics") or [] for name, p in one["parameters"].items()
+    }
+    added = {name for term in model.terms if term.effect for name in names(term.expression)} & set(stated)
+    parameters = {
+        name: replace(p, low=stated[name]["low"], high=stated[name]["high"]) if name in added else p
+        for name, p in model.parameters.items()
+    }
+    return replace(model, parameters=parameters)
 
 
 def discovery(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
@@ -138,21 +157,21 @@ def residual(run: Run, order: Sequence[str]) -> dict[str, Any] | None:
     rows = series.residual_table(run, model, recording)
     if not rows:
         return None
-    keys = ("rms", "ratio", "mean", "memory", "largest", "beyond", "inside", "count")
+    heads = {
+        "rms": "rms",
+        "ratio": "rms / noise",
+        "mean": "mean",
+        "memory": "correlation of neighbours",
+        "largest": "largest",
+        "beyond": "beyond 3σ [%]",
+        "inside": "inside the 95 % band [%]",
+        "count": "readings",
+    }
+    known = [key for key in heads if any(row[key] is not None for row in rows)]
     lines = tuple(
-        Line((f"{row['output']} [{row['unit'] or '-'}]", *(number(row[k]) for k in keys))) for row in rows
+        Line((f"{row['output']} [{row['unit'] or '-'}]", *(number(row[k]) for k in known))) for row in rows
     )
-    header = (
-        "Error",
-        "rms",
-        "rms / noise",
-        "mean",
-        "correlation of neighbours",
-        "largest",
-        "beyond 3σ [%]",
-        "inside the 95 % band [%]",
-        "readings",
-    )
+    header = ("Error" if is_error(run) else "Output", *(heads[key] for key in known))
     return {
         "about": f"Reading minus “{model}” on {recording}. Pure sensor noise would have no correlation "
         "between neighbouring readings: all bars would be inside the band.",
@@ -222,7 +241,7 @@ def quality(run: Run) -> dict[str, Any] | None:
     findings = [str(line) for line in run.results.get("findings") or []]
     if not rows and not findings:
         return None
-    header = ("Recording", "Error", "Readings", "Over", "Usually every", "Longest gap", "Range")
+    header = ("Recording", "Output", "Readings", "Over", "Usually every", "Longest gap", "Range")
     return {
         "tables": [Printed("Readings", header, tuple(rows), frozenset({1, 6}))] if rows else [],
         "findings": findings,

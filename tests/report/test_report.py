@@ -6,6 +6,8 @@ import dataclasses
 import importlib.util
 import json
 import re
+import shutil
+from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from types import ModuleType
@@ -20,9 +22,13 @@ from discovery.errors import UserError
 from discovery.models import Parameter
 from discovery.report import equations, write_comparison, write_figures, write_report
 from discovery.report.chart import thinned
+from discovery.report.compare import load_runs, shared_recordings
+from discovery.report.lead import lead_over
 from discovery.report.mismatch import NEAR, section, sizes
-from discovery.report.ranking import ratio
+from discovery.report.printed import behind
+from discovery.report.ranking import ranked, ratio
 from discovery.report.run import load_run
+from discovery.report.runlist import run_list
 from discovery.report.series import autocorrelation
 
 
@@ -62,7 +68,7 @@ class _Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         given = dict(attrs)
-        if tag not in ("meta", "link", "input", "br", "hr", "img", "rect", "line", "mspace"):
+        if tag not in ("meta", "link", "input", "br", "wbr", "hr", "img", "rect", "line", "mspace"):
             self.open.append(tag)
         if given.get("id"):
             self.ids.append(str(given["id"]))
@@ -143,7 +149,7 @@ def test_kelvins_and_micrometres_are_not_mixed(tmp_path: Path, together: bool) -
         folders.append(tmp_path / name)
         folders[-1].mkdir()
         (folders[-1] / "results.json").write_text(json.dumps(content))
-    written = write_comparison(folders, tmp_path) if together else write_report(folders[0])
+    written = write_comparison(load_runs(folders), tmp_path) if together else write_report(folders[0])
     page = written.read_text("utf-8")
     assert (
         "Its rms is 0.3 K and 0.64 µm (median rms over 3 outputs and 1 recording; largest: 0.4 K and" in page
@@ -156,11 +162,31 @@ def test_kelvins_and_micrometres_are_not_mixed(tmp_path: Path, together: bool) -
 
 def test_every_model_can_be_the_reference(folder: Path, page: str) -> None:
     run = load_run(folder)
-    scores = [float(text) for text in re.findall(r'data-score="([^"]+)"', page)]
-    assert len(scores) == len(run.results["models"])
-    assert scores == sorted(scores)  # best first
-    more = np.exp(scores[-1] - scores[0])
-    assert more == pytest.approx(1 / ratio(run, "discovered", "superposition"), rel=1e-4)
+    (text,) = re.findall(r'data-against="([^"]+)"', page)
+    given = json.loads(unescape(text))
+    order = ranked(run)
+    for i, chosen in enumerate(order):
+        for j, model in enumerate(order):
+            said = given["texts"][given["cells"][i][j][0]]
+            more = 100 * (ratio(run, model, chosen) - 1)
+            assert said == "reference" if i == j else said.startswith(f"{more:+.0f} %".replace("-", "−"))
+
+
+def test_models_are_ranked_on_what_all_of_them_predict(folder: Path) -> None:
+    """A model of the easy outputs alone does not win by leaving out the hard one."""
+    run = load_run(folder)
+    models = json.loads(json.dumps(run.results["models"]))
+    for model in models.values():
+        for scores in model["recordings"].values():
+            scores["E_A0C"]["rms"] = 50.0
+    models["superposition"]["recordings"] = {
+        recording: {"E_Y0C": scores["E_Y0C"]}
+        for recording, scores in models["superposition"]["recordings"].items()
+    }
+    models["discovered"]["recordings"]["validation"]["E_A0C"]["rms"] = 5000.0
+    one = dataclasses.replace(run, results={**run.results, "models": models})
+    rms = {name: models[name]["recordings"]["validation"]["E_Y0C"]["rms"] for name in models}
+    assert ranked(one) == sorted(rms, key=lambda name: rms[name])
 
 
 def test_a_simulated_machine_is_said_first_and_inputs_are_drawn(tmp_path: Path) -> None:
@@ -169,12 +195,13 @@ def test_a_simulated_machine_is_said_first_and_inputs_are_drawn(tmp_path: Path) 
     (folder / "results.json").write_text(
         json.dumps(results | {"simulated": True, "input_units": {"pump": "1"}})
     )
-    inputs = {"validation": {"pump": {"time": [0, 3600], "value": [0, 1]}}}
+    inputs = {"validation": {"pump": {"time": [0, 1800, 3600], "value": [0, 1, 1], "held": True}}}
     (folder / "inputs.json").write_text(json.dumps(inputs))
     page = write_report(folder).read_text("utf-8")
     assert re.search(r'class="eyebrow">Simulated machine · ', page)
     (chart,) = (one for one in _data(page)["charts"] if one["key"] == "validation-inputs")
     assert chart["panels"][0]["label"] == "pump [-]"
+    assert chart["panels"][0]["series"][0]["y"] == [0, 0, 1, 1, 1]  # a step, not a ramp
     (folder / "inputs.json").write_text('{"validation": {"pump": [1]}}')
     with pytest.raises(UserError, match=r"inputs\.json: cannot be read"):
         write_report(folder)
@@ -348,11 +375,47 @@ def test_a_comparison_counts_as_unseen_only_what_no_run_has_fitted(folder: Path,
     other = sample.write_sample(tmp_path / "second")
     results = json.loads((other / "results.json").read_text()) | {"experiment": "second"}
     (other / "results.json").write_text(json.dumps(results))
-    page = write_comparison([folder, other], tmp_path).read_text("utf-8")
+    page = write_comparison(load_runs([folder, other]), tmp_path).read_text("utf-8")
     assert "discovered, second" in page
-    assert "compared on validation" in page
-    with pytest.raises(UserError, match="two runs or more"):
-        write_comparison([folder], tmp_path)
+    assert "compared on “validation”" in page
+
+
+def test_runs_of_two_machines_are_listed_but_their_models_are_not_mixed(folder: Path, tmp_path: Path) -> None:
+    """Recordings of the same name with other readings are not the same recordings."""
+    other = sample.write_sample(tmp_path / "machine", hours=20.0)
+    runs = load_runs([folder, tmp_path])
+    assert shared_recordings(runs) == []
+    page = write_comparison(runs, tmp_path).read_text("utf-8")
+    assert "These runs share no recording" in page
+    assert 'href="machine/report.html"' not in page  # it has none
+    write_report(other)
+    page = write_comparison(runs, tmp_path).read_text("utf-8")
+    assert 'href="machine/report.html"' in page
+
+
+def test_the_list_says_how_a_run_differs_from_any_other(folder: Path, tmp_path: Path) -> None:
+    """The lead of one best model over another is that of the same two models in one run."""
+    other = sample.write_sample(tmp_path / "plain")
+    results = json.loads((other / "results.json").read_text())
+    models = {name: one for name, one in results["models"].items() if name in ("reduced", "superposition")}
+    values = {"G": {"value": 9.0, "low": 8.5, "high": 9.5, "unit": "W/K"}}
+    models["reduced"]["values"] = values
+    changed = results | {"models": models, "inputs": {"campaign.toml": "1" * 64}}
+    (other / "results.json").write_text(json.dumps(changed))
+    results["models"]["reduced"]["values"] = {"G": values["G"] | {"value": 4.0, "low": 3.0, "high": 5.0}}
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "results.json").write_text(json.dumps(results))
+    shutil.copytree(other / "predictions", tmp_path / "full" / "predictions")
+    runs = load_runs([tmp_path / "full", other])
+    table = run_list(runs, ["full", "plain"], tmp_path)
+    assert table.against is not None
+    assert table.against.cells[0][1][0] == behind(lead_over(load_run(folder), "discovered", "reduced"))
+    assert table.against.cells[1][0][0].startswith("−")
+    assert table.against.cells[1][1] == ("reference", "")
+    told = table.against.cells[0][1][1]
+    assert "without discovered" in told
+    assert "campaign.toml changed" in told
+    assert "reduced, G: 4 → 9 W/K" in told
 
 
 def test_thinning_keeps_peaks() -> None:
