@@ -68,7 +68,7 @@ def test_from_nothing_to_a_diagnosis_in_four_commands(desk: Path, monkeypatch: p
     proof = diagnosis["improvement"]["held_out"]["tuesday"]
     assert proof["rms_after"] < 0.3 * proof["rms_before"]
     page = (desk / "answer" / "report.html").read_text("utf-8")
-    assert "Physics is missing in “first order”" in page
+    assert "Physics is missing in “first_order”" in page
 
 
 @pytest.fixture(scope="module")
