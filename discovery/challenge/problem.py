@@ -50,7 +50,7 @@ class Problem:
 
     @cached_property
     def baseline(self) -> Scored:
-        """The baseline under the everyday noise that makes what it leaves most likely."""
+        """The baseline under the process noise that makes what it leaves most likely."""
         noise = self.context.settings[len(self.context.settings) // 2].noise
         found = score(self.context, (), noise)
         assert found is not None  # the context has fitted it
@@ -70,7 +70,7 @@ class Problem:
     def improvement(self, repaired: Fit | None, chosen: Sequence[Hypothesis]) -> Answer:
         """`improvement` of diagnosis.json for a repaired model with `chosen` in it; nothing without one.
 
-        The noise floor is the everyday noise with these effects in the model, as in the workbench's proof.
+        The noise floor is the process noise with these effects in the model, as in the workbench's proof.
         """
         if repaired is None:
             return {"held_out": {}, "explained": None}

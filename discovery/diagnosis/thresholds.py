@@ -36,6 +36,7 @@ NAMED = 0.7  # probability from which an effect is named
 MATTERS = 0.15  # reading noises, rms: what explains less of free runs (1 % of their rms) has no name
 SHORT = 11.0  # log evidence that a name has to add, and by which nothing at all may be short of the best
 SMALL = 0.33  # ... or this share of the log evidence of all of it
+CHANCE = 1.645  # standard deviations of all log evidence that a name has to add: 5 % lie above
 RIVAL = 3.0  # log evidence within which another answer may as well be right
 RIVALS_SHOWN = 12  # other answers in the document
 DRAWS = 100  # bootstrap draws over blocks and priors

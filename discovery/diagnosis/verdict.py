@@ -19,7 +19,6 @@ from discovery.diagnosis.scored import Scored, score
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.vetoes import vetoed
 from discovery.effects.hypothesis import Hypothesis, Key
-from discovery.fitting.covariance import ABOVE95
 from discovery.printed import printed
 
 NO_MISMATCH, MISSING, FAULT, UNEXPLAINED = (
@@ -132,7 +131,7 @@ def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Na
     readings to another: it is half of the square of a distance known within one standard deviation.
     """
     kept = list(chosen)
-    least = max(thresholds.SHORT, ABOVE95 * sqrt(2 * max(found.gain, 0.0)))
+    least = max(thresholds.SHORT, thresholds.CHANCE * sqrt(2 * max(found.gain, 0.0)))
     while kept:
         fewer = [[o for o in kept if o is not n] for n in kept]
         best = max(fewer, key=lambda others: _alone(context, found, answer, others))

@@ -13,7 +13,6 @@ from discovery.models import Model
 Array = NDArray[np.float64]
 
 Z95 = 1.959963984540054  # standard deviations of a normal distribution: 95 % lie within
-ABOVE95 = 1.6448536269514722  # ... and 5 % above
 _UNSEEN = 1e-4  # share of a column's length that the other unknowns leave; below it, it is not determined
 
 

@@ -223,8 +223,8 @@ def _better(run: Run) -> list[str]:
     if best is None or lead is None or lead.high > _CLEARLY:
         return []
     return [
-        f"“{best}” predicts better than “{given}”: its rms is {_against(lead)}. No effect of the catalogue "
-        "explains the difference."
+        f"“{best}” predicts better than “{given}”: its rms is {_against(lead)}. The diagnosis found no "
+        "effect for the difference, or took it for noise."
     ]
 
 
