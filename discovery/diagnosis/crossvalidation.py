@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> dict[Key, Improvement | None]:
     """What each of some effects of a model changes of free runs on recordings that are left out of the fit in
-    turn.
+    turn: of the outputs that it shows in, or of all where it acts in the machine.
 
     Models are fitted anew to the others, and start, as those of an experiment are; rms in reading noises.
     None where nothing can be left out, or where recordings left out can say nothing of an effect because it
@@ -41,13 +41,17 @@ def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> 
     for (effects, _), part in zip(tasks, parts, strict=True):
         left.setdefault(frozenset(o.key for o in effects), {}).update(part)
     found: dict[Key, Improvement | None] = dict.fromkeys(h.key for h in chosen)
-    one = np.ones(len(context.outputs))
     for h in lasting:
+        only = set(h.shown) if h.shown and not h.terms else set(context.outputs)
+        mine = [y for y, name in enumerate(context.outputs) if name in only]
         without, with_it = left[answer.keys - {h.key}], left[answer.keys]
+        one = np.ones(len(mine))
         runs = [
-            FreeRuns(without[run], with_it.get(run), 1.0, one) for run in context.recordings if run in without
+            FreeRuns(without[r][:, mine], with_it[r][:, mine] if r in with_it else None, 1.0, one)
+            for r in context.recordings
+            if r in without
         ]
-        found[h.key] = improvement(runs, context.outputs) if runs else None
+        found[h.key] = improvement(runs, [context.outputs[y] for y in mine]) if runs else None
     return found
 
 

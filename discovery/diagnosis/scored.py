@@ -88,6 +88,17 @@ class Scored:
         """The noise that is most likely."""
         return self.settings[self.best].noise
 
+    @cached_property
+    def coarse(self) -> float:
+        """Probability that more is off than is usual for a lumped model, among the settings tried."""
+        coarse = np.array([not is_usual(s) for s in self.settings])
+        return float(np.exp(self.levels - log_sum_exp(self.levels)) @ coarse)
+
+    @property
+    def off(self) -> float:
+        """The share of flows by which the model is off under the most likely noise."""
+        return off_by(self.settings[self.best])
+
     def level(self, k: int) -> float:
         """Log marginal likelihood under one noise setting."""
         if (self.sizes < 0).any():  # what presses against zero does not act
@@ -248,7 +259,9 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     return _over_noise(context, bare)
 
 
-def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | None = None) -> Scored:
+def _over_noise(
+    context: Context, bare: Scored, force: Mapping[str, tuple[float, float]] | None = None
+) -> Scored:
     """The score over the noise settings that matter: from the one of the fit to the most likely one, and all
     that lie next to a likely one.
     """
@@ -257,12 +270,12 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
     def level(k: int) -> float:
         if k not in known:
             setting = context.settings[k]
-            gram = bare.seen.grams(_forced(setting.noise, force) if force else setting.noise)
+            gram = bare.seen.grams(replace(setting.noise, force=force))
             known[k] = replace(bare, settings=(setting,), grams=(gram,))
         return float(known[k].levels[0])
 
     # a force on top of form error that is larger than usual would be the same noise once more
-    usual = [k for k, s in enumerate(context.settings) if not force or _is_usual(s.noise)]
+    usual = [k for k, s in enumerate(context.settings) if not force or is_usual(s)]
     start = min(usual, key=lambda k: _distance(context.settings[k].noise, bare.fit.noise))
     queue = [start]
     while queue:
@@ -284,27 +297,30 @@ def _over_noise(context: Context, bare: Scored, force: Mapping[str, float] | Non
 
 
 def _distance(one: Noise, other: Noise) -> float:
-    """How far two noises are apart in slow noise, form error and jitter."""
+    """How far two noises are apart in slow noise, form error, heat that nobody records, and jitter."""
     slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
     form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
-    return slow + form + abs(one.jitter - other.jitter)
+    here, there = (sum((noise.heat or {}).values()) for noise in (one, other))
+    heat = abs(here - there) / max(here + there, 1e-300)
+    return slow + form + heat + abs(one.jitter - other.jitter)
 
 
-def _forced(noise: Noise, force: Mapping[str, float]) -> Noise:
-    """A noise with forces that are so many times the usual process noise, whatever it is elsewhere."""
-    usual = thresholds.SHARE / noise.share
-    return replace(noise, force={state: usual * times for state, times in force.items()})
+def is_usual(setting: Setting) -> bool:
+    """Whether a model is off by no more than is usual."""
+    return off_by(setting) <= thresholds.SHARE
 
 
-def _is_usual(noise: Noise) -> bool:
-    return max(noise.share, noise.form) <= thresholds.SHARE
+def off_by(setting: Setting) -> float:
+    """The share of flows by which a model is off: its laws, its flows, or heat that nobody records."""
+    return max(setting.noise.share, setting.noise.form, setting.level * thresholds.FLOOR)
 
 
 def with_force(context: Context, one: Scored, state: str) -> Scored:
-    """The same fit with a latent force at a state: process noise that is many times as large there."""
+    """The same fit with a latent force at a state: process noise that is many times the usual there."""
     odds = float(np.log(thresholds.ODDS) - np.log(len(context.floor)))
     forced = replace(one, forced=state, log_odds_force=odds)
-    return _over_noise(context, forced, {state: thresholds.UNKNOWN_FORCE})
+    times = thresholds.UNKNOWN_FORCE
+    return _over_noise(context, forced, {state: (times * context.floor[state], times * thresholds.SHARE)})
 
 
 def light(one: Scored) -> Scored:

@@ -12,11 +12,12 @@ from __future__ import annotations
 
 # --- process noise: what a lumped model misses everywhere -------------------------------------------------
 FLOOR = 0.02  # of the largest rms flow of the model, at level one: heat at a body that nobody records
-SHARE = 0.08  # of what flows through a body at level one: form error of a lumped model
-LEVELS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of process noise, integrated over ...
-LEVEL_WEIGHTS = (0.15, 0.35, 0.35, 0.12, 0.03)  # ... with these weights
-FORMS = ((0.0, 0.0), (0.0, 0.1), (0.025, 0.1), (0.08, 0.1), (0.25, 0.25))  # by which laws are off at an
-# operating point, and share of flows into the neighbours of a body: from an exact model to a coarse one ...
+LEVELS = (0.1, 0.3, 1.0, 2.0, 4.0, 8.0)  # of this heat, integrated over ...
+LEVEL_WEIGHTS = (0.15, 0.35, 0.3, 0.11, 0.06, 0.03)  # ... with these weights
+SHARE = 0.08  # of what flows through a body, off from hour to hour: form error of a usual lumped model
+FORMS = ((0.02, 0.0, 0.0), (0.02, 0.0, 0.1), (0.08, 0.025, 0.1), (0.08, 0.08, 0.1), (0.25, 0.25, 0.25))
+# shares of flows: off from hour to hour, at an operating point, and beyond the edge of a body; from an exact
+# model to a coarse one ...
 FORM_WEIGHTS = (0.25, 0.25, 0.25, 0.15, 0.1)  # ... with these weights
 SLOW = (0.0, 0.3, 1.0, 3.0, 10.0)  # slow noise of outputs, shares of the reading noise, integrated over ...
 SLOW_WEIGHTS = (0.35, 0.35, 0.2, 0.08, 0.02)  # ... with these weights

@@ -201,11 +201,10 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
 
 def _nothing(context: Context, found: Search, answer: Scored, candidates: tuple[Named, ...]) -> Verdict:
     """Nothing is missing, unless the model is so coarse that process noise explains whatever there is."""
-    share = max(found.baseline.noise.share, found.baseline.noise.form)
-    if share > thresholds.SHARE:
+    if found.baseline.coarse >= thresholds.NAMED:
         reason = (
-            f"the flows of the model are off by about {100 * share:.0f} %, more than is usual for a lumped "
-            "model, and no effect explains that"
+            f"the flows of the model are off by about {100 * found.baseline.off:.0f} %, more than is usual "
+            "for a lumped model, and no effect explains that"
         )
         return Verdict(UNEXPLAINED, answer, (), candidates, (reason,))
     if context.outliers:

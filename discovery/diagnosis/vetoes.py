@@ -37,12 +37,11 @@ def every_clock(context: Context, answer: Scored, h: Hypothesis) -> str | None:
 
 def far_from_the_machine(_: Context, answer: Scored, h: Hypothesis) -> str | None:
     """What happens in one recording, or in the measuring chain, is told from a model that is nearly right."""
-    share = max(answer.noise.share, answer.noise.form)
-    if share <= thresholds.SHARE or (h.effect.is_physics and not h.effect.is_event):
+    if answer.coarse < thresholds.NAMED or (h.effect.is_physics and not h.effect.is_event):
         return None
     return (
         f"{h.effect.word} at {h.where} is not named: the flows of the model are off by about "
-        f"{100 * share:.0f} %, which may look the same"
+        f"{100 * answer.off:.0f} %, which may look the same"
     )
 
 

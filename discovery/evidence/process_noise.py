@@ -1,9 +1,10 @@
 """What a model misses everywhere: process noise that grows with the flows, slow sensors, late switches.
 
-    s_i(t)^2 = level^2 (floor_i^2 + (share flow_i(t))^2)
+    s_i(t)^2 = (level floor_i)^2 + (share flow_i(t))^2
 
-A lumped model errs the more the more heat flows through a body; and no body is free of heat that nobody
-records. The level is unknown: evidence is integrated over a few of them, and over slow sensor noise.
+No body is free of heat that nobody records, of an unknown level; and a lumped model errs the more the more
+heat flows through a body, by a share that is small for a model that is nearly exact and large for a coarse
+one. Evidence is integrated over a few of each, and over slow sensor noise.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ class Setting:
 
     noise: Noise
     log_weight: float
+    level: float  # of the heat that nobody records
     place: tuple[int, int, int, int]  # on the grid of jitters, slow noises, levels and form errors
 
     def is_next_to(self, other: Setting) -> bool:
@@ -46,14 +48,13 @@ class Prior:
     """What is believed of process noise and slow noise before the recordings are read (`thresholds.py`)."""
 
     floor: float  # of the largest rms flow of the model, at level one
-    share: float  # of the flow through each state, at level one
+    share: float  # of the flow through each state that a usual lumped model is off by
     levels: tuple[float, ...]
     weights: tuple[float, ...]
     slow: tuple[float, ...]  # shares of the reading noise
     slow_weights: tuple[float, ...]
-    forms: tuple[
-        tuple[float, float], ...
-    ]  # shares by which laws are off, and flows beyond the edge of a body
+    forms: tuple[tuple[float, float, float], ...]  # shares of flows that are off from hour to hour, by which
+    # laws are off, and of flows beyond the edge of a body
     form_weights: tuple[float, ...]
 
 
@@ -100,21 +101,21 @@ def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: boo
     found = []
     for place in np.ndindex(*(len(axis) for axis in axes)):
         jitter, slow, level, _ = (axis[k][0] for axis, k in zip(axes, place, strict=True))
-        form, edge = prior.forms[place[3]]
+        share, form, edge = prior.forms[place[3]]
         weight = np.prod([axis[k][1] for axis, k in zip(axes, place, strict=True)])
-        noise = replace(_noise(white, floor, prior, level, slow, jitter), form=form, edge=edge)
-        found.append(Setting(noise, float(np.log(weight / total)), place))
+        noise = replace(_noise(white, floor, level, share, slow, jitter), form=form, edge=edge)
+        found.append(Setting(noise, float(np.log(weight / total)), level, place))
     return tuple(found)
 
 
 def _noise(
-    white: Noise, floor: Mapping[str, float], prior: Prior, level: float, slow: float, jitter: float
+    white: Noise, floor: Mapping[str, float], level: float, share: float, slow: float, jitter: float
 ) -> Noise:
     return replace(
         white,
         slow=tuple(slow * w for w in white.white) if slow else (),
         heat={name: level * value for name, value in floor.items()} if level else None,
-        share=level * prior.share,
+        share=share,
         jitter=jitter,
     )
 
@@ -157,7 +158,7 @@ def _white_with(
     """White level (Y,) of unit innovations with given slow and process noise, and its -log likelihood."""
     white, cost = np.array(start.white), np.inf
     for _ in range(4):
-        noise = _noise(replace(start, white=tuple(white)), floor, prior, level, slow, 0.0)
+        noise = _noise(replace(start, white=tuple(white)), floor, level, level * prior.share, slow, 0.0)
         squares, counts, cost = np.zeros(len(white)), np.zeros(len(white)), 0.0
         for part, residual in zip(seen.filters, seen.residuals, strict=True):
             z, log = part.whitened(noise, residual[:, :, None])

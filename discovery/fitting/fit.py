@@ -17,7 +17,7 @@ from discovery.dynamics import Grid, Trajectory
 from discovery.errors import RunsAwayError
 from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.kalman import innovations
-from discovery.fitting.noise import Noise, readings_as_one, resolution, white_noise
+from discovery.fitting.noise import Noise, readings_as_one, resolution, roughness, white_noise
 from discovery.fitting.problem import Prior, Problem, make_problem
 from discovery.fitting.solve import Loss, Solution, solve
 from discovery.models import Model
@@ -30,8 +30,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 3  # of a fit that also finds the noise, or how much a prior counts
+_ROUNDS = 3  # of a fit that also finds how much a prior counts
+_MOST = 20  # ... or a reading noise that is not stated: it falls from what the start values leave
 _BEGINS = 0.05  # of what a state moves in a recording, how far from its start it may begin
+_SMALL = 0.01  # of the spread of readings: the least noise to begin with, where none is stated
 _ROUGH = 15  # of Levenberg-Marquardt in a round between the first and the last
 
 
@@ -153,13 +155,16 @@ def fit_model(
     problem = problem.spread(current, _first_spreads(problem, theta))
     together = 1.0
     rounds = _ROUNDS if noise is None or nuisance else 1
-    for k in range(rounds):
-        most = max_rounds if k in (0, rounds - 1) else _ROUGH
+    unknown = noise is None and any(stated[name] is None for name in problem.outputs)
+    settled = False
+    for k in range(_MOST):
+        last = (k >= rounds - 1 and not unknown) or settled or k == _MOST - 1
+        most = max_rounds if last or (k == 0 and not unknown) else min(_ROUGH, max_rounds)
         solution = solve(problem, theta, current, loss, most, tolerance, together, goal)
         theta = solution.theta
         if not np.isfinite(solution.jacobian).all():
             raise RunsAwayError(f"model '{model.name}' answers its parameters with numbers without bound")
-        if k == rounds - 1 or solution.ended_early:
+        if last or solution.ended_early:
             break
         left = [problem.residual(t) for t in solution.trajectories]
         settled = True
@@ -168,6 +173,7 @@ def fit_model(
             updated = white_noise(problem.outputs, stated, single, least)
             change = max(abs(np.log(a / b)) for a, b in zip(updated.white, current.white, strict=True))
             settled, current = change < 0.02, updated
+            unknown = unknown and not settled
         if nuisance:
             alone = [innovations(t, current, r) for t, r in zip(solution.trajectories, left, strict=True)]
             before, together = together, readings_as_one(alone)
@@ -175,7 +181,7 @@ def fit_model(
             spreads = _found_spreads(problem, solution.jacobian, theta, together)
             settled = settled and all(abs(np.log(new / old)) < 0.1 for new, old in spreads.values())
             problem = problem.spread(current, {name: new for name, (new, _) in spreads.items()})
-        if settled:
+        if settled and solution.converged:
             break
     excess = _excess(problem, solution) if noise is None and loss == "linear" else 1.0
     covariance, lost = _covariance(problem, solution, together, excess)
@@ -231,16 +237,28 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
 def _first_noise(
     problem: Problem, theta: Array, stated: Mapping[str, float | None], least: Sequence[float]
 ) -> Noise:
-    """The noise to begin with: what the model leaves where the fit begins, and no more than the readings.
+    """The noise to begin with: what the model leaves where the fit begins, and no more than how rough the
+    readings are.
 
-    With too much noise the first round forgets where it began: only the priors count.
+    With too much noise, or outputs weighed otherwise than in the end, the first round forgets where it began.
     """
-    readings = [system.grid.readings for system in problem.systems]
-    most = white_noise(problem.outputs, stated, readings, least)
+    single = [system.grid.single for system in problem.systems]
+    rough = [_rough([r[:, j][np.isfinite(r[:, j])] for r in single]) for j in range(len(problem.outputs))]
     left = [problem.residual(problem.run(s, theta)) * s.grid.per_reading for s in problem.systems]
     begun = white_noise(problem.outputs, stated, left, least)
-    white = [min(a, b) if np.isfinite(a) else b for a, b in zip(begun.white, most.white, strict=True)]
-    return replace(most, white=tuple(white))
+    white = [
+        stated[name] or max(min(a, b) if np.isfinite(a) else b, floor)
+        for name, a, b, floor in zip(problem.outputs, begun.white, rough, least, strict=True)
+    ]
+    return replace(begun, white=tuple(white))
+
+
+def _rough(readings: Sequence[Array]) -> float:
+    """How rough the readings (R,) of a channel are, and no less than a small share of their spread: a logger
+    that interpolates leaves no roughness at all.
+    """
+    spread = np.concatenate(readings)
+    return max(roughness(readings), _SMALL * float(np.std(spread)) if len(spread) else 0.0)
 
 
 def _first_spreads(problem: Problem, theta: Array) -> dict[str, float]:

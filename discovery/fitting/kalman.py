@@ -179,9 +179,9 @@ class Filter:
         t, heat = self.trajectory, noise.heat or {}
         system = t.system
         there = np.array([heat.get(name, 0.0) > 0 for name in system.states])
-        floor = np.array([heat.get(name, 0.0) for name in system.states])
-        times = np.array([(noise.force or {}).get(name, 1.0) for name in system.states])
-        gain = np.sqrt(floor**2 + (noise.share * self.flow) ** 2) * system.scale * there * times
+        own = [(noise.force or {}).get(name, (heat.get(name, 0.0), noise.share)) for name in system.states]
+        floor, share = np.array(own).reshape(-1, 2).T
+        gain = np.hypot(floor, share * self.flow) * system.scale * there
         read = system.grid.read.astype(np.int64)
         response = driven(t.which, t.e, t.w0, t.w1, read, gain) if there.any() else np.zeros((0, 0, 0))
         slow = np.array(noise.slow or ())

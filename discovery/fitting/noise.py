@@ -22,7 +22,7 @@ class Noise:
 
     A lumped model errs the more the more flows: the process noise of a state is the root of `heat`^2 (W, or
     a rate per time unit) and (`share` times what flows through the state)^2, at each instant. States that
-    `heat` does not hold have none, those of `force` so many times as much.
+    `heat` does not hold have none, those of `force` a heat and a share of their own.
     """
 
     outputs: tuple[str, ...]
@@ -30,7 +30,7 @@ class Noise:
     slow: tuple[float, ...] = ()
     heat: Mapping[str, float] | None = None
     share: float = 0.0
-    force: Mapping[str, float] | None = None
+    force: Mapping[str, tuple[float, float]] | None = None
     slow_time: float = SLOW_TIME
     heat_time: float = HEAT_TIME
     form: float = 0.0  # share by which a law of the model is off at an operating point, whenever it is there
@@ -58,6 +58,16 @@ def white_noise(
         found = float(np.sqrt(np.mean(series**2))) if len(series) else 1.0
         white.append(float(stated.get(name) or max(found, floor)))
     return Noise(tuple(outputs), tuple(white))
+
+
+def roughness(readings: Sequence[Array]) -> float:
+    """Standard deviation of white noise, by second differences of consecutive readings (R,) and their median.
+
+    Of x[k-1] - 2 x[k] + x[k+1] white noise makes sqrt(6) times its own; what moves slowly makes nothing.
+    """
+    second = [np.diff(y[np.isfinite(y)], 2) for y in readings]
+    size = np.abs(np.concatenate(second))
+    return float(np.median(size) / 0.6745 / np.sqrt(6)) if len(size) else 0.0
 
 
 def resolution(readings: Sequence[Array]) -> tuple[float, ...]:

@@ -40,6 +40,7 @@ class Solution:
     trajectories: tuple[Trajectory, ...]
     jacobian: Array  # (N, U) of whitened residuals and priors
     cost: float  # half the sum of their squares
+    converged: bool = True  # no step helps any more; else the rounds were used up
     ended_early: bool = False  # it would not have come near its goal
 
 
@@ -87,7 +88,7 @@ def solve(
     now = _whitened(problem, x, noise, together, runs, filters)
     cost, damping = _cost(now.residual, loss), _DAMPING
     jacobian = _jacobian(problem, x, noise, together, now, filters)
-    course, late = [cost], False
+    course, done, late = [cost], len(x) == 0, False
     for left in range(max_rounds if len(x) else 0, 0, -1):
         weight, slope = _weights(now.residual, loss)
         rows = jacobian * weight[:, None]
@@ -111,6 +112,7 @@ def solve(
                 break
             damping *= _TIGHTEN
         if found is None:
+            done = True
             break
         gained = cost - _cost(found.residual, loss)
         x, now = moved, found
@@ -126,7 +128,7 @@ def solve(
         late = len(course) > _PACE and cost - left * (course[-1 - _PACE] - cost) / _PACE > goal
         if done or late:
             break
-    return Solution(x, now.trajectories, jacobian, 0.5 * float(now.residual @ now.residual), late)
+    return Solution(x, now.trajectories, jacobian, 0.5 * float(now.residual @ now.residual), done, late)
 
 
 def cost_under(problem: Problem, theta: Array, trajectories: Sequence[Trajectory], noise: Noise) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid
 from discovery.fitting import Fit, fit_model
+from discovery.fitting.noise import roughness
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.sparse.borrowed import borrowed
@@ -21,7 +22,7 @@ from discovery.sparse.drives import Drives
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.library import Feature, FilteredInputs
 from discovery.sparse.masses import Response, Rules, mass_model, responses_of, within
-from discovery.sparse.optimiser import SparseSearch, features_of, rough_noise
+from discovery.sparse.optimiser import SparseSearch, features_of
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.problem import WHOLE
 
@@ -54,7 +55,7 @@ def discover_masses(
     options = matched(options, data.drives.expressions, campaign.path)
     grids = {r: data.grids[r].part(outputs=[output]) for r in recordings}
     readings = [grids[r].readings[:, 0] for r in recordings]
-    noise = campaign.channels[output].noise or rough_noise(readings)
+    noise = campaign.channels[output].noise or roughness(readings)
     library = FilteredInputs(
         ["time", *data.drives.inputs, "read"],
         [d for d in data.drives.expressions if d not in options.forbid],

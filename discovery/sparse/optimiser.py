@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pysindy.optimizers.base import BaseOptimizer
 
+from discovery.fitting.noise import roughness
 from discovery.sparse.choice import Choice, chosen
 from discovery.sparse.folds import PREDICT, make_blocks
 from discovery.sparse.library import Feature, FilteredInputs, ModelTerms
@@ -110,7 +111,7 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
         cuts = np.cumsum(rows)[:-1]
         readings = tuple(np.split(target, cuts))
         size = float(np.nanstd(target)) or 1.0
-        noise = (self.noise[k] if self.noise else None) or rough_noise(readings) or 1e-3 * size
+        noise = (self.noise[k] if self.noise else None) or roughness(readings) or 1e-3 * size
         counts = [d.shape[1] for d in nuisance]
         zeroed = isinstance(library, FilteredInputs) and library.zeroed
         precision = (
@@ -180,13 +181,3 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
 def features_of(library: FilteredInputs, terms: Terms) -> list[Feature]:
     """The features of a set, in its order."""
     return [library.feature_at(int(f), float(p)) for f, p in zip(terms.family, terms.place, strict=True)]
-
-
-def rough_noise(readings: Sequence[Array]) -> float:
-    """Standard deviation of white noise, by second differences of consecutive readings and their median.
-
-    Of x[k-1] - 2 x[k] + x[k+1] white noise makes sqrt(6) times its own; what moves slowly makes nothing.
-    """
-    second = [np.diff(y[np.isfinite(y)], 2) for y in readings]
-    size = np.abs(np.concatenate(second))
-    return float(np.median(size) / 0.6745 / np.sqrt(6)) if len(size) else 0.0

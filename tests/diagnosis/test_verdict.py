@@ -43,15 +43,19 @@ class Model:
     hypotheses: tuple[Hypothesis, ...]
     evidence: float
     forced: str = ""
-    share: float = thresholds.SHARE
+    off: float = thresholds.SHARE
 
     @property
     def keys(self) -> frozenset[Key]:
         return frozenset(h.key for h in self.hypotheses)
 
     @property
+    def coarse(self) -> float:
+        return float(self.off > thresholds.SHARE)
+
+    @property
     def noise(self) -> Any:
-        return SimpleNamespace(share=self.share, form=0.0)
+        return SimpleNamespace()
 
     @property
     def fit(self) -> Any:
@@ -267,7 +271,7 @@ def test_a_name_has_to_matter_on_recordings_left_out(
     ("models", "world", "words", "reason"),
     [
         ([Model((SUN,), 50.0)], World(("r2",)), {"unmeasured_heat": 0.98}, "record the machine once more"),
-        ([Model((OFFSET,), 50.0, share=0.24)], World(), {"sensor_offset": 0.98}, "off by about 24 %"),
+        ([Model((OFFSET,), 50.0, off=0.24)], World(), {"sensor_offset": 0.98}, "off by about 24 %"),
         (
             [Model(tuple(claim("clock_shift", recording=r) for r in ("r1", "r2")), 50.0)],
             World(),
@@ -286,7 +290,7 @@ def test_a_veto_of_physics_stands_against_any_probability(
 
 
 def test_a_law_that_always_acts_needs_no_model_that_is_nearly_right() -> None:
-    found = Tried([Model((FLUID,), 50.0, share=0.24), Model((), 0.0)])
+    found = Tried([Model((FLUID,), 50.0, off=0.24), Model((), 0.0)])
     assert said(found, {"fluid_convection": 0.9}).word == "missing physics"
 
 

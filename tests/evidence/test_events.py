@@ -18,7 +18,7 @@ from tests.effects.sample import sample, trajectory
 from tests.machine import Array, Inputs
 
 NOISE = Noise(tuple(machine.SEEN), (machine.NOISE,) * 3)
-SETTING = Setting(NOISE, 0.0, (0, 0, 0, 0))
+SETTING = Setting(NOISE, 0.0, 1.0, (0, 0, 0, 0))
 SLAB = Slab(np.array([60.0]), np.array([3.5]), np.array([0.0]))
 
 

@@ -35,7 +35,7 @@ CASES = {
         (),
         {"a": 3.0, "b": 9.0},
         0.3,
-        force={"a": 5.0},
+        force={"a": (15.0, 1.5)},
         slow_time=5000.0,
         heat_time=9000.0,
     ),
@@ -77,7 +77,8 @@ def dense(trajectory: Trajectory, noise: Noise) -> Array:
     sizes = sizes_of_flows(trajectory)
     for i, name in enumerate("ab"):
         floor = (noise.heat or {}).get(name, 0.0)
-        gain = (noise.force or {}).get(name, 1.0) * np.sqrt(floor**2 + (noise.share * sizes[:, i]) ** 2)
+        heat, share = (noise.force or {}).get(name, (floor, noise.share))
+        gain = np.sqrt(heat**2 + (share * sizes[:, i]) ** 2)
         gain *= floor > 0
         answer = np.zeros((count, outs, count))  # to a unit force, held between two readings
         for k in range(count - 1):
