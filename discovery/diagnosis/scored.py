@@ -316,11 +316,13 @@ def off_by(setting: Setting) -> float:
 
 
 def with_force(context: Context, one: Scored, state: str) -> Scored:
-    """The same fit with a latent force at a state: process noise that is many times the usual there."""
+    """The same fit with a latent force at a state: many times the usual unrecorded heat, and flows as far off as
+    those of a coarse model.
+    """
     odds = float(np.log(thresholds.ODDS) - np.log(len(context.floor)))
     forced = replace(one, forced=state, log_odds_force=odds)
-    times = thresholds.UNKNOWN_FORCE
-    return _over_noise(context, forced, {state: (times * context.floor[state], times * thresholds.SHARE)})
+    heat, (coarse, *_) = thresholds.UNKNOWN_FORCE * context.floor[state], thresholds.FORMS[-1]
+    return _over_noise(context, forced, {state: (heat, coarse)})
 
 
 def light(one: Scored) -> Scored:

@@ -22,7 +22,7 @@ FORM_WEIGHTS = (0.25, 0.25, 0.25, 0.15, 0.1)  # ... with these weights
 SLOW = (0.0, 0.3, 1.0, 3.0, 10.0)  # slow noise of outputs, shares of the reading noise, integrated over ...
 SLOW_WEIGHTS = (0.35, 0.35, 0.2, 0.08, 0.02)  # ... with these weights
 FORM = 0.2  # of the flow of a named effect, at each operating point: no law is quite that of nature
-UNKNOWN_FORCE = 3.0  # times the process noise of a body at level one: a latent force, "none of these"
+UNKNOWN_FORCE = 10.0  # times the unrecorded heat of a body at level one: a latent force, "none of these"
 
 # --- effects ----------------------------------------------------------------------------------------------
 BELIEF = 0.5  # log of the factor within which the start values of a hand-built model are believed

@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.crossvalidation import left_out
-from discovery.diagnosis.scored import scan_model, with_force
+from discovery.diagnosis.scored import is_usual, scan_model, with_force
 from tests.diagnosis.parts import bare, claim_of, dry, scored_of, wetted
 
 
@@ -27,6 +27,23 @@ def test_evidence_is_integrated_over_noise_settings() -> None:
     total = one.levels.max() + np.log(np.sum(np.exp(one.levels - one.levels.max())))
     assert one.evidence == pytest.approx(total + h.log_odds)
     assert one.best == int(np.argmax(one.levels))
+
+
+def test_heat_that_nobody_records_says_nothing_of_the_flows() -> None:
+    """Much unrecorded heat at a model whose flows are right, and the reverse: both are among the settings. A model is coarse where more than 8 % of its flows may be off with most of the probability."""
+    floors = {tuple(s.noise.heat.values()) for s in dry().settings if s.noise.heat and s.noise.share == 0.02}
+    shares = {s.noise.share for s in dry().settings if s.level == 1.0}
+    assert len(floors) == len(thresholds.LEVELS)
+    assert shares == {share for share, _, _ in thresholds.FORMS}
+    level = {s.level: next(iter(s.noise.heat.values())) for s in dry().settings if s.noise.heat}
+    assert level[4.0] == pytest.approx(4.0 * level[1.0])
+    usual = [s for s in dry().settings if is_usual(s)]
+    assert {(s.level <= 4.0, s.noise.share <= 0.08, s.noise.form <= 0.08) for s in usual} == {
+        (True, True, True)
+    }
+    settings = tuple(s for s in dry().settings if not is_usual(s))[: len(bare().settings)]
+    assert replace(bare(), settings=settings).coarse == pytest.approx(1.0)
+    assert bare().coarse < 1.0
 
 
 def test_an_interval_is_of_95_percent() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.signal import lfilter
 
 from discovery.fitting import fit_model, make_problem, predict_recording
 from discovery.fitting.covariance import covariance_of
+from discovery.fitting.solve import Solution, solve
 from discovery.fitting.starts import warm_start
 from discovery.models import Model, Parameter, State
 from discovery.models.reduced import reduced
@@ -277,3 +279,28 @@ def test_a_start_that_a_formula_sets_moves_with_its_parameters() -> None:
     free = predict_recording(fit.model, campaign, "r", ("T",), (0.01,))
     np.testing.assert_allclose(free.x[:, 0], fit.trajectories[0].x[:, 0], atol=0.01)
     np.testing.assert_allclose(free.x[:, 0], 20 + y, atol=0.02)
+
+
+@pytest.mark.parametrize(("every", "least"), [(1, 1.0), (8, 0.01)], ids=["white noise", "interpolated"])
+def test_a_noise_that_is_not_stated_begins_with_how_rough_readings_are(
+    every: int, least: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Start values are far off (rms of 40 noises), and yet outputs weigh from the first step as in the end; a
+    logger that draws lines between every eighth reading leaves no roughness.
+    """
+    r = recording(5, noise=1.7)
+    y, k = r.values["y"], np.arange(len(r.time))
+    logged = replace(r, values={**r.values, "y": np.interp(k, k[::every], y[::every])})
+    unstated = {name: replace(channel, noise=None) for name, channel in CHANNELS.items()}
+    begun: list[float] = []
+
+    def noted(*args: Any, **options: Any) -> Solution:
+        begun.append(args[2].white[0])
+        return solve(*args, **options)
+
+    monkeypatch.setattr("discovery.fitting.fit.solve", noted)
+    fit = fit_model(model(a=Parameter(0.05)), Campaign("c", unstated, {"r5": logged}), ["r5"])
+    expected = 1.7 if every == 1 else least * float(np.std(logged.values["y"]))
+    assert begun[0] == pytest.approx(expected, rel=0.35 if every == 1 else 1e-9)
+    assert begun[-1] == pytest.approx(fit.noise.white[0], rel=0.03)
+    assert float(np.std(fit.residuals()["r5"])) == pytest.approx(fit.noise.white[0], rel=0.03)
