@@ -30,7 +30,7 @@ def test_evidence_is_integrated_over_noise_settings() -> None:
 
 
 def test_heat_that_nobody_records_says_nothing_of_the_flows() -> None:
-    """Much unrecorded heat at a model whose flows are right, and the reverse: both are among the settings. A model is coarse where more than 8 % of its flows may be off with most of the probability."""
+    """Both much unrecorded heat at a model whose flows are right, and the reverse, are among the settings."""
     floors = {tuple(s.noise.heat.values()) for s in dry().settings if s.noise.heat and s.noise.share == 0.02}
     shares = {s.noise.share for s in dry().settings if s.level == 1.0}
     assert len(floors) == len(thresholds.LEVELS)
