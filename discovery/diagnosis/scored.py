@@ -316,8 +316,8 @@ def off_by(setting: Setting) -> float:
 
 
 def with_force(context: Context, one: Scored, state: str) -> Scored:
-    """The same fit with a latent force at a state: many times the usual unrecorded heat, and flows that are off
-    as far as those of a coarse model.
+    """The same fit with a latent force at a state: many times the usual unrecorded heat, and flows that are
+    off as far as those of a coarse model.
     """
     odds = float(np.log(thresholds.ODDS) - np.log(len(context.floor)))
     forced = replace(one, forced=state, log_odds_force=odds)

@@ -223,9 +223,9 @@ def _apart(found: Search, answer: Scored, rest: Sequence[Named]) -> tuple[str, .
 
 
 def _added(found: Search, answer: Scored, h: Hypothesis) -> float:
-    """Log evidence that goes with an effect: what the model without it lacks."""
+    """Log evidence that goes with an effect: what the model without it lacks, or the one without any."""
     without = found.tried.get(answer.keys - {h.key}, found.baseline)
-    return answer.evidence - without.evidence
+    return answer.evidence - max(without.evidence, found.baseline.evidence)
 
 
 def _named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis) -> Named:
