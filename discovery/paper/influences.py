@@ -38,7 +38,8 @@ def equation_8(m: Material) -> Chapter:
         tables.append(compared)
     dry = m.form.dry_load
     if dry:
-        compared, worst = _compared(m, name, dry, "Load identified on a wet and on a dry machine")
+        wet = m.form.wet_load or name
+        compared, worst = _compared(m, wet, dry, "Load identified on a wet and on a dry machine")
         tables.append(compared)
         if worst:
             error, ours, theirs = worst

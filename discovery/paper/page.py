@@ -8,7 +8,7 @@ from typing import Any
 
 from discovery.errors import RunsAwayError, UserError
 from discovery.evaluation.paper import SOURCE
-from discovery.evaluation.rolematrix import left_out, matrix, steadiness
+from discovery.evaluation.rolematrix import left_out, matrix, not_seen, steadiness
 from discovery.experiment.experiment import Experiment
 from discovery.experiment.fitted import Fitted
 from discovery.experiment.results import command_of
@@ -100,7 +100,8 @@ def _worst(roles: Mapping[str, Any]) -> list[str]:
         ratios: dict[str, list[float]] = {}
         for found in model["rms"].values():
             for role, judged in found.items():
-                seen = [one[role] for other, one in found.items() if other != role and one.get(role)]
+                having = [other for other in found if role not in not_seen(model, other)]
+                seen = [found[other][role] for other in having if found[other].get(role)]
                 if judged.get(role) and seen:
                     ratios.setdefault(role, []).append(judged[role] / (sum(seen) / len(seen)))
         if ratios:
@@ -110,6 +111,8 @@ def _worst(roles: Mapping[str, Any]) -> list[str]:
                 f"{name} carries over worst to '{worst}': {mean[worst]:.2f} times the rms of its fits "
                 "that saw it."
             )
+        elif model["rms"]:
+            out.append(f"{name} is made from recordings of its own: it saw no role in any fold.")
     return out
 
 
