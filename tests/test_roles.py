@@ -51,7 +51,9 @@ def test_a_fold_is_fitted_to_all_other_roles(path: Path) -> None:
 def test_one_influence_at_a_time_is_identified_again_in_each_fold(path: Path) -> None:
     """Its own recordings stay, cycles that play a role are those of the fold; without a role it sees none."""
     text = path.read_text().replace('"100 mm" = ["c"]', "").replace('held_out = ["c"]', "held_out = []")
-    path.write_text(text.replace('P = ["a", "b"]', 'P = ["c", "a"]').replace('T_env = ["a"]', 'T_env = ["c"]'))
+    path.write_text(
+        text.replace('P = ["a", "b"]', 'P = ["c", "a"]').replace('T_env = ["a"]', 'T_env = ["c"]')
+    )
     experiment = load_experiment(path)
     fold = without_role(experiment, "fitting").form.models["apart"]
     assert fold.separate == {"T_env": ["c"], "P": ["c", "b"]}  # type: ignore[union-attr]

@@ -149,7 +149,10 @@ def _entry(entry: ModelEntry, seen: Sequence[str], played: set[str]) -> ModelEnt
         changed["also"] = [name for name in entry.also if name not in played]
     if separate(entry):
         changed["separate"] = {
-            channel: [*(r for r in recordings if r not in played), *(seen if set(recordings) & played else ())]
+            channel: [
+                *(r for r in recordings if r not in played),
+                *(seen if set(recordings) & played else ()),
+            ]
             for channel, recordings in separate(entry).items()
         }
     return entry.model_copy(update=changed)
