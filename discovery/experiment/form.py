@@ -171,8 +171,7 @@ class PaperForm(Strict):
     dry: str | None = Field(None, description="the same warm-up without fluid, figure 3")
     compensated: list[str] = Field([], description="recordings replayed with active compensation")
     speeding: list[str] = Field([], description="models that differ in eq. (6) alone")
-    wet_load: str | None = Field(None, description="eq. (8) with the load from its own recording, wet")
-    dry_load: str | None = Field(None, description="the same with the load from a dry machine")
+    dry_load: str | None = Field(None, description="eq. (8) with the load from a dry machine")
     cooling: str | None = Field(None, description="eq. (8) with the axis cooling power as u_2")
     nozzle: str | None = Field(None, description="recording in which height and flow of the jet matter")
     flooded: str | None = Field(None, description="recording in which they do not")
@@ -189,7 +188,7 @@ class PaperForm(Strict):
 
     def models(self) -> list[tuple[str, str]]:
         """What it says of models: key and model."""
-        keys = ("thermobalance", "superposition", "reduced", "wet_load", "dry_load", "cooling")
+        keys = ("thermobalance", "superposition", "reduced", "dry_load", "cooling")
         alone = [(key, getattr(self, key)) for key in keys]
         return [(key, name) for key, name in alone if name] + [("speeding", name) for name in self.speeding]
 

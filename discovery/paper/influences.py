@@ -43,8 +43,7 @@ def equation_8(m: Material) -> Chapter:
         tables.append(compared)
     dry = m.form.dry_load
     if dry:
-        wet = m.form.wet_load or name
-        compared, worst = _compared(m, wet, dry, "Load identified on a wet and on a dry machine")
+        compared, worst = _compared(m, name, dry, "Load identified on a wet and on a dry machine")
         tables.append(compared)
         if worst:
             error, ours, theirs = worst

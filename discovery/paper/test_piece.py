@@ -52,7 +52,8 @@ def test_piece(m: Material) -> Chapter | None:
                 data = render(revised[0])
                 after = from_document(*open_seal(data, exported.model.name), exported.model.name).model
                 rms.append((recording, f"revised, {a_day} a day", *_left(m, after, recording)))
-            shows.append(f"{recording}, {a_day} features a day: {found.verdict}; {says}.")
+            answer = "no change" if found.verdict == "nothing" else found.verdict
+            shows.append(f"{recording}, {a_day} features a day: {answer}; {says}.")
     header = ("rms", "model", *(f"{e} [{m.unit(e)}]" for e in m.errors))
     return Chapter(
         "test-piece",
