@@ -107,7 +107,16 @@ def _gone_through(m: Material, name: str) -> tuple[dict[str, Active], list[str]]
         "readings taken while it was ready. Before, it has just been switched on and knows no start.",
         "The uncompensated errors, reconstructed from reading and applied correction, are those of the plant "
         f"within {worst:.1g} µm.",
+        *(line for recording, run in runs.items() for line in _guarded(m, name, recording, run)),
     ]
+
+
+def _guarded(m: Material, name: str, recording: str, run: Active) -> list[str]:
+    """What the guards of the runtime say of a recording, and what the model leaves there without them."""
+    scores = m.results["models"][name]["recordings"].get(recording, {})
+    free = ", ".join(f"{e} {one['rms']:.2g} {m.unit(e)}" for e, one in scores.items())
+    without = f" In a free run, without guards, it leaves (rms) {free}." if free else ""
+    return [f"{recording}: the runtime reports '{remark}'.{without}" for remark in run.remarks]
 
 
 def _means(m: Material, runs: dict[str, Active], parts: dict[str, str]) -> Table | None:
