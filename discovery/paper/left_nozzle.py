@@ -65,8 +65,8 @@ def left_nozzle(m: Material) -> Chapter | None:
         (
             "What the model has no body for: fluid on a cover shows as fluid on the bodies that carry the "
             "cover.",
-            "The start: only the first reading says how warm an unseen machine was, so its first hours may be "
-            "the largest part of what the repaired models leave.",
+            "The start: only the first reading says how warm an unseen machine was, so its first hours "
+            "may be the largest part of what the repaired models leave.",
             "The machine of the paper: it prints no figures of where the fluid went.",
         ),
     )
