@@ -56,7 +56,7 @@ def left_nozzle(m: Material) -> Chapter | None:
     notes = [f"How '{r}' was made: {note}." for r, note in made.items() if note]
     return Chapter(
         "left-nozzle",
-        "Figure 8 (nozzle on the left): what changed, and where",
+        "Nozzle on the left (figure 8, table 1): what changed, and where",
         "The outlet is moved to the left, so that most of the fluid is spread on the structure. The model "
         "is not changed; E_A0C improves by 32 % instead of 60 %.",
         (_named(cases), _rms(experiment, models)),
