@@ -48,6 +48,26 @@ def test_a_fold_is_fitted_to_all_other_roles(path: Path) -> None:
     assert experiment.fit == ("a", "b")  # the experiment itself stays
 
 
+def test_one_influence_at_a_time_is_identified_again_in_each_fold(path: Path) -> None:
+    """Its own recordings stay, cycles that play a role are those of the fold; without a role it sees none."""
+    text = path.read_text().replace('"100 mm" = ["c"]', "").replace('held_out = ["c"]', "held_out = []")
+    path.write_text(
+        text.replace('P = ["a", "b"]', 'P = ["c", "a"]').replace('T_env = ["a"]', 'T_env = ["c"]')
+    )
+    experiment = load_experiment(path)
+    fold = without_role(experiment, "fitting").form.models["apart"]
+    assert fold.separate == {"T_env": ["c"], "P": ["c", "b"]}  # type: ignore[union-attr]
+    folds = [fold_of(experiment, "apart", role) for role in ("fitting", "validation")]
+    assert [fold.unseen for fold in folds] == [("fitting",), ("validation",)]
+    found = summary(folds, ["fitting", "validation"])
+    spreads = {n: p["sd"] for term in found["terms"].values() for n, p in term["parameters"].items()}
+    assert spreads["p1_E_Y0C"] == 0.0  # of T_env, from "c" alone
+    assert spreads["p5_E_Y0C"] > 0.0  # of P, from "c" and the other role
+    path.write_text(path.read_text().replace('P = ["c", "a"]', 'P = ["c"]'))
+    alone = fold_of(load_experiment(path), "apart", "fitting")
+    assert alone.unseen == ("fitting", "validation")
+
+
 def test_a_fold_does_not_see_what_is_left_out(path: Path) -> None:
     before = {
         name: fold_of(load_experiment(path), name, "validation") for name in ("reduced", "apart", "one_body")
@@ -87,9 +107,9 @@ def test_the_matrix_is_what_a_run_without_the_role_finds(path: Path) -> None:
 
 def test_terms_and_parameters_over_the_folds() -> None:
     folds = [
-        Fold("m", "a", {"E": {"a": 3.0, "b": 1.0}}, {"loss": {"k": 1.0}, "gap": {"g": 9.0}}),
-        Fold("m", "b", {"E": {"a": 1.0, "b": 5.0}}, {"loss": {"k": 3.0}}),
-        Fold("m", "c", {}, {}, ("diverges",)),
+        Fold("m", "a", {"E": {"a": 3.0, "b": 1.0}}, {"loss": {"k": 1.0}, "gap": {"g": 9.0}}, ("a",)),
+        Fold("m", "b", {"E": {"a": 1.0, "b": 5.0}}, {"loss": {"k": 3.0}}, ("b",)),
+        Fold("m", "c", {}, {}, lost=("diverges",)),
     ]
     found = summary(folds, ["a", "b"])
     assert found["terms"]["loss"]["share"] == 1.0

@@ -103,10 +103,11 @@ def _windows(
         for h in values:
             if not h.acts_in(run):
                 continue
-            place = h.states[0] if h.states else ""
-            heat = heat_of(best, trajectory, h)
-            series = 0.5 * (heat[0::2] + heat[1::2])
-            found += _spans(time, series, 0.5 * float(np.percentile(np.abs(series), 95)), run, place, offset)
+            for place in dict.fromkeys(t.into for t in h.terms) if h.states else ("",):
+                heat = heat_of(best, trajectory, h, place)
+                series = 0.5 * (heat[0::2] + heat[1::2])
+                level = 0.5 * float(np.percentile(np.abs(series), 95))
+                found += _spans(time, series, level, run, place, offset)
     if not values and forces and forces[0].gain > 0:
         f = forces[0]
         for run, heat in f.heat.items():

@@ -99,17 +99,18 @@ def of_free_heat(baseline: Scored, f: Force, seed: int = 0) -> str | None:
     return _rule(_path(tree, names), switches or set())
 
 
-def heat_of(best: Scored, trajectory: Trajectory, h: Hypothesis) -> Array:
-    """What an effect lets flow into its first body, or into all where it has none, at the ends of the steps
-    (2 K,), W or rate.
+def heat_of(best: Scored, trajectory: Trajectory, h: Hypothesis, body: str = "") -> Array:
+    """What an effect lets flow into a body (default: its first), or into all where it has none, at the ends
+    of the steps (2 K,), W or rate.
     """
+    body = body or (h.states[0] if h.states else "")
     heat = np.zeros(2 * len(trajectory.system.grid.step))
     env: Mapping[str, Array | float] = {
         **trajectory.at_ends(),
         **best.model.values(trajectory.system.grid.recording),
     }
     for term in h.terms:
-        if not h.states or term.into == h.states[0]:
+        if not body or term.into == body:
             flow = evaluate(term.expression, env, memory=trajectory.system.ends).value
             heat = heat + np.broadcast_to(flow, heat.shape)
     return heat

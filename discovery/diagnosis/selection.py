@@ -99,14 +99,24 @@ class Search:
         return self.scans[one.keys]
 
     def _grown(self, current: Scored) -> Scored:
-        """Add the claim that adds most, while one does."""
+        """Add the claim that adds most, or let an effect act at more places, while one of these adds."""
         while len(current.hypotheses) < MOST:
             best = self._refitted(current, current.hypotheses, _hopeful(self.scanned(current).claims, REFITS))
+            best = max(best, self._widened(current), key=lambda one: one.evidence)
             if best.evidence <= current.evidence:
                 break
             current = best
             self.tell(f"{best.hypotheses[-1].effect.title}, {best.hypotheses[-1].where}")
         return current
+
+    def _widened(self, current: Scored) -> Scored:
+        """The best refit in which an effect acts at its places and more; `current` where none is better."""
+        best = current
+        for h in current.hypotheses:
+            others = tuple(o for o in current.hypotheses if o.key != h.key)
+            wider = [c for c in self.scanned(current).without[h.key] if c.hypothesis.widens(h)]
+            best = max(best, self._refitted(current, others, wider), key=lambda one: one.evidence)
+        return best
 
     def _questioned(self, current: Scored) -> Scored:
         """Take each effect out, and see whether it is needed and what would stand in its place."""

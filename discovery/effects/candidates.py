@@ -67,6 +67,8 @@ def with_shapes(h: Hypothesis) -> list[Hypothesis]:
 
 
 def _claims(effect: Effect, model: Model, scene: Scene) -> Iterator[Hypothesis]:
+    if any(scene.channels[name].role in effect.unless for name in scene.largest):
+        return
     used = names(parse(effect.formula, f"effect {effect.word}"))
     any_input = () if effect.place in ("input temperature", "inputs of a recording") else (INPUT, LEVEL, RATE)
     wanted = [variable for variable in (*ROLE_OF, *any_input) if variable in used]
@@ -218,8 +220,11 @@ def _naming(
 
 def _extras(effect: Effect, model: Model, spot: Spot) -> tuple[str, ...]:
     """What the names of several amplitudes end with: one for each error that is seen by itself, and, in a
-    model without capacities, where what leaves one body in K/h is not what enters the other, one for each.
+    model without capacities, where what leaves one body in K/h is not what enters the other, one for each;
+    one for each body that an effect spreads over.
     """
+    if spot.sizes:
+        return spot.bodies
     if len(spot.outputs) > 1 and effect.place != "seat":
         return spot.outputs
     if _is_exchange(effect, spot) and not model.states[spot.bodies[0]].capacity:
@@ -249,7 +254,9 @@ def _changes(
             for k, name in enumerate(spot.outputs)
         }
     if spot.each:
-        return tuple(_flow(effect, formula, naming.sized(effect), (b,)) for b in spot.bodies), {}
+        sizes = [naming.sized(effect, k if spot.sizes else 0) for k in range(len(spot.bodies))]
+        pairs = zip(spot.bodies, sizes, strict=True)
+        return tuple(_flow(effect, formula, size, (b,)) for b, size in pairs), {}
     if len(naming.amplitudes) > 1:
         ways = (spot.bodies, spot.bodies[::-1])
         flows = (_flow(effect, formula, naming.sized(effect, k), way) for k, way in enumerate(ways))

@@ -155,8 +155,9 @@ class Effect:
     the error without the effect. Where states have no capacity (phenomenological models) it is a rate.
 
     `search`: how its instants are found, if it has any; `acts`: in all recordings, in one, or from one on.
-    `shared`: also offered at all its places at once, with one size. `roles`: of the recorded inputs that its
-    formula may follow.
+    `shared`: also offered at all its places at once, with one size. `spreads`: also offered at two linked
+    bodies at once, with a size at each. `roles`: of the recorded inputs that its formula may follow;
+    `unless`: of a recorded input that would say that it acts, so that it is not offered where one moves.
     """
 
     word: str
@@ -172,7 +173,9 @@ class Effect:
     search: Literal["shapes", "window", "step", "single readings"] = "shapes"
     acts: Literal["always", "in one recording", "from a recording on"] = "always"
     shared: bool = False
+    spreads: bool = False
     roles: tuple[str, ...] = ()
+    unless: tuple[str, ...] = ()
     examples: tuple[Example, ...] = field(default=())
 
     @property

@@ -60,6 +60,11 @@ class Hypothesis:
         """Whether outputs are shifted by something that does not depend on what they showed before."""
         return any(BEFORE.id not in names(change) for change in self.shown.values()) and not self.states
 
+    def widens(self, other: Hypothesis) -> bool:
+        """Whether it is the same law at the bodies of another one and more."""
+        same = (self.effect, self.recording, self.channels) == (other.effect, other.recording, other.channels)
+        return same and set(self.states) > set(other.states)
+
     def acts_in(self, recording: str) -> bool:
         """Whether it acts in a recording."""
         return self.recording is None or recording in self.acting

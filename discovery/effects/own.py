@@ -116,6 +116,7 @@ class EffectForm(Strict):
         None, description="default: in one recording where its place or an instant says so, else always"
     )
     shared: bool = Field(False, description="also with one size at all its bodies at once")
+    spreads: bool = Field(False, description="also at two linked bodies at once, with a size at each")
     source: str = "given in the experiment file"
 
     def effect(self) -> Effect:
@@ -155,6 +156,7 @@ class EffectForm(Strict):
             search=("shapes", "step", "window")[instants],
             acts=self.acts or ("in one recording" if of_one else "always"),
             shared=self.shared,
+            spreads=self.spreads,
             roles=tuple(self.roles),
         )
 

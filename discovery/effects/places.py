@@ -17,7 +17,8 @@ TEMPERATURES = ("degC", "K")
 @dataclass(frozen=True)
 class Spot:
     """One place: `bodies` that heat enters (and, for an exchange, leaves), `terms` of the model that change,
-    `outputs` that show more. `each`: one law of one size at each of the bodies.
+    `outputs` that show more. `each`: one law at each of the bodies, of one size or, with `sizes`, of a size
+    of its own at each.
     """
 
     bodies: tuple[str, ...] = ()
@@ -25,6 +26,7 @@ class Spot:
     outputs: tuple[str, ...] = ()
     channel: str = ""
     each: bool = False
+    sizes: bool = False
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,9 @@ def spots(
         yield from (Spot((b,)) for b in alone)
         if effect.shared and len(group := _group(effect, parts, alone)) > 1:
             yield Spot(group, each=True)
+        if effect.spreads:
+            pairs = (p for p in combinations(alone, 2) if frozenset(p) in parts.links)
+            yield from (Spot(p, each=True, sizes=True) for p in pairs)
         return
     role = {name: channel.role for name, channel in channels.items()}
     match effect.place:

@@ -21,10 +21,16 @@ def matrix(roles: Mapping[str, Any], error: str, unit: str = "") -> Table:
     rows: list[tuple[str | float | None, ...]] = []
     for name, model in roles["models"].items():
         for without, judged in model["rms"].get(error, {}).items():
-            cells = [_cell(judged.get(role), unseen=role == without) for role in order]
+            cells = [_cell(judged.get(role), unseen=role in not_seen(model, without)) for role in order]
             rows.append((name, f"without {without}", *cells))
     label = f"{error} [{unit}]" if unit else error
     return Table(f"{label}: rms; in brackets: left out of fit and search", ("Model", "", *order), tuple(rows))
+
+
+def not_seen(model: Mapping[str, Any], without: str) -> list[str]:
+    """Roles that a fold of a model saw no recording of; runs of earlier versions do not say it."""
+    found: list[str] = model.get("unseen", {}).get(without, [without])
+    return found
 
 
 def _cell(value: float | None, *, unseen: bool) -> str | None:
@@ -35,7 +41,7 @@ def _cell(value: float | None, *, unseen: bool) -> str | None:
 
 def left_out(roles: Mapping[str, Any], units: Mapping[str, str]) -> Table:
     """One line for each model and error: rms on each role when that role was left out, and the mean of its
-    fits on the roles that they saw.
+    fits on the roles that they saw, if they saw one.
     """
     order = list(roles["recordings"])
     rows: list[tuple[str | float | None, ...]] = []
@@ -46,7 +52,7 @@ def left_out(roles: Mapping[str, Any], units: Mapping[str, str]) -> Table:
                 value
                 for without, judged in found.items()
                 for role, value in judged.items()
-                if role != without and value is not None and math.isfinite(value)
+                if role not in not_seen(model, without) and value is not None and math.isfinite(value)
             ]
             label = f"{error} [{units[error]}]" if units.get(error) else error
             rows.append((name, label, *unseen, sum(seen) / len(seen) if seen else None))

@@ -72,6 +72,9 @@ class ModelFolds(Strict):
         description="by error, role left out, role judged on"
     )
     terms: dict[str, Steadiness]
+    unseen: dict[str, list[str]] = Field(
+        description="by role left out, the roles of which it saw no recording"
+    )
     lost: list[str] = Field(description="what went wrong")
 
 

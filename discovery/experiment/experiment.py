@@ -201,6 +201,8 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
     for word, name in form.paper.models() if form.paper else []:
         if name not in form.models:
             raise _mistake(path, ("paper", word), f"no model '{name}'; {suggest(name, list(form.models))}")
+    if form.paper and form.paper.left_nozzle and not (path.parent / form.paper.left_nozzle).is_file():
+        raise _mistake(path, ("paper", "left_nozzle"), f"there is no experiment '{form.paper.left_nozzle}'")
     for section in ("mismatch", "export"):
         chosen = getattr(form, section)
         if chosen and chosen.model not in form.models:

@@ -176,12 +176,14 @@ class PaperForm(Strict):
     nozzle: str | None = Field(None, description="recording in which height and flow of the jet matter")
     flooded: str | None = Field(None, description="recording in which they do not")
     symmetric: str | None = Field(None, description="error that symmetry keeps small, E_X0C")
+    test_piece: list[str] = Field([], description="recordings of which few readings recalibrate the model")
+    left_nozzle: str | None = Field(None, description="experiment that diagnoses the nozzle on the left")
 
     def recordings(self) -> list[tuple[str, str]]:
         """What it says of recordings: key and recording."""
         alone = [(key, getattr(self, key)) for key in ("wet", "dry", "nozzle", "flooded")]
         return [(key, name) for key, name in alone if name] + [
-            ("compensated", name) for name in self.compensated
+            (key, name) for key in ("compensated", "test_piece") for name in getattr(self, key)
         ]
 
     def models(self) -> list[tuple[str, str]]:

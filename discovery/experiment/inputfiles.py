@@ -20,6 +20,9 @@ def input_files(experiment: Experiment) -> dict[str, Path]:
         match entry:
             case FileEntry(file=name) | SparseOptions(built_on_file=True, baseline=name):
                 files[name] = experiment.path.parent / name
+    paper = experiment.form.paper
+    if paper is not None and paper.left_nozzle is not None:
+        files[paper.left_nozzle] = experiment.path.parent / paper.left_nozzle
     return files
 
 

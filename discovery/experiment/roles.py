@@ -3,7 +3,7 @@
 A role is a part of the experiment: fitting cycle, validation cycle, left nozzle, nozzle at 100 mm, warm-up. A
 fold sees the recordings of all other roles and nothing else: structure, parameters, start values and
 thresholds come from these. What it leaves on each role is the matrix "found without / judged on"; on its
-diagonal stands what nobody has seen.
+diagonal stands what nobody has seen. A model that is made from recordings of its own has seen no role at all.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from discovery.errors import RunsAwayError, UserError
 from discovery.experiment.experiment import Experiment
 from discovery.experiment.fitted import Fitted
-from discovery.experiment.form import ModelEntry
+from discovery.experiment.form import ModelEntry, separate
 from discovery.experiment.modelfits import fit_entry
 from discovery.models import Model
 from discovery.progress import Progress, silent
@@ -32,13 +32,14 @@ Roles = Mapping[str, Sequence[str]]
 @dataclass(frozen=True)
 class Fold:
     """One model found without one role. `rms[error][role]`: of reading minus model; `terms[term][parameter]`:
-    the values found; `lost`: what went wrong.
+    the values found; `unseen`: roles of which it saw no recording; `lost`: what went wrong.
     """
 
     model: str
     without: str
     rms: Mapping[str, Mapping[str, float]]
     terms: Mapping[str, Mapping[str, float]]
+    unseen: tuple[str, ...] = ()
     lost: tuple[str, ...] = ()
 
 
@@ -108,16 +109,20 @@ def fold_of(experiment: Experiment, name: str, without: str) -> Fold:
     try:
         fitted = fit_entry(seen, name, entry)
     except (RunsAwayError, UserError) as error:
-        return Fold(name, without, {}, {}, (str(error),))
+        return Fold(name, without, {}, {}, lost=(str(error),))
     lost = tuple(note for note in fitted.notes if "diverges" in note)
-    return Fold(name, without, _rms(fitted, experiment.form.roles or {}), terms_of(fitted.model), lost)
+    roles: Roles = experiment.form.roles or {}
+    made_from = {one for names in separate(entry).values() for one in names} or set(seen.fit)
+    unseen = tuple(role for role, recordings in roles.items() if made_from.isdisjoint(recordings))
+    return Fold(name, without, _rms(fitted, roles), terms_of(fitted.model), unseen, lost)
 
 
 def without_role(experiment: Experiment, without: str) -> Experiment:
     """The experiment that is fitted to all roles but one, with that one held out.
 
     Recordings without a role stay with the models that named them (`separate`, `also`). Where a model named
-    recordings with a role, it gets those of all roles that the fold sees.
+    recordings with a role, it gets those of all roles that the fold sees: eq. (8) one influence at a time is
+    identified again from its own recordings and these.
     """
     roles: Roles = experiment.form.roles or {}
     seen = [name for role, recordings in roles.items() if role != without for name in recordings]
@@ -142,10 +147,13 @@ def _entry(entry: ModelEntry, seen: Sequence[str], played: set[str]) -> ModelEnt
     changed: dict[str, Any] = {}
     if hasattr(entry, "also"):
         changed["also"] = [name for name in entry.also if name not in played]
-    if getattr(entry, "separate", None):
+    if separate(entry):
         changed["separate"] = {
-            channel: list(seen) if set(recordings) & played else recordings
-            for channel, recordings in getattr(entry, "separate").items()  # noqa: B009
+            channel: [
+                *(r for r in recordings if r not in played),
+                *(seen if set(recordings) & played else ()),
+            ]
+            for channel, recordings in separate(entry).items()
         }
     return entry.model_copy(update=changed)
 
@@ -194,6 +202,7 @@ def summary(folds: Sequence[Fold], roles: Sequence[str]) -> dict[str, Any]:
             }
             for term in dict.fromkeys(term for fold in whole for term in fold.terms)
         },
+        "unseen": {fold.without: list(fold.unseen) for fold in whole},
         "lost": [f"without {fold.without}: {what}" for fold in folds for what in fold.lost],
     }
 

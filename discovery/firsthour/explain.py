@@ -93,7 +93,7 @@ def _entry(effect: Effect) -> Iterator[str]:
     yield f"{effect.title} ({effect.word}; {effect.group})"
     yield ""
     yield f"  formula        {effect.formula}"
-    yield f"  acts on        {effect.place}"
+    yield f"  acts on        {effect.place}{', or two linked ones' if effect.spreads else ''}"
     if size.fixed is None:
         usual = f"{size.name}, about {size.plausible:g} {size.unit}"
         yield f"  size           {usual} on machines of this class{sign}"

@@ -37,6 +37,7 @@ class Active:
     `measured[error]` (N,): on the compensated machine, NaN where not read. `applied[error]` (N,): correction
     that the controller took off. `reconstructed[error]` (N,): the uncompensated error, from these two alone.
     `ready` (N,): the runtime was in state ACTIVE; before, it was just switched on and its start still counts.
+    `remarks`: what the runtime asks somebody to see to, each once.
     """
 
     time: Array
@@ -44,6 +45,7 @@ class Active:
     applied: Mapping[str, Array]
     reconstructed: Mapping[str, Array]
     ready: NDArray[np.bool_]
+    remarks: tuple[str, ...] = ()
 
     def compensated(self, error: str) -> Array:
         """What was measured while the runtime was ready, NaN elsewhere."""
@@ -97,6 +99,7 @@ def compensate(exported: Exported, campaign: Campaign, recording: str) -> Active
     readings: dict[str, Reading] = {}
     ready = np.zeros(len(data.time), dtype=bool)
     active = False
+    remarks: dict[str, None] = {}
     offsets = dict.fromkeys(errors, 0.0)
     columns = {name: data.values[name] for name in names}
     for k, now in enumerate(data.time.tolist()):
@@ -105,13 +108,14 @@ def compensate(exported: Exported, campaign: Campaign, recording: str) -> Active
             readings |= fresh
             tick = compensator.tick(readings, now)
             active = tick.state is State.ACTIVE
+            remarks |= {f"{e.what}: {e.cause}; {e.remedy}": None for e in tick.events if e.remedy}
             offsets = {name: in_steps(tick.offsets[name], step[name]) for name in errors}
         ready[k] = active
         for name in errors:
             applied[name][k] = -offsets[name]
     measured = {name: np.asarray(data.values[name] - applied[name]) for name in errors}
     found = _reconstructed(campaign, recording, data.time, measured, applied)
-    return Active(data.time, measured, applied, found, ready)
+    return Active(data.time, measured, applied, found, ready, tuple(remarks))
 
 
 def _reconstructed(

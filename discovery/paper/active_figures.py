@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 
 import numpy as np
 
 from discovery.errors import UserError
 from discovery.evaluation.criteria import criteria, improvement
 from discovery.evaluation.paper import TABLE_1, TABLE_1_COLUMNS, TABLE_3
-from discovery.evaluation.tables import Table, table_1, table_3
+from discovery.evaluation.tables import CRITERIA, Table, table_1, table_3
 from discovery.paper.active import AXIS_UM, LEVER_M, Active, compensate, exported_of
 from discovery.paper.chapter import Chapter, Material
 from discovery.report.chart import Chart, Panel, Series
@@ -106,7 +107,16 @@ def _gone_through(m: Material, name: str) -> tuple[dict[str, Active], list[str]]
         "readings taken while it was ready. Before, it has just been switched on and knows no start.",
         "The uncompensated errors, reconstructed from reading and applied correction, are those of the plant "
         f"within {worst:.1g} µm.",
+        *(line for recording, run in runs.items() for line in _guarded(m, name, recording, run)),
     ]
+
+
+def _guarded(m: Material, name: str, recording: str, run: Active) -> list[str]:
+    """What the guards of the runtime say of a recording, and what the model leaves there without them."""
+    scores = m.results["models"][name]["recordings"].get(recording, {})
+    free = ", ".join(f"{e} {one['rms']:.2g} {m.unit(e)}" for e, one in scores.items())
+    without = f" In a free run, without guards, it leaves (rms) {free}." if free else ""
+    return [f"{recording}: the runtime reports '{remark}'.{without}" for remark in run.remarks]
 
 
 def _means(m: Material, runs: dict[str, Active], parts: dict[str, str]) -> Table | None:
@@ -135,28 +145,36 @@ def _improved(run: Active, error: str) -> dict[str, float]:
 
 
 def _criteria(m: Material, name: str, runs: dict[str, Active], equation: str = "") -> Table:
-    """P_V, M_V, Q_M and rms on the actively compensated machine, and the paper's of table 3."""
+    """P_V, M_V, Q_M and rms on the actively compensated machine, and what table 3 prints for the second test
+    cycle.
+    """
     header = ("Error", "", "P_V", "paper P_V", "M_V", "paper M_V", "Q_M", "paper Q_M", "rms")
+    second = m.results["parts"].get("2. test cycle")
     rows: list[tuple[str | float | None, ...]] = []
     for error in m.errors:
         for recording, run in runs.items():
             if error not in run.measured:
                 continue
-            printed = TABLE_3.get(error, {}).get(equation, (None, None, None))
-            for label, series, paper in (
-                ("uncompensated", run.uncompensated(error), (None, None, None)),
-                ("compensated", run.compensated(error), printed),
+            before, after = criteria(run.uncompensated(error)), criteria(run.compensated(error))
+            for label, one, row in (
+                ("uncompensated", asdict(before), "uncompensated"),
+                ("compensated", asdict(after), equation),
+                ("improvement [%]", improvement(before, after), f"{equation} %"),
             ):
-                one = criteria(series)
-                cells = [
-                    x for pair in zip((one.peak, one.mean, one.variance), paper, strict=True) for x in pair
-                ]
-                rows.append((error, f"{recording}, {label}", *cells, one.rms))
+                printed = TABLE_3.get(error, {}) if equation and recording == second else {}
+                paper = printed.get(row, (None, None, None))
+                cells = [x for key, p in zip(CRITERIA, paper, strict=True) for x in (one[key], p)]
+                rows.append((error, f"{recording}, {label}", *cells, one["rms"]))
+    for recording in runs:
+        if (still := m.form.symmetric) is not None:
+            found = asdict(criteria(m.read(recording, still)[1]))
+            both = [x for key in CRITERIA for x in (found[key], None)]
+            rows.append((still, f"{recording}, not compensated", *both, found["rms"]))
     return Table(f"Measured on the machine that '{name}' compensates", header, tuple(rows))
 
 
 def _charts(m: Material, key: str, runs: dict[str, Active]) -> tuple[Chart, ...]:
-    """Errors on the compensated machine, and as they would have been."""
+    """Errors on the compensated machine, and as they would have been; the one that is not compensated."""
     charts = []
     for recording, run in runs.items():
         for error in run.measured:
@@ -166,12 +184,15 @@ def _charts(m: Material, key: str, runs: dict[str, Active]) -> tuple[Chart, ...]
                 Series("compensated, as read", x, run.measured[error][seen], "line", "0"),
                 Series("uncompensated, reconstructed", x, run.reconstructed[error][seen], "line", "1"),
             )
-            charts.append(
-                Chart(
-                    f"{key}-{recording}-{error}",
-                    f"{error} on {recording}",
-                    "time [h]",
-                    (Panel(f"{error} [{m.unit(error)}]", tuple(curves), zero=True),),
-                )
-            )
+            charts.append(_chart(m, key, recording, error, curves))
+        if m.form.symmetric:
+            time, values = m.read(recording, m.form.symmetric)
+            one = Series("not compensated, as read", time / 3600.0, values, "line", "0")
+            charts.append(_chart(m, key, recording, m.form.symmetric, [one]))
     return tuple(charts)
+
+
+def _chart(m: Material, key: str, recording: str, error: str, curves: Sequence[Series]) -> Chart:
+    title = f"{error} on {recording}" + ("" if len(curves) > 1 else ", not compensated")
+    panel = Panel(f"{error} [{m.unit(error)}]", tuple(curves), zero=True)
+    return Chart(f"{key}-{recording}-{error}", title, "time [h]", (panel,))

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from discovery.evaluation.budget import budget
 from discovery.evaluation.tables import Table, budget_tables
 from discovery.experiment.form import separate
+from discovery.fitting import predict_recording
 from discovery.paper.chapter import Chapter, Material
+
+_COLUMNS = 5  # recordings in a table of budgets
 
 
 def equation_8(m: Material) -> Chapter:
@@ -93,11 +98,20 @@ def _compared(m: Material, wet: str, dry: str, title: str) -> tuple[Table, tuple
 
 def budgets(m: Material) -> Chapter | None:
     """Energy and fluid of each recording, by the thermobalance."""
-    found = m.results["models"][m.form.thermobalance].get("budgets") or {}
+    fitted, campaign = m.fitted[m.form.thermobalance], m.experiment.campaign
+    outputs = [e for e in fitted.fit.problem.outputs if e in m.errors]
+    found = {}
+    for recording in campaign.recordings:
+        run = predict_recording(fitted.model, campaign, recording, outputs, fitted.fit.noise.white)
+        if (one := budget(run, campaign)) is not None:
+            found[recording] = asdict(one) | {"gap": one.gap}
     if not found:
         return None
-    tables = budget_tables(found)
+    names = list(found)
+    wide = [names[k : k + _COLUMNS] for k in range(0, len(names), _COLUMNS)]
+    tables = tuple(t for part in wide for t in budget_tables({name: found[name] for name in part}))
     gap = max(abs(one["gap"]) for one in found.values())
+    largest = max(sum(abs(q) for q in one["entering"].values()) for one in found.values())
     return Chapter(
         "budgets",
         "Energy and fluid budget of each recording",
@@ -105,9 +119,8 @@ def budgets(m: Material) -> Chapter | None:
         "none is given.",
         tables,
         shows=(
-            f"What enters and is not stored is at most {gap:.2g} MJ in a recording: the budgets close, "
-            "so the "
-            "integration is right.",
+            f"What enters and is not stored is at most {gap:.2g} MJ in a recording (heat exchanged: up to "
+            f"{largest:.3g} MJ): the budgets close, so the integration is right.",
         ),
         not_shown=("Whether the heat is what the machine had: these are flows of the fitted model.",),
     )

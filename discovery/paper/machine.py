@@ -64,12 +64,15 @@ def figure_3(m: Material) -> Chapter | None:
     rows: list[tuple[str | float | None, ...]] = []
     found: dict[tuple[str, str], tuple[float, float]] = {}
     charts = []
-    for error in m.errors:
+    still = (m.form.symmetric,) if m.form.symmetric else ()  # it has no warm-up to speak of
+    for error in (*m.errors, *still):
         curves = []
         for index, (label, recording) in enumerate(phases):
             time, values = m.read(recording, error)
             time = time - time[0]
             curves.append(Series(label, time / 3600.0, values, "line", str(index)))
+            if error in still:
+                continue
             for phase, chosen in (
                 ("warm-up", time <= WARM_UP_H * 3600),
                 ("cool-down", time > WARM_UP_H * 3600),

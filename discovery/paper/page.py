@@ -8,7 +8,8 @@ from typing import Any
 
 from discovery.errors import RunsAwayError, UserError
 from discovery.evaluation.paper import SOURCE
-from discovery.evaluation.rolematrix import left_out, matrix, steadiness
+from discovery.evaluation.rolematrix import left_out, matrix, not_seen, steadiness
+from discovery.evaluation.tables import Table
 from discovery.experiment.experiment import Experiment
 from discovery.experiment.fitted import Fitted
 from discovery.experiment.results import command_of
@@ -17,7 +18,9 @@ from discovery.paper.active_figures import section_3, section_4
 from discovery.paper.chapter import Chapter, Material
 from discovery.paper.film import equation_6, nozzle
 from discovery.paper.influences import budgets, equation_8
+from discovery.paper.left_nozzle import left_nozzle
 from discovery.paper.machine import figure_2, figure_3, symmetric
+from discovery.paper.test_piece import test_piece
 from discovery.progress import Progress, silent
 from discovery.recordings import Channel
 from discovery.report.page import fill
@@ -30,10 +33,12 @@ _IN_ORDER: tuple[tuple[str, Callable[[Material], Chapter | None]], ...] = (
     ("equations (1) to (6)", equation_6),
     ("nozzle height and flow", nozzle),
     ("figures 6 and 7", section_3),
+    ("left nozzle", left_nozzle),
     ("symmetry", symmetric),
     ("equation (8)", equation_8),
     ("figures 8 and 9", section_4),
     ("budgets", budgets),
+    ("test piece", test_piece),
 )
 NOT_REPEATED = (
     "Figures 1, 4, 5 and 8 (nozzle positions) are drawings and photographs. Figure 2 shows temperatures "
@@ -100,7 +105,8 @@ def _worst(roles: Mapping[str, Any]) -> list[str]:
         ratios: dict[str, list[float]] = {}
         for found in model["rms"].values():
             for role, judged in found.items():
-                seen = [one[role] for other, one in found.items() if other != role and one.get(role)]
+                having = [other for other in found if role not in not_seen(model, other)]
+                seen = [found[other][role] for other in having if found[other].get(role)]
                 if judged.get(role) and seen:
                     ratios.setdefault(role, []).append(judged[role] / (sum(seen) / len(seen)))
         if ratios:
@@ -110,7 +116,14 @@ def _worst(roles: Mapping[str, Any]) -> list[str]:
                 f"{name} carries over worst to '{worst}': {mean[worst]:.2f} times the rms of its fits "
                 "that saw it."
             )
+        elif model["rms"]:
+            out.append(f"{name} is made from recordings of its own: it saw no role in any fold.")
     return out
+
+
+def _words(table: Table) -> list[int]:
+    """Columns of words, which begin at the left."""
+    return [k for k in range(1, len(table.header)) if any(isinstance(row[k], str) for row in table.rows)]
 
 
 def write_page(folder: Path, experiment: Experiment, made: Sequence[Chapter]) -> Path:
@@ -126,7 +139,7 @@ def write_page(folder: Path, experiment: Experiment, made: Sequence[Chapter]) ->
                 "key": one.key,
                 "title": one.title,
                 "paper": one.paper,
-                "tables": [printed(table, left=(1,)) for table in one.tables],
+                "tables": [printed(table, left=_words(table)) for table in one.tables],
                 "charts": one.charts,
                 "shows": one.shows,
                 "not_shown": one.not_shown,

@@ -111,7 +111,7 @@ def _physics(d: Mapping[str, Any]) -> Printed:
             words(one["effect"]),
             _place(one),
             percent(one.get("probability")),
-            one.get("expression") or "",
+            "; ".join(one.get("expressions") or [one.get("expression") or ""]),
             "; ".join(sizes(one)),
         )
         rows.append(Line(cells))

@@ -131,8 +131,8 @@ def machine_for(effect: Effect) -> Model:
 
 
 def expand(effect: Effect, without: Collection[str] = ()) -> list[Hypothesis]:
-    """Every place and shape of an effect on the sample machine."""
-    model, channels = sample(without)
+    """Every place and shape of an effect on the sample machine, without what would make it needless."""
+    model, channels = sample({*without, *effect.unless})
     return claims(errors() if effect.place in OF_ERRORS else model, effect, channels)
 
 

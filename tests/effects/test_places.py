@@ -16,7 +16,7 @@ from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import TERM_PLACES
 from discovery.models import Model, read_model, write_model
-from discovery.terms import Term, parse, substitute
+from discovery.terms import Term, names, parse, substitute
 from tests.effects.sample import EVENT_ODDS, ODDS, claims, expand, inside, sample, scene, trajectory
 
 DRIVEN = ("friction_speed", "viscosity_temperature", "thermal_preload", "windage")
@@ -153,6 +153,29 @@ def test_one_law_on_a_group_of_bodies_has_one_size() -> None:
     assert set(both.states) == {"motor", "bed"}
     assert len(both.amplitudes) == 1
     assert {t.into for t in both.terms} == {"motor", "bed"}
+
+
+def test_a_jet_spreads_over_two_linked_bodies_with_a_size_at_each() -> None:
+    """What the fluid wets already, and what no link joins, is no pair."""
+    model, channels = sample()
+    link = Term("motor to bed", "bed", parse("G_mt*(motor - bed)"), "motor")
+    found = claims(replace(model, terms=(*model.terms, link)), catalogue()["displaced_jet"], channels)
+    assert {h.states for h in found} == {("motor",), ("bed",), ("motor", "bed")}
+    both = next(h for h in found if len(h.states) == 2)
+    assert both.amplitudes == ("G_jet_motor_side", "G_jet_bed_side")
+    assert [(t.into, t.source) for t in both.terms] == [("motor", None), ("bed", None)]
+    assert [set(both.amplitudes) & names(t.expression) for t in both.terms] == [{a} for a in both.amplitudes]
+    alone = [h for h in found if len(h.states) == 1]
+    assert all(both.widens(h) and not h.widens(both) for h in alone)
+    assert not both.widens(both)
+
+
+@pytest.mark.parametrize("file", ["displaced_jet_moved", "displaced_jet_moved_away"])
+def test_a_nozzle_was_moved_only_where_no_channel_says_where_it_points(file: str) -> None:
+    model, channels = sample()
+    moved = catalogue()[file]
+    assert not claims(model, moved, channels)
+    assert {h.recording for h in expand(moved)} == {"two"}
 
 
 @pytest.mark.parametrize("word", ["air_convection", "conduction_path", "sensor_offset", "wear"])

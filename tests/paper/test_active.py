@@ -44,6 +44,15 @@ def test_a_true_model_leaves_noise_and_half_a_step(campaign: Campaign, tmp_path:
         )
 
 
+def test_what_the_guards_say_is_a_remark(campaign: Campaign, tmp_path: Path) -> None:
+    exported = exported_of(read_model(tmp_path / "model.toml"), campaign, ["a", "b"])
+    assert compensate(exported, campaign, "c").remarks == ()
+    data = campaign.recordings["c"]
+    strong = replace(data, values={**data.values, "P": 4.0 * data.values["P"]})
+    (remark,) = compensate(exported, replace(campaign, recordings={"c": strong}), "c").remarks
+    assert remark.startswith("gain falls: P far outside of the training")
+
+
 def test_the_loop_knows_no_reading(campaign: Campaign, tmp_path: Path) -> None:
     """Other readings, same inputs: the same corrections."""
     model = read_model(tmp_path / "model.toml")

@@ -13,6 +13,7 @@ from discovery.errors import UserError
 from discovery.experiment import load_experiment, run
 from discovery.models import Parameter
 from discovery.paper.film import identified
+from discovery.paper.test_piece import features
 from tests.small import EXPERIMENT, write_small
 
 PAPER = """
@@ -29,6 +30,7 @@ speeding = ["one_body", "reduced"]
 wet = "a"
 dry = "b"
 compensated = ["c"]
+test_piece = ["c"]
 symmetric = "E_R0T"
 """
 
@@ -59,6 +61,7 @@ def test_the_page_has_a_chapter_for_each_part(path: Path) -> None:
         "equation-8",
         "section-4",
         "budgets",
+        "test-piece",
     ]
     page = (out / "paper.html").read_text()
     for one in made.values():
@@ -76,6 +79,11 @@ def test_the_page_has_a_chapter_for_each_part(path: Path) -> None:
     assert row[2:8:2] == pytest.approx([scores["peak"], scores["mean"], scores["variance"]])
     # E_R0T of this machine is no error that symmetry keeps small, and the page says so
     assert "moves by more" in made["symmetry"]["shows"][0]
+    # the machine is as it was: a few features say so, and the model is kept
+    answers = rows_of(made["test-piece"], "What the features say")
+    assert [(row[2], row[3], row[5]) for row in answers] == [(12, "nothing", None), (24, "nothing", None)]
+    # every recording that was loaded has a budget
+    assert len(rows_of(made["budgets"], "Heat into")[0]) == 1 + len("abc")
     # the model of the machine compensates it
     rows = rows_of(made["section-3"], "Measured on the machine")
     left = {r[1]: r[8] for r in rows if r[0] == "E_Y0C"}
@@ -86,6 +94,16 @@ def test_a_model_that_the_page_names_must_be_there(path: Path) -> None:
     path.write_text(path.read_text().replace('reduced = "reduced"', 'reduced = "redused"'))
     with pytest.raises(UserError, match="no model 'redused'"):
         load_experiment(path)
+
+
+def test_a_feature_is_one_reading_of_one_error(path: Path) -> None:
+    data = load_experiment(path).campaign.recordings["c"]
+    few = features(data, ["E_Y0C", "E_R0T"], 12)
+    kept = np.array([np.isfinite(few.values[e]) for e in ("E_Y0C", "E_R0T")])
+    assert kept.sum(axis=1).tolist() == [6, 6]
+    assert kept.sum(axis=0).max() == 1
+    assert few.values["T_env"].tolist() == data.values["T_env"].tolist()
+    assert few.values["E_Y0C"][kept[0]].tolist() == data.values["E_Y0C"][kept[0]].tolist()
 
 
 def test_an_exponent_is_identified_by_its_interval() -> None:

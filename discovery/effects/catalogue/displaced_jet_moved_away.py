@@ -20,5 +20,6 @@ EFFECT = Effect(
     confused_with=("fluid_convection_flow", "wear"),
     source="Liu, Lienhard, Lombara 1991: the heat flow of a jet follows the fluid that feeds it",
     acts="from a recording on",
+    unless=("nozzle side",),
     examples=(Example({"share": 0.7, "term": 80.0}, -56.0),),
 )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from discovery.virtual.record import Order
+from dataclasses import replace
+
+from discovery.virtual.record import Order, Request
 
 TITLE = "virtual NMV 5000, cutting fluid"
 SEED = 20261122  # fixed before anything was run on these recordings; never changed since
@@ -22,7 +24,8 @@ ORDERS = (
         "left_nozzle",
         "fit",
         72.0,
-        "nozzle on the left: 30 % of the jet meets the table, the rest the structure",
+        "nozzle on the left: 30 % of the jet meets the table, the rest b_body_1 (20 W/K), "
+        "b_body_2 (10 W/K) and a skin of both (25 W/K)",
         side=1.0,
     ),
     _order(4, "height_100", "validation", 72.0, "nozzle at 100 mm", height=100.0),
@@ -60,6 +63,11 @@ ORDERS = (
     ),
     _order(16, "ten_days", "validation", 240.0, "random cycle of ten days, nozzle at 50 mm"),
     _order(17, "nozzle_long", "nozzle", 72.0, "as `nozzle`, three times as long"),
+    replace(
+        _order(18, "worn", "fit", 72.0, "random cycle of a machine whose drive losses fell by 20 %"),
+        effects=tuple(Request("wear", 0.2, (body,)) for body in ("c_body_1", "c_body_2")),
+        age=1.0,
+    ),
 )
 
 CAMPAIGNS = {"nmv5000": (TITLE, ORDERS)}
