@@ -13,7 +13,7 @@ import numpy as np
 from discovery.report.heat import subject
 from discovery.report.lead import Array, Lead, lead_of
 from discovery.report.printed import Against, Line, Printed, behind
-from discovery.report.ranking import cells, is_error, mean_improvement, ranked, rms_by_unit
+from discovery.report.ranking import cells, is_error, ranked, removed, rms_by_unit
 from discovery.report.run import Run, pretty_unit
 from discovery.report.text import listed, number, percent, words
 from discovery.runfolder import DIAGNOSIS, RESULTS
@@ -135,8 +135,8 @@ def _score(run: Run, model: str | None) -> str:
     """What the best model removes of errors, or its median rms of temperatures."""
     if model is None:
         return "–"
-    if is_error(run) and np.isfinite(removed := mean_improvement(run, model)):
-        return f"{number(removed, 2)}\u00a0%"
+    if is_error(run) and np.isfinite(share := removed(run, model)):
+        return f"{number(share, 2)}\u00a0%"
     scored = rms_by_unit(run, model).items()
     return ", ".join(f"{number(float(np.median(rms)), 2)} {unit}".strip() for unit, rms in scored) or "–"
 

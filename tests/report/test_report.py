@@ -126,7 +126,8 @@ def test_the_answer_agrees_with_an_independent_count(folder: Path, page: str) ->
     assert "The discovered model predicts best on the held-out recording “validation”" in page
     more = 100 * (np.exp(-np.log(1 - less / 100)) - 1)
     assert f"+{more:.0f} % (" in page
-    removed = np.mean([scores["discovered"][o]["improvement"]["rms"] for o in sample.OUTPUTS])
+    left = [1 - scores["discovered"][o]["improvement"]["rms"] / 100 for o in sample.OUTPUTS]
+    removed = 100 * (1 - np.exp(np.mean(np.log(left))))
     assert f"It removes {float(f'{removed:.2g}'):.0f} % of the thermal error" in page
 
 
@@ -257,6 +258,28 @@ def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path
     page = write_report(folder).read_text("utf-8")
     assert "contradict" not in page
     assert "The repair removes none of this mismatch" in page
+    assert "(improvement, 95 %: −0.1 to 0.2; may be chance)" in page
+
+
+def test_an_output_that_the_repair_makes_worse_is_named(tmp_path: Path) -> None:
+    folder = sample.write_sample(tmp_path / "run")
+    results = json.loads((folder / "results.json").read_text())
+    before = results["models"]["thermobalance"]["recordings"]
+    after = json.loads(json.dumps(before))
+    after["validation"]["E_Y0C"]["rms"] = 2 * before["validation"]["E_Y0C"]["rms"]
+    results["models"]["repaired"] = {"kind": "repaired", "recordings": after}
+    (folder / "results.json").write_text(json.dumps(results))
+    page = write_report(folder).read_text("utf-8")
+    assert re.search(r"After the repair, the rms is larger for E_Y0C on validation \(\S+ → \S+ µm\)\.", page)
+
+
+def test_a_narrow_screen_lists_the_network(page: str) -> None:
+    listed = re.search(r'<dl class="bodies listed">(.*?)</dl>', page, re.S)
+    assert listed
+    bodies = re.findall(r"<dt>(\w+).*?</dt><dd>(.*?)</dd>", listed[1])
+    assert [name for name, _ in bodies] == ["table", "c_body_1", "b_corpus"]
+    assert '<span class="added">b_corpus</span>' in dict(bodies)["c_body_1"]
+    assert "<span>T_fluid</span>" in dict(bodies)["table"]
 
 
 @pytest.mark.parametrize(("unit", "said"), [("um", "µm"), ("times the reading noise",) * 2])
