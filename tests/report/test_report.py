@@ -19,10 +19,11 @@ import pytest
 from discovery.challenge import scoring
 from discovery.diagnosis.thresholds import RIVAL
 from discovery.errors import UserError
+from discovery.experiment.summary import comparison
 from discovery.models import Parameter
 from discovery.report import equations, write_comparison, write_figures, write_report
 from discovery.report.chart import thinned
-from discovery.report.compare import load_runs, shared_recordings
+from discovery.report.compare import groups, load_runs, shared_recordings
 from discovery.report.lead import lead_over
 from discovery.report.mismatch import NEAR, section, sizes
 from discovery.report.printed import behind
@@ -414,6 +415,24 @@ def test_runs_of_two_machines_are_listed_but_their_models_are_not_mixed(folder: 
     write_report(other)
     page = write_comparison(runs, tmp_path).read_text("utf-8")
     assert 'href="machine/report.html"' in page
+
+
+def test_runs_of_several_machines_are_compared_machine_by_machine(tmp_path: Path) -> None:
+    for name, hours in (("first", 24.0), ("again", 24.0), ("other", 20.0), ("twin", 20.0)):
+        path = sample.write_sample(tmp_path / name, hours) / "results.json"
+        results = json.loads(path.read_text())
+        path.write_text(json.dumps(results | {"experiment": name, "campaign": f"machine of {hours:g} h"}))
+    runs = load_runs([tmp_path])
+    assert groups(runs) == [[0, 1], [2, 3]]
+    page = write_comparison(runs, tmp_path).read_text("utf-8")
+    assert "Not all of these runs share recordings" in page
+    for number, hours, label in ((1, 24, "again"), (2, 20, "twin")):
+        part = page.partition(f'<section id="group-{number}"><h2>machine of {hours} h</h2>')[2]
+        assert f"discovered, {label}" in part.partition("</section>")[0]
+    said = "\n".join(comparison(runs))
+    assert "again: discovered" in said
+    assert "twin: discovered" in said
+    assert "machine: machine of 24 h → machine of 20 h" in said
 
 
 def test_the_list_says_how_a_run_differs_from_any_other(folder: Path, tmp_path: Path) -> None:
