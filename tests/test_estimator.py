@@ -50,6 +50,15 @@ def test_frames_give_the_mass_with_intervals_that_hold_the_truth(found: SparseDi
         assert row["value"] == pytest.approx(truth, rel=0.03)
 
 
+def test_it_shows_its_table_and_the_error_against_size(found: SparseDiscovery) -> None:
+    assert found.to_frame().equals(found.coefficients())
+    (axes,) = found.plot().axes
+    left_out, _, chosen = axes.get_lines()
+    path = found.discovery_.report["path"]
+    assert sorted(left_out.get_ydata()) == sorted(p["left_out_rms"] for p in path)
+    assert chosen.get_xdata()[0] == next(p["terms"] for p in path if p["chosen"])
+
+
 def test_free_runs_on_what_was_not_seen_leave_the_noise(found: SparseDiscovery) -> None:
     new = frame(7)
     predicted = found.predict(new[["P", "Q"]])

@@ -34,7 +34,7 @@ def test_its_steady_state_is_the_heat_balance(tmp_path: Path) -> None:
     housing = 25.0 + 300.0 / 10.0  # all heat leaves through the housing
     bearing = housing + 300.0 / 20.0
     assert check_dimensions(model, campaign.channels) == []
-    wrong = model.parameters | {"hA": replace(model.parameters["hA"], unit="W")}
+    wrong = dict(model.parameters) | {"hA": replace(model.parameters["hA"], unit="W")}
     (said,) = check_dimensions(replace(model, parameters=wrong), campaign.channels)
     assert said.partition("': ")[2] in " ".join(PAGE.read_text("utf-8").split())
     assert found["E_Z|model"].iloc[-1] == pytest.approx((bearing - 21.0) + (housing - 21.0), rel=1e-4)
