@@ -93,7 +93,7 @@ clean:
 .venv/created.stamp:
 	@test -n "$(PYTHON)" || { echo "error: no Python from 3.11 to 3.13 was found. Install one" \
 	    "(Debian, Ubuntu: apt install python3 python3-venv), or name it: make PYTHON=/path/to/python3.12" >&2; exit 1; }
-	@"$(PYTHON)" -c '$(FITS)' || { echo "error: $(PYTHON) is no Python from 3.11 to 3.13 with venv and ensurepip." \
+	@"$(PYTHON)" -c '$(FITS)' 2>/dev/null || { echo "error: $(PYTHON) is not a Python from 3.11 to 3.13 with venv and ensurepip." \
 	    "Install one (Debian, Ubuntu: apt install python3 python3-venv), or name it: make PYTHON=/path/to/python3.12" >&2; exit 1; }
 	"$(PYTHON)" -m venv .venv
 	@touch $@

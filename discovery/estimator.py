@@ -89,7 +89,7 @@ def _named(optimiser: Any) -> dict[str, Any]:
     kind = type(optimiser)
     if getattr(pysindy, kind.__name__, None) is not kind or not hasattr(optimiser, "get_params"):
         raise UserError(
-            f"optimiser: {kind.__name__} is no optimiser of the package pysindy; give 'search', "
+            f"optimiser: {kind.__name__} is not an optimiser of the package pysindy; give 'search', "
             "'pysindy:STLSQ' or pysindy.STLSQ(...). Your own optimiser works in a SINDy of your own, with "
             "our library (docs/discovery.md)"
         )

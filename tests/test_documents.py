@@ -104,7 +104,7 @@ def test_the_numbers_of_the_diagnosis_are_those_that_decide() -> None:
         f"process noise of {t.UNKNOWN_FORCE:g} times level one",
         f"drawn again {t.DRAWS} times",
         f"It is at most {t.SUREST}",
-        f"a probability of {t.NAMED} on",
+        f"its probability is at least {t.NAMED}",
         f"at least {t.SHORT:g} units of log evidence",
         f"({t.CHANCE} sqrt(2 G)",
         f"more than {t.SHORT:g} units and a third of the whole gain",

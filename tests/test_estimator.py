@@ -106,7 +106,7 @@ def test_mistakes_are_one_sentence() -> None:
         discover(one, ["E"], max_terms=0)
     with pytest.raises(UserError, match="no option 'libary'; did you mean 'library'"):
         discover(one, ["E"], libary=["linear"])
-    with pytest.raises(UserError, match="Ridge is no optimiser of the package pysindy"):
+    with pytest.raises(UserError, match="Ridge is not an optimiser of the package pysindy"):
         discover(one, ["E"], optimiser=Ridge())
     with pytest.raises(UserError, match="as texts, as in"):
         discover(one, ["E"], library=pysindy.PolynomialLibrary(2))

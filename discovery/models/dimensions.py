@@ -147,7 +147,7 @@ def _compare(
     shown = f"'{text(expression)[:60]}'"
     if apart is None:
         return f"{shown} has the dimension of {spell(found)} where {name} is expected"
-    return f"{shown} counts in {apart:.4g} {name} where {name} is expected; mend the units and the numbers"
+    return f"{shown} counts in {apart:.4g} {name} where {name} is expected; correct the units and the numbers"
 
 
 def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimension:
