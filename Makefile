@@ -8,7 +8,7 @@ FITS   := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[
 PYTHON ?= $(shell for one in python3.11 python3.12 python3.13 python3 python; do \
 	"$$one" -c '$(FITS)' >/dev/null 2>&1 && echo "$$one" && break; done)
 
-.PHONY: demo test benchmarks coverage site browser-test outside lint types lock audit licences fuzz clean
+.PHONY: demo test benchmarks coverage site browser-test outside lint types lock audit licences fuzz tag clean
 
 demo: $(STAMP)
 	$(BIN)/discovery run experiments/demonstration.toml
@@ -86,6 +86,11 @@ licences: $(STAMP)
 # Files changed at random; longer with FUZZ="--seconds 3600"
 fuzz: $(STAMP)
 	$(BIN)/python -W ignore -m tests.fuzz $(FUZZ)
+
+# The release as a tag; its notes are the section of the changelog
+VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' discovery/__init__.py)
+tag:
+	sed -n '/^## \[$(VERSION)\]/,/^## \[/p' CHANGELOG.md | grep -v '^## ' | git tag --cleanup=verbatim -a v$(VERSION) -F -
 
 clean:
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache

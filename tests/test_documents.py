@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from discovery import limits
+from discovery import __version__, limits
 from discovery.diagnosis import thresholds
 from discovery.experiment.form import ExperimentForm
 from discovery.models.modelfile import ModelForm
@@ -125,3 +125,11 @@ def test_the_limits_on_files_are_those_of_the_security_page() -> None:
         f"{limits.MOST_PIECEWISE >> 30} GB of CSV",
     ):
         assert said in text, said
+
+
+def test_changelog_citation_and_program_name_one_version() -> None:
+    newest = re.search(r"^## \[(\d[^\]]*)\] - (\S+)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
+    assert newest
+    assert newest[1] == __version__
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"\nversion: {newest[1]}\ndate-released: {newest[2]}\n" in citation

@@ -137,7 +137,9 @@ def test_stamps_of_another_form_are_the_only_trouble(write: Write) -> None:
     stamps = [lines[0][0]] + [f"01.03.2026 08:{minute:02}:00" for minute in range(30)]
     path = write([f"{stamp},{rest}" for stamp, (_, rest) in zip(stamps, lines, strict=True)])
     assert len(found(path)) == 1
-    with pytest.raises(UserError, match=r"line 2: the stamp '01\.03\.2026 08:00:00' is not an ISO 8601 instant"):
+    with pytest.raises(
+        UserError, match=r"line 2: the stamp '01\.03\.2026 08:00:00' is not an ISO 8601 instant"
+    ):
         load_campaign(path)
 
 
