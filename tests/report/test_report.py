@@ -470,6 +470,16 @@ def test_thinning_keeps_peaks() -> None:
     assert (np.diff(a) > 0).all()
 
 
+def test_a_held_value_stays_flat_when_its_curve_is_thinned() -> None:
+    """Long at 50, then a new value every half minute; no line may lead from 50 to a value after the step."""
+    at = np.r_[0.0, 700.0 + 30.0 * np.arange(400)]
+    values = np.r_[50.0, np.random.default_rng(0).uniform(0, 100, 400)]
+    a, b = thinned(np.repeat(at, 2)[1:], np.repeat(values, 2)[:-1], 200)
+    assert len(a) <= 200
+    assert (a[1], b[1]) == (700.0, 50.0)
+    assert (b.min(), b.max()) == (values[:-1].min(), values[:-1].max())
+
+
 def test_autocorrelation_is_that_of_statsmodels() -> None:
     from statsmodels.tsa.stattools import acf
 
