@@ -55,8 +55,8 @@ def test_it_shows_its_table_and_the_error_against_size(found: SparseDiscovery) -
     (axes,) = found.plot().axes
     left_out, _, chosen = axes.get_lines()
     path = found.discovery_.report["path"]
-    assert sorted(left_out.get_ydata()) == sorted(p["left_out_rms"] for p in path)
-    assert chosen.get_xdata()[0] == next(p["terms"] for p in path if p["chosen"])
+    assert np.sort(np.asarray(left_out.get_ydata())).tolist() == sorted(p["left_out_rms"] for p in path)
+    assert np.asarray(chosen.get_xdata())[0] == next(p["terms"] for p in path if p["chosen"])
 
 
 def test_free_runs_on_what_was_not_seen_leave_the_noise(found: SparseDiscovery) -> None:

@@ -75,7 +75,7 @@ def _models(run: Run) -> Part:
     found = {m: lead for m in rivals if (lead := lead_over(run, best, m)) is not None}
     for rival, lead in list(found.items())[:1]:
         points.append(
-            f"Next is {_name(run, rival)}: over all outputs, the rms of “{best}” is {_against(lead)}."
+            f"Second best is {_name(run, rival)}: over all outputs, the rms of “{best}” is {_against(lead)}."
         )
     given = [m for m in found if origin(run, m) == "given"][:2]
     figures += [(_percent_less(found[m]), f"rms of {best} against {m}{_interval(found[m])}") for m in given]
