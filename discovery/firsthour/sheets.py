@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -141,6 +142,7 @@ def _mark(lines: Sequence[str]) -> str:
     return best if score(best)[0] > 0 else ","
 
 
+@lru_cache(maxsize=4096)
 def _plain(cell: str) -> bool:
     """Whether a cell is a number without blanks inside, a stamp, a switch or nothing."""
     if is_number(cell):

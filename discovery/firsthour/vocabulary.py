@@ -275,8 +275,9 @@ def words_of(name: str) -> list[Word]:
     return [word for _, word in sorted(found, key=lambda one: one[0])]
 
 
-def _matches(folded: str) -> list[tuple[int, int, int]]:
-    return [(*found.span(), row) for row, form in _patterns() for found in form.finditer(folded)]
+@lru_cache(maxsize=1024)
+def _matches(folded: str) -> tuple[tuple[int, int, int], ...]:
+    return tuple((*found.span(), row) for row, form in _patterns() for found in form.finditer(folded))
 
 
 @lru_cache(maxsize=1)
