@@ -79,29 +79,22 @@ def test_the_lines_on_discovery_run(capsys: pytest.CaptureFixture[str]) -> None:
     assert "lag(P0" in printed.rpartition("E_Y")[2]
 
 
-def numbers(values: Any, scale: float = 1.0) -> str:
+def numbers(values: Any) -> str:
     """As a page lists them: 0, 0.3, 1 or 3."""
-    *first, last = [f"{scale * value:g}" for value in values]
+    *first, last = [f"{value:g}" for value in values]
     return f"{', '.join(first)} or {last}"
 
 
 def test_the_numbers_of_the_diagnosis_are_those_that_decide() -> None:
     t = thresholds
-    weights: dict[float, float] = {}
-    for (form, _), weight in zip(t.FORMS, t.FORM_WEIGHTS, strict=True):
-        weights[form] = weights.get(form, 0.0) + weight
     text = " ".join((ROOT / "docs" / "mismatch.md").read_text("utf-8").split())
     for said in (
         f"`level` of {numbers(t.LEVELS)} with weights {', '.join(map(str, t.LEVEL_WEIGHTS))}",
         f"{t.FLOOR:.0%} of the largest flow".replace("%", " %"),
-        f"{t.SHARE:.0%} of what flows through".replace("%", " %"),
         f"{numbers(t.SLOW)} times the reading noise, weights {', '.join(map(str, t.SLOW_WEIGHTS))}",
-        f"standard deviation {numbers(weights, 100)} % with weights {', '.join(map(str, weights.values()))}",
-        f"{t.FORM:.0%} for the flow of a named effect".replace("%", " %"),
         f"odds of {t.ODDS} for each word",
         f"within a factor of {t.FACTOR} (jumps of a sensor: {t.JUMP:g} reading noises",
         f"width {t.BELIEF} of the logarithm",
-        f"process noise of {t.UNKNOWN_FORCE:g} times level one",
         f"drawn again {t.DRAWS} times",
         f"It is at most {t.SUREST}",
         f"its probability is at least {t.NAMED}",
