@@ -8,7 +8,7 @@ FITS   := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[
 PYTHON ?= $(shell for one in python3.11 python3.12 python3.13 python3 python; do \
 	"$$one" -c '$(FITS)' >/dev/null 2>&1 && echo "$$one" && break; done)
 
-.PHONY: demo test benchmarks coverage site browser-test outside lint types lock audit licences fuzz clean
+.PHONY: demo test benchmarks coverage site browser-test outside lint types lock audit licences fuzz tag clean
 
 demo: $(STAMP)
 	$(BIN)/discovery run experiments/demonstration.toml
@@ -87,13 +87,18 @@ licences: $(STAMP)
 fuzz: $(STAMP)
 	$(BIN)/python -W ignore -m tests.fuzz $(FUZZ)
 
+# The release as a tag; its notes are the section of the changelog
+VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' discovery/__init__.py)
+tag:
+	sed -n '/^## \[$(VERSION)\]/,/^## \[/p' CHANGELOG.md | grep -v '^## ' | git tag --cleanup=verbatim -a v$(VERSION) -F -
+
 clean:
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache
 
 .venv/created.stamp:
 	@test -n "$(PYTHON)" || { echo "error: no Python from 3.11 to 3.13 was found. Install one" \
 	    "(Debian, Ubuntu: apt install python3 python3-venv), or name it: make PYTHON=/path/to/python3.12" >&2; exit 1; }
-	@"$(PYTHON)" -c '$(FITS)' || { echo "error: $(PYTHON) is no Python from 3.11 to 3.13 with venv and ensurepip." \
+	@"$(PYTHON)" -c '$(FITS)' 2>/dev/null || { echo "error: $(PYTHON) is not a Python from 3.11 to 3.13 with venv and ensurepip." \
 	    "Install one (Debian, Ubuntu: apt install python3 python3-venv), or name it: make PYTHON=/path/to/python3.12" >&2; exit 1; }
 	"$(PYTHON)" -m venv .venv
 	@touch $@

@@ -28,6 +28,7 @@ from discovery.sparse.options import SparseOptions
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Channels = Mapping[str, Mapping[str, Any]]
@@ -88,7 +89,7 @@ def _named(optimiser: Any) -> dict[str, Any]:
     kind = type(optimiser)
     if getattr(pysindy, kind.__name__, None) is not kind or not hasattr(optimiser, "get_params"):
         raise UserError(
-            f"optimiser: {kind.__name__} is no optimiser of the package pysindy; give 'search', "
+            f"optimiser: {kind.__name__} is not an optimiser of the package pysindy; give 'search', "
             "'pysindy:STLSQ' or pysindy.STLSQ(...). Your own optimiser works in a SINDy of your own, with "
             "our library (docs/discovery.md)"
         )
@@ -212,6 +213,32 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             for name, p in self.model_.parameters.items()
         }
         return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "low", "high", "unit"])
+
+    def to_frame(self) -> pd.DataFrame:
+        """The coefficients, under the name that other results have for their table."""
+        return self.coefficients()
+
+    def plot(self) -> Figure:
+        """Error against size: the rms of each model that the search tried, by its number of terms; the chosen
+        one is marked.
+        """
+        from matplotlib.figure import Figure
+
+        check_is_fitted(self, "discovery_")
+        path = self.discovery_.report["path"]
+        searched = list(dict.fromkeys(tuple(point["outputs"]) for point in path))
+        figure = Figure(figsize=(5, 3 * len(searched)), layout="constrained")
+        panels = figure.subplots(len(searched), 1, squeeze=False)[:, 0]
+        for axes, outputs in zip(panels, searched, strict=True):
+            points = sorted((p for p in path if tuple(p["outputs"]) == outputs), key=lambda p: p["terms"])
+            for key, label in (("left_out_rms", "on data left out"), ("fit_rms", "on data fitted")):
+                errors = [np.nan if p.get(key) is None else p[key] for p in points]
+                axes.plot([p["terms"] for p in points], errors, "o-", label=label)
+            for chosen in (p["terms"] for p in points if p["chosen"]):
+                axes.axvline(chosen, color="0.6", ls=":", label="chosen")
+            axes.set(title=", ".join(outputs), xlabel="terms", ylabel="rms [reading noise]", yscale="log")
+        panels[0].legend(fontsize="small")
+        return figure
 
     def equations(self) -> list[str]:
         """A line for each state and output."""

@@ -68,7 +68,7 @@ def read_file(path: str | os.PathLike[str]) -> str:
     """The text of a file to write by hand. Raises UserError as `read_text`, and for a recording."""
     if Path(path).name.lower().endswith(_TABLES) and Path(path).is_file():
         raise UserError(
-            f"{path}: this is a recording, where a TOML file is wanted; `discovery new DIR --from {path}` "
+            f"{path}: this is a recording, and a TOML file is needed; `discovery new DIR --from {path}` "
             "makes campaign, model and experiment of it"
         )
     return read_text(path)
@@ -81,7 +81,7 @@ def check_kind(path: str | os.PathLike[str], data: Mapping[str, Any], schema: ty
     for kind, (keys, command) in _KINDS.items():
         if keys <= data.keys() and not keys & schema.model_fields.keys():
             say = command.format(path=path)
-            raise UserError(f"{path}: this is {kind}, where {wanted} is wanted; say `discovery {say}`")
+            raise UserError(f"{path}: this is {kind}, and {wanted} is needed; try `discovery {say}`")
 
 
 def parse_toml(text: str, path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -43,7 +43,9 @@ def regular(path: str | os.PathLike[str]) -> Path:
     if stat.S_ISDIR(mode):
         raise UserError(f"{path}: this is a folder; name a file in it")
     if not stat.S_ISREG(mode):
-        raise UserError(f"{path}: this is no regular file (a pipe or a device); copy its content to a file")
+        raise UserError(
+            f"{path}: this is not a regular file (a pipe or a device); copy its content to a file"
+        )
     return path
 
 
@@ -60,7 +62,7 @@ def read_whole(path: str | os.PathLike[str], most: int = MOST_TEXT) -> bytes:
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({_reason(error)})") from None
     if len(data) > most:
-        raise UserError(f"{path}: larger than {_size(most)}; this is no file of this kind")
+        raise UserError(f"{path}: larger than {_size(most)}; this is not a file of this kind")
     return data
 
 

@@ -50,6 +50,15 @@ def test_frames_give_the_mass_with_intervals_that_hold_the_truth(found: SparseDi
         assert row["value"] == pytest.approx(truth, rel=0.03)
 
 
+def test_it_shows_its_table_and_the_error_against_size(found: SparseDiscovery) -> None:
+    assert found.to_frame().equals(found.coefficients())
+    (axes,) = found.plot().axes
+    left_out, _, chosen = axes.get_lines()
+    path = found.discovery_.report["path"]
+    assert np.sort(np.asarray(left_out.get_ydata())).tolist() == sorted(p["left_out_rms"] for p in path)
+    assert np.asarray(chosen.get_xdata())[0] == next(p["terms"] for p in path if p["chosen"])
+
+
 def test_free_runs_on_what_was_not_seen_leave_the_noise(found: SparseDiscovery) -> None:
     new = frame(7)
     predicted = found.predict(new[["P", "Q"]])
@@ -97,7 +106,7 @@ def test_mistakes_are_one_sentence() -> None:
         discover(one, ["E"], max_terms=0)
     with pytest.raises(UserError, match="no option 'libary'; did you mean 'library'"):
         discover(one, ["E"], libary=["linear"])
-    with pytest.raises(UserError, match="Ridge is no optimiser of the package pysindy"):
+    with pytest.raises(UserError, match="Ridge is not an optimiser of the package pysindy"):
         discover(one, ["E"], optimiser=Ridge())
     with pytest.raises(UserError, match="as texts, as in"):
         discover(one, ["E"], library=pysindy.PolynomialLibrary(2))

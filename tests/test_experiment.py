@@ -228,13 +228,13 @@ def test_a_model_may_be_fitted_to_more_than_the_others(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("reads", "name", "kinds", "say"),
     [
-        (load_experiment, "campaign.toml", "a campaign, where an experiment", "check {}"),
-        (load_experiment, "model.toml", "a model, where an experiment", "check CAMPAIGN --model {}"),
-        (load_experiment, "a.csv", "a recording, where a TOML file", "new DIR --from {}"),
-        (read_model, "campaign.toml", "a campaign, where a model", "check {}"),
-        (check_campaign, "experiment.toml", "an experiment, where a campaign", "run {}"),
-        (check_campaign, "a.csv", "a recording, where a TOML file", "new DIR --from {}"),
-        (load_campaign, "model.toml", "a model, where a campaign", "check CAMPAIGN --model {}"),
+        (load_experiment, "campaign.toml", "a campaign, and an experiment", "check {}"),
+        (load_experiment, "model.toml", "a model, and an experiment", "check CAMPAIGN --model {}"),
+        (load_experiment, "a.csv", "a recording, and a TOML file", "new DIR --from {}"),
+        (read_model, "campaign.toml", "a campaign, and a model", "check {}"),
+        (check_campaign, "experiment.toml", "an experiment, and a campaign", "run {}"),
+        (check_campaign, "a.csv", "a recording, and a TOML file", "new DIR --from {}"),
+        (load_campaign, "model.toml", "a model, and a campaign", "check CAMPAIGN --model {}"),
     ],
 )
 def test_files_mixed_up_are_called_by_their_kind(
@@ -242,7 +242,7 @@ def test_files_mixed_up_are_called_by_their_kind(
 ) -> None:
     with pytest.raises(UserError) as caught:
         reads(folder / name)
-    assert f"{folder / name}: this is {kinds} is wanted; " in str(caught.value)
+    assert f"{folder / name}: this is {kinds} is needed; " in str(caught.value)
     assert f"`discovery {say.format(folder / name)}`" in str(caught.value)
 
 

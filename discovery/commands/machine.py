@@ -19,7 +19,9 @@ def export(
     out: Annotated[Path | None, typer.Option("--out", help="Folder of the files [RUN/export/MODEL].")] = None,
     campaign: Annotated[Path | None, typer.Option(help="Campaign file [the one of the run].")] = None,
     step: Annotated[float, typer.Option(help="Fixed internal step, s.")] = 10.0,
-    states: Annotated[int | None, typer.Option(help="First reduce the model to so many states.")] = None,
+    states: Annotated[
+        int | None, typer.Option(help="First reduce the model to this number of states.")
+    ] = None,
     sign: Annotated[
         Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs; created if missing.")
     ] = None,
@@ -89,7 +91,7 @@ def compensate(
         ),
     ] = None,
 ) -> None:
-    """Run an exported model: reads inputs, gives offsets [um, um/m] with status word and heartbeat.
+    """Run an exported model: read inputs, write offsets [um, um/m] with status word and heartbeat.
 
     \b
     discovery compensate model.json --trust machine.pem.pub --inputs in.csv --out offsets.csv --state memory
@@ -151,7 +153,7 @@ def compensate(
 
 
 def update(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="The exported model at work (.json).")],
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="The exported model in use (.json).")],
     campaign: Annotated[
         Path,
         typer.Argument(
@@ -159,15 +161,18 @@ def update(
         ),
     ],
     recordings: Annotated[
-        list[str] | None, typer.Option("--recording", help="In order; may be repeated [all of the campaign].")
+        list[str] | None,
+        typer.Option(
+            "--recording", help="Recording to use; repeatable, in order of time [all of the campaign]."
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="File of the next revision [MODEL with .rN].")
     ] = None,
     sign: Annotated[Path | None, typer.Option(help="Private key (PEM, Ed25519) that signs it.")] = None,
 ) -> None:
-    """Keep an exported model up with an ageing machine: no change, wear, a faulty input sensor, or new
-    physics?
+    """Adapt an exported model to an ageing machine: was there no change, wear, a faulty input sensor, or
+    new physics?
 
     Wear becomes the next revision, with a changelog entry; `discovery compensate` runs it in the shadow
     first, and `discovery export` writes it to every target.
@@ -193,7 +198,7 @@ def opcua_certificate(
         str | None, typer.Option(metavar="URL", help="Fetch the certificate of the server at URL instead.")
     ] = None,
 ) -> None:
-    """Make the own certificate and key, or fetch the certificate of the server.
+    """Make a certificate and a key for the compensation, or fetch the certificate of the server.
 
     \b
     discovery opcua certificate line3
@@ -237,9 +242,11 @@ def opcua_browse(
 
 
 def watch(
-    state: Annotated[Path, typer.Argument(metavar="STATE", help="Folder that --state of compensate names.")],
-    port: Annotated[int, typer.Option(help="Port of the page, on this computer alone.")] = 8467,
-    hours: Annotated[float, typer.Option(help="How far back the page shows.")] = 24.0,
+    state: Annotated[
+        Path, typer.Argument(metavar="STATE", help="Folder that you gave to `discovery compensate --state`.")
+    ],
+    port: Annotated[int, typer.Option(help="Port of the page. Only this computer can open it.")] = 8467,
+    hours: Annotated[float, typer.Option(help="Hours of the past that the page shows.")] = 24.0,
 ) -> None:
     """Show a running compensation in a browser: offsets, inputs, state, events; and /metrics for
     Prometheus.

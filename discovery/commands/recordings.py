@@ -24,7 +24,7 @@ def check(
 
     Each channel is checked alone, against similar channels, and against other recordings: units, signs,
     clocks, swapped columns, dead or frozen sensors, copies. An `error` means that the recording cannot be
-    used (exit status 1). A `warning` deserves a look.
+    used (exit status 1). A `warning` is a possible fault.
     """
     from discovery.recordings.check import check_campaign, summary
     from discovery.recordings.finding import folded

@@ -14,9 +14,8 @@ Jobs = Annotated[
         "--jobs",
         "-j",
         min=1,
-        help="Fits at a time: models, folds and refits run side by side, each on one core. More than the "
-        "cores of the machine gain nothing; 1 leaves the others free. The results are the same with any "
-        "number. [every core; or the environment variable DISCOVERY_JOBS]",
+        help="Number of fits that run at the same time, each on one core. The results are the same with any "
+        "number. [all cores; or the environment variable DISCOVERY_JOBS]",
     ),
 ]
 
@@ -63,7 +62,7 @@ def run(
         _run_folder(experiment, out, dask, force=force, quiet=quiet, as_json=as_json)
         return
     if dask is not None:
-        raise UsageError(f"--dask runs the experiments of a folder; {experiment} is no folder")
+        raise UsageError(f"--dask runs the experiments of a folder; {experiment} is not a folder")
     from discovery.experiment import run as run_experiment
     from discovery.experiment.ending import ending
     from discovery.experiment.summary import summary

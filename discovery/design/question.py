@@ -20,7 +20,7 @@ INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these rec
 
 NOTHING_CLOSE = (
     "look at what happened in the windows in which heat is missing, and record what nothing records at that "
-    "body: its temperature, and whatever else heats or cools it"
+    "body: its temperature, and everything else that heats or cools it"
 )
 
 APART = Aim("separates the rivals", "the two answers differ there")

@@ -180,7 +180,8 @@ def make_context(
         fit = fitted(grids, fit)
         white = reading_noise(fit, stated, floor, process_prior())
     form, laws = model_form(fit, np.array(white.white))
-    own = {n: replace(s, start_sd=fit.model.states[n].start_sd) for n, s in model.states.items()}
+    spreads = fit.problem.start_spreads()
+    own = {n: replace(s, start_sd=spreads.get(n, s.start_sd)) for n, s in model.states.items()}
     scene = Scene(
         campaign.channels,
         tuple(outputs),

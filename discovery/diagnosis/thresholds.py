@@ -1,4 +1,4 @@
-"""Every number that decides in a diagnosis, with its meaning in the model of `docs/explanation/diagnosis.md`.
+"""Every number that decides in a diagnosis, with its meaning in the model of `docs/mismatch.md`.
 
     C_i dx_i/dt = terms + sum_k z_k a_k phi_k(x, u; eta_k) + s_i(t) w_i(t)
     y_j         = output(x) + sensor effects + slow_j(t) + white noise

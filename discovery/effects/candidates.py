@@ -301,9 +301,10 @@ def _changed(
 
 def _units(h: Hypothesis, model: Model, channels: Mapping[str, Channel]) -> dict[str, str]:
     """Unit of each parameter at its place: um of the catalogue means the unit of the output, W for what
-    enters the state (a rate, where it has no capacity).
+    enters the state (a rate, where it has no capacity), and an effect of the flow counts by its unit.
     """
     outputs = tuple(h.shown)
+    of_flow = _flow_unit(h, channels)
 
     def at(unit: str, output: str) -> str:
         if output and unit.startswith("um"):
@@ -311,8 +312,8 @@ def _units(h: Hypothesis, model: Model, channels: Mapping[str, Channel]) -> dict
         if h.terms and unit.startswith("W") and h.states and not model.states[h.states[0]].capacity:
             of = differences(model.states[h.states[0]].unit)
             rate = f"1/{model.time_unit}" if unit == f"W/{of}" else f"{of}/{model.time_unit}"
-            return rate if unit == f"W/{of}" else rate + unit.removeprefix("W")
-        return unit
+            return (rate if unit == f"W/{of}" else rate + unit.removeprefix("W")) + of_flow
+        return unit + of_flow if unit.startswith("W") else unit
 
     several = len(h.amplitudes) > 1 and outputs
     shown = outputs if several else outputs[:1] * len(h.amplitudes) or ("",) * len(h.amplitudes)
@@ -320,3 +321,13 @@ def _units(h: Hypothesis, model: Model, channels: Mapping[str, Channel]) -> dict
     return {name: at(h.effect.amplitude.unit, y) for name, y in zip(h.amplitudes, shown, strict=True)} | {
         name: at(shape.unit, first) for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
     }
+
+
+def _flow_unit(h: Hypothesis, channels: Mapping[str, Channel]) -> str:
+    """What the unit of an effect that is in proportion to a flow carries, as "/(l/min)"; nothing where a flow
+    has no unit.
+    """
+    if "flow" not in names(parse(h.effect.formula, f"effect {h.effect.word}")):
+        return ""
+    used = {name for term in h.terms for name in names(term.expression)} & set(channels)
+    return next((f"/({u})" for n in sorted(used) if same_dimension(u := channels[n].unit, "l/min")), "")

@@ -65,7 +65,7 @@ class ShapeForm(Strict):
     unit: Unit = "1"
     middle: float | None = Field(None, description="a usual value")
     factor: float | None = Field(None, gt=1, description="68 % of values lie within this factor of it")
-    spread: float | None = Field(None, gt=0, description="68 % of values lie within so much of it")
+    spread: float | None = Field(None, gt=0, description="68 % of values lie within this distance of it")
     instant: bool = Field(False, description="a time in the recording, which the search finds")
 
     @model_validator(mode="after")

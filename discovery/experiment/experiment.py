@@ -188,7 +188,7 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
         for name in getattr(entry, "outputs", None) or []:
             if name not in outputs:
                 raise _mistake(
-                    path, key, f"'{name}' is no output of the experiment; {suggest(name, list(outputs))}"
+                    path, key, f"'{name}' is not an output of the experiment; {suggest(name, list(outputs))}"
                 )
         for word, name in own_recordings(entry):
             if name in form.held_out:

@@ -10,7 +10,7 @@ from typing import Any
 from discovery.evaluation.rolematrix import matrix
 from discovery.evaluation.tables import Table, as_text
 from discovery.models.units import differences
-from discovery.report.compare import labels_of, shared_recordings
+from discovery.report.compare import groups, labels_of, shared_recordings
 from discovery.report.run import Run
 from discovery.report.runlist import run_list
 from discovery.runfolder import read_results
@@ -55,8 +55,8 @@ def remarks(folder: Path) -> Iterator[str]:
 
 
 def comparison(runs: Sequence[Run]) -> Iterator[str]:
-    """Runs and how they differ from the first; of a few, also the rms of every model on each recording that
-    all share.
+    """Runs and how they differ from the first; of a few, also the rms of every model on the recordings
+    that runs share.
     """
     labels, listing = labels_of(runs), run_list(runs, labels_of(runs), Path())
     yield as_text(Table(listing.title, listing.header[:-1], tuple(row.cells[:-1] for row in listing.rows)))
@@ -66,13 +66,14 @@ def comparison(runs: Sequence[Run]) -> Iterator[str]:
     yield ""
     if len(runs) > _MOST_TABLES:
         return
-    shared = shared_recordings(runs)
-    if not shared:
+    together = [of for of in groups(runs) if len(of) > 1]
+    if not together:
         yield "These runs share no recording, so their models are not compared side by side."
-    for recording in shared:
-        results = {label: run.results for label, run in zip(labels, runs, strict=True)}
-        yield as_text(rms_table(results, recording))
-        yield ""
+    for of in together:
+        results = {labels[k]: runs[k].results for k in of}
+        for recording in shared_recordings([runs[k] for k in of]):
+            yield as_text(rms_table(results, recording))
+            yield ""
 
 
 def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:

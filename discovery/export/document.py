@@ -82,7 +82,7 @@ def read_document(path: Path) -> Exported:
     if not path.is_file():
         raise UserError(f"{path}: there is no such file; name the .json that `discovery export` wrote")
     if path.stat().st_size > MAX_BYTES:
-        raise UserError(f"{path}: larger than {MAX_BYTES} bytes; this is no exported model")
+        raise UserError(f"{path}: larger than {MAX_BYTES} bytes; this is not an exported model")
     document, seal = open_seal(path.read_bytes(), path)
     return from_document(document, seal, path)
 
@@ -91,7 +91,7 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
     """The model of a document (see `read_document`)."""
     if document.get("format") != FORMAT:
         raise UserError(
-            f"{place}: format {document.get('format')!r} is not '{FORMAT}'; this is no exported model"
+            f"{place}: format {document.get('format')!r} is not '{FORMAT}'; this is not an exported model"
         )
     if document.get("version") != VERSION:
         raise UserError(

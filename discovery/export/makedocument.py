@@ -91,7 +91,7 @@ def make_document(
     for expression in model.expressions():
         for name in sorted(names(expression) - known):
             raise UserError(
-                f"model '{model.name}': '{name}' is no channel of campaign "
+                f"model '{model.name}': '{name}' is not a channel of campaign "
                 f"{campaign.path}; it cannot be exported"
             )
     compiled = compile_model(model, step_s)

@@ -73,8 +73,8 @@ def recorded(tables: Sequence[OwnTable], time_unit: str | None = None) -> Record
             kept.append(column)
     if not kept:
         raise UserError(
-            f"{tables[0].path}: no column but time holds values that move; record a temperature or an error"
-            + (f" ({'; '.join(notes)})" if notes else "")
+            f"{tables[0].path}: no column except time has values that change; record a temperature or "
+            "an error" + (f" ({'; '.join(notes)})" if notes else "")
         )
     guesses = {
         column.name: replace(one, role="other input", why=f"{one.why}, set by a controller")

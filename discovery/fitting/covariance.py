@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.fitting.problem import Problem
-from discovery.models import Model
+from discovery.fitting.problem import FORMER, Problem
+from discovery.models import Model, State
 
 Array = NDArray[np.float64]
 
@@ -86,6 +86,26 @@ def with_intervals(problem: Problem, theta: Array, errors: Array) -> Model:
             continue
         low, high = interval or (None, None)
         parameters[u.name] = replace(p, value=value, low=low, high=high)
-    spreads = {u.name: u.prior[1] for u in problem.unknowns if u.spread == "fitted" and u.prior}
-    states = {n: replace(s, start_sd=spreads[n]) if n in spreads else s for n, s in model.states.items()}
-    return replace(model, parameters=parameters, states=states)
+    return replace(model, parameters=parameters, states=_with_spreads(problem))
+
+
+def _with_spreads(problem: Problem) -> dict[str, State]:
+    """The states with the spread of their starts in recordings that no fit has seen.
+
+    One recording says little about the start of one body. The mean over all bodies of its kind counts as
+    `FORMER` recordings, as the spread before does in a fit.
+    """
+    states = dict(problem.model.states)
+    found = problem.start_spreads()
+    for name, sd in found.items():
+        alike = [found[other] ** 2 for other in found if _kind(states[other]) == _kind(states[name])]
+        recordings = sum(u.name == name and u.is_start for u in problem.unknowns)
+        shared = FORMER * sum(alike) / len(alike)
+        states[name] = replace(
+            states[name], start_sd=float(np.sqrt((shared + recordings * sd**2) / (FORMER + recordings)))
+        )
+    return states
+
+
+def _kind(state: State) -> tuple[str, bool]:
+    return state.unit, state.capacity is not None

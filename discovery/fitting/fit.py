@@ -18,7 +18,7 @@ from discovery.errors import RunsAwayError
 from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.kalman import innovations
 from discovery.fitting.noise import Noise, readings_as_one, resolution, roughness, white_noise
-from discovery.fitting.problem import Prior, Problem, make_problem
+from discovery.fitting.problem import FORMER, Prior, Problem, make_problem
 from discovery.fitting.solve import Loss, Solution, solve
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -280,7 +280,7 @@ def _found_spreads(
 ) -> dict[str, tuple[float, float]]:
     """By state: the spread of its starts that makes them most likely, and the one before.
 
-    One step of expectation maximisation over the recordings, with the one before as two of them.
+    One step of expectation maximisation over the recordings, with the one before as `FORMER` of them.
     """
     asked = {u.name for u in problem.unknowns if u.spread == "fitted"}
     if not asked:
@@ -292,7 +292,7 @@ def _found_spreads(
         before = problem.unknowns[mine[0]].prior
         assert before is not None
         squares = sum(theta[i] ** 2 + together * covariance[i, i] for i in mine)
-        found[name] = (float(np.sqrt((2 * before[1] ** 2 + squares) / (2 + len(mine)))), before[1])
+        found[name] = (float(np.sqrt((FORMER * before[1] ** 2 + squares) / (FORMER + len(mine)))), before[1])
     return found
 
 

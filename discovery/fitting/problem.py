@@ -28,6 +28,7 @@ from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
 
+FORMER = 2  # recordings as which the spread of starts that was believed before counts
 MOST = 2.0  # of what is expected, the most that an input is logged late
 
 
@@ -115,6 +116,10 @@ class Problem:
             elif u.spread == "fitted" and found and u.name in found:
                 unknowns[i] = replace(u, prior=(0.0, found[u.name]))
         return replace(self, unknowns=tuple(unknowns))
+
+    def start_spreads(self) -> dict[str, float]:
+        """By state: the spread of its starts, where the fit has found it."""
+        return {u.name: u.prior[1] for u in self.unknowns if u.spread == "fitted" and u.prior}
 
     def prior_rows(self, theta: Array, together: float = 1.0) -> tuple[Array, Array]:
         """What priors and beliefs add to the least squares: residual (K,) and its derivative (K, U).

@@ -86,7 +86,7 @@ def _check_names(model: Model, channels: Mapping[str, str], path: Path | str) ->
             raise UserError(
                 f"{path}, {place}: '{name}' is neither a state or parameter of the model "
                 "nor a channel of the campaign "
-                f"({', '.join(sorted(channels))}); mend the name or add the channel"
+                f"({', '.join(sorted(channels))}); correct the name or add the channel"
             )
 
 

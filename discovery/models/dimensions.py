@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from discovery.models.model import TIME_UNITS, Model, State
-from discovery.models.units import Dimension, differences, dimension, known, plain, ratio, times
+from discovery.models.units import Dimension, differences, dimension, known, plain, ratio, spell, times
 from discovery.recordings import Channel
 from discovery.terms import Apply, Expression, Name, Number, text
 from discovery.terms.expression import COMPARISONS
@@ -38,9 +38,11 @@ def check_dimensions(model: Model, channels: Mapping[str, Channel]) -> list[str]
     ]
     dimensions = {name: dimension(unit) for name, unit in units.items()}
     for term in (t for t in model.terms if not t.effect):
-        found = _compare(term.expression, dimensions, *_entering(model, model.states[term.into]))
+        wanted, name = _entering(model, model.states[term.into])
+        found = _compare(term.expression, dimensions, wanted, name)
         if found:
-            sentences.append(f"model '{model.name}', term '{term.name}': {found}")
+            remedy = _remedy(model, term.expression, dimensions, wanted)
+            sentences.append(f"model '{model.name}', term '{term.name}': {found}{remedy}")
     measured = {name: Name(name) for name in model.states if name in channels}
     for name, expression in {**measured, **model.outputs}.items():
         unit = channels[name].unit if name in channels else ""
@@ -144,8 +146,8 @@ def _compare(
         return None
     shown = f"'{text(expression)[:60]}'"
     if apart is None:
-        return f"{shown} has the dimension {_spell(found)} where {name} is expected"
-    return f"{shown} counts in {apart:.4g} {name} where {name} is expected; mend the units and the numbers"
+        return f"{shown} has the dimension of {spell(found)} where {name} is expected"
+    return f"{shown} counts in {apart:.4g} {name} where {name} is expected; correct the units and the numbers"
 
 
 def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimension:
@@ -163,7 +165,7 @@ def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimensio
             base, power = _of(a, dimensions), _of(b, dimensions)
             if power and plain(power):
                 raise _Mismatch(
-                    f"the exponent '{text(b)}' has the dimension {_spell(power)}; it must be a pure number"
+                    f"the exponent '{text(b)}' has the dimension of {spell(power)}; it must be a pure number"
                 )
             if base == {}:
                 return {}
@@ -187,7 +189,8 @@ def _of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimensio
             inner = _of(a, dimensions)
             if inner and plain(inner):
                 raise _Mismatch(
-                    f"{function}() of '{text(a)}', which is {_spell(inner)}; it must be a pure number"
+                    f"{function}() of '{text(a)}', which has the dimension of {spell(inner)}; "
+                    "it must be a pure number"
                 )
             return {}
         case Apply(function="sign"):
@@ -205,8 +208,8 @@ def _equal(a: Expression, b: Expression, dimensions: Mapping[str, Dimension]) ->
     if left is not None and right is not None and (apart := ratio(left, right)) != 1.0:
         one, other = f"'{text(a)[:40]}'", f"'{text(b)[:40]}'"
         if apart is None:
-            raise _Mismatch(f"{one} ({_spell(left)}) meets {other} ({_spell(right)}), another dimension")
-        raise _Mismatch(f"{one} meets {other}, but its unit is {apart:.4g} times as large")
+            raise _Mismatch(f"{one} ({spell(left)}) and {other} ({spell(right)}) have different dimensions")
+        raise _Mismatch(f"the unit of {one} is {apart:.4g} times that of {other}; give both the same unit")
     return right if left is None else left
 
 
@@ -217,7 +220,28 @@ def _combine(a: Dimension, b: Dimension, sign: float) -> Dimension:
     return times(total, 1.0)
 
 
-def _spell(measured: Dimension) -> str:
-    if not measured or not plain(measured):
-        return "of a pure number"
-    return " ".join(base + (f"^{n:g}" if n != 1 else "") for base, n in sorted(plain(measured).items()))
+def _remedy(
+    model: Model, expression: Expression, dimensions: Mapping[str, Dimension], wanted: Dimension
+) -> str:
+    """The unit that would fit, where a term is one parameter times something."""
+    factors = _factors(expression)
+    mine = [f.id for f, sign in factors if isinstance(f, Name) and f.id in model.parameters and sign > 0]
+    if len(mine) != 1:
+        return ""
+    fits = wanted
+    for factor, sign in factors:
+        try:
+            fits = fits if factor == Name(mine[0]) else _combine(fits, _of(factor, dimensions), -sign)
+        except _Mismatch:
+            return ""
+    unit = spell(fits, exact=True) if fits is not None else ""
+    return f"; {mine[0]} in {unit} would fit".replace("in a pure number", "without a unit") if unit else ""
+
+
+def _factors(expression: Expression, sign: float = 1.0) -> list[tuple[Expression, float]]:
+    """What is multiplied (1) and divided by (-1)."""
+    match expression:
+        case Apply(function="*" | "/" as how, arguments=(a, b)):
+            return [*_factors(a, sign), *_factors(b, sign if how == "*" else -sign)]
+        case _:
+            return [(expression, sign)]

@@ -184,7 +184,7 @@ def _check_start_with(states: Mapping[str, State], at: Callable[..., str]) -> No
         for other in state.start_with:
             if other not in above:
                 raise UserError(
-                    f"{at('states', name, 'start_with')}: '{other}' is no state above '{name}' "
+                    f"{at('states', name, 'start_with')}: '{other}' is not a state above '{name}' "
                     f"({', '.join(above) or 'there is none'}); name one, or leave it out"
                 )
         above.append(name)

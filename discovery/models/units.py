@@ -14,6 +14,16 @@ Dimension = Mapping[str, float] | None
 SIZE = "size"
 _TURNS = ("revolutions_per_minute", "revolution", "turn", "radian", "degree")
 _CLOSE = 1e-6
+# Units that a sentence begins with
+_LEADS = ("", "W", "W**2", "J", "um", "mm", "rpm", "l/min", "V", "N", "Pa")
+_SI = {
+    "[length]": "m",
+    "[mass]": "kg",
+    "[time]": "s",
+    "[temperature]": "K",
+    "[current]": "A",
+    "[angle]": "rad",
+}
 
 
 @lru_cache(maxsize=512)
@@ -92,3 +102,32 @@ def differences(unit: str) -> str:
     """
     bare = unit.replace("delta_deg", "deg")
     return bare.replace("degC", "K").replace("degF", "delta_degF")
+
+
+def spell(measured: Dimension, exact: bool = False) -> str:
+    """A dimension as a unit, with the fewest parts; `exact`: of that size, too, or nothing.
+
+    >>> spell(dimension("W*K")), spell(dimension("kW/m**2")), spell({})
+    ('W*K', 'W/m**2', 'a pure number')
+    """
+    if not measured or not plain(measured):
+        return "a pure number"
+    found = []
+    for k, lead in enumerate(_LEADS):
+        rest = dict(measured)
+        for base, n in (dimension(lead) or {}).items():
+            rest[base] = rest.get(base, 0.0) - n
+        rest = times(rest, 1.0)
+        if not exact or abs(rest.get(SIZE, 0.0)) < _CLOSE:
+            parts = [(_SI.get(base, base), n) for base, n in plain(rest).items()]
+            parts = sorted(parts, key=lambda p: -p[1])
+            found.append((bool(lead) + sum(abs(n) for _, n in parts), k, parts))
+    if not found:
+        return ""
+    _, k, parts = min(found)
+    above = "*".join([*filter(None, [_LEADS[k]]), *(_power(unit, n) for unit, n in parts if n > 0)])
+    return "/".join([above or "1", *(_power(unit, -n) for unit, n in parts if n < 0)])
+
+
+def _power(unit: str, n: float) -> str:
+    return unit if n == 1 else f"{unit}**{n:g}"

@@ -162,9 +162,9 @@ def _stamp(text: str, line: int, instants: bool, troubles: _Troubles) -> float |
     try:
         return parse_instant(text) if instants else _finite(text)
     except ValueError:
-        kind = "ISO 8601 instant" if instants else "number of seconds"
+        kind = "an ISO 8601 instant" if instants else "a number of seconds"
         do = "write all stamps as seconds, or all as instants like 2026-03-01T08:00:00"
-        troubles.cell("stamp", line, f"the stamp '{_short(text)}' is no {kind}", do)
+        troubles.cell("stamp", line, f"the stamp '{_short(text)}' is not {kind}", do)
         return None
 
 

@@ -52,7 +52,7 @@ def _mistake(
         known = ", ".join(errors) or "there is none"
         return f'the error that it corrects is not given; write corrects = "NAME" of an error ({known})'
     if error not in errors:
-        return f"'{error}' is no channel of role error; {suggest(error, errors)}"
+        return f"'{error}' is not a channel of role error; {suggest(error, errors)}"
     if error in taken:
         return f"'{error}' has two corrections; add them up in one column"
     if error in units and units[error] != units[name]:

@@ -16,10 +16,11 @@ from discovery.report.ranking import (
     astray,
     cells,
     is_error,
-    mean_improvement,
     origin,
     ranked,
+    removed,
     rms_by_unit,
+    rms_unit,
 )
 from discovery.report.recommended import recommended
 from discovery.report.run import Run, pretty_unit
@@ -74,7 +75,7 @@ def _models(run: Run) -> Part:
     found = {m: lead for m in rivals if (lead := lead_over(run, best, m)) is not None}
     for rival, lead in list(found.items())[:1]:
         points.append(
-            f"Next is {_name(run, rival)}: over all outputs, the rms of “{best}” is {_against(lead)}."
+            f"Second best is {_name(run, rival)}: over all outputs, the rms of “{best}” is {_against(lead)}."
         )
     given = [m for m in found if origin(run, m) == "given"][:2]
     figures += [(_percent_less(found[m]), f"rms of {best} against {m}{_interval(found[m])}") for m in given]
@@ -128,11 +129,12 @@ def _interval(lead: Lead) -> str:
 
 def _removed(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
     """How much of the thermal error is gone; the error without compensation is the reading itself."""
-    improved = mean_improvement(run, best)
-    if not math.isfinite(improved):
+    share = removed(run, best)
+    if not math.isfinite(share):
         return [], []
-    point = f"It removes {number(improved, 2)} % of the thermal error (rms, mean over {_count(run, best)})."
-    return [point], [(f"{number(improved, 2)} %", f"of the error removed by {best}, {_seen(run)}")]
+    over = f"rms, geometric mean over {_count(run, best)}"
+    point = f"It removes {number(share, 2)} % of the thermal error ({over})."
+    return [point], [(f"{number(share, 2)} %", f"of the error removed by {best}, {_seen(run)}")]
 
 
 def _left(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
@@ -212,7 +214,7 @@ def _missing(run: Run) -> Part:
     figures: list[tuple[str, str]] = []
     if found:
         proof, figures = _proof(diagnosis)
-        points += proof
+        points += [*proof, *_worse(run)]
     return Part(f"{sentence}.", tuple(points), tuple(figures))
 
 
@@ -299,4 +301,22 @@ def _gain(one: Mapping[str, Any]) -> str:
     """The interval of an improvement, behind its figures."""
     if one.get("gain_low") is None:
         return ""
-    return f" (improvement, 95 %: {number(one['gain_low'])} to {number(one['gain_high'])})"
+    chance = "; may be chance" if one["gain_low"] <= 0 <= one["gain_high"] else ""
+    return f" (improvement, 95 %: {number(one['gain_low'])} to {number(one['gain_high'])}{chance})"
+
+
+def _worse(run: Run) -> list[str]:
+    """The outputs of held-out recordings that the repaired model predicts clearly worse than before."""
+    given = diagnosed_key(run)
+    after = next((model for model in run.results.get("models", {}) if origin(run, model) == "repaired"), None)
+    if given is None or after is None or not run.held_out:
+        return []
+    before = cells(run, given)
+    found = [
+        f"{output} on {recording} ({number(old)} → {number(new)} {rms_unit(run, output)}".rstrip() + ")"
+        for (recording, output), score in cells(run, after).items()
+        if (old := before.get((recording, output), {}).get("rms"))
+        and (new := score.get("rms"))
+        and old < _CLEARLY * new
+    ]
+    return [f"After the repair, the rms is larger for {listed(found)}."] if found else []

@@ -63,7 +63,8 @@ class Chart:
 
 
 def thinned(x: Array, y: Array, most: int) -> tuple[Array, Array]:
-    """At most about `most` points that keep the look of a curve: lowest and highest of each bin.
+    """At most about `most` points that keep the look of a curve: lowest and highest of each bin; of a curve
+    with steps also the first and the last, so that a value that was held stays flat.
 
     >>> x = np.arange(1000.0)
     >>> a, b = thinned(x, np.where(x == 500, 9.0, 0.0), 100)
@@ -74,9 +75,17 @@ def thinned(x: Array, y: Array, most: int) -> tuple[Array, Array]:
     x, y = x[known], y[known]
     if len(x) <= most:
         return x, y
+    inner = np.arange(1, len(x) - 1)
+    stepped = bool((np.diff(x) == 0).any())
+    if stepped:
+        edges = np.linspace(x[0], x[-1], max(2, most // 4))
+        parts = [part for part in np.split(inner, np.searchsorted(x[inner], edges[1:-1])) if len(part)]
+    else:
+        parts = np.array_split(inner, max(1, most // 2 - 1))
     keep = [0, len(x) - 1]
-    for part in np.array_split(np.arange(1, len(x) - 1), max(1, most // 2 - 1)):
+    for part in parts:
         keep += [int(part[np.argmin(y[part])]), int(part[np.argmax(y[part])])]
+        keep += [int(part[0]), int(part[-1])] if stepped else []
     index = np.unique(keep)
     return x[index], y[index]
 

@@ -41,6 +41,9 @@
   };
   const visible = (series) => !hidden.has(series.name);
 
+  const PRINTED = 680;  // px of a chart as wide as a sheet of paper
+  let printing = false;
+
   class View {
     constructor(figure, chart) {
       this.figure = figure; this.chart = chart; this.cursor = null;
@@ -62,7 +65,7 @@
     from(pixel) { const [a, b] = this.domain; return a + ((pixel - LEFT) / (this.width - LEFT - RIGHT)) * (b - a); }
 
     draw() {
-      const width = this.box.clientWidth;
+      const width = printing ? (this.figure.closest(".grid-2, .grid-3") && !this.figure.matches(".solid") ? PRINTED / 2 : PRINTED) : this.box.clientWidth;
       if (!width) return;
       this.width = Math.max(width, 260);
       const small = Boolean(this.figure.closest(".small"));
@@ -356,8 +359,9 @@
     const shut = [...document.querySelectorAll("details:not([open])")];
     off.forEach((one) => one.classList.remove("off"));
     shut.forEach((one) => { one.open = true; });
+    printing = true;  // the window may be wider or narrower than paper
     drawAll();
-    const back = () => { off.forEach((one) => one.classList.add("off")); shut.forEach((one) => { one.open = false; }); drawAll(); };
+    const back = () => { printing = false; off.forEach((one) => one.classList.add("off")); shut.forEach((one) => { one.open = false; }); drawAll(); };
     window.addEventListener("afterprint", back, { once: true });
   });
   for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", drawAll);

@@ -31,8 +31,24 @@ def write_comparison(runs: Sequence[Run], out: Path) -> Path:
     """
     path = out if out.suffix == ".html" else out / "comparison.html"
     listing = run_list(runs, labels_of(runs), path.parent)
-    write_atomic(path, render(merged(runs, path.parent), listing))
+    found = [merged(runs, path.parent, of) for of in groups(runs) if len(of) > 1]
+    if len(found) == 1 and found[0].recordings and len(groups(runs)) == 1:
+        write_atomic(path, render(found[0], listing))
+    else:
+        write_atomic(path, render(merged(runs, path.parent), listing, found))
     return path
+
+
+def groups(runs: Sequence[Run]) -> list[list[int]]:
+    """The runs that share recordings, by their places in the list; a run that shares none is a group."""
+    found: list[list[int]] = []
+    for k, run in enumerate(runs):
+        with_it = next((of for of in found if shared_recordings([*(runs[i] for i in of), run])), None)
+        if with_it is None:
+            found.append([k])
+        else:
+            with_it.append(k)
+    return found
 
 
 def load_runs(folders: Sequence[Path], against: Path | None = None) -> list[Run]:
@@ -103,12 +119,18 @@ def _read(data: Predictions, output: str) -> Array:
     return np.stack([data.time[known], data.readings[output][known]])
 
 
-def merged(runs: Sequence[Run], folder: Path) -> Run:
+def merged(runs: Sequence[Run], folder: Path, chosen: Sequence[int] | None = None) -> Run:
     """One run that holds the models of all, on the recordings that all have; no model where they have none.
 
     A recording counts as held out only where no run has fitted it.
+
+    Args:
+        chosen: only these of the runs, called as in the list of all.
     """
-    labels, common = labels_of(runs), shared_recordings(runs)
+    chosen = range(len(runs)) if chosen is None else chosen
+    names = labels_of(runs)
+    labels, runs = [names[k] for k in chosen], [runs[k] for k in chosen]
+    common = shared_recordings(runs)
     places = [os.path.relpath(run.folder) for run in runs]
     command = shlex.join(["discovery", "compare", *places]) if len(runs) <= _NAMED else ""
     fitted = {name for run in runs for name in run.results.get("fit", [])}
@@ -135,6 +157,7 @@ def merged(runs: Sequence[Run], folder: Path) -> Run:
         "simulated": all(run.results.get("simulated") for run in runs),
         "models": models,
         "command": command,
+        "campaign": next((str(one) for run in runs if (one := run.results.get("campaign"))), ""),
     }
     predictions = {
         name: _predictions(runs, labels, name)

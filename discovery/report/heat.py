@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from discovery.models import Model
 from discovery.models.units import differences
 from discovery.report.chart import Array, Chart, Panel, Series
-from discovery.report.network import drawing
+from discovery.report.network import drawing, listing
 from discovery.report.run import Run, pretty_unit
 from discovery.report.series import time_axis
 from discovery.report.text import with_unit
 
 
-def network(run: Run) -> dict[str, str] | None:
+def network(run: Run) -> dict[str, Any] | None:
     """The thermal network of the diagnosed (else the first thermal) model; its bodies show where physics is
     missing.
     """
@@ -31,25 +33,26 @@ def network(run: Run) -> dict[str, str] | None:
     }
     shares = {k: float(v) for k, v in (location.get("states") or {}).items() if k in model.states}
     if (run.diagnosis or {}).get("verdict") == "no mismatch":
-        note, svg = "", drawing(model, {})
+        note, heat, unit = "", {}, ""
     elif added:  # what the answer names, with its probability
         note = (
-            "Orange: bodies where the answer places missing physics, with its probability. Orange lines: the "
-            "heat paths that the repair adds."
+            "Orange: bodies where the answer places missing physics, with its probability, and the heat "
+            "paths that the repair adds."
         )
-        svg = drawing(model, {k: v for k, v in added.items() if k in model.states}, "")
+        heat, unit = {k: v for k, v in added.items() if k in model.states}, ""
     elif any(shares.values()):
         note = "The darker a body, the more probable it is that physics is missing there."
-        svg = drawing(model, shares, "")
+        heat, unit = shares, ""
     elif any(watts.values()):
         note = "The darker a body, the more heat (rms) is missing there."
-        svg = drawing(model, watts, heat_unit(run))
+        heat, unit = watts, heat_unit(run)
     else:
-        note, svg = "", drawing(model, {})
+        note, heat, unit = "", {}, ""
     return {
         "model": model.name,
         "note": note,
-        "svg": svg,
+        "svg": drawing(model, heat, unit),
+        "bodies": listing(model, heat, unit),
         "title": "Where physics is missing" if note else "The thermal network",
     }
 

@@ -1,4 +1,6 @@
-"""The thermal network of a model as a drawing: bodies are nodes, transfer terms are edges, inputs hang on."""
+"""The thermal network of a model: a drawing, with bodies as nodes and heat paths as edges, and a list of the
+bodies for a narrow screen.
+"""
 
 from __future__ import annotations
 
@@ -41,13 +43,51 @@ def edges(model: Model) -> list[Edge]:
     ]
 
 
+@dataclass(frozen=True)
+class Body:
+    """A body for the list: `said`: what is known of it; `paths`: (name of the other end, added by a
+    diagnosis).
+    """
+
+    name: str
+    said: str
+    paths: tuple[tuple[str, bool], ...]
+
+
+def listing(model: Model, heat: Mapping[str, float], unit: str = "W") -> list[Body]:
+    """The bodies of the drawing, each with the bodies and inputs that it exchanges heat with."""
+    bodies, links = _bodies(model), _links(model)
+    return [
+        Body(
+            name,
+            _said(heat.get(name), unit),
+            tuple(
+                (link.other if link.one == name else link.one, link.added)
+                for link in links
+                if name in (link.one, link.other)
+            ),
+        )
+        for name in bodies
+    ]
+
+
+def _bodies(model: Model) -> list[str]:
+    return [name for name, state in model.states.items() if state.capacity or state.unit == "degC"]
+
+
+def _links(model: Model) -> list[Edge]:
+    """Without lags and other memory: they are no bodies, and their inputs are drawn at the body."""
+    helpers = set(model.states) - set(_bodies(model))
+    return [link for link in edges(model) if not helpers & {link.one, link.other}]
+
+
+def _said(heat: float | None, unit: str) -> str:
+    return "" if heat is None else f"{number(heat)} {unit}" if unit else f"{100 * heat:.0f} %"
+
+
 def drawing(model: Model, heat: Mapping[str, float], unit: str = "W") -> str:
     """SVG of the network; `heat` by state colours its bodies (a share of 1 or watts, as `unit` says)."""
-    bodies = [name for name, state in model.states.items() if state.capacity or state.unit == "degC"]
-    helpers = set(model.states) - set(
-        bodies
-    )  # lags and other memory: no bodies, their inputs are drawn at the body
-    links = [link for link in edges(model) if not helpers & {link.one, link.other}]
+    bodies, links = _bodies(model), _links(model)
     inputs = sorted({end for link in links for end in (link.one, link.other)} - set(bodies))
     place = _layout(bodies, inputs, links)
     largest = max((abs(value) for value in heat.values()), default=0.0) or 1.0
@@ -122,7 +162,7 @@ def _link(link: Edge, place: Mapping[str, tuple[float, float]], bodies: set[str]
 
 def _body(name: str, x: float, y: float, heat: float | None, largest: float, unit: str) -> str:
     share = 0.0 if heat is None else min(1.0, abs(heat) / largest)
-    said = "" if heat is None else f"{number(heat)} {unit}" if unit else f"{100 * heat:.0f} %"
+    said = _said(heat, unit)
     width = max(92, 9 * len(name) + 22)
     box = f'x="{x - width / 2:.0f}" y="{y - 25:.0f}" width="{width}"'
     return (

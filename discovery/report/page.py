@@ -28,13 +28,6 @@ if TYPE_CHECKING:
 _HERE = Path(__file__).parent
 _BUDGET = 300_000  # numbers that all curves of a page may hold together, below 2 MB
 _MOST_CURVES = 6  # more of them cannot be distinguished
-_NOT_SHARED = Answer(
-    Part(
-        "These runs share no recording",
-        ("Only their list is shown. To compare models side by side, name runs of the same recordings.",),
-    ),
-    Part(),
-)
 
 
 def write_report(run_dir: Path) -> Path:
@@ -51,11 +44,16 @@ def write_report(run_dir: Path) -> Path:
     return path
 
 
-def render(run: Run, runs: Printed | None = None) -> str:
-    """The page of a run as HTML; `runs`: the list that the page of several runs opens with."""
+def render(run: Run, runs: Printed | None = None, groups: Sequence[Run] = ()) -> str:
+    """The page of a run as HTML.
+
+    Args:
+        runs: the list that the page of several runs opens with.
+        groups: runs that share recordings, merged, where not all do.
+    """
     order = shown_models(run)
     curves = series.prediction_charts(run, order)
-    groups = [
+    predictions = [
         _group(run, recording, [c for c in curves if c.group == recording]) for recording in run.recordings
     ]
     missing, residual, found = (
@@ -71,9 +69,10 @@ def render(run: Run, runs: Printed | None = None) -> str:
     view: dict[str, Any] = {
         "title": f"{run.name}: report",
         "eyebrow": _eyebrow(run),
-        "answer": answer(run) if run.results.get("models") or run.diagnosis else _NOT_SHARED,
+        "answer": answer(run) if run.results.get("models") or run.diagnosis else _of_groups(groups),
         "runs": runs,
-        "predictions": groups,
+        "groups": [_side_by_side(one) for one in groups],
+        "predictions": predictions,
         "shaded": any(chart.shades for chart in curves),
         "curves": _legend(run, order, curves),
         "summary": summary(run),
@@ -94,6 +93,34 @@ def render(run: Run, runs: Printed | None = None) -> str:
         "reproduce": sections.reproduce(run),
     }
     return fill("page.html.j2", view, charts, _contents(view))
+
+
+def _of_groups(groups: Sequence[Run]) -> Answer:
+    """The answer on runs that do not all share recordings."""
+    if not groups:
+        text = "Only their list is shown. To compare models side by side, name runs of the same recordings."
+        return Answer(Part("These runs share no recording", (text,)), Part())
+    points = tuple(f"{_campaign(one)}: {_lower(answer(one).first.headline)}" for one in groups)
+    return Answer(Part("Not all of these runs share recordings", points), Part())
+
+
+def _lower(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]
+
+
+def _campaign(run: Run) -> str:
+    return str(run.results.get("campaign") or run.name)
+
+
+def _side_by_side(run: Run) -> dict[str, Any]:
+    """The models of runs that share recordings."""
+    return {
+        "title": _campaign(run),
+        "about": _eyebrow(run),
+        "summary": summary(run),
+        "by_output": best_by_output(run),
+        "command": run.results.get("command"),
+    }
 
 
 def charts_of(run: Run) -> list[Chart]:
@@ -154,6 +181,7 @@ def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
     missing = [("diagnosis", "Missing physics"), ("network", "Thermal network")]
     parts = [
         ("runs", "Runs"),
+        ("groups", ""),
         *(missing + compared if view["missing_first"] else compared + missing),
         ("models", ""),
         ("discovery", "Search for terms"),
@@ -165,7 +193,9 @@ def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
     anchors = {"summary": "comparison", "diagnosis": "mismatch"}
     out = [("answer", "The answer")]
     for key, name in parts:
-        if key == "models":
+        if key == "groups":
+            out += [(f"group-{k}", str(one["title"])) for k, one in enumerate(view["groups"], start=1)]
+        elif key == "models":
             out += [
                 (f"model-{index}", f"Model “{m['name']}”") for index, m in enumerate(view["models"], start=1)
             ]

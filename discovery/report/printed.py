@@ -15,10 +15,10 @@ from discovery.report.ranking import (
     cells,
     is_error,
     kind,
-    mean_improvement,
     mean_rms,
     origin,
     ranked,
+    removed,
     rms_unit,
     rms_units,
 )
@@ -111,9 +111,9 @@ def summary(run: Run) -> Printed | None:
     if not order:
         return None
     recordings = list(dict.fromkeys(r for model in order for r, _ in cells(run, model)))
-    removed = is_error(run)
+    errors = is_error(run)
     units = rms_units(run)
-    what = "removed rms [%]" if removed else f"rms [{', '.join(units)}]"
+    what = "Removed rms [%]" if errors else f"rms [{', '.join(units)}]"
     few = len(recordings) <= _MOST_RECORDINGS
     shown = recordings if few else [f"{word} of {len(recordings)} recordings" for word in ("median", "worst")]
     header = ("Model", "Terms", "Parameters", *shown, _AGAINST, "Fit [s]")
@@ -122,17 +122,16 @@ def summary(run: Run) -> Printed | None:
         entry = run.results["models"][model]
         each = [_scores(run, model, recording) for recording in recordings]
         if not few:
-            worst = np.min if removed else np.max
+            worst = np.min if errors else np.max
             each = [[float(of(found)) for found in zip(*each, strict=True)] for of in (np.median, worst)]
-        figures = [", ".join(number(one, 2 if removed else 3) for one in scores) for scores in each]
+        figures = [", ".join(number(one, 2 if errors else 3) for one in scores) for scores in each]
         made = {one.lower(): one for one in (origin(run, model), kind(run, model))}.values()
         size = [number(entry.get("terms") or None), number(entry.get("parameters"))]
         times = "best" if model == order[0] else behind(lead_over(run, order[0], model))
         look = "best" if model == order[0] else ""
         line = (model, *size, *figures, times, number(entry.get("seconds"), 2))
         rows.append(Line(line, look, about=", ".join(made)))
-    title = f"{what}, {'mean over all errors' if removed else 'over all outputs of a unit'}"
-    title = title[0].upper() + title[1:] if removed else title
+    title = f"{what}, {'geometric mean over all errors' if errors else 'over all outputs of a unit'}"
     against = None
     if 1 < len(order) <= _MOST_CHOSEN:
         choices = tuple(
@@ -147,9 +146,9 @@ def summary(run: Run) -> Printed | None:
 
 
 def _scores(run: Run, model: str, recording: str) -> list[float]:
-    """On a recording: the mean removed rms [%] of errors, or the rms over the outputs of each unit."""
+    """On a recording: the removed rms [%] of errors, or the rms over the outputs of each unit."""
     if is_error(run):
-        return [mean_improvement(run, model, recording)]
+        return [removed(run, model, recording)]
     found = mean_rms(run, model, recording)
     return [found.get(unit, math.nan) for unit in rms_units(run)]
 

@@ -95,14 +95,13 @@ def ranked(run: Run) -> list[str]:
     return sorted(models, key=place)
 
 
-def mean_improvement(run: Run, model: str, recording: str | None = None) -> float:
-    """Mean over errors (and held-out recordings) of the improvement of the rms [%]; NaN: there is none."""
-    found = [
-        score["improvement"]["rms"]
-        for (name, _), score in cells(run, model).items()
-        if recording in (None, name) and _is_number(score.get("improvement", {}).get("rms"))
-    ]
-    return sum(found) / len(found) if found else math.nan
+def removed(run: Run, model: str, recording: str | None = None) -> float:
+    """How much of the rms of the errors a model removes [%], by the mean that also ranks the models; NaN:
+    the errors without compensation are not known.
+    """
+    return 100 * (
+        1 - ratio(run, model, None, {key for key in cells(run, model) if recording in (None, key[0])})
+    )
 
 
 def _is_number(value: object) -> TypeGuard[float]:

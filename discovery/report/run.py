@@ -183,12 +183,13 @@ _PRETTY = {"um": "µm", "um/m": "µm/m", "degC": "°C", "1": "", "delta_degC": "
 def pretty_unit(unit: str) -> str:
     """A unit in print.
 
-    >>> pretty_unit("um/m"), pretty_unit("W/K"), pretty_unit("1"), pretty_unit("degC/h")
-    ('µm/m', 'W/K', '', 'K/h')
+    >>> pretty_unit("um/m"), pretty_unit("1"), pretty_unit("degC/h"), pretty_unit("W/K/(l/min)")
+    ('µm/m', '', 'K/h', 'W/K per l/min')
     """
     return _PRETTY.get(
         unit,
-        unit.replace("**2", "²")
+        unit.replace("/(l/min)", " per l/min")
+        .replace("**2", "²")
         .replace("**3", "³")
         .replace("**", "^")
         .replace("*", "·")

@@ -13,12 +13,13 @@ import numpy as np
 from discovery.report.heat import subject
 from discovery.report.lead import Array, Lead, lead_of
 from discovery.report.printed import Against, Line, Printed, behind
-from discovery.report.ranking import cells, is_error, mean_improvement, ranked, rms_by_unit
+from discovery.report.ranking import cells, is_error, ranked, removed, rms_by_unit
 from discovery.report.run import Run, pretty_unit
 from discovery.report.text import listed, number, percent, words
 from discovery.runfolder import DIAGNOSIS, RESULTS
 
 _MOST_DIFFERENCES = 8  # of two runs; the rest is counted
+_MOST_NAMES = 4  # in a list that is printed whole
 _NOT_SHARED = "no common held-out recording"
 
 
@@ -38,6 +39,10 @@ def run_list(runs: Sequence[Run], labels: Sequence[str], page: Path) -> Printed:
         if chosen == other:
             return "reference", ""
         lead = _lead(left[chosen], left[other])
+        if lead is None and (
+            machines := differences(*({"machine": facts[k]["machine"]} for k in (chosen, other)))
+        ):
+            return _NOT_SHARED, machines[0]  # all else differs, too
         told = differences(facts[chosen], facts[other]) + _moved(runs[chosen], runs[other])
         more = len(told) - _MOST_DIFFERENCES
         told = [*told[:_MOST_DIFFERENCES], f"{more} more"] if more > 1 else told
@@ -80,8 +85,28 @@ def differences(chosen: Mapping[str, str], other: Mapping[str, str]) -> list[str
         elif kind == "model":
             found.append(f"with {name}" if after else f"without {name}")
         else:
-            found.append(f"{key}: {before or 'none'} → {after or 'none'}")
+            found.append(f"{key}: {_changed(before or 'none', after or 'none')}")
     return found
+
+
+def _changed(before: str, after: str) -> str:
+    """What a list of names became; of a long one, what was added and what was left out.
+
+    >>> _changed("a, b", "a"), _changed("a, b, c, d, e", "a, b, c, d, x"), _changed("a", "b, c, d, e, f")
+    ('a, b → a', 'with x, without e', '1 → 5 others')
+    """
+    old, new = before.split(", "), after.split(", ")
+    if max(len(old), len(new)) <= _MOST_NAMES:
+        return f"{before} → {after}"
+    if not set(old) & set(new):
+        return f"{len(old)} → {len(new)} others"
+    more, less = ([n for n in one if n not in other] for one, other in ((new, old), (old, new)))
+    said = [
+        f"{word} {', '.join(names) if len(names) <= _MOST_NAMES else f'{len(names)} others'}"
+        for word, names in (("with", more), ("without", less))
+        if names
+    ]
+    return ", ".join(said)
 
 
 def _moved(chosen: Run, other: Run) -> list[str]:
@@ -135,8 +160,8 @@ def _score(run: Run, model: str | None) -> str:
     """What the best model removes of errors, or its median rms of temperatures."""
     if model is None:
         return "–"
-    if is_error(run) and np.isfinite(removed := mean_improvement(run, model)):
-        return f"{number(removed, 2)}\u00a0%"
+    if is_error(run) and np.isfinite(share := removed(run, model)):
+        return f"{number(share, 2)}\u00a0%"
     scored = rms_by_unit(run, model).items()
     return ", ".join(f"{number(float(np.median(rms)), 2)} {unit}".strip() for unit, rms in scored) or "–"
 
@@ -159,7 +184,9 @@ def _about(run: Run) -> str:
     parts += [str(results["campaign"])] if results.get("campaign") else []
     for said, key in (("fit", "fit"), ("held out", "held_out")):
         if names := results.get(key):
-            parts.append(f"{said}: {', '.join(names) if len(names) < 5 else f'{len(names)} recordings'}")
+            parts.append(
+                f"{said}: {', '.join(names) if len(names) <= _MOST_NAMES else f'{len(names)} recordings'}"
+            )
     made = [path.stat().st_mtime for name in (RESULTS, DIAGNOSIS) if (path := run.folder / name).exists()]
     parts += [datetime.fromtimestamp(max(made)).strftime("%Y-%m-%d %H:%M")] if made else []
     return " · ".join(parts)

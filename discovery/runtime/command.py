@@ -153,7 +153,7 @@ def go_back(folder: Path, say: Say) -> None:
     """One step back to the model before."""
     back = step_back(folder)
     say(
-        f"revision {back.revision} of '{back.model.name}' is at work again; its offsets "
+        f"revision {back.revision} of '{back.model.name}' is active again; its offsets "
         "begin where the last ones were"
     )
 

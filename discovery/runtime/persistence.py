@@ -48,7 +48,7 @@ class Lock:
             owner = self.file.read().strip() or "another process"
             self.file.close()
             raise UserError(
-                f"{folder}: a compensation is already at work with this folder ({owner}); stop it first, or "
+                f"{folder}: another compensation already uses this folder ({owner}); stop it first, or "
                 "name another folder with --state"
             ) from None
         self.file.truncate(0)

@@ -106,7 +106,7 @@ def _parsed(
             continue
         if abs(stamp) > EPOCH_LIMIT and line == 2:
             raise UserError(
-                f"time {cells[place].strip()} of the inputs is no instant in seconds; give seconds "
+                f"time {cells[place].strip()} of the inputs is not an instant in seconds; give seconds "
                 f"or ISO 8601 "
                 "instants, not milliseconds or nanoseconds"
             )

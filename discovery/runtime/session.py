@@ -268,7 +268,7 @@ class Session:
         candidate = offer(self.folder, data)
         rule = Rule(hours=self.rule.hours, most_um=None)
         self.shadow = begin_shadow(candidate, self.settings, rule)
-        self.tell(now, "shadow run", f"revision {candidate.revision} runs in the shadow of the one at work")
+        self.tell(now, "shadow run", f"revision {candidate.revision} runs in the shadow of the active model")
 
     def save(self, now: float) -> None:
         """Write the state to disk, unless the save before is still under way; what the output holds first."""

@@ -82,7 +82,7 @@ def step_back(folder: Path) -> Exported:
         UserError: there is none before.
     """
     if not (folder / PREVIOUS).exists():
-        raise UserError(f"{folder}: there is no model before the one at work, so no step back")
+        raise UserError(f"{folder}: there is no earlier model, so --back is not possible")
     now, before = (folder / ACTIVE).read_bytes(), (folder / PREVIOUS).read_bytes()
     write_atomic(folder / ACTIVE, before)
     write_atomic(folder / PREVIOUS, now)

@@ -45,7 +45,7 @@ class Update:
             lines.append(
                 f"{self.path}: the next revision, residual {self.after:.2f} of the fit's; "
                 f"`discovery compensate` "
-                "runs it in the shadow of the one at work first"
+                "runs it in the shadow of the active one first"
             )
             return lines
         lines.append(f"the model is kept: {_why(self.comparison)}")

@@ -121,7 +121,7 @@ def metrics(found: dict[str, Any]) -> str:
         "# HELP discovery_status Status word.",
         "# TYPE discovery_status gauge",
         f"discovery_status {facts.get('status', 0)}",
-        "# HELP discovery_revision Revision of the model at work.",
+        "# HELP discovery_revision Revision of the active model.",
         "# TYPE discovery_revision gauge",
         f"discovery_revision {facts.get('revision', 0)}",
         "# HELP discovery_events_total Events by what happened.",

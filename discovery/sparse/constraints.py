@@ -38,8 +38,8 @@ def matched(
         found = [one for one in offered if one == said] or [o for o in offered if o.startswith(f"{said} - ")]
         if not found and not (key == "forbid" and options.form == "auto"):
             raise UnknownTermError(
-                f"{path}: the discovery has '{word}' under {key}, which is no term of its library; write it "
-                f"as the library does: {', '.join(dict.fromkeys(offered))}"
+                f"{path}: the discovery has '{word}' under {key}, which is not a term of its library; "
+                f"write it as the library does: {', '.join(dict.fromkeys(offered))}"
             )
         return found
 

@@ -174,7 +174,7 @@ def _on_file(
     for name in options.into or ():
         if name not in baseline.states:
             raise UserError(
-                f"{path}: the discovery adds terms into '{name}', which is no state of this model "
+                f"{path}: the discovery adds terms into '{name}', which is not a state of this model "
                 f"({', '.join(baseline.states)}); correct the name under into"
             )
     bodies = [name for name, state in baseline.states.items() if state.capacity] or list(baseline.states)

@@ -47,8 +47,8 @@ def make_inputs(campaign: Campaign, recordings: Sequence[str], asked: Sequence[s
     for name in asked or ():
         if name not in campaign.channels:
             raise UserError(
-                f"{campaign.path}: the discovery asks for the input '{name}', which is no channel "
-                f"of the campaign ({', '.join(campaign.channels)}); mend the name under inputs"
+                f"{campaign.path}: the discovery asks for the input '{name}', which is not a channel "
+                f"of the campaign ({', '.join(campaign.channels)}); correct the name under inputs"
             )
         if not campaign.channels[name].is_input:
             raise UserError(

@@ -54,8 +54,8 @@ def candidates(
     unused = set(options.bounds) - {w for c in found for w in (c.label,)} - set(families)
     if unused:
         raise UserError(
-            f"{campaign.path}: the discovery bounds '{sorted(unused)[0]}', which is no term of its library; "
-            f"write it as the library does: {', '.join(sorted({c.label for c in found}))}"
+            f"{campaign.path}: the discovery bounds '{sorted(unused)[0]}', which is not a term of its "
+            f"library; write it as the library does: {', '.join(sorted({c.label for c in found}))}"
         )
     return [c for c in _unique(found) if c.label not in options.forbid]
 

@@ -170,7 +170,7 @@ def test_columns_that_say_nothing_stay_out(tmp_path: Path) -> None:
     channels = tomllib.loads((tmp_path / "rig" / "campaign.toml").read_text())["channels"]
     assert set(channels) == {"P", "T1", "T2", "T_env"}
     experiment = tomllib.loads((tmp_path / "rig" / "experiment.toml").read_text())
-    assert experiment["outputs"] == ["T1"]  # a sensor that never moves is no output
+    assert experiment["outputs"] == ["T1"]  # a sensor that never moves is not an output
 
 
 @pytest.mark.parametrize(

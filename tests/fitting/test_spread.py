@@ -199,3 +199,25 @@ def test_masses_that_are_warm_together_share_a_first_reading() -> None:
     sums = covariance.sum(axis=1)
     expected = [2.0, 1.0] + sums / (covariance.sum() + NOISE**2) * (11.0 - 3.0)
     assert found == pytest.approx(expected)
+
+
+def test_the_starts_of_bodies_that_one_recording_shows_share_what_it_knows() -> None:
+    """A mean over the bodies of a kind, with the weight of two recordings."""
+    states = {name: State(name, "degC", size, parse("room")) for name, size in (("a", 3e3), ("b", 2e4))}
+    states["slow"] = State("slow", "degC", None, parse("room"))
+    terms = (
+        Term("heat", "a", parse("load")),
+        Term("a to b", "b", parse("G*(a - b)"), "a"),
+        Term("air", "b", parse("G*(room - b)")),
+        Term("room", "slow", parse("(room - slow)/1e4")),
+    )
+    bodies = Model("bodies", {"G": Parameter(10.0, "W/K", 0.0)}, states, terms, {"T": parse("a + b - slow")})
+    rooms = [cold(np.random.default_rng(seed), f"r{seed}", 0.0) for seed in range(3)]
+    for count in (1, 3):
+        fit = fit_model(bodies, campaign(*rooms), [room.name for room in rooms[:count]])
+        alone = fit.problem.start_spreads()
+        mean = (alone["a"] ** 2 + alone["b"] ** 2) / 2
+        for name, expected in (("a", mean), ("b", mean), ("slow", alone["slow"] ** 2)):
+            assert fit.model.states[name].start_sd == pytest.approx(
+                np.sqrt((2 * expected + count * alone[name] ** 2) / (2 + count))
+            )

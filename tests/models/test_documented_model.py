@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pandas as pd
 import pytest
 
 from discovery import campaign_from_frames, prediction_frame, read_model
+from discovery.models.dimensions import check_dimensions
 
 PAGE = Path(__file__).parents[2] / "docs" / "own_model.md"
 
@@ -31,4 +33,8 @@ def test_its_steady_state_is_the_heat_balance(tmp_path: Path) -> None:
     found = prediction_frame(model, campaign, "monday", ["E_Z"])
     housing = 25.0 + 300.0 / 10.0  # all heat leaves through the housing
     bearing = housing + 300.0 / 20.0
+    assert check_dimensions(model, campaign.channels) == []
+    wrong = dict(model.parameters) | {"hA": replace(model.parameters["hA"], unit="W")}
+    (said,) = check_dimensions(replace(model, parameters=wrong), campaign.channels)
+    assert said.partition("': ")[2] in " ".join(PAGE.read_text("utf-8").split())
     assert found["E_Z|model"].iloc[-1] == pytest.approx((bearing - 21.0) + (housing - 21.0), rel=1e-4)

@@ -198,7 +198,7 @@ def test_a_memory_of_memories_starts_settled(tmp_path: Path) -> None:
         ("[states]", "[state]", ["unknown key", "did you mean 'states'"]),
         ("fixed = true", "fixd = true", ["line 8", "did you mean 'fixed'"]),
         ('time_unit = "min"', 'time_unit = "minutes"', ["line 3", "min"]),
-        ("{ a = 0.5 }", "{ y = 0.5 }", ["line 12", "'y' is no state above 'b'"]),
+        ("{ a = 0.5 }", "{ y = 0.5 }", ["line 12", "'y' is not a state above 'b'"]),
         ("G    =", "exp =", ["line 6", "cannot name"]),
         ("G    =", '"µ" =', ["line 6", "'µ' cannot name a parameter"]),
         ("G    =", '"ﬁx" =', ["line 6", "cannot name a parameter"]),

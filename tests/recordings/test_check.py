@@ -122,7 +122,7 @@ def test_nothing_is_wrong(write: Write) -> None:
         ("time,T_env,speed,E_Y0C\n", "error: fit.csv: no row with a stamp"),
         (
             with_line(9, "2026-03-01,20,0,"),
-            "error: fit.csv, line 9: the stamp '2026-03-01' is no number of seconds; write all stamps",
+            "error: fit.csv, line 9: the stamp '2026-03-01' is not a number of seconds; write all stamps",
         ),
     ],
 )
@@ -137,7 +137,9 @@ def test_stamps_of_another_form_are_the_only_trouble(write: Write) -> None:
     stamps = [lines[0][0]] + [f"01.03.2026 08:{minute:02}:00" for minute in range(30)]
     path = write([f"{stamp},{rest}" for stamp, (_, rest) in zip(stamps, lines, strict=True)])
     assert len(found(path)) == 1
-    with pytest.raises(UserError, match=r"line 2: the stamp '01\.03\.2026 08:00:00' is no ISO 8601 instant"):
+    with pytest.raises(
+        UserError, match=r"line 2: the stamp '01\.03\.2026 08:00:00' is not an ISO 8601 instant"
+    ):
         load_campaign(path)
 
 
@@ -189,7 +191,7 @@ def test_a_spread_belongs_to_inputs(write: Write) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mixed", "trouble"), [("08:00:00", "some stamps name a time zone"), ("25:00", "is no ISO")]
+    ("mixed", "trouble"), [("08:00:00", "some stamps name a time zone"), ("25:00", "is not an ISO")]
 )
 def test_instants_that_do_not_fit_together(write: Write, mixed: str, trouble: str) -> None:
     lines = [

@@ -104,7 +104,7 @@ def test_frames(write: Write) -> None:
     channels = {"E": {"role": "error", "unit": "um"}, "applied": {"role": "applied correction", "unit": "um"}}
     campaign = campaign_from_frames({"monday": frame}, channels)
     np.testing.assert_allclose(campaign.recordings["monday"].values["E"], raw.values["E_Y0C"] + 2.0)
-    with pytest.raises(UserError, match=r"channel 'applied': 'F' is no channel of role error"):
+    with pytest.raises(UserError, match=r"channel 'applied': 'F' is not a channel of role error"):
         campaign_from_frames(
             {"monday": frame}, channels | {"applied": channels["applied"] | {"corrects": "F"}}
         )
@@ -117,7 +117,7 @@ SECOND = 'E_Z0T = { role = "error", unit = "um/m", column = "E_Y0C" }\n\n[rec'
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (ONE.replace('um" }', 'um", corrects = "E_Y0" }'), "corr.corrects: 'E_Y0' is no channel of role"),
+        (ONE.replace('um" }', 'um", corrects = "E_Y0" }'), "corr.corrects: 'E_Y0' is not a channel of role"),
         (ONE.replace("[rec", SECOND), "corr: the error that it corrects is not given; write corrects ="),
         (
             ONE.replace("[rec", SECOND).replace('um" }', 'um", corrects = "E_Z0T" }'),

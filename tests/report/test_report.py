@@ -19,10 +19,11 @@ import pytest
 from discovery.challenge import scoring
 from discovery.diagnosis.thresholds import RIVAL
 from discovery.errors import UserError
+from discovery.experiment.summary import comparison
 from discovery.models import Parameter
 from discovery.report import equations, write_comparison, write_figures, write_report
 from discovery.report.chart import thinned
-from discovery.report.compare import load_runs, shared_recordings
+from discovery.report.compare import groups, load_runs, shared_recordings
 from discovery.report.lead import lead_over
 from discovery.report.mismatch import NEAR, section, sizes
 from discovery.report.printed import behind
@@ -126,7 +127,8 @@ def test_the_answer_agrees_with_an_independent_count(folder: Path, page: str) ->
     assert "The discovered model predicts best on the held-out recording “validation”" in page
     more = 100 * (np.exp(-np.log(1 - less / 100)) - 1)
     assert f"+{more:.0f} % (" in page
-    removed = np.mean([scores["discovered"][o]["improvement"]["rms"] for o in sample.OUTPUTS])
+    left = [1 - scores["discovered"][o]["improvement"]["rms"] / 100 for o in sample.OUTPUTS]
+    removed = 100 * (1 - np.exp(np.mean(np.log(left))))
     assert f"It removes {float(f'{removed:.2g}'):.0f} % of the thermal error" in page
 
 
@@ -257,6 +259,28 @@ def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path
     page = write_report(folder).read_text("utf-8")
     assert "contradict" not in page
     assert "The repair removes none of this mismatch" in page
+    assert "(improvement, 95 %: −0.1 to 0.2; may be chance)" in page
+
+
+def test_an_output_that_the_repair_makes_worse_is_named(tmp_path: Path) -> None:
+    folder = sample.write_sample(tmp_path / "run")
+    results = json.loads((folder / "results.json").read_text())
+    before = results["models"]["thermobalance"]["recordings"]
+    after = json.loads(json.dumps(before))
+    after["validation"]["E_Y0C"]["rms"] = 2 * before["validation"]["E_Y0C"]["rms"]
+    results["models"]["repaired"] = {"kind": "repaired", "recordings": after}
+    (folder / "results.json").write_text(json.dumps(results))
+    page = write_report(folder).read_text("utf-8")
+    assert re.search(r"After the repair, the rms is larger for E_Y0C on validation \(\S+ → \S+ µm\)\.", page)
+
+
+def test_a_narrow_screen_lists_the_network(page: str) -> None:
+    listed = re.search(r'<dl class="bodies listed">(.*?)</dl>', page, re.S)
+    assert listed
+    bodies = re.findall(r"<dt>(\w+).*?</dt><dd>(.*?)</dd>", listed[1])
+    assert [name for name, _ in bodies] == ["table", "c_body_1", "b_corpus"]
+    assert '<span class="added">b_corpus</span>' in dict(bodies)["c_body_1"]
+    assert "<span>T_fluid</span>" in dict(bodies)["table"]
 
 
 @pytest.mark.parametrize(("unit", "said"), [("um", "µm"), ("times the reading noise",) * 2])
@@ -393,6 +417,24 @@ def test_runs_of_two_machines_are_listed_but_their_models_are_not_mixed(folder: 
     assert 'href="machine/report.html"' in page
 
 
+def test_runs_of_several_machines_are_compared_machine_by_machine(tmp_path: Path) -> None:
+    for name, hours in (("first", 24.0), ("again", 24.0), ("other", 20.0), ("twin", 20.0)):
+        path = sample.write_sample(tmp_path / name, hours) / "results.json"
+        results = json.loads(path.read_text())
+        path.write_text(json.dumps(results | {"experiment": name, "campaign": f"machine of {hours:g} h"}))
+    runs = load_runs([tmp_path])
+    assert groups(runs) == [[0, 1], [2, 3]]
+    page = write_comparison(runs, tmp_path).read_text("utf-8")
+    assert "Not all of these runs share recordings" in page
+    for number, hours, label in ((1, 24, "again"), (2, 20, "twin")):
+        part = page.partition(f'<section id="group-{number}"><h2>machine of {hours} h</h2>')[2]
+        assert f"discovered, {label}" in part.partition("</section>")[0]
+    said = "\n".join(comparison(runs))
+    assert "again: discovered" in said
+    assert "twin: discovered" in said
+    assert "machine: machine of 24 h → machine of 20 h" in said
+
+
 def test_the_list_says_how_a_run_differs_from_any_other(folder: Path, tmp_path: Path) -> None:
     """The lead of one best model over another is that of the same two models in one run."""
     other = sample.write_sample(tmp_path / "plain")
@@ -426,6 +468,16 @@ def test_thinning_keeps_peaks() -> None:
     assert len(a) <= 200
     assert (b.max(), b.min()) == (7.0, -7.0)
     assert (np.diff(a) > 0).all()
+
+
+def test_a_held_value_stays_flat_when_its_curve_is_thinned() -> None:
+    """Long at 50, then a new value every half minute; no line may lead from 50 to a value after the step."""
+    at = np.r_[0.0, 700.0 + 30.0 * np.arange(400)]
+    values = np.r_[50.0, np.random.default_rng(0).uniform(0, 100, 400)]
+    a, b = thinned(np.repeat(at, 2)[1:], np.repeat(values, 2)[:-1], 200)
+    assert len(a) <= 200
+    assert (a[1], b[1]) == (700.0, 50.0)
+    assert (b.min(), b.max()) == (values[:-1].min(), values[:-1].max())
 
 
 def test_autocorrelation_is_that_of_statsmodels() -> None:

@@ -445,7 +445,7 @@ def test_the_command_says_what_is_missing(model_file: Path, tmp_path: Path) -> N
         ([model, "--allow-unsigned", "--inputs", "none.csv"], "there is no such file", 1),
         ([model, "--allow-unsigned", "--inputs", str(tmp_path)], "this is a folder", 1),
         ([str(tmp_path / "none.json"), *inputs], "there is no such file", 1),
-        ([model, "--back", "--state", str(tmp_path)], "no step back", 1),
+        ([model, "--back", "--state", str(tmp_path)], "--back is not possible", 1),
         ([model, *inputs, "--trust", str(tmp_path / "no.pub")], "there is no such key", 1),
         ([model, "--allow-unsigned"], "say where the readings come from", 2),
         ([model, "--back"], "--back needs --state", 2),

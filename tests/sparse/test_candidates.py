@@ -55,7 +55,7 @@ def test_the_pump_is_a_share_and_the_air_the_zero() -> None:
     assert inputs(pump=[0.0, 4.0]).gate == "pump/4"
 
 
-@pytest.mark.parametrize(("name", "said"), [("E", "has the role error"), ("fan", "no channel")])
+@pytest.mark.parametrize(("name", "said"), [("E", "has the role error"), ("fan", "not a channel")])
 def test_what_cannot_drive_is_refused(name: str, said: str) -> None:
     with pytest.raises(UserError, match=said):
         inputs([name])
@@ -159,7 +159,7 @@ def test_a_bound_holds_the_start_too() -> None:
     (one, _) = offered("drive*y", ["drive"], bounds={"drive*y": (2.0, 3.0)})
     assert (one.low, one.high) == (2.0, 3.0)
     assert 2.0 <= one.start <= 3.0
-    with pytest.raises(UserError, match="no term of its library"):
+    with pytest.raises(UserError, match="not a term of its library"):
         offered("drive*y", ["drive"], bounds={"air*y": (2.0, 3.0)})
 
 

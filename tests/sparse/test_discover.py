@@ -249,11 +249,11 @@ def test_a_users_mistakes_are_named(gated: Campaign) -> None:
         discover(gated, ["a"], ["E"], SparseOptions(optimiser="pysindy:STLQS"))
     with pytest.raises(UserError, match="optimiser_arguments"):
         discover(gated, ["a"], ["E"], SparseOptions(optimiser="pysindy:SR3", optimiser_arguments={"x": 1}))
-    with pytest.raises(UserError, match="'T_air', which is no channel"):
+    with pytest.raises(UserError, match="'T_air', which is not a channel"):
         discover(gated, ["a"], ["E"], SparseOptions(inputs=("T_air",)))
     with pytest.raises(UserError, match="cannot drive"):
         discover(gated, ["a"], ["E"], SparseOptions(inputs=("E",)))
     with pytest.raises(UserError, match="'velocity'"):
         discover(gated, ["a"], ["E"], SparseOptions(library=("velocity**2",)))
-    with pytest.raises(UserError, match="no term of its library"):
+    with pytest.raises(UserError, match="not a term of its library"):
         discover(gated, ["a"], ["E"], SparseOptions(form="rates", library=("P",), bounds={"pump": (0, 1)}))

@@ -11,7 +11,7 @@ from discovery.effects.form import DRIVING, Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="input_path",
-    title="A path of its own from a recorded input to an error",
+    title="A separate path from a recorded input to an error",
     group="inputs",
     place="output",
     formula="k_path*lag(level, t_path)",

@@ -11,7 +11,7 @@ from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="input_path",
-    title="A path of its own from a recorded temperature to an error",
+    title="A separate path from a recorded temperature to an error",
     group="inputs",
     place="output",
     formula="k_path*(lag(input, t_path) - lag(input, 1e9))",

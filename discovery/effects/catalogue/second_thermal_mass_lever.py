@@ -11,7 +11,7 @@ from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="second_thermal_mass",
-    title="Second thermal mass with a lever of its own",
+    title="Second thermal mass with its own lever",
     group="air and structure",
     place="lever",
     formula="k_m*(lag(body, t_m) - body)",
