@@ -172,7 +172,8 @@ def make_context(
     if any(g.unsure for g in whole.values()):
         grids = thinned(whole)
         fit = fitted(grids, fit)
-    floor = floors(fit, thresholds.FLOOR)
+    ambient = [n for n, channel in campaign.channels.items() if channel.role == "ambient temperature"]
+    floor = floors(fit, thresholds.FLOOR, ambient, thresholds.AIR)
     white = reading_noise(fit, stated, floor, process_prior())
     outliers = find_outliers(fit, whole, np.array(white.white))
     if outliers:

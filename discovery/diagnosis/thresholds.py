@@ -12,8 +12,9 @@ from __future__ import annotations
 
 # --- process noise: what a lumped model misses everywhere -------------------------------------------------
 FLOOR = 0.02  # of the largest rms flow of the model, at level one: heat at a body that nobody records
-LEVELS = (0.1, 0.3, 1.0, 2.0, 4.0, 8.0)  # of this heat, integrated over ...
-LEVEL_WEIGHTS = (0.15, 0.35, 0.3, 0.11, 0.06, 0.03)  # ... with these weights
+AIR = 0.1  # K: the air at a body differs from the air that is measured, at level one; it adds to this heat
+LEVELS = (0.1, 0.3, 1.0, 2.0, 5.0, 10.0)  # of this heat, integrated over ...
+LEVEL_WEIGHTS = (0.15, 0.35, 0.3, 0.12, 0.06, 0.02)  # ... with these weights
 SHARE = 0.08  # of what flows through a body, off from hour to hour: form error of a usual lumped model
 FORMS = ((0.02, 0.0, 0.0), (0.02, 0.0, 0.1), (0.08, 0.025, 0.1), (0.08, 0.08, 0.1), (0.25, 0.25, 0.25))
 # shares of flows: off from hour to hour, at an operating point, and beyond the edge of a body; from an exact
@@ -35,9 +36,8 @@ JUMP = 8.0  # median size of what a sensor shows too much, in reading noises
 SUREST = 0.98  # probability that is never exceeded: causes that nobody thought of
 NAMED = 0.7  # probability from which an effect is named
 MATTERS = 0.15  # reading noises, rms: what explains less of free runs (1 % of their rms) has no name
-SHORT = 11.0  # log evidence that a name has to add, and by which nothing at all may be short of the best
-SMALL = 0.33  # ... or this share of the log evidence of all of it
-CHANCE = 1.645  # standard deviations of all log evidence that a name has to add: 5 % lie above
+SHORT = 11.0  # log evidence that a name has to add, and by which an answer may be short of the best
+CHANCE = 1.645  # ... or so many standard deviations of all log evidence: 5 % lie above
 RIVAL = 3.0  # log evidence within which another answer may as well be right
 RIVALS_SHOWN = 12  # other answers in the document
 DRAWS = 100  # bootstrap draws over blocks and priors

@@ -82,7 +82,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
     best = max(rest, key=lambda m: m.evidence)
     short = best.evidence - _alone(context, found, answer, named)
-    if short > max(thresholds.SHORT, thresholds.SMALL * found.gain):
+    if short > _by_chance(found):
         if best.forced:
             reasons.append(f"heat of unknown cause at {best.forced} explains more than what can be named")
         reasons.append(f"what can be named explains too little (log evidence {short:.0f} below the best)")
@@ -127,11 +127,10 @@ def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None
 
 def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> list[Named]:
     """Those without which a model of them alone would be short: each one has to add evidence of its own, and
-    more than by chance next to large effects. A log evidence of G varies by sqrt(2 G) from one set of
-    readings to another: it is half of the square of a distance known within one standard deviation.
+    more than by chance next to large effects.
     """
     kept = list(chosen)
-    least = max(thresholds.SHORT, thresholds.CHANCE * sqrt(2 * max(found.gain, 0.0)))
+    least = _by_chance(found)
     while kept:
         fewer = [[o for o in kept if o is not n] for n in kept]
         best = max(fewer, key=lambda others: _alone(context, found, answer, others))
@@ -139,6 +138,13 @@ def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Na
             break
         kept = best
     return kept
+
+
+def _by_chance(found: Search) -> float:
+    """Log evidence that may come by chance. A log evidence of G varies by sqrt(2 G) from one set of readings
+    to another: it is half of the square of a distance known within one standard deviation.
+    """
+    return max(thresholds.SHORT, thresholds.CHANCE * sqrt(2 * max(found.gain, 0.0)))
 
 
 def _alone(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> float:

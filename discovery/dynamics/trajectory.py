@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -169,6 +169,20 @@ def flows(trajectory: Trajectory) -> Array:
         if j >= 0:
             squares[:, j] += mean
     return np.sqrt(squares)
+
+
+def answers(trajectory: Trajectory, inputs: Collection[str]) -> Array:
+    """How much more flows into each state per unit of some inputs together, (K, n)."""
+    system = trajectory.system
+    rates = np.zeros((len(system.grid.step), len(system.states)))
+    found = _term_rates(system, trajectory.values, trajectory.x, frozenset(inputs))
+    for dual, i, j in zip(found, system.into, system.source, strict=True):
+        for partial in dual.partials.values():
+            mean = _interval_means(partial)
+            rates[:, i] += mean
+            if j >= 0:
+                rates[:, j] -= mean
+    return rates
 
 
 def _state_ends(system: System, x: Array) -> dict[str, Array]:

@@ -9,14 +9,14 @@ one. Evidence is integrated over a few of each, and over slow sensor noise.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, sensitivities
-from discovery.dynamics.trajectory import flows
+from discovery.dynamics.trajectory import answers, flows
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Fit, Noise
 from discovery.fitting.noise import resolution
@@ -58,10 +58,15 @@ class Prior:
     form_weights: tuple[float, ...]
 
 
-def floors(fit: Fit, share: float) -> dict[str, float]:
+def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float = 0.0) -> dict[str, float]:
     """Process noise that no state is free of, W at a body, else a rate: a share of the largest rms flow of
-    the model. Heat and rates are never compared: the bed of a machine follows the room at 1e-5 K/s beside
-    bodies that take 300 W.
+    the model, and what flows where the air at a body is not quite as warm as the air that is measured. Heat
+    and rates are never compared: the bed of a machine follows the room at 1e-5 K/s beside bodies that take
+    300 W.
+
+    Args:
+        ambient: channels that measure the air.
+        apart: rms difference [K] of the air at a body from these.
     """
     largest = flow_sizes(fit)
     states = {n: s for n, s in fit.problem.model.states.items() if not s.memory}
@@ -69,7 +74,12 @@ def floors(fit: Fit, share: float) -> dict[str, float]:
         kind: max((largest[n] for n, s in states.items() if bool(s.capacity) == kind), default=0.0)
         for kind in (True, False)
     }
-    return {name: share * top[bool(state.capacity)] for name, state in states.items()}
+    air = dict.fromkeys(states, 0.0)
+    for run in fit.trajectories if apart else ():
+        size = apart * np.sqrt(np.mean(answers(run, ambient) ** 2, axis=0))
+        for name, one in zip(run.system.states, size.tolist(), strict=True):
+            air[name] = max(air.get(name, 0.0), one)
+    return {n: float(np.hypot(share * top[bool(s.capacity)], air[n])) for n, s in states.items()}
 
 
 def flow_sizes(fit: Fit) -> dict[str, float]:

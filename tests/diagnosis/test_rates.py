@@ -100,9 +100,11 @@ def test_process_noise_of_rates_has_nothing_to_do_with_the_heat_of_the_bodies_be
     )
     runs = machine.campaign(machine.simulated(1))
     context = context_of(runs, followed)
-    fastest = 1.5 / 13751.0  # K/s, of the room: a follower is slower
-    assert 0 < context.floor["foundation"] < thresholds.FLOOR * fastest
-    bodies = flow_sizes(context.baseline)
-    heat = max(size for name, size in bodies.items() if name != "foundation")
-    assert context.floor["bed"] == pytest.approx(thresholds.FLOOR * heat)
+    found, sizes = context.baseline.model.values(), flow_sizes(context.baseline)
+    air = thresholds.AIR / found["tau"]  # K/s, where the air is so much warmer
+    assert context.floor["foundation"] == pytest.approx(np.hypot(thresholds.FLOOR * sizes["foundation"], air))
+    assert sizes["foundation"] < 1.5 / 13751.0  # K/s, of the room: a follower is slower
+    heat = max(size for name, size in sizes.items() if name != "foundation")
+    air = thresholds.AIR * found["hA_b"]  # W
+    assert context.floor["bed"] == pytest.approx(np.hypot(thresholds.FLOOR * heat, air))
     assert heat > 100.0

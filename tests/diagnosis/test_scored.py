@@ -36,9 +36,9 @@ def test_heat_that_nobody_records_says_nothing_of_the_flows() -> None:
     assert len(floors) == len(thresholds.LEVELS)
     assert shares == {share for share, _, _ in thresholds.FORMS}
     level = {s.level: next(iter(s.noise.heat.values())) for s in dry().settings if s.noise.heat}
-    assert level[4.0] == pytest.approx(4.0 * level[1.0])
+    assert level[5.0] == pytest.approx(5.0 * level[1.0])
     usual = [s for s in dry().settings if is_usual(s)]
-    assert {(s.level <= 4.0, s.noise.share <= 0.08, s.noise.form <= 0.08) for s in usual} == {
+    assert {(s.level <= 2.0, s.noise.share <= 0.08, s.noise.form <= 0.08) for s in usual} == {
         (True, True, True)
     }
     settings = tuple(s for s in dry().settings if not is_usual(s))[: len(bare().settings)]
