@@ -50,6 +50,20 @@ def test_frames_give_the_mass_with_intervals_that_hold_the_truth(found: SparseDi
         assert row["value"] == pytest.approx(truth, rel=0.03)
 
 
+def test_a_second_mass_slower_than_the_recording_does_not_take_the_first_one_along() -> None:
+    """A lag of 1500 s, and one of 60 h that 8 h do not determine."""
+    time, load = np.arange(0.0, 8 * 3600.0, 60.0), np.repeat([0.0, 2.0, 0.0, 3.0, 1.0, 0.0, 2.0, 0.0], 60)
+    masses = np.zeros((len(time), 2))
+    share = np.exp(-60.0 / np.array([1500.0, 216000.0]))
+    for k in range(len(time) - 1):
+        masses[k + 1] = load[k] + (masses[k] - load[k]) * share
+    noise = 0.1 * np.random.default_rng(5).standard_normal(len(time))
+    made = pd.DataFrame({"P": load, "E": masses @ [5.0, 3.0] + noise}, index=pd.Index(time, name="time"))
+    numbers = discover(made, ["E"], CHANNELS, form="masses").coefficients()
+    assert numbers["value"]["E_tau1"] == pytest.approx(1500.0, rel=0.05)
+    assert numbers["value"]["E_gain1"] == pytest.approx(5.0, rel=0.05)
+
+
 def test_it_shows_its_table_and_the_error_against_size(found: SparseDiscovery) -> None:
     assert found.to_frame().equals(found.coefficients())
     (axes,) = found.plot().axes
