@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from inspect import signature
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
@@ -53,7 +52,8 @@ def discover(
         channels: column -> {"role": ..., "unit": ...} as in a campaign file; a column without an entry is
             another input or output without a unit.
         options: as in an experiment file (`form`, `library`, `bounds`, `keep`, `optimiser`, ...); `optimiser`
-            may also be an optimiser of PySINDy, as in `pysindy.STLSQ(threshold=0.05)`.
+            may also be an optimiser of PySINDy, as in `pysindy.STLSQ(threshold=0.05)`, or an object of your
+            own class derived from `pysindy.optimizers.BaseOptimizer`.
 
     Raises:
         UserError: a column that is missing, an option that does not fit.
@@ -77,25 +77,6 @@ def discover(
 
 def _is_text(one: Any) -> bool:
     return isinstance(one, str)
-
-
-def _named(optimiser: Any) -> dict[str, Any]:
-    """An optimiser of PySINDy as the options name it.
-
-    Raises UserError: it is something else.
-    """
-    import pysindy
-
-    kind = type(optimiser)
-    if getattr(pysindy, kind.__name__, None) is not kind or not hasattr(optimiser, "get_params"):
-        raise UserError(
-            f"optimiser: {kind.__name__} is not an optimiser of the package pysindy; give 'search', "
-            "'pysindy:STLSQ' or pysindy.STLSQ(...). Your own optimiser works in a SINDy of your own, with "
-            "our library (docs/discovery.md)"
-        )
-    taken = signature(kind).parameters
-    arguments = {k: v for k, v in optimiser.get_params(deep=False).items() if k in taken and v is not None}
-    return {"optimiser": f"pysindy:{kind.__name__}", "optimiser_arguments": arguments}
 
 
 class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
@@ -274,13 +255,13 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
                 "library: name families or expressions as texts, as in ['linear', 'sqrt', 'y*u']; a library "
                 "of PySINDy works in a SINDy of your own, with our SparseSearch (docs/discovery.md)"
             )
-        if not isinstance(self.optimiser, str):
-            given |= _named(self.optimiser)
         try:
             return SparseOptions.model_validate(given)
         except ValidationError as error:
             what = error.errors(include_url=False)[0]
-            raise UserError(f"{'.'.join(str(k) for k in what['loc'])}: {what['msg']}") from None
+            raise UserError(
+                f"{'.'.join(str(k) for k in what['loc'])}: {what['msg'].removeprefix('Value error, ')}"
+            ) from None
 
     def _campaign(self, x: pd.DataFrame, z: pd.DataFrame) -> Campaign:
         import pandas as pd

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pysindy
 import pytest
+from pysindy.optimizers import BaseOptimizer
 from sklearn.base import clone
 from sklearn.linear_model import Ridge
 from sklearn.model_selection import GridSearchCV, TimeSeriesSplit
@@ -48,6 +49,20 @@ def test_frames_give_the_mass_with_intervals_that_hold_the_truth(found: SparseDi
         (row,) = [row for _, row in table.iterrows() if row["unit"] == unit]
         assert row["low"] < truth < row["high"]
         assert row["value"] == pytest.approx(truth, rel=0.03)
+
+
+def test_a_second_mass_slower_than_the_recording_does_not_take_the_first_one_along() -> None:
+    """A lag of 1500 s, and one of 60 h that 8 h do not determine."""
+    time, load = np.arange(0.0, 8 * 3600.0, 60.0), np.repeat([0.0, 2.0, 0.0, 3.0, 1.0, 0.0, 2.0, 0.0], 60)
+    masses = np.zeros((len(time), 2))
+    share = np.exp(-60.0 / np.array([1500.0, 216000.0]))
+    for k in range(len(time) - 1):
+        masses[k + 1] = load[k] + (masses[k] - load[k]) * share
+    noise = 0.1 * np.random.default_rng(5).standard_normal(len(time))
+    made = pd.DataFrame({"P": load, "E": masses @ [5.0, 3.0] + noise}, index=pd.Index(time, name="time"))
+    numbers = discover(made, ["E"], CHANNELS, form="masses").coefficients()
+    assert numbers["value"]["E_tau1"] == pytest.approx(1500.0, rel=0.05)
+    assert numbers["value"]["E_gain1"] == pytest.approx(5.0, rel=0.05)
 
 
 def test_it_shows_its_table_and_the_error_against_size(found: SparseDiscovery) -> None:
@@ -98,6 +113,20 @@ def test_an_optimiser_of_pysindy_is_taken_as_it_is() -> None:
     assert "P" in "".join(given.equations())
 
 
+class Cut(BaseOptimizer):  # type: ignore[misc]
+    """An optimiser of a user: least squares, small coefficients cut off."""
+
+    def _reduce(self, x: np.ndarray, y: np.ndarray) -> None:
+        found = np.linalg.lstsq(x, y, rcond=None)[0].T
+        self.coef_ = np.where(np.abs(found) < 0.05, 0.0, found)
+        self.ind_ = self.coef_ != 0
+
+
+def test_an_optimiser_of_a_user_is_taken() -> None:
+    found = discover({"a": frame(0, 300)}, ["E"], CHANNELS, form="masses", max_terms=3, optimiser=Cut())
+    assert "P" in "".join(found.equations())
+
+
 def test_mistakes_are_one_sentence() -> None:
     one = frame(0, 100)
     with pytest.raises(UserError, match="no column 'F'"):
@@ -106,7 +135,7 @@ def test_mistakes_are_one_sentence() -> None:
         discover(one, ["E"], max_terms=0)
     with pytest.raises(UserError, match="no option 'libary'; did you mean 'library'"):
         discover(one, ["E"], libary=["linear"])
-    with pytest.raises(UserError, match="Ridge is not an optimiser of the package pysindy"):
+    with pytest.raises(UserError, match=r"Ridge\(\) is not an optimiser of PySINDy"):
         discover(one, ["E"], optimiser=Ridge())
     with pytest.raises(UserError, match="as texts, as in"):
         discover(one, ["E"], library=pysindy.PolynomialLibrary(2))

@@ -79,12 +79,13 @@ class Ending:
         lead, other = self.against_runner_up, self.runner_up
         if lead is None or other is None or self.best is None:
             return "how sure: there is no other model to compare with"
-        said = "smaller" if lead.ratio < 1 else "larger"
+        difference = f"{abs(1 - lead.ratio):.0%}"
+        said = f"{difference} {'smaller' if lead.ratio < 1 else 'larger'} than"
+        said = "the same as" if difference == "0%" else said
         low, high = sorted((1 - lead.low, 1 - lead.high))
         close = "" if lead.high < 1 else "; the recordings do not separate the two"
         return (
-            f"how sure: its rms is {abs(1 - lead.ratio):.0%} {said} than that of {other} (95 %: {low:.0%} to "
-            f"{high:.0%}; "
+            f"how sure: its rms is {said} that of {other} (95 %: {low:.0%} to {high:.0%} smaller; "
             f"better in {lead.sure:.0%} of resampled recordings){close}"
         )
 
@@ -107,7 +108,10 @@ class Ending:
                 else name
                 for name in sorted(self.guesses, key=lambda n: -self.hangs_on_guesses.get(n, 0.0))
             ]
-            told.append(f"the guesses for {', '.join(named[:4])} are not confirmed")
+            told.append(
+                f"the guesses for {', '.join(named[:4])} are not confirmed (if right, delete `guessed` "
+                "in the campaign file)"
+            )
         return f"doubts: {'; '.join(told)}" if told else "doubts: none; the recordings are sound"
 
 

@@ -128,6 +128,8 @@ def experiment_text(
     width = max(map(len, models))
     lines = [f"{model:{width}} = {entry}" for model, entry in models.items()]
     told = "\n".join(f"# {line}" for line in remarks)
+    why = "# What does this model lack? The plainest one that predicts."
+    diagnosed = f'\n{why}\n[mismatch]\nmodel = "{mismatch}"\n' if mismatch else ""
     return f"""# Written by `discovery new`. Fits see the recordings under fit alone.
 name = "{name}"
 campaign = "campaign.toml"
@@ -138,4 +140,4 @@ held_out = [{listed(names[-1:])}]
 {told}
 [models]
 {chr(10).join(lines)}
-""" + (f'\n[mismatch]\nmodel = "{mismatch}"\n' if mismatch else "")
+{diagnosed}"""

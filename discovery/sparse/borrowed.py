@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,9 @@ from discovery.sparse.search import Search, Terms
 Array = NDArray[np.float64]
 
 
-def borrowed(optimiser: str, arguments: Mapping[str, Any]) -> Callable[[Problem], Choice]:
-    """A choice made by an optimiser of PySINDy: "pysindy:SR3" is `pysindy.SR3(**arguments)`.
+def borrowed(optimiser: Any, arguments: Mapping[str, Any]) -> Callable[[Problem], Choice]:
+    """A choice made by an optimiser of PySINDy: "pysindy:SR3" is `pysindy.SR3(**arguments)`; an object is
+    taken as given.
 
     It gets the M rows that hold all that the readings say (`gram.factor`), columns and target of unit
     length: a coefficient is a share of the output's size, and a threshold of 0.05 drops what makes less
@@ -30,32 +32,36 @@ def borrowed(optimiser: str, arguments: Mapping[str, Any]) -> Callable[[Problem]
     Raises:
         UserError: PySINDy has no such optimiser, or it does not take these arguments.
     """
-    import pysindy
-
-    name = optimiser.removeprefix("pysindy:")
-    from pysindy.optimizers.base import BaseOptimizer
-
-    known = [
-        n for n, one in vars(pysindy).items() if isinstance(one, type) and issubclass(one, BaseOptimizer)
-    ]
-    if name not in known:
-        raise UserError(
-            f"optimiser = 'pysindy:{name}': PySINDy has no optimiser {name}; {suggest(name, known)}"
-        )
-    try:
-        getattr(pysindy, name)(**arguments)
-    except (TypeError, ValueError) as error:
-        raise UserError(f"optimiser = 'pysindy:{name}': {error}; correct optimiser_arguments") from None
+    made = _made(optimiser, arguments) if isinstance(optimiser, str) else optimiser
 
     def select(problem: Problem) -> Choice:
         search = problem.search()
         rows, target = factor(search.g)
         length = search.g.length
-        theirs = getattr(pysindy, name)(**arguments)
+        theirs = deepcopy(made)
         fit_quietly(theirs, rows / length, target / max(np.sqrt(search.g.square), 1e-300))
         return evidence(problem, _terms(search, np.ravel(theirs.coef_)))
 
     return select
+
+
+def _made(optimiser: str, arguments: Mapping[str, Any]) -> Any:
+    import pysindy
+    from pysindy.optimizers.base import BaseOptimizer
+
+    name = optimiser.removeprefix("pysindy:")
+    known = [
+        n for n, one in vars(pysindy).items() if isinstance(one, type) and issubclass(one, BaseOptimizer)
+    ]
+    known.remove("BaseOptimizer")
+    if name not in known:
+        raise UserError(
+            f"optimiser = 'pysindy:{name}': PySINDy has no optimiser {name}; {suggest(name, known)}"
+        )
+    try:
+        return getattr(pysindy, name)(**arguments)
+    except (TypeError, ValueError) as error:
+        raise UserError(f"optimiser = 'pysindy:{name}': {error}; correct optimiser_arguments") from None
 
 
 def _terms(search: Search, coefficients: Array) -> Terms:

@@ -40,9 +40,9 @@ class Choice:
 def chosen(problem: Problem) -> Choice:
     """The smallest set within `tolerance` standard errors of the best on what was left out.
 
-    No set is larger than the one of the least extended BIC at the effective number of readings, and none
-    ends at the slow end of the time constants. Terms then share a time constant where the criterion is
-    better for it.
+    No set is larger than the one of the least extended BIC at the effective number of readings. No term
+    ends at the slow end of the time constants: its family may then have one term fewer. Terms share a time
+    constant where the criterion is better for it.
     """
     problem = _with_parts(_with_spread(problem))
     while True:
@@ -57,7 +57,7 @@ def chosen(problem: Problem) -> Choice:
         ended = search.ended(terms)
         if not ended:
             break
-        problem = replace(problem, families=problem.families.without(ended))
+        problem = replace(problem, families=problem.families.limited(ended))
     found = evidence(problem, terms)
     fit = [max(search.g.square - one.gain, 0.0) / search.g.count for one in path[: len(errors)]]
     return replace(

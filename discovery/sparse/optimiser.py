@@ -105,6 +105,10 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
     def _problem(self, x: Array, target: Array, k: int) -> tuple[Problem, float]:
         """The problem of one target over its noise, and the noise."""
         library = self.library
+        if library is not None and sum(getattr(library, "rows_", ())) != len(x):
+            raise ValueError(
+                "SparseSearch(library) needs the object that is the feature_library of the same SINDy"
+            )
         rows = [len(x)] if library is None else library.rows_
         times = [np.arange(len(x), dtype=float)] if library is None else library.times_
         nuisance = [np.zeros((len(x), 0))] if library is None else library.nuisance_
@@ -154,6 +158,8 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
     def _mine(self, name: str) -> list[int]:
         """Families of a drive or column. Raises ValueError: there is none."""
         if self.library is None:
+            if not name.isdecimal():
+                raise ValueError(f"'{name}': without library=, name columns by number, as in keep=['0']")
             return [int(name)]
         names = self.library.drive_of_family_
         found = [f for f, drive in enumerate(names) if drive == name]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, WithJsonSchema, field_validator, model_validator
 
 from discovery.schema import Strict
 from discovery.sparse.laws import LAWS
@@ -12,6 +13,8 @@ from discovery.sparse.laws import LAWS
 THERMAL = ("wet", "rotation", "coupling", "radiation", "natural", "load", "second mass")
 FAMILIES = (*LAWS, "threshold", "product", *THERMAL)
 HIDDEN = ("own", "rate", "upstream")
+
+OPTIMISER = r"^(search|pysindy:\w+)$"  # in a file, which never runs the code of a user
 
 FROM_LIST = Field(strict=False)  # a file has lists where options have tuples
 Words = Annotated[tuple[str, ...], FROM_LIST]
@@ -68,10 +71,10 @@ class SparseOptions(Strict):
         description="smallest and largest coefficient of a term, by its expression; [0, inf] is a sign; in "
         "the units of the equations, for rates of errors and temperatures per hour",
     )
-    optimiser: str = Field(
+    optimiser: Annotated[Any, WithJsonSchema({"type": "string", "pattern": OPTIMISER})] = Field(
         "search",
-        pattern=r"^(search|pysindy:\w+)$",
-        description='"search": our own; "pysindy:SR3": an optimiser of PySINDy by its name',
+        description='"search": our own; "pysindy:SR3": an optimiser of PySINDy by its name; from Python also '
+        "an object",
     )
     optimiser_arguments: dict[str, Any] = Field(
         default_factory=dict, description="of the optimiser of PySINDy, as { threshold = 0.1 }"
@@ -89,6 +92,20 @@ class SparseOptions(Strict):
     refine: bool = Field(True, description="fit all numbers of the chosen model by output error at the end")
     seed: int = Field(0, ge=0, description="of the bootstraps")
     also: Words = Field((), description="recordings that this model is fitted to in addition to `fit`")
+
+    @field_validator("optimiser")
+    @classmethod
+    def _optimiser_of_pysindy(cls, one: Any) -> Any:
+        from pysindy.optimizers.base import BaseOptimizer
+
+        named = isinstance(one, str) and re.fullmatch(OPTIMISER, one)
+        if not (named or isinstance(one, BaseOptimizer)):
+            raise ValueError(
+                f"{one!r} is not an optimiser of PySINDy; give 'search' or a name, as in 'pysindy:SR3'. An "
+                "object works from Python, if its class is derived from pysindy.optimizers.BaseOptimizer "
+                "(docs/discovery.md)"
+            )
+        return one
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

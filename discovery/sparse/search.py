@@ -4,7 +4,7 @@ cheaper.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -25,24 +25,32 @@ _TRIES = 6  # entries that run into a term of their own family before growth end
 @dataclass(frozen=True)
 class Families:
     """How columns belong together: first column and number of columns of each family, bounds of
-    coefficients.
+    coefficients, and families that have as many terms as they may have.
     """
 
     start: Ints  # (F,)
     count: Ints
     low: Array
     high: Array
+    most: Ints | None = None  # terms of each family at most; None: any number
 
     @property
     def columns(self) -> int:
         """Number of columns."""
         return int(self.count.sum())
 
-    def without(self, barred: Sequence[int]) -> Families:
-        """The same with some families that may not enter."""
-        low, high = self.low.copy(), self.high.copy()
-        low[list(barred)], high[list(barred)] = 0.0, 0.0
-        return replace(self, low=low, high=high)
+    def limited(self, most: Mapping[int, int]) -> Families:
+        """The same with at most so many terms of some families; 0: the family may not enter."""
+        limits = np.full(len(self.start), np.iinfo(int).max) if self.most is None else self.most.copy()
+        limits[list(most)] = list(most.values())
+        low, high = (np.where(limits == 0, 0.0, bound) for bound in (self.low, self.high))
+        return replace(self, low=low, high=high, most=limits)
+
+    def full(self, members: Ints) -> NDArray[np.bool_]:
+        """Which columns (M,) belong to a family of which these members are as many as there may be."""
+        if self.most is None:
+            return np.zeros(self.columns, dtype=bool)
+        return np.repeat(np.bincount(members, minlength=len(self.start)) >= self.most, self.count)
 
 
 def plain(columns: int, low: Array | None = None, high: Array | None = None) -> Families:
@@ -106,7 +114,7 @@ class Search:
         f, size = self.families, len(terms)
         barred = np.zeros(f.columns, dtype=bool)
         for _ in range(_TRIES):
-            where = (terms.family, terms.place, f.low, f.high, barred)
+            where = (terms.family, terms.place, f.low, f.high, barred | f.full(terms.family))
             family, place = pursuit.entry(*self._problem, *where)
             if family < 0:
                 return None
@@ -122,12 +130,13 @@ class Search:
                 terms = self.without(found, max(pair))
         return None
 
-    def ended(self, terms: Terms) -> list[int]:
-        """Families whose time constant ended at the slow end of the grid: there they only add up their
-        input.
+    def ended(self, terms: Terms) -> dict[int, int]:
+        """Families of which a time constant ended at the slow end of the grid, where it only adds up its
+        input, with the number of their other terms.
         """
         last = self.families.count[terms.family] - 1
-        return [int(f) for f in terms.family[(last > 0) & (terms.place > last - _EDGE)]]
+        slow = (last > 0) & (terms.place > last - _EDGE)
+        return {int(f): int(np.sum(~slow & (terms.family == f))) for f in terms.family[slow]}
 
     def without(self, terms: Terms, k: int) -> Terms:
         """The set without its term k, refined."""
