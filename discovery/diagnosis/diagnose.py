@@ -180,7 +180,7 @@ def diagnose(
     fitting = improvement([runs[r] for r in fit if r in runs], outputs)
     proof = {r: improvement([runs[r]], outputs) for r in read if r in runs}
     each = [improvement([one], outputs) for one in runs.values()]
-    verdict = refuted(idle(verdict, each), proof)
+    verdict = refuted(idle(found, verdict, each), proof)
     if not verdict.named and after is not None:
         after = None
     verdict = replace(verdict, reasons=(*verdict.reasons, *_reasons(context, verdict, read, proof, effects)))

@@ -321,8 +321,8 @@ def with_force(context: Context, one: Scored, state: str) -> Scored:
     """
     odds = float(np.log(thresholds.ODDS) - np.log(len(context.floor)))
     forced = replace(one, forced=state, log_odds_force=odds)
-    heat, (coarse, *_) = thresholds.UNKNOWN_FORCE * context.floor[state], thresholds.FORMS[-1]
-    return _over_noise(context, forced, {state: (heat, coarse)})
+    times, share = thresholds.UNKNOWN_FORCE
+    return _over_noise(context, forced, {state: (times * context.floor[state], share)})
 
 
 def light(one: Scored) -> Scored:

@@ -16,14 +16,21 @@ AIR = 0.1  # K: the air at a body differs from the air that is measured, at leve
 LEVELS = (0.1, 0.3, 1.0, 2.0, 5.0, 10.0)  # of this heat, integrated over ...
 LEVEL_WEIGHTS = (0.15, 0.35, 0.3, 0.12, 0.06, 0.02)  # ... with these weights
 SHARE = 0.08  # of what flows through a body, off from hour to hour: form error of a usual lumped model
-FORMS = ((0.02, 0.0, 0.0), (0.02, 0.0, 0.1), (0.08, 0.025, 0.1), (0.08, 0.08, 0.1), (0.25, 0.25, 0.25))
+FORMS = (
+    (0.02, 0.0, 0.0),
+    (0.02, 0.0, 0.1),
+    (0.02, 0.025, 0.1),
+    (0.08, 0.08, 0.1),
+    (0.25, 0.25, 0.25),
+    (0.8, 0.25, 0.25),
+)
 # shares of flows: off from hour to hour, at an operating point, and beyond the edge of a body; from an exact
 # model to a coarse one ...
-FORM_WEIGHTS = (0.25, 0.25, 0.25, 0.15, 0.1)  # ... with these weights
+FORM_WEIGHTS = (0.25, 0.25, 0.25, 0.15, 0.08, 0.02)  # ... with these weights
 SLOW = (0.0, 0.3, 1.0, 3.0, 10.0)  # slow noise of outputs, shares of the reading noise, integrated over ...
 SLOW_WEIGHTS = (0.35, 0.35, 0.2, 0.08, 0.02)  # ... with these weights
 FORM = 0.2  # of the flow of a named effect, at each operating point: no law is quite that of nature
-UNKNOWN_FORCE = 10.0  # times the unrecorded heat of a body at level one: a latent force, "none of these"
+UNKNOWN_FORCE = (10.0, 0.25)  # times the unrecorded heat of a body, share of its flows: "none of these"
 
 # --- effects ----------------------------------------------------------------------------------------------
 BELIEF = 0.5  # log of the factor within which the start values of a hand-built model are believed

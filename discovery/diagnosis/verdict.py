@@ -165,9 +165,9 @@ def _only(context: Context, found: Search, answer: Scored, chosen: Sequence[Name
     return found.tried.get(keys)
 
 
-def idle(verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:
-    """No mismatch where what was named does too little for free runs, on average over all recordings, fitted
-    and unseen. Logarithms of the rms are averaged: one recording of another machine does not drown the rest.
+def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:
+    """No name where what was named does too little for free runs, on average over all recordings, fitted and
+    unseen. Logarithms of the rms are averaged: one recording of another machine does not drown the rest.
     """
     if not verdict.named or _lower(runs) >= 0.5 * thresholds.MATTERS**2:
         return verdict
@@ -175,7 +175,9 @@ def idle(verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:
         "what could be named changes free runs too little to matter (rms lower by "
         f"{printed(100 * _lower(runs))} % on average over the recordings)"
     )
-    return replace(verdict, word=NO_MISMATCH, named=(), candidates=(), reasons=(reason, *verdict.reasons))
+    reasons = (reason, *_coarse(found), *verdict.reasons)
+    word = UNEXPLAINED if _coarse(found) else NO_MISMATCH
+    return replace(verdict, word=word, named=(), candidates=(), reasons=reasons)
 
 
 def _lower(runs: Iterable[Improvement]) -> float:
@@ -207,16 +209,22 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
 
 def _nothing(context: Context, found: Search, answer: Scored, candidates: tuple[Named, ...]) -> Verdict:
     """Nothing is missing, unless the model is so coarse that process noise explains whatever there is."""
-    if found.baseline.coarse >= thresholds.NAMED:
-        reason = (
-            f"the flows of the model are off by about {100 * found.baseline.off:.0f} %, more than is usual "
-            "for a lumped model, and no effect explains that"
-        )
-        return Verdict(UNEXPLAINED, answer, (), candidates, (reason,))
+    if coarse := _coarse(found):
+        return Verdict(UNEXPLAINED, answer, (), candidates, coarse)
     if context.outliers:
         reason = f"{len(context.outliers)} single wrong readings, nothing else"
         return Verdict(FAULT, answer, (), (), (reason,))
     return Verdict(NO_MISMATCH, answer, (), (), _apart(found, answer, candidates))
+
+
+def _coarse(found: Search) -> tuple[str, ...]:
+    """What is said of a model that is off by more than is usual; nothing of any other."""
+    if found.baseline.coarse < thresholds.NAMED:
+        return ()
+    return (
+        f"the flows of the model are off by about {100 * found.baseline.off:.0f} %, more than is usual for a "
+        "lumped model, and no effect explains that",
+    )
 
 
 def _apart(found: Search, answer: Scored, rest: Sequence[Named]) -> tuple[str, ...]:

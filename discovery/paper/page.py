@@ -20,7 +20,7 @@ from discovery.paper.film import equation_6, nozzle
 from discovery.paper.influences import budgets, equation_8
 from discovery.paper.left_nozzle import left_nozzle
 from discovery.paper.machine import figure_2, figure_3, symmetric
-from discovery.paper.test_piece import test_piece
+from discovery.paper.recalibration import recalibration
 from discovery.progress import Progress, silent
 from discovery.recordings import Channel
 from discovery.report.page import fill
@@ -38,7 +38,7 @@ _IN_ORDER: tuple[tuple[str, Callable[[Material], Chapter | None]], ...] = (
     ("equation (8)", equation_8),
     ("figures 8 and 9", section_4),
     ("budgets", budgets),
-    ("test piece", test_piece),
+    ("test piece", recalibration),
 )
 NOT_REPEATED = (
     "Figures 1, 4, 5 and 8 (nozzle positions) are drawings and photographs. Figure 2 shows temperatures "

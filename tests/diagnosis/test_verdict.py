@@ -302,10 +302,12 @@ def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
     named = said(WET, {"fluid_convection": 0.9})
     large, small = improved(2.0, 1.0, 0.1, 1.5), improved(2.0, 1.995, -0.1, 0.3)
     another_machine = improved(200.0, 260.0, -70.0, -50.0)
-    assert idle(named, [large]) is named
-    withdrawn = idle(named, [small, small])
+    assert idle(cast(Any, WET), named, [large]) is named
+    withdrawn = idle(cast(Any, WET), named, [small, small])
     assert (withdrawn.word, withdrawn.named) == ("no mismatch", ())
-    assert idle(named, [large, large, another_machine]) is named
+    assert idle(cast(Any, WET), named, [large, large, another_machine]) is named
+    far = Tried([Model((FLUID,), 50.0), Model((), 0.0, off=0.24)])
+    assert idle(cast(Any, far), named, [small, small]).word == "unexplained"
 
 
 def test_unseen_recordings_withdraw_a_name_and_never_add_one() -> None:

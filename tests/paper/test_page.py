@@ -13,7 +13,7 @@ from discovery.errors import UserError
 from discovery.experiment import load_experiment, run
 from discovery.models import Parameter
 from discovery.paper.film import identified
-from discovery.paper.test_piece import features
+from discovery.paper.recalibration import features
 from tests.small import EXPERIMENT, write_small
 
 PAPER = """

@@ -219,7 +219,7 @@ def test_a_state_from_the_future_is_refused_for_an_older_copy(
 
 def test_one_writer_a_folder(exported: Exported, model_file: Path, tmp_path: Path) -> None:
     first = Session(exported, model=model_file, folder=tmp_path)
-    with pytest.raises(UserError, match=r"already at work with this folder \(process \d+\)"):
+    with pytest.raises(UserError, match=r"another compensation already uses this folder \(process \d+\)"):
         Session(exported, model=model_file, folder=tmp_path)
     first.close(0.0)
     Session(exported, model=model_file, folder=tmp_path).close(0.0)

@@ -27,7 +27,7 @@ from discovery.runtime.update import AS_NEW, revision_of
 FEATURES_A_DAY = (12, 24)
 
 
-def test_piece(m: Material) -> Chapter | None:
+def recalibration(m: Material) -> Chapter | None:
     """What few readings of each recording say of the model at work, and what its next revision is worth."""
     if not m.form.test_piece:
         return None
