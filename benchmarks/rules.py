@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1] / "discovery"
 FOLDERS = ("evidence", "diagnosis")
 AIM_RULES, AIM_CONSTANTS = 15, 20
-TODAY_RULES, TODAY_CONSTANTS = 23, 32  # what a test holds: the aim is not reached yet
+TODAY_RULES, TODAY_CONSTANTS = 23, 34  # what a test holds: the aim is not reached yet
 
 RESOLUTION = {  # finer gives the same answer in more time
     "evidence/bayes.py": "_NARROW",

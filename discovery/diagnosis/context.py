@@ -36,6 +36,8 @@ def process_prior() -> Prior:
     return Prior(
         thresholds.FLOOR,
         thresholds.SHARE,
+        thresholds.SHARES,
+        thresholds.SHARE_WEIGHTS,
         thresholds.LEVELS,
         thresholds.LEVEL_WEIGHTS,
         thresholds.SLOW,

@@ -15,18 +15,12 @@ FLOOR = 0.02  # of the largest rms flow of the model, at level one: heat at a bo
 AIR = 0.1  # K: the air at a body differs from the air that is measured, at level one; it adds to this heat
 LEVELS = (0.1, 0.3, 1.0, 2.0, 5.0, 10.0)  # of this heat, integrated over ...
 LEVEL_WEIGHTS = (0.15, 0.35, 0.3, 0.12, 0.06, 0.02)  # ... with these weights
-SHARE = 0.08  # of what flows through a body, off from hour to hour: form error of a usual lumped model
-FORMS = (
-    (0.02, 0.0, 0.0),
-    (0.02, 0.0, 0.1),
-    (0.02, 0.025, 0.1),
-    (0.08, 0.08, 0.1),
-    (0.25, 0.25, 0.25),
-    (0.8, 0.25, 0.25),
-)
-# shares of flows: off from hour to hour, at an operating point, and beyond the edge of a body; from an exact
-# model to a coarse one ...
-FORM_WEIGHTS = (0.25, 0.25, 0.25, 0.15, 0.08, 0.02)  # ... with these weights
+SHARE = 0.08  # off by more than this share of its flows a lumped model is coarse
+SHARES = (0.02, 0.08, 0.25, 0.8)  # of what flows through a body, off from hour to hour, integrated over ...
+SHARE_WEIGHTS = (0.5, 0.35, 0.12, 0.03)  # ... with these weights
+FORMS = ((0.0, 0.0), (0.0, 0.1), (0.025, 0.1), (0.08, 0.1), (0.25, 0.25))  # by which laws are off at an
+# operating point, and share of flows into the neighbours of a body: from an exact model to a coarse one ...
+FORM_WEIGHTS = (0.25, 0.25, 0.25, 0.15, 0.1)  # ... with these weights
 SLOW = (0.0, 0.3, 1.0, 3.0, 10.0)  # slow noise of outputs, shares of the reading noise, integrated over ...
 SLOW_WEIGHTS = (0.35, 0.35, 0.2, 0.08, 0.02)  # ... with these weights
 FORM = 0.2  # of the flow of a named effect, at each operating point: no law is quite that of nature

@@ -36,7 +36,7 @@ class Setting:
     noise: Noise
     log_weight: float
     level: float  # of the heat that nobody records
-    place: tuple[int, int, int, int]  # on the grid of jitters, slow noises, levels and form errors
+    place: tuple[int, ...]  # on the grid of jitters, slow noises, levels, shares and form errors
 
     def is_next_to(self, other: Setting) -> bool:
         """Whether the two are neighbours on the grid."""
@@ -49,12 +49,15 @@ class Prior:
 
     floor: float  # of the largest rms flow of the model, at level one
     share: float  # of the flow through each state that a usual lumped model is off by
+    shares: tuple[float, ...]
+    share_weights: tuple[float, ...]
     levels: tuple[float, ...]
     weights: tuple[float, ...]
     slow: tuple[float, ...]  # shares of the reading noise
     slow_weights: tuple[float, ...]
-    forms: tuple[tuple[float, float, float], ...]  # shares of flows that are off from hour to hour, by which
-    # laws are off, and of flows beyond the edge of a body
+    forms: tuple[
+        tuple[float, float], ...
+    ]  # shares by which laws are off, and flows beyond the edge of a body
     form_weights: tuple[float, ...]
 
 
@@ -105,13 +108,14 @@ def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: boo
         [(jitter, 1.0) for jitter in jitters],
         list(zip(prior.slow, prior.slow_weights, strict=True)),
         list(zip(prior.levels, prior.weights, strict=True)),
+        list(zip(prior.shares, prior.share_weights, strict=True)),
         [(float(k), weight) for k, weight in enumerate(prior.form_weights)],
     )
     total = float(np.prod([sum(weight for _, weight in axis) for axis in axes]))
     found = []
     for place in np.ndindex(*(len(axis) for axis in axes)):
-        jitter, slow, level, _ = (axis[k][0] for axis, k in zip(axes, place, strict=True))
-        share, form, edge = prior.forms[place[3]]
+        jitter, slow, level, share, _ = (axis[k][0] for axis, k in zip(axes, place, strict=True))
+        form, edge = prior.forms[place[-1]]
         weight = np.prod([axis[k][1] for axis, k in zip(axes, place, strict=True)])
         noise = replace(_noise(white, floor, level, share, slow, jitter), form=form, edge=edge)
         found.append(Setting(noise, float(np.log(weight / total)), level, place))
