@@ -20,14 +20,7 @@ from typing import Any
 from discovery.diagnosis import thresholds
 
 FACTOR = 1.5
-FIXED = (
-    "DRAWS",
-    "BLOCKS",
-    "RIVALS_SHOWN",
-    "LEVEL_WEIGHTS",
-    "SLOW_WEIGHTS",
-    "FORM_WEIGHTS",
-)  # resolution, shares
+FIXED = ("DRAWS", "BLOCKS", "RIVALS_SHOWN")  # resolution, and what is shown
 
 
 def constants() -> dict[str, Any]:
@@ -37,7 +30,9 @@ def constants() -> dict[str, Any]:
 
 
 def scaled(value: Any, factor: float) -> Any:
-    """A constant times a factor; a probability stays one (its odds are scaled)."""
+    """A constant times a factor; a probability stays one (its odds are scaled), and so do weights."""
+    if isinstance(value, dict):
+        return {scaled(size, factor): weight for size, weight in value.items()}
     if isinstance(value, tuple):
         return tuple(factor * v for v in value)
     if 0 < value < 1:

@@ -89,9 +89,9 @@ def test_the_numbers_of_the_diagnosis_are_those_that_decide() -> None:
     t = thresholds
     text = " ".join((ROOT / "docs" / "mismatch.md").read_text("utf-8").split())
     for said in (
-        f"`level` of {numbers(t.LEVELS)} with weights {', '.join(map(str, t.LEVEL_WEIGHTS))}",
+        f"`level` of {numbers(t.LEVELS)} with weights {', '.join(map(str, t.LEVELS.values()))}",
         f"{t.FLOOR:.0%} of the largest flow".replace("%", " %"),
-        f"{numbers(t.SLOW)} times the reading noise, weights {', '.join(map(str, t.SLOW_WEIGHTS))}",
+        f"{numbers(t.SLOW)} times the reading noise, weights {', '.join(map(str, t.SLOW.values()))}",
         f"odds of {t.ODDS} for each word",
         f"within a factor of {t.FACTOR} (jumps of a sensor: {t.JUMP:g} reading noises",
         f"width {t.BELIEF} of the logarithm",
@@ -100,6 +100,8 @@ def test_the_numbers_of_the_diagnosis_are_those_that_decide() -> None:
         f"its probability is at least {t.NAMED}",
         f"at least {t.SHORT:g} units of log evidence",
         f"({t.CHANCE} sqrt(2 G)",
+        f"{numbers(t.UNKNOWN_HEAT)} times the usual unrecorded heat",
+        f"off by {numbers(100 * s for s in t.UNKNOWN_SHARES)} %",
         f"differs by {t.AIR} K from the air that is measured",
         f"within {t.RIVAL:g} they are not excluded",
     ):

@@ -36,14 +36,10 @@ def process_prior() -> Prior:
     return Prior(
         thresholds.FLOOR,
         thresholds.SHARE,
-        thresholds.SHARES,
-        thresholds.SHARE_WEIGHTS,
         thresholds.LEVELS,
-        thresholds.LEVEL_WEIGHTS,
+        thresholds.SHARES,
         thresholds.SLOW,
-        thresholds.SLOW_WEIGHTS,
         thresholds.FORMS,
-        thresholds.FORM_WEIGHTS,
     )
 
 

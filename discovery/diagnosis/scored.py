@@ -12,15 +12,12 @@ from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
-from discovery.effects.candidates import with_shapes
 from discovery.effects.form import Shape
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
-from discovery.evidence.bayes import Score, Slab, Without, scan
-from discovery.evidence.events import place_events
+from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import effect_form
-from discovery.evidence.process_noise import Setting
-from discovery.evidence.signatures import signatures
+from discovery.evidence.process_noise import Setting, UnknownHeat, unknown_heat
 from discovery.evidence.whitening import Grams, Whitened, log_sum_exp
 from discovery.fitting import Fit, Noise, Prior, fit_model
 from discovery.fitting.covariance import Z95
@@ -259,40 +256,42 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     return _over_noise(context, bare)
 
 
-def _over_noise(
-    context: Context, bare: Scored, force: Mapping[str, tuple[float, float]] | None = None
-) -> Scored:
+def _over_noise(context: Context, bare: Scored, forces: Sequence[UnknownHeat] = ()) -> Scored:
     """The score over the noise settings that matter: from the one of the fit to the most likely one, and all
     that lie next to a likely one.
-    """
-    known: dict[int, Scored] = {}
 
-    def level(k: int) -> float:
-        if k not in known:
-            setting = context.settings[k]
-            gram = bare.seen.grams(replace(setting.noise, force=force))
-            known[k] = replace(bare, settings=(setting,), grams=(gram,))
-        return float(known[k].levels[0])
+    Args:
+        forces: what heat of unknown cause at a state may be like; all of it is integrated over, too.
+    """
+    known: dict[tuple[int, int], Scored] = {}
+
+    def scored_at(node: tuple[int, int]) -> Scored:
+        if node not in known:
+            setting = context.settings[node[0]]
+            if forces:
+                setting = forces[node[1]].on_top_of(setting)
+            known[node] = replace(bare, settings=(setting,), grams=(bare.seen.grams(setting.noise),))
+        return known[node]
+
+    def level(node: tuple[int, int]) -> float:
+        return float(scored_at(node).levels[0])
 
     # a force on top of form error that is larger than usual would be the same noise once more
-    usual = [k for k, s in enumerate(context.settings) if not force or is_usual(s)]
+    usual = [k for k, s in enumerate(context.settings) if not forces or is_usual(s)]
     start = min(usual, key=lambda k: _distance(context.settings[k].noise, bare.fit.noise))
-    queue = [start]
+    queue = [(start, 0)]
     while queue:
         here = queue.pop(0)
-        if level(here) < max(level(k) for k in known) - NEAR:
+        if level(here) < max(level(node) for node in known) - NEAR:
             continue
-        queue += [
-            k
-            for k in usual
-            if k not in known and k not in queue
-            if context.settings[k].is_next_to(context.settings[here])
-        ]
-    order = sorted(known, key=lambda k: -level(k))[:KEPT]
+        settings = [(k, here[1]) for k in usual if context.settings[k].is_next_to(context.settings[here[0]])]
+        others = [(here[0], j) for j, f in enumerate(forces) if f.is_next_to(forces[here[1]])]
+        queue += [node for node in (*settings, *others) if node not in known and node not in queue]
+    order = sorted(known, key=lambda node: -level(node))[:KEPT]
     return replace(
         bare,
-        settings=tuple(context.settings[k] for k in order),
-        grams=tuple(known[k].grams[0] for k in order),
+        settings=tuple(known[node].settings[0] for node in order),
+        grams=tuple(known[node].grams[0] for node in order),
     )
 
 
@@ -316,85 +315,12 @@ def off_by(setting: Setting) -> float:
 
 
 def with_force(context: Context, one: Scored, state: str) -> Scored:
-    """The same fit with a latent force at a state: many times the usual unrecorded heat, and flows that are
-    off as far as those of a coarse model.
-    """
+    """The same fit with heat of unknown cause at a state, of any size."""
     odds = float(np.log(thresholds.ODDS) - np.log(len(context.floor)))
-    forced = replace(one, forced=state, log_odds_force=odds)
-    times, share = thresholds.UNKNOWN_FORCE
-    return _over_noise(context, forced, {state: (times * context.floor[state], share)})
+    forces = unknown_heat(state, context.floor[state], thresholds.UNKNOWN_HEAT, thresholds.UNKNOWN_SHARES)
+    return _over_noise(context, replace(one, forced=state, log_odds_force=odds), forces)
 
 
 def light(one: Scored) -> Scored:
     """A score without what takes memory and is not asked for again: its sensitivities."""
     return replace(one, seen=replace(one.seen, last={}))
-
-
-@dataclass(frozen=True)
-class Scan:
-    """Claims on what a model leaves, the best odds first; and on what it leaves without one effect."""
-
-    claims: tuple[Score, ...]
-    without: Mapping[Key, tuple[Score, ...]]
-
-
-def scan_model(context: Context, current: Scored) -> Scan:
-    """Every effect at every place, scored on what a model leaves."""
-    found = [h for h in context.candidates if h.key not in current.keys]
-    found = [h for h in found if h.effect.search != "single readings"]
-    settings = _in_play(context, current)
-    events = [h for h in found if h.effect.search in ("window", "step")]
-    placed = place_events(current.seen, settings[0], events, [context.slab([h]) for h in events])
-    moved = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
-    shaped = [one for h in found if h.effect.search == "shapes" for one in with_shapes(h)]
-    every = [*shaped, *placed, *moved]
-    own = [_without(current, h) for h in current.hypotheses]
-    first, *others = scan(current.seen, settings, every, context.slab(every), own)
-    by_effect = zip(current.hypotheses, others, strict=True)
-    return Scan(tuple(first), {h.key: tuple(claims) for h, claims in by_effect})
-
-
-def _alike(h: Hypothesis, other: Hypothesis) -> bool:
-    """Whether two events are the same at two places of one recording."""
-    return h.recording == other.recording and h.effect.word == other.effect.word
-
-
-def _at_instants(h: Hypothesis, other: Hypothesis) -> Hypothesis:
-    """An event at the instants of another one."""
-    shapes = dict(zip(h.shapes, other.shapes.values(), strict=True))
-    spans = dict(zip(h.shapes, other.spans.values(), strict=True))
-    return replace(h.at(shapes, other.log_weight), spans=spans)
-
-
-def _without(current: Scored, h: Hypothesis) -> Without:
-    """One of the effects of a model, to be taken out: what it shows, and its unknowns."""
-    fitted = current.fit.model.parameters
-    sizes = {name: fitted[name].value for name in (*h.amplitudes, *h.shapes)}
-    here = replace(h, shapes={name: sizes[name] for name in h.shapes})
-    amounts = np.array([sizes[name] for name in h.amplitudes])
-    shown = tuple(signatures(t, [here]) @ amounts for t in current.fit.trajectories)
-    names = {*h.amplitudes, *h.shapes}
-    unknowns = current.fit.problem.unknowns
-    mine = [k for k, i in enumerate(current.seen.moving) if unknowns[i].name in names]
-    return Without(shown, np.array(mine, dtype=np.intp))
-
-
-def _in_play(context: Context, current: Scored) -> list[Setting]:
-    """Noise settings to scan under: the most likely one first, and one with little process noise, for which
-    what is missing may have passed.
-    """
-    best = current.settings[current.best]
-    other = next(s for s in context.settings if s.place == (*best.place[:2], 0, 0, 0))
-    return [best] if other.place == best.place else [best, other]
-
-
-def attempt(
-    context: Context, current: Scored, others: Sequence[Hypothesis], claim: Score, goal: float = inf
-) -> Scored | None:
-    """Refit with others and a claim, from the sizes that the scan gives; `goal` as in `fit_model`."""
-    h = claim.hypothesis
-    sizes: dict[str, float] = {}
-    if h.effect.amplitude.fixed is None:
-        low = 0.0 if h.effect.amplitude.sign > 0 else -h.effect.amplitude.most
-        sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
-    return score(context, (*others, h), current.noise, current.fit, sizes, goal)

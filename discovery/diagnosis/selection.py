@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from math import inf
 
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.scored import Scan, Scored, attempt, light, scan_model, score, scored
+from discovery.diagnosis.scan import Scan, attempt, scan_model
+from discovery.diagnosis.scored import Scored, light, score, scored
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score
 from discovery.fitting import Noise

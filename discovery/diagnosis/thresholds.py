@@ -3,6 +3,8 @@
     C_i dx_i/dt = terms + sum_k z_k a_k phi_k(x, u; eta_k) + s_i(t) w_i(t)
     y_j         = output(x) + sensor effects + slow_j(t) + white noise
 
+Evidence is integrated over the values of a table {value: weight}.
+
 `python -m benchmarks.thresholds` shows what each one does on cases of several families of machines. What is
 here are priors (what is believed before the recordings are read), the resolution of integrals, and the
 probabilities from which something is said. A rule that is neither does not exist.
@@ -13,18 +15,15 @@ from __future__ import annotations
 # --- process noise: what a lumped model misses everywhere -------------------------------------------------
 FLOOR = 0.02  # of the largest rms flow of the model, at level one: heat at a body that nobody records
 AIR = 0.1  # K: the air at a body differs from the air that is measured, at level one; it adds to this heat
-LEVELS = (0.1, 0.3, 1.0, 2.0, 5.0, 10.0)  # of this heat, integrated over ...
-LEVEL_WEIGHTS = (0.15, 0.35, 0.3, 0.12, 0.06, 0.02)  # ... with these weights
+LEVELS = {0.1: 0.15, 0.3: 0.35, 1.0: 0.3, 2.0: 0.12, 5.0: 0.06, 10.0: 0.02}  # of this heat, with weights
 SHARE = 0.08  # off by more than this share of its flows a lumped model is coarse
-SHARES = (0.02, 0.08, 0.25, 0.8)  # of what flows through a body, off from hour to hour, integrated over ...
-SHARE_WEIGHTS = (0.5, 0.35, 0.12, 0.03)  # ... with these weights
-FORMS = ((0.0, 0.0), (0.0, 0.1), (0.025, 0.1), (0.08, 0.1), (0.25, 0.25))  # by which laws are off at an
-# operating point, and share of flows into the neighbours of a body: from an exact model to a coarse one ...
-FORM_WEIGHTS = (0.25, 0.25, 0.25, 0.15, 0.1)  # ... with these weights
-SLOW = (0.0, 0.3, 1.0, 3.0, 10.0)  # slow noise of outputs, shares of the reading noise, integrated over ...
-SLOW_WEIGHTS = (0.35, 0.35, 0.2, 0.08, 0.02)  # ... with these weights
+SHARES = {0.02: 0.5, 0.08: 0.35, 0.25: 0.12, 0.8: 0.03}  # of what flows through a body, off from hour to hour
+FORMS = {(0.0, 0.0): 0.25, (0.0, 0.1): 0.25, (0.025, 0.1): 0.25, (0.08, 0.1): 0.15, (0.25, 0.25): 0.1}
+# shares by which laws are off at an operating point, and of flows that enter the neighbours of a body
+SLOW = {0.0: 0.35, 0.3: 0.35, 1.0: 0.2, 3.0: 0.08, 10.0: 0.02}  # slow noise of outputs, in reading noises
 FORM = 0.2  # of the flow of a named effect, at each operating point: no law is quite that of nature
-UNKNOWN_FORCE = (10.0, 0.25)  # times the unrecorded heat of a body, share of its flows: "none of these"
+UNKNOWN_HEAT = (1.0, 3.0, 10.0, 30.0)  # "none of these": times the unrecorded heat of a body ...
+UNKNOWN_SHARES = (0.0, 0.25, 0.8)  # ... and share of what flows through it; each pair is as likely
 
 # --- effects ----------------------------------------------------------------------------------------------
 BELIEF = 0.5  # log of the factor within which the start values of a hand-built model are believed

@@ -70,8 +70,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
             key=lambda n: -_added(found, answer, n.hypothesis),
         )
     )
-    more = posterior.best.evidence - found.baseline.evidence
-    if more < thresholds.SHORT or gain < thresholds.MATTERS:
+    if gain < thresholds.MATTERS:
         return _nothing(context, found, answer, candidates)
     probable = [n for n in candidates if n.probability >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
@@ -87,14 +86,14 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
             reasons.append(f"heat of unknown cause at {best.forced} explains more than what can be named")
         reasons.append(f"what can be named explains too little (log evidence {short:.0f} below the best)")
         named = ()
-    if not named and not reasons:
-        reasons.append(f"no effect reaches a probability of {thresholds.NAMED:g}")
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
-    reasons += _apart(found, answer, unsure)
-    if not named:
-        return Verdict(UNEXPLAINED, answer, (), candidates, tuple(reasons))
-    kinds = {n.hypothesis.effect.is_physics for n in named}
-    return Verdict(MISSING if True in kinds else FAULT, answer, named, (), tuple(reasons))
+    every = (*reasons, *_apart(found, answer, unsure))
+    if named:
+        kinds = {n.hypothesis.effect.is_physics for n in named}
+        return Verdict(MISSING if True in kinds else FAULT, answer, named, (), every)
+    if reasons:
+        return Verdict(UNEXPLAINED, answer, (), candidates, every)
+    return _nothing(context, found, answer, candidates)
 
 
 def _proved(

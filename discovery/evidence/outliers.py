@@ -14,11 +14,8 @@ from discovery.fitting import Fit
 
 Array = NDArray[np.float64]
 
-FAR = 6.5  # reading noises from the median of the readings around
+FAR = 6.5  # reading noises from the median of the readings around, which scatter less, too
 AROUND = 3  # readings on each side that a reading is compared with
-LONELY = 0.25  # these agree with each other within this share of the distance (median deviation)
-NEXT = 4.0  # reading noises from that median within which both neighbours lie ...
-CLOSE = 0.1  # ... or this share of the distance: what decays is no wrong reading
 MOST = 2  # wrong readings in a row
 
 
@@ -55,28 +52,27 @@ def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Out
             # whatever the model leaves out, the noise is no smaller than differences of readings show
             steps = np.diff(r)
             noise = max(float(white[y]), float(np.median(np.abs(steps - np.median(steps)))) / 0.954)
-            alone = scatter < LONELY * np.abs(jump)
-            suspect = np.abs(jump) > FAR * noise
-            limit = np.maximum(NEXT * noise, CLOSE * np.abs(jump))
-            alone &= _returns(r, middle, limit, suspect)
+            limit = FAR * np.maximum(noise, scatter)
+            alone = _returns(r, middle, limit)
             alone &= ~switched[rows]  # a short pulse that is logged late shows in one reading
-            for k in np.flatnonzero(suspect & alone):
+            for k in np.flatnonzero(alone):
                 at = float(grid.time[grid.read[rows[k]]])
                 found.append(Outlier(name, grid.recording, at, float(jump[k]), noise))
     return found
 
 
-def _returns(r: Array, middle: Array, limit: Array, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether the readings (N,) next to each one, on both sides, are near the median of those around it; of
-    `MOST` suspects of about one size in a row, those next to the row. At its ends a recording may just have
-    begun to move.
+def _returns(r: Array, middle: Array, limit: Array) -> NDArray[np.bool_]:
+    """Which readings (N,) are far from the median of those around, while the readings next to them, on both
+    sides, are near it; of `MOST` of about one size in a row, those next to the row. At its ends a recording
+    may just have begun to move.
     """
-    found, size = np.zeros(len(r), dtype=bool), np.abs(r - middle)
+    size = np.abs(r - middle)
+    suspect = size > limit
+    found = np.zeros(len(r), dtype=bool)
     for k in np.flatnonzero(suspect):
         before, after = k - 1, k + 1
-        row = (
-            suspect & (size > 0.4 * size[k]) & (size < 2.5 * size[k])
-        )  # what fades is a response, not a row of wrong readings
+        # what fades is a response, not a row of wrong readings
+        row = suspect & (size > 0.4 * size[k]) & (size < 2.5 * size[k])
         while before > 0 and row[before] and after - before <= MOST:
             before -= 1
         while after < len(r) - 1 and row[after] and after - before <= MOST:

@@ -9,7 +9,7 @@ one. Evidence is integrated over a few of each, and over slow sensor noise.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,28 +44,41 @@ class Setting:
 
 
 @dataclass(frozen=True)
+class UnknownHeat:
+    """Heat of unknown cause at a state, in place of its process noise: "none of these" (a latent force)."""
+
+    state: str
+    heat: float  # W, or a rate
+    share: float  # of what flows through the state
+    log_weight: float
+    place: tuple[int, int]  # on the grid of both
+
+    def is_next_to(self, other: UnknownHeat) -> bool:
+        """Whether the two are neighbours on the grid."""
+        return sum(abs(a - b) for a, b in zip(self.place, other.place, strict=True)) == 1
+
+    def on_top_of(self, setting: Setting) -> Setting:
+        """A noise setting with it."""
+        noise = replace(setting.noise, force={self.state: (self.heat, self.share)})
+        return replace(setting, noise=noise, log_weight=setting.log_weight + self.log_weight)
+
+
+@dataclass(frozen=True)
 class Prior:
     """What is believed of process noise and slow noise before the recordings are read (`thresholds.py`)."""
 
     floor: float  # of the largest rms flow of the model, at level one
     share: float  # of the flow through each state that a usual lumped model is off by
-    shares: tuple[float, ...]
-    share_weights: tuple[float, ...]
-    levels: tuple[float, ...]
-    weights: tuple[float, ...]
-    slow: tuple[float, ...]  # shares of the reading noise
-    slow_weights: tuple[float, ...]
-    forms: tuple[
-        tuple[float, float], ...
-    ]  # shares by which laws are off, and flows beyond the edge of a body
-    form_weights: tuple[float, ...]
+    levels: Mapping[float, float]  # of the heat that nobody records, each with its weight
+    shares: Mapping[float, float]  # of what flows through a body, off from hour to hour
+    slow: Mapping[float, float]  # slow noise, shares of the reading noise
+    forms: Mapping[tuple[float, float], float]  # by which laws are off, and flows beyond the edge of a body
 
 
 def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float = 0.0) -> dict[str, float]:
     """Process noise that no state is free of, W at a body, else a rate: a share of the largest rms flow of
     the model, and what flows where the air at a body is not quite as warm as the air that is measured. Heat
-    and rates are never compared: the bed of a machine follows the room at 1e-5 K/s beside bodies that take
-    300 W.
+    and rates are never compared: a bed may follow the room at 1e-5 K/s while other bodies take 300 W.
 
     Args:
         ambient: channels that measure the air.
@@ -106,20 +119,39 @@ def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: boo
     jitters = (0.0, JITTER) if unsure else (0.0,)
     axes = (
         [(jitter, 1.0) for jitter in jitters],
-        list(zip(prior.slow, prior.slow_weights, strict=True)),
-        list(zip(prior.levels, prior.weights, strict=True)),
-        list(zip(prior.shares, prior.share_weights, strict=True)),
-        [(float(k), weight) for k, weight in enumerate(prior.form_weights)],
+        list(prior.slow.items()),
+        list(prior.levels.items()),
+        list(prior.shares.items()),
+        [(float(k), weight) for k, weight in enumerate(prior.forms.values())],
     )
+    forms = list(prior.forms)
     total = float(np.prod([sum(weight for _, weight in axis) for axis in axes]))
     found = []
     for place in np.ndindex(*(len(axis) for axis in axes)):
         jitter, slow, level, share, _ = (axis[k][0] for axis, k in zip(axes, place, strict=True))
-        form, edge = prior.forms[place[-1]]
+        form, edge = forms[place[-1]]
         weight = np.prod([axis[k][1] for axis, k in zip(axes, place, strict=True)])
         noise = replace(_noise(white, floor, level, share, slow, jitter), form=form, edge=edge)
         found.append(Setting(noise, float(np.log(weight / total)), level, place))
     return tuple(found)
+
+
+def unknown_heat(
+    state: str, floor: float, times: Sequence[float], shares: Sequence[float]
+) -> tuple[UnknownHeat, ...]:
+    """Heat of unknown cause at a state, each size as likely as any other.
+
+    Args:
+        floor: process noise of the state at level one, W or a rate.
+        times: sizes, in multiples of it.
+        shares: of what flows through the state.
+    """
+    weight = -float(np.log(len(times) * len(shares)))
+    return tuple(
+        UnknownHeat(state, size * floor, share, weight, (i, j))
+        for i, size in enumerate(times)
+        for j, share in enumerate(shares)
+    )
 
 
 def _noise(

@@ -10,7 +10,8 @@ from scipy.stats import norm
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.crossvalidation import left_out
-from discovery.diagnosis.scored import is_usual, scan_model, with_force
+from discovery.diagnosis.scan import scan_model
+from discovery.diagnosis.scored import is_usual, with_force
 from tests.diagnosis.parts import bare, claim_of, dry, scored_of, wetted
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from discovery.challenge.methods.named import named_entry, windows_of
 from discovery.challenge.problem import Answer, Problem
-from discovery.diagnosis.scored import Scored, attempt, scan_model, score
+from discovery.diagnosis.scan import attempt, scan_model
+from discovery.diagnosis.scored import Scored, score
 from discovery.effects.hypothesis import Hypothesis
 
 MOST = 3  # effects that may be added

@@ -1,0 +1,88 @@
+"""The scan: every effect at every place, scored at first order on what a model leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.scored import Scored, score
+from discovery.effects.candidates import with_shapes
+from discovery.effects.hypothesis import Hypothesis, Key
+from discovery.evidence.bayes import Score, Without, scan
+from discovery.evidence.events import place_events
+from discovery.evidence.process_noise import Setting
+from discovery.evidence.signatures import signatures
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Claims on what a model leaves, the best odds first; and on what it leaves without one effect."""
+
+    claims: tuple[Score, ...]
+    without: Mapping[Key, tuple[Score, ...]]
+
+
+def scan_model(context: Context, current: Scored) -> Scan:
+    """Every effect at every place, scored on what a model leaves."""
+    found = [h for h in context.candidates if h.key not in current.keys]
+    found = [h for h in found if h.effect.search != "single readings"]
+    settings = _in_play(context, current)
+    events = [h for h in found if h.effect.search in ("window", "step")]
+    placed = place_events(current.seen, settings[0], events, [context.slab([h]) for h in events])
+    moved = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
+    shaped = [one for h in found if h.effect.search == "shapes" for one in with_shapes(h)]
+    every = [*shaped, *placed, *moved]
+    own = [_without(current, h) for h in current.hypotheses]
+    first, *others = scan(current.seen, settings, every, context.slab(every), own)
+    by_effect = zip(current.hypotheses, others, strict=True)
+    return Scan(tuple(first), {h.key: tuple(claims) for h, claims in by_effect})
+
+
+def _alike(h: Hypothesis, other: Hypothesis) -> bool:
+    """Whether two events are the same at two places of one recording."""
+    return h.recording == other.recording and h.effect.word == other.effect.word
+
+
+def _at_instants(h: Hypothesis, other: Hypothesis) -> Hypothesis:
+    """An event at the instants of another one."""
+    shapes = dict(zip(h.shapes, other.shapes.values(), strict=True))
+    spans = dict(zip(h.shapes, other.spans.values(), strict=True))
+    return replace(h.at(shapes, other.log_weight), spans=spans)
+
+
+def _without(current: Scored, h: Hypothesis) -> Without:
+    """One of the effects of a model, to be taken out: what it shows, and its unknowns."""
+    fitted = current.fit.model.parameters
+    sizes = {name: fitted[name].value for name in (*h.amplitudes, *h.shapes)}
+    here = replace(h, shapes={name: sizes[name] for name in h.shapes})
+    amounts = np.array([sizes[name] for name in h.amplitudes])
+    shown = tuple(signatures(t, [here]) @ amounts for t in current.fit.trajectories)
+    names = {*h.amplitudes, *h.shapes}
+    unknowns = current.fit.problem.unknowns
+    mine = [k for k, i in enumerate(current.seen.moving) if unknowns[i].name in names]
+    return Without(shown, np.array(mine, dtype=np.intp))
+
+
+def _in_play(context: Context, current: Scored) -> list[Setting]:
+    """Noise settings to scan under: the most likely one first, and one with little process noise, for which
+    what is missing may have passed.
+    """
+    best = current.settings[current.best]
+    other = next(s for s in context.settings if s.place == (*best.place[:2], 0, 0, 0))
+    return [best] if other.place == best.place else [best, other]
+
+
+def attempt(
+    context: Context, current: Scored, others: Sequence[Hypothesis], claim: Score, goal: float = inf
+) -> Scored | None:
+    """Refit with others and a claim, from the sizes that the scan gives; `goal` as in `fit_model`."""
+    h = claim.hypothesis
+    sizes: dict[str, float] = {}
+    if h.effect.amplitude.fixed is None:
+        low = 0.0 if h.effect.amplitude.sign > 0 else -h.effect.amplitude.most
+        sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
+    return score(context, (*others, h), current.noise, current.fit, sizes, goal)
