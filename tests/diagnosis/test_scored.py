@@ -75,6 +75,20 @@ def test_a_latent_force_explains_what_is_missing_and_nothing_else() -> None:
     assert lacking.prior - bare().prior == pytest.approx(odds)
 
 
+def test_heat_of_unknown_cause_may_have_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Evidence is the mean over all pairs of a size and a share, of which each is tried near the best one."""
+    found = with_force(dry(), bare(), "table")
+    pairs = [(size, share) for size in thresholds.UNKNOWN_HEAT for share in thresholds.UNKNOWN_SHARES]
+    alone = []
+    for size, share in pairs:
+        monkeypatch.setattr(thresholds, "UNKNOWN_HEAT", (size,))
+        monkeypatch.setattr(thresholds, "UNKNOWN_SHARES", (share,))
+        alone.append(with_force(dry(), bare(), "table").evidence)
+    mean = np.max(alone) + np.log(np.mean(np.exp(np.array(alone) - np.max(alone))))
+    assert found.evidence == pytest.approx(mean, abs=0.7)  # it keeps the likely settings, not all
+    assert np.ptp(alone) > 10.0  # a wrong size explains nothing
+
+
 def test_a_scan_sees_the_effect_and_what_would_stand_without_it() -> None:
     first = scan_model(dry(), bare())
     assert first.claims[0].hypothesis.key == wetted().hypotheses[0].key
