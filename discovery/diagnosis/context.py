@@ -18,7 +18,15 @@ from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import model_form
 from discovery.evidence.late import perhaps_late
 from discovery.evidence.outliers import Outlier, find_outliers, without
-from discovery.evidence.process_noise import Prior, Setting, floors, flow_sizes, reading_noise, settings
+from discovery.evidence.process_noise import (
+    Prior,
+    Setting,
+    floors,
+    flow_sizes,
+    neighbours,
+    reading_noise,
+    settings,
+)
 from discovery.evidence.signatures import signatures
 from discovery.fitting import Fit, Noise, fit_model
 from discovery.models import Model
@@ -77,6 +85,11 @@ class Context:
     def usual(self) -> Noise:
         """The noise that is most likely before the recordings are read."""
         return max(self.settings, key=lambda s: s.log_weight).noise
+
+    @cached_property
+    def next_to(self) -> tuple[tuple[int, ...], ...]:
+        """The noise settings next to each one, by index."""
+        return neighbours([s.place for s in self.settings])
 
     @cached_property
     def candidates(self) -> list[Hypothesis]:

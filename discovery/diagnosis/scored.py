@@ -17,7 +17,7 @@ from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
 from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import effect_form
-from discovery.evidence.process_noise import Setting, UnknownHeat, unknown_heat
+from discovery.evidence.process_noise import Setting, UnknownHeat, neighbours, unknown_heat
 from discovery.evidence.whitening import Grams, Whitened, log_sum_exp
 from discovery.fitting import Fit, Noise, Prior, fit_model
 from discovery.fitting.covariance import Z95
@@ -263,30 +263,31 @@ def _over_noise(context: Context, bare: Scored, forces: Sequence[UnknownHeat] = 
     Args:
         forces: what heat of unknown cause at a state may be like; all of it is integrated over, too.
     """
-    known: dict[tuple[int, int], Scored] = {}
+    # a force on top of form error that is larger than usual would be the same noise once more
+    usual = {k for k, s in enumerate(context.settings) if not forces or is_usual(s)}
+    other_forces = neighbours([f.place for f in forces])
 
-    def scored_at(node: tuple[int, int]) -> Scored:
-        if node not in known:
-            setting = context.settings[node[0]]
-            if forces:
-                setting = forces[node[1]].on_top_of(setting)
-            known[node] = replace(bare, settings=(setting,), grams=(bare.seen.grams(setting.noise),))
-        return known[node]
+    def near(node: tuple[int, int]) -> list[tuple[int, int]]:
+        k, j = node
+        there = [(k, other) for other in other_forces[j]] if forces else []
+        return [*((other, j) for other in context.next_to[k] if other in usual), *there]
+
+    def tried(node: tuple[int, int]) -> Scored:
+        setting = context.settings[node[0]]
+        setting = forces[node[1]].on_top_of(setting) if forces else setting
+        return replace(bare, settings=(setting,), grams=(bare.seen.grams(setting.noise),))
+
+    start = min(usual, key=lambda k: _distance(context.settings[k].noise, bare.fit.noise)), 0
+    known, open_ends, best = {start: tried(start)}, [start], -inf
 
     def level(node: tuple[int, int]) -> float:
-        return float(scored_at(node).levels[0])
+        return float(known[node].levels[0])
 
-    # a force on top of form error that is larger than usual would be the same noise once more
-    usual = [k for k, s in enumerate(context.settings) if not forces or is_usual(s)]
-    start = min(usual, key=lambda k: _distance(context.settings[k].noise, bare.fit.noise))
-    queue = [(start, 0)]
-    while queue:
-        here = queue.pop(0)
-        if level(here) < max(level(node) for node in known) - NEAR:
-            continue
-        settings = [(k, here[1]) for k in usual if context.settings[k].is_next_to(context.settings[here[0]])]
-        others = [(here[0], j) for j, f in enumerate(forces) if f.is_next_to(forces[here[1]])]
-        queue += [node for node in (*settings, *others) if node not in known and node not in queue]
+    while open_ends and level(here := max(open_ends, key=level)) >= best - NEAR:
+        best = max(best, level(here))
+        fresh = {node: tried(node) for node in near(here) if node not in known}
+        known |= fresh
+        open_ends = [node for node in (*open_ends, *fresh) if node != here]
     order = sorted(known, key=lambda node: -level(node))[:KEPT]
     return replace(
         bare,

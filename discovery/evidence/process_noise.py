@@ -38,10 +38,6 @@ class Setting:
     level: float  # of the heat that nobody records
     place: tuple[int, ...]  # on the grid of jitters, slow noises, levels, shares and form errors
 
-    def is_next_to(self, other: Setting) -> bool:
-        """Whether the two are neighbours on the grid."""
-        return sum(abs(a - b) for a, b in zip(self.place, other.place, strict=True)) == 1
-
 
 @dataclass(frozen=True)
 class UnknownHeat:
@@ -52,10 +48,6 @@ class UnknownHeat:
     share: float  # of what flows through the state
     log_weight: float
     place: tuple[int, int]  # on the grid of both
-
-    def is_next_to(self, other: UnknownHeat) -> bool:
-        """Whether the two are neighbours on the grid."""
-        return sum(abs(a - b) for a, b in zip(self.place, other.place, strict=True)) == 1
 
     def on_top_of(self, setting: Setting) -> Setting:
         """A noise setting with it."""
@@ -133,6 +125,17 @@ def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: boo
         weight = np.prod([axis[k][1] for axis, k in zip(axes, place, strict=True)])
         noise = replace(_noise(white, floor, level, share, slow, jitter), form=form, edge=edge)
         found.append(Setting(noise, float(np.log(weight / total)), level, place))
+    return tuple(found)
+
+
+def neighbours(places: Sequence[tuple[int, ...]]) -> tuple[tuple[int, ...], ...]:
+    """For each place on a grid, the indices of those one step away."""
+    index = {place: k for k, place in enumerate(places)}
+    found = []
+    for place in places:
+        steps = [(axis, at + step) for axis, at in enumerate(place) for step in (-1, 1)]
+        near = [(*place[:axis], at, *place[axis + 1 :]) for axis, at in steps]
+        found.append(tuple(index[one] for one in near if one in index))
     return tuple(found)
 
 
