@@ -31,7 +31,7 @@ from discovery.evidence.latent_force import Force, latent_forces
 from discovery.fitting import Fit, fit_model
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.threads import one_thread
+from discovery.threads import one_thread, side_by_side
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -219,8 +219,12 @@ def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]
 
 def _unknown(context: Context, found: Search) -> list[Scored]:
     """A latent force at each state: instead of everything, and with the best answer."""
-    models = {one.keys: one for one in (found.baseline, found.best)}.values()
-    return [with_force(context, one, state) for one in models for state in context.floor]
+    models = list({one.keys: one for one in (found.baseline, found.best)}.values())
+
+    def at_each_state(one: Scored) -> list[Scored]:  # what it has whitened is kept from one state to the next
+        return [with_force(context, one, state) for state in context.floor]
+
+    return [forced for each in side_by_side(at_each_state, models) for forced in each]
 
 
 def _repaired(

@@ -82,15 +82,19 @@ class Search:
         """The search under another noise, from what was tried: scored again, and gone on with."""
         best = self.best.evidence
         other = Search(context, self.tell, first=self.claims)
-        for one in self.tried.values():
-            if not one.hypotheses or one.evidence > best - FAR:
-                other.keep(scored(context, one.hypotheses, one.fit))
+        near = [one for one in self.tried.values() if not one.hypotheses or one.evidence > best - FAR]
+
+        def under_it(one: Scored) -> Scored:
+            return _lighter(scored(context, one.hypotheses, one.fit))
+
+        for one in side_by_side(under_it, near):
+            other.keep(one)
         return other.run()
 
     def keep(self, one: Scored) -> Scored:
         """Note a refit where none of the same effects is better."""
         if one.keys not in self.tried or self.tried[one.keys].evidence < one.evidence:
-            self.tried[one.keys] = light(one) if one.hypotheses else one
+            self.tried[one.keys] = _lighter(one)
         return one
 
     def scanned(self, one: Scored) -> Scan:
@@ -163,6 +167,11 @@ class Search:
         """Cost of a fit under a noise from which it may take part in the answer."""
         best = self.best.fit
         return FAR + cost_under(best.problem, best.theta, best.trajectories, noise)
+
+
+def _lighter(one: Scored) -> Scored:
+    """Without what takes memory; the baseline is asked for it again."""
+    return light(one) if one.hypotheses else one
 
 
 def _alike(h: Hypothesis, claims: Sequence[Score]) -> list[Score]:

@@ -33,10 +33,26 @@ def lines_of(d: dict[str, Any]) -> list[str]:
         after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
         rms = f"rms {printed(i['rms_before'])} -> {after}{unit} (noise {printed(i['noise_floor'])})"
         lines.append(f"  unseen recording {run}: {rms}{', worse than without' if run in worse else ''}")
+    if not d["physics"]:
+        lines += _left(d["improvement"])
     if worse:
         lines.append("  do not use the repaired model: unseen recordings contradict it; fit more recordings")
     lines.append(f"  next: {d['next_experiment']}")
     return lines
+
+
+def _left(improvement: dict[str, Any]) -> list[str]:
+    """What free runs of the model leave, next to what the noise that the diagnosis found accounts for."""
+    runs = {"recordings to fit": improvement["fit"]} | {
+        f"unseen recording {run}": i for run, i in improvement["held_out"].items()
+    }
+    unit = _unit(improvement)
+    return [
+        f"  {which}: rms {printed(i['rms_before'])}{unit} "
+        f"(reading noise and heat that nobody records: {printed(i['noise_floor'])})"
+        for which, i in runs.items()
+        if i["rms_before"] is not None
+    ]
 
 
 def _unit(improvement: dict[str, Any]) -> str:

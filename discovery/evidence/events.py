@@ -19,6 +19,7 @@ from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Projected, Slab, project
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.whitening import Whitened, log_sum_exp
+from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -38,12 +39,16 @@ def place_events(
         claims: events (`search` "window" or "step"), each of one recording.
         slabs: prior of the amplitudes of each claim.
     """
-    rough: list[tuple[float, _Search, Hypothesis, Slab]] = []
-    for run in dict.fromkeys(h.recording for h in claims):
-        search = _Search(seen, setting, str(run))
-        for h, slab in zip(claims, slabs, strict=True):
-            if h.recording == run and (found := search.rough(h, slab)):
-                rough.append((found[0] + h.log_odds, search, found[1], slab))
+    seen.absorbed(setting.noise)  # once, before recordings are searched side by side
+
+    def of_recording(run: str) -> list[tuple[float, _Search, Hypothesis, Slab]]:
+        search = _Search(seen, setting, run)
+        its = [(h, slab) for h, slab in zip(claims, slabs, strict=True) if h.recording == run]
+        tried = [(search.rough(h, slab), h, slab) for h, slab in its]
+        return [(found[0] + h.log_odds, search, found[1], slab) for found, h, slab in tried if found]
+
+    runs = list(dict.fromkeys(str(h.recording) for h in claims))
+    rough = [one for each in side_by_side(of_recording, runs) for one in each]
     rough.sort(key=lambda one: -one[0])
     return [search.close(h, slab) for _, search, h, slab in rough[:CLOSER]] + [
         h for _, _, h, _ in rough[CLOSER:]

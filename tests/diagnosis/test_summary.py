@@ -76,3 +76,29 @@ def test_the_proof_has_a_unit_or_is_in_noises_and_a_jump_that_may_be_none_is_not
             "  rezero at dZ in fri, probability 0.98: zero_dZ = 2.1 um (2 to 2.2), t_zero = 60 s (50 to 70)",
             f"  unseen recording sun: rms {said}noise 0.421)",
         ]
+
+
+def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> None:
+    """Far from the reading noise, an engineer has to see it, whatever explains it."""
+    left = {"rms_before": 4.8, "rms_after": 4.8, "noise_floor": 4.6}
+    away = {"rms_before": None, "rms_after": None, "noise_floor": 1.0}
+    improvement = {
+        "unit": "times the reading noise",
+        "fit": left,
+        "held_out": {"sun": away},
+        "contradicted_by": [],
+    }
+    document: dict[str, Any] = {
+        "verdict": "no mismatch",
+        "model": "m",
+        "physics": [],
+        "alternatives": [],
+        "reasons": [],
+        "description": None,
+        "improvement": improvement,
+        "next_experiment": "none",
+    }
+    (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
+    (line,) = summary(tmp_path)[1:-1]
+    assert line.startswith("  recordings to fit: rms 4.8 times the reading noise (")
+    assert line.endswith("reading noise and heat that nobody records: 4.6)")
