@@ -51,12 +51,18 @@ def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str
     guesses = _one_unit(columns, guesses)
     guesses = _the_fluid(_one_room(columns, guesses))
     guesses = _corrections(columns, _signed(columns, _answers(columns, guesses)))
+    return sensors_as_inputs(guesses)
+
+
+def sensors_as_inputs(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Where an error is measured, temperatures of the machine are inputs of it, unless a person said so."""
+    found = dict(guesses)
     if any(one.role == "error" for one in guesses.values()):
         for name, one in guesses.items():
-            if one.role == "temperature" and one.unit in DEGREES:
+            if one.role == "temperature" and one.unit in DEGREES and not one.said:
                 why = f"{one.why}; a sensor on the machine is an input of the errors"
-                guesses[name] = replace(one, role=OTHER, why=why)
-    return guesses
+                found[name] = replace(one, role=OTHER, why=why)
+    return found
 
 
 def _alike(column: Column, columns: Sequence[Column]) -> list[Column]:
