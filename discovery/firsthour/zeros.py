@@ -15,7 +15,7 @@ _FAR = 3.0  # times the span: no thermal error starts so far from zero
 
 
 def from_first_readings(found: Recorded, guesses: Mapping[str, Guess]) -> Recorded:
-    """The recordings with each error counted from its first reading, where the zero of its probe is arbitrary.
+    """The recordings with errors counted from their first reading, where the zero of a probe is arbitrary.
 
     That is so if it starts in any recording further from zero than it then moves, several times over. All
     recordings are treated alike. Parts of one file keep the zero of that file.
@@ -39,8 +39,8 @@ def from_first_readings(found: Recorded, guesses: Mapping[str, Guess]) -> Record
 
     (first, run), *_ = runs.items()
     notes = tuple(
-        f"'{name}' starts at {zeros[run.path, run.name, name]:g} in {first}, far from zero compared with how much "
-        "it moves: in each file it is counted from its first reading"
+        f"'{name}' starts at {zeros[run.path, run.name, name]:g} in {first}, far from zero compared with how "
+        "much it moves: in each file it is counted from its first reading"
         for name in shifted
         if (run.path, run.name, name) in zeros
     )
