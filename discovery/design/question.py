@@ -122,8 +122,9 @@ def _smallest(found: Search) -> str:
         places = list(dict.fromkeys(" and ".join(c.hypothesis.places) for c in seen))
         everywhere = len(seen) == len(claims) and len(places) > 1 and h.effect.place in _ANYWHERE
         where = _ANYWHERE[h.effect.place] if everywhere else f"at {'; '.join(places)}"
-        unit = h.units.get(h.amplitudes[0], "")
-        texts.append(f"{word} of {printed(size, 2)} {unit}{speed} {where}")
+        unit = h.units.get(h.amplitudes[0], "1")
+        amount = printed(size, 2) if unit == "1" else f"{printed(size, 2)} {unit}"
+        texts.append(f"{word} of {amount}{speed} {where}")
     return (
         "these recordings would have shown " + ", ".join(texts)
         if texts

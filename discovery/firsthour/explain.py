@@ -21,6 +21,16 @@ MODELS = {
     "pysindy": "PySINDy as its users take it, threshold by cross-validation: to compare with",
 }
 
+# the names that `discovery new` gives to the models of an experiment
+FIRST_MODELS = {
+    "regression": MODELS["regression"],
+    "reduced": MODELS["reduced"],
+    "first_order": "one thermal mass for each output, warmed by the inputs and cooled by the room",
+    "two_masses": "two thermal masses for each output, a fast one and a slow one",
+    "discovered": MODELS["sindy"],
+    "pysindy": MODELS["pysindy"],
+}
+
 
 def list_words(what: str) -> Iterator[str]:
     """Lines on all effects, models or roles.

@@ -13,6 +13,7 @@ import numpy as np
 from discovery.experiment import load_experiment
 from discovery.files import read_toml, write_atomic
 from discovery.firsthour.choosing import CANDIDATES, NOT_TRIED, Score, choose
+from discovery.firsthour.explain import FIRST_MODELS
 from discovery.firsthour.firstmodel import first_model, usual_inputs
 from discovery.firsthour.guess import Guess, drives
 from discovery.firsthour.inputs import strongest
@@ -142,7 +143,8 @@ def _decided(
         chosen = list(dict.fromkeys([*best, *references]))
         said = [
             f"first model: {helping[0]}; on {how} left out of its fit, its rms is {scores[0].ratio:.0%} of "
-            f"the rms without a model ({', '.join(told[1:])})"
+            f"the rms without a model ({', '.join(told[1:])})",
+            f"  {helping[0]}: {FIRST_MODELS[helping[0]]}; `discovery list models` explains the others",
         ]
     else:
         chosen = [next(iter(lines))]

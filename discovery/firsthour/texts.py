@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from discovery.files import format_toml
 from discovery.firsthour.asking import doubt
+from discovery.firsthour.explain import FIRST_MODELS
 from discovery.firsthour.guess import Guess
 from discovery.firsthour.measures import DEGREES
 from discovery.firsthour.recorded import Recorded
@@ -127,6 +128,7 @@ def experiment_text(
     name = re.sub(r"[^\w .+-]+", "_", title).lstrip(" .+-") or "experiment"
     width = max(map(len, models))
     lines = [f"{model:{width}} = {entry}" for model, entry in models.items()]
+    meant = [f"# {model}: {FIRST_MODELS[model]}" for model in models if model in FIRST_MODELS]
     told = "\n".join(f"# {line}" for line in remarks)
     why = "# What does this model lack? The plainest one that predicts."
     diagnosed = f'\n{why}\n[mismatch]\nmodel = "{mismatch}"\n' if mismatch else ""
@@ -139,5 +141,5 @@ held_out = [{listed(names[-1:])}]
 
 {told}
 [models]
-{chr(10).join(lines)}
+{chr(10).join([*meant, *lines])}
 {diagnosed}"""
