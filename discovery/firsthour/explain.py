@@ -27,7 +27,7 @@ FIRST_MODELS = {
     "reduced": MODELS["reduced"],
     "first_order": "one thermal mass for each output, warmed by the inputs and cooled by the room",
     "two_masses": "two thermal masses for each output, a fast one and a slow one",
-    "discovered": MODELS["sindy"],
+    "discovered": MODELS["sindy"].removeprefix("discovered: "),
     "pysindy": MODELS["pysindy"],
 }
 

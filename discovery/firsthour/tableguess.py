@@ -34,6 +34,7 @@ Hints = Mapping[str, Sequence[tuple[str, Mapping[str, float]]]]
 
 _HELD = 0.5  # share of readings that repeat the one before: what is set, not measured
 _ONE_OF_SEVERAL = re.compile(r"\d+|(?<![^\W\d_])(d ?)?[xyz](?![^\W\d_])")
+_BRACKETS = re.compile(r"[\[(（][^\])）]*[\])）]")
 _PUSHES = ("torque", "current", "signal", "flow", "power", "speed")
 
 
@@ -182,7 +183,8 @@ def _air(column: Column) -> tuple[float, int]:
     says = max((word.says.get("air", 0.0) for word in words), default=0.0)
     more = sum("air" not in word.says and word.gloss != "temp" for word in words)
     named = sum(len(word.said) for word in words)
-    rest = max(0, len(re.sub(r"[\W\d_]", "", fold(column.header))) - named)
+    bare = _BRACKETS.sub("", column.header)  # a unit in brackets is no further word
+    rest = max(0, len(re.sub(r"[\W\d_]", "", fold(bare))) - named)
     return -says, more + (rest > 0)
 
 

@@ -217,6 +217,18 @@ def test_a_column_that_is_empty_where_models_are_fitted_stays_out(tmp_path: Path
     assert "T2" not in _campaign(rig)["channels"]
 
 
+def test_a_room_in_japanese_and_empty_cells_behind_the_last_tab(tmp_path: Path) -> None:
+    rows = [f"{k}\t{21 + k % 5 / 9}\t{100 * (k // 9 % 2)}\t{'' if k % 9 else k / 7}" for k in range(90)]
+    text = "\n".join(["経過時間[分]\t室温[℃]\t主軸電力[W]\t変位X[μm]", *rows])
+    (tmp_path / "run.txt").write_bytes(text.encode("shift_jis"))
+    command = ["new", str(tmp_path / "rig"), "--quick", "--from", str(tmp_path / "run.txt")]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    channels = _campaign(tmp_path / "rig")["channels"]
+    assert channels["room"] == {"role": "ambient temperature", "unit": "degC"}
+    assert channels["disp_X"]["role"] == "error"
+
+
 def _probe(zero: float, further: float = 0.0) -> Row:
     """A bed that is heated, a probe with an arbitrary zero that follows it, and the number of the sample."""
     return lambda k: f"{k},{k // 3},{21 + k % 5 / 9},{25 + k * k / 90},{zero + further * (k == 59) - k / 2}"
