@@ -57,8 +57,8 @@ def run(
     folder are replaced at the very end, so an interrupted run changes nothing. Your exports, figures and
     notes stay.
 
-    For a folder, every experiment that is not finished yet is run: start the command again to go on where it
-    stopped.
+    For a folder, the command runs every experiment that is not finished yet. Start it again to continue after
+    a stop.
     """
     import json
 

@@ -19,7 +19,7 @@ from discovery.printed import printed
 INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
 
 NOTHING_CLOSE = (
-    "look at what happened in the windows in which heat is missing, and record what nothing records at that "
+    "look at what happened in the windows with missing heat, and record what is not recorded yet at that "
     "body: its temperature, and everything else that heats or cools it"
 )
 
@@ -128,7 +128,7 @@ def _smallest(found: Search) -> str:
     return (
         "these recordings would have shown " + ", ".join(texts)
         if texts
-        else "nothing is missing that these recordings could show"
+        else "no missing physics was detected that these recordings could show"
     )
 
 

@@ -61,7 +61,7 @@ def plan(
     guesses = {name: _as_guess(name, one, campaign, fit) for name, one in form.channels.items()}
     outputs = measured(campaign, fit)
     room = next((n for n, one in guesses.items() if one.role == "ambient temperature"), None)
-    progress("looking for what drives the outputs")
+    progress("looking for the inputs that drive the outputs")
     # a constant drives no error
     thermal = all(guesses[name].role != "other output" for name in outputs)
     drivers = strongest(campaign, fit, outputs, usual_inputs(guesses, room, thermal=thermal))

@@ -244,7 +244,7 @@ def _says_nothing(
         if has_load:
             return "is a set point, no measurement: left out"
     if not np.isfinite(column.values).any():
-        return "holds nothing in what is fitted: left out"
+        return "has no values in the recordings to fit: left out"
     inputs = one.role == "other input" or (
         one.role not in TEMPERATURES and one.role != "error" and not one.sure
     )

@@ -148,7 +148,7 @@ def _answers(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[st
         return found
     for name, held in holds.items():
         if held is False and found[name].role == OTHER:
-            why = "it never holds its value, as what somebody sets does; nothing else is measured"
+            why = "it never holds its value, so nobody sets it; nothing else is measured"
             found[name] = found[name].doubtful(why, role="other output")
     return found
 

@@ -179,7 +179,7 @@ def test_a_single_sensor_shows_no_room(tmp_path: Path) -> None:
 
 def test_nothing_stands_for_a_room_that_would_drive_errors(tmp_path: Path) -> None:
     said, rig = _made(tmp_path, "time,P [W],E_Z [um]", lambda k: f"{k},{k % 3},{k * k / 90:.2f}")
-    assert "none is made up" in said
+    assert "none is assumed" in said
     assert "T_env" not in _campaign(rig)["channels"]
 
 
@@ -213,7 +213,7 @@ def test_rooms_beside_the_air_outside_are_outputs(tmp_path: Path) -> None:
 
 def test_a_column_that_is_empty_where_models_are_fitted_stays_out(tmp_path: Path) -> None:
     said, rig = _made(tmp_path, "time,P,T1,T2", lambda k: f"{k},{k % 3},{20 + k % 7},{'' if k < 40 else 20}")
-    assert "column 'T2' holds nothing in what is fitted: left out" in said
+    assert "column 'T2' has no values in the recordings to fit: left out" in said
     assert "T2" not in _campaign(rig)["channels"]
 
 

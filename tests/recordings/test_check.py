@@ -54,7 +54,7 @@ def test_nothing_is_wrong(write: Write) -> None:
         (with_line(9, "100,20,0,"), "error: fit.csv, line 9: time runs backwards by 260 s; sort"),
         (
             with_line(9, "360,20,0,"),
-            "error: fit.csv, line 9: the stamp of the line before comes again; delete",
+            "error: fit.csv, line 9: the time stamp of the line before is repeated; delete",
         ),
         ([*rows(), "90000,20,0,1"], "warning: fit.csv, line 62: time jumps by 86460 s where steps are 60 s"),
         (with_line(9, "420,2O,0,"), "error: fit.csv, line 9: 'T_env' is '2O', not a number; write a number"),
