@@ -76,7 +76,7 @@ def test_nothing_is_wrong(write: Write) -> None:
         ),
         (
             with_column(2, ["1"] * 10 + [""] * 40 + ["1"] * 10),
-            "warning: fit.csv, line 12: 20 of 30 readings of 'E_Y0C' stand where 'speed' is not known",
+            "warning: fit.csv, line 12: 'speed' is not known at 20 of 30 readings of 'E_Y0C'",
         ),
         (
             with_column(1, [""] * 30 + [f"{20 + i % 3}" for i in range(30)]),
