@@ -88,7 +88,7 @@ def keep_run(folder: Path) -> None:
 
 def _removed(one: dict[str, Any]) -> float:
     """Share of the rms without a model that is gone, in percent."""
-    return 100.0 * (1.0 - one["rms"] / one["uncompensated"]["rms"])
+    return 100.0 * float(1.0 - one["rms"] / one["uncompensated"]["rms"])
 
 
 def main(run: str | None = None) -> None:
