@@ -26,10 +26,14 @@ if TYPE_CHECKING:
     from discovery.notebook import RunResults, run
     from discovery.recordings import load_campaign
     from discovery.report import write_report
+    from discovery.sparse.library import FilteredInputs
+    from discovery.sparse.optimiser import SparseSearch
 
 _HOME = {
+    "FilteredInputs": "sparse.library",
     "RunResults": "notebook",
     "SparseDiscovery": "estimator",
+    "SparseSearch": "sparse.optimiser",
     "UserError": "errors",
     "campaign_from_frames": "frames",
     "diagnose": "diagnosis",
@@ -45,8 +49,10 @@ _HOME = {
 }
 
 __all__ = [
+    "FilteredInputs",
     "RunResults",
     "SparseDiscovery",
+    "SparseSearch",
     "UserError",
     "campaign_from_frames",
     "diagnose",

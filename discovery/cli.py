@@ -66,7 +66,7 @@ class _Sentences(TyperGroup):
         except (KeyboardInterrupt, SystemError) as error:
             if not _interrupted(error):
                 raise
-            typer.echo("\nstopped; nothing half-written is left, the command can be run again", err=True)
+            typer.echo("\nstopped; no half-written files are left; you can run the command again", err=True)
             _leave_fits_behind()
             raise typer.Exit(130) from None
         except OSError as error:

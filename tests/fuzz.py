@@ -14,6 +14,7 @@ import io
 import json
 import random
 import resource
+import shlex
 import shutil
 import sys
 import tempfile
@@ -23,6 +24,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
+from benchmarks.tables import keep
 from discovery.errors import UsageError, UserError
 
 ROOT = Path(__file__).parents[1]
@@ -192,6 +194,7 @@ def main() -> int:
     asked.add_argument("--inputs", type=int, default=10**9)
     asked.add_argument("--seed", type=int, default=1)
     asked.add_argument("--kind", action="append", choices=list(KINDS))
+    asked.add_argument("--store", action="store_true", help="keep the figures for benchmarks/fuzzing.md")
     given = asked.parse_args()
     rng = random.Random(given.seed)
     kinds = given.kind or list(KINDS)
@@ -219,11 +222,15 @@ def main() -> int:
             if took > MOST_SECONDS or "\n" in said:
                 wrong += 1
                 _keep(kind, data, said, counts.total())
-    print("| kind | inputs | read as sound | longest, s |\n|---|---|---|---|")
-    for kind in kinds:
-        print(f"| {kind} | {counts[kind]} | {read[kind]} | {slowest[kind]:.2f} |")
+    rows = [(kind, counts[kind], read[kind], f"{slowest[kind]:.2f}") for kind in kinds]
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f"\n{counts.total()} inputs, seed {given.seed}: {wrong} wrong; memory at most {memory:.0f} MB")
+    after = f"{counts.total()} inputs, seed {given.seed}: {wrong} wrong; memory at most {memory:.0f} MB."
+    for row in rows:
+        print(*row, sep=" | ")
+    print(after)
+    if given.store:
+        head = ("kind", "inputs", "read as sound", "longest, s")
+        keep("fuzzing", f"python -W ignore -m tests.fuzz {shlex.join(sys.argv[1:])}", head, rows, after)
     return int(wrong > 0 or memory > MOST_MEGABYTES)
 
 

@@ -37,9 +37,9 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def _run(folder: Path, *options: str) -> tuple[int, str, str]:
+def _run(folder: Path, *options: str, verb: str = "run") -> tuple[int, str, str]:
     out = ["--out", str(folder / "out")]
-    result = CliRunner().invoke(app, ["run", str(folder / "experiment.toml"), *out, *options])
+    result = CliRunner().invoke(app, [verb, str(folder / "experiment.toml"), *out, *options])
     return result.exit_code, result.stdout, result.stderr
 
 
@@ -71,12 +71,13 @@ def test_a_wrong_recording_stops_a_run_unless_forced(folder: Path) -> None:
         cells[3] = f"{-float(cells[3]):.3f}" if cells[3] else ""
         turned.append(",".join(cells))
     (folder / "b.csv").write_text("\n".join(turned) + "\n")
-    status, _, said = _run(folder)
-    assert status == 1
-    assert "'E_Y0C' has the other sign" in said
-    assert "b.csv" in said
-    assert "--force" in said
-    assert not (folder / "out").exists()
+    for verb in ("run", "diagnose"):
+        status, _, said = _run(folder, verb=verb)
+        assert status == 1
+        assert "'E_Y0C' has the other sign" in said
+        assert "b.csv" in said
+        assert "--force" in said
+        assert not (folder / "out").exists()
     status, printed, _ = _run(folder, "--force", "--quiet")
     assert status == 0
     assert "has the other sign" in printed

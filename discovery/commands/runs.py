@@ -18,6 +18,11 @@ Jobs = Annotated[
         "number. [all cores; or the environment variable DISCOVERY_JOBS]",
     ),
 ]
+Force = Annotated[bool, typer.Option("--force", help="Use faulty recordings.")]
+
+
+def _on_stderr(line: str) -> None:
+    typer.echo(line, err=True)
 
 
 def run(
@@ -39,7 +44,7 @@ def run(
             "tcp://10.0.0.5:8786. The workers need the same files at the same place.",
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Run in spite of faulty recordings.")] = False,
+    force: Force = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the last five lines.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print only one JSON object with the findings.")
@@ -52,8 +57,8 @@ def run(
     folder are replaced at the very end, so an interrupted run changes nothing. Your exports, figures and
     notes stay.
 
-    For a folder, every experiment that is not finished yet is run: start the command again to go on where it
-    stopped.
+    For a folder, the command runs every experiment that is not finished yet. Start it again to continue after
+    a stop.
     """
     import json
 
@@ -68,12 +73,9 @@ def run(
     from discovery.experiment.summary import summary
     from discovery.progress import shown, silent
 
-    def tell(line: str) -> None:
-        typer.echo(line, err=True)
-
     with shown(quiet=quiet or as_json) as progress:
         folder = run_experiment(
-            experiment, out, progress, force=force, tell=silent if quiet or as_json else tell
+            experiment, out, progress, force=force, tell=silent if quiet or as_json else _on_stderr
         )
     found = ending(folder)
     if as_json:
@@ -122,6 +124,7 @@ def diagnose(
     experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file.")],
     out: Annotated[Path | None, typer.Option(help="Folder of the results [runs/NAME].")] = None,
     jobs: Jobs = None,
+    force: Force = False,
 ) -> None:
     """Find the physics that the model of [mismatch] lacks: which effect, where, how sure, and what its repair
     gains.
@@ -129,6 +132,8 @@ def diagnose(
     Writes diagnosis.json, the repaired model and report.html. Other models of the same recordings stay in the
     folder. "no mismatch" and "unexplained" are possible answers: an effect is named only if the recordings
     determine it.
+
+    Faulty recordings (see `discovery check`) stop the command; --force overrides this.
     """
     use_jobs(jobs)
     from discovery.diagnosis.summary import summary
@@ -137,7 +142,7 @@ def diagnose(
     from discovery.progress import shown
 
     with shown() as progress:
-        folder = find(experiment, out, progress)
+        folder = find(experiment, out, progress, force=force, tell=_on_stderr)
     for line in summary(folder):
         typer.echo(line)
     for line in remarks(folder):

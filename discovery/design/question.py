@@ -19,7 +19,7 @@ from discovery.printed import printed
 INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
 
 NOTHING_CLOSE = (
-    "look at what happened in the windows in which heat is missing, and record what nothing records at that "
+    "look at what happened in the windows with missing heat, and record what is not recorded yet at that "
     "body: its temperature, and everything else that heats or cools it"
 )
 
@@ -122,12 +122,13 @@ def _smallest(found: Search) -> str:
         places = list(dict.fromkeys(" and ".join(c.hypothesis.places) for c in seen))
         everywhere = len(seen) == len(claims) and len(places) > 1 and h.effect.place in _ANYWHERE
         where = _ANYWHERE[h.effect.place] if everywhere else f"at {'; '.join(places)}"
-        unit = h.units.get(h.amplitudes[0], "")
-        texts.append(f"{word} of {printed(size, 2)} {unit}{speed} {where}")
+        unit = h.units.get(h.amplitudes[0], "1")
+        amount = printed(size, 2) if unit == "1" else f"{printed(size, 2)} {unit}"
+        texts.append(f"{word} of {amount}{speed} {where}")
     return (
         "these recordings would have shown " + ", ".join(texts)
         if texts
-        else "nothing is missing that these recordings could show"
+        else "no missing physics was detected that these recordings could show"
     )
 
 

@@ -91,7 +91,7 @@ class Ending:
 
     def _verdict(self) -> str:
         if self.verdict is None:
-            return "verdict: not asked ([mismatch] names no model)"
+            return "verdict: no diagnosis ([mismatch] names no model)"
         effects = f": {', '.join(self.effects)}" if self.effects else ""
         return f"verdict: {self.verdict}{effects}"
 

@@ -135,9 +135,9 @@ def coarse_notes(fit: Fit) -> list[str]:
     names = ", ".join(grid.recording for grid in grids)
     readings = int(max(largest.means.counts.max(), 1)) if largest.means else 1
     return [
-        f"{names}: up to {largest.instants} instants, finer than needed; readings are compared as "
-        f"{len(largest.read)} means of up to {readings}, and so are their rms; inputs are means over "
-        f"{float(np.median(largest.step)):.3g} s, their large steps where they are"
+        f"{names}: up to {largest.instants} instants, finer than needed; readings are averaged to "
+        f"{len(largest.read)} means of up to {readings}, and the rms is that of the means; inputs are "
+        f"averaged over {float(np.median(largest.step)):.3g} s, but large steps keep their times"
     ]
 
 

@@ -204,7 +204,7 @@ class ExperimentForm(Strict):
         description="default: every channel of role error, else of role temperature",
     )
     fit: list[str] = Field(min_length=1, description="recordings that fits may see")
-    held_out: list[str] = Field([], description="recordings that nothing sees before the end")
+    held_out: list[str] = Field([], description="held-out recordings, which no fit and no choice uses")
     cross_validate: bool = Field(
         True, description="leave recordings and blocks out of the fit, one after the other"
     )

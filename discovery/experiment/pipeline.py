@@ -65,14 +65,7 @@ def run(
             cannot be exported; then the run is kept.
     """
     began = clock.perf_counter()
-    progress("reading the recordings")
-    experiment = load_experiment(path)
-    progress("comparing the recordings with each other")
-    findings = quality(experiment)
-    if not force:
-        refuse(findings)
-    for line in folded(findings):
-        tell(line)
+    experiment, findings = _looked_at(path, progress, tell, force=force)
     progress = steps = Steps(progress, [*map(_weight, experiment.form.models.values()), _DIAGNOSIS])
     folder = out or default_folder(experiment.name)
     if experiment.form.export:
@@ -96,6 +89,21 @@ def run(
         progress(f"exporting {experiment.form.export.model}")
         export_of(folder, experiment.form.export)
     return folder
+
+
+def _looked_at(
+    path: Path, progress: Progress, tell: Progress, *, force: bool
+) -> tuple[Experiment, list[Finding]]:
+    """An experiment, and what is wrong with its recordings, which is said before anything is fitted."""
+    progress("reading the recordings")
+    experiment = load_experiment(path)
+    progress("comparing the recordings with each other")
+    findings = quality(experiment)
+    if not force:
+        refuse(findings)
+    for line in folded(findings):
+        tell(line)
+    return experiment, findings
 
 
 _DIAGNOSIS = 4.0  # how long it takes, relative to a model that is only fitted
@@ -184,15 +192,21 @@ def export_of(folder: Path, wanted: ExportForm) -> None:
         raise UserError(f"the run is done and kept in {folder}, but its export failed: {error}") from None
 
 
-def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -> Path:
+def diagnose(
+    path: Path,
+    out: Path | None = None,
+    progress: Progress = silent,
+    *,
+    force: bool = False,
+    tell: Progress = silent,
+) -> Path:
     """What the model of [mismatch] leaves out, alone: that model, the diagnosis, the repaired one, a report.
 
-    Without [mismatch] the experiment's only (or first) model is taken. Files and failures as in `run`; other
-    models that a run left in the folder stay there (see `joining`).
+    Without [mismatch] the experiment's only (or first) model is taken. Files, arguments and failures as in
+    `run`; other models that a run left in the folder stay there (see `joining`).
     """
     began = clock.perf_counter()
-    progress("reading the recordings")
-    experiment = load_experiment(path)
+    experiment, findings = _looked_at(path, progress, tell, force=force)
     form = experiment.form
     asked = form.mismatch or MismatchForm(model=next(iter(form.models)))
     name, entry = asked.model, form.models[asked.model]
@@ -209,7 +223,7 @@ def diagnose(path: Path, out: Path | None = None, progress: Progress = silent) -
             fitted[name] = repaired_of(experiment, name, found, found.repaired, progress)
         progress("writing the report")
         seconds = clock.perf_counter() - began
-        write_run(temporary, "diagnose", experiment, fitted, _written(found), seconds)
+        write_run(temporary, "diagnose", experiment, fitted, _written(found), seconds, findings)
         join(folder, temporary)
         write_report(temporary)
     return folder

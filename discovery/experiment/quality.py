@@ -35,7 +35,7 @@ def refuse(findings: Sequence[Finding]) -> None:
     rest = f"\n  and {len(lines) - _SHOWN} more" if len(lines) > _SHOWN else ""
     told = "".join(f"\n  {line}" for line in lines[:_SHOWN])
     raise UserError(
-        f"the recordings cannot be used; correct them, or use --force to run them anyway:{told}{rest}"
+        f"the recordings cannot be used; correct them, or say --force to use them anyway:{told}{rest}"
     )
 
 

@@ -24,7 +24,7 @@ from discovery.evaluation.shares import term_shares
 from discovery.experiment.document import ResultsDocument
 from discovery.experiment.experiment import Experiment
 from discovery.experiment.inputfiles import hashes, input_files
-from discovery.experiment.quality import guessed, quality
+from discovery.experiment.quality import guessed
 from discovery.files import write_atomic
 from discovery.models import Model, write_model
 from discovery.models.equations import equations
@@ -49,18 +49,17 @@ def write_run(
     fitted: Mapping[str, Fitted],
     diagnosis: Mapping[str, Any] | None,
     seconds: float,
-    findings: Sequence[Finding] | None = None,
+    findings: Sequence[Finding],
     further: Mapping[str, Any] | None = None,
 ) -> None:
     """Everything that a run leaves behind but the report.
 
     Args:
         verb: of the command that made it.
-        findings: of the recordings, where they were looked at before.
+        findings: what is wrong with the recordings.
         further: what results.json holds in addition to the models: "role_matrix", "paper".
     """
-    found = quality(experiment) if findings is None else findings
-    document = results_document(verb, experiment, fitted, seconds, found, further)
+    document = results_document(verb, experiment, fitted, seconds, findings, further)
     write_json(folder / RESULTS, document.model_dump(exclude_unset=True))
     write_json(folder / INPUTS, inputs_over_time(experiment))
     if diagnosis is not None:

@@ -23,10 +23,9 @@ _COUNTER = re.compile(
     r"\b(m?ah|[km]?wh|energy|capacity|odometer)\b"
 )
 _COUNTER_UNITS = {"ah", "mah", "wh", "kwh", "mwh", "j", "kj", "mj"}
+_THINGS = r"(row|entry|record|sample|scan|sweep|point|data|line|reading|step|cycle|loop|test|probe)s?"
 _ID = re.compile(
-    r"(.* )?u?u?id( ?\d+)?|"
-    r"(row|entry|record|sample|scan|sweep|point|data|line|reading|step|cycle|loop|test)s? ?(point )?"
-    r"(no|nr|num|number|idx|index|count|counter)( ?\d+)?"
+    r"(.* )?u?u?id( ?\d+)?|" + _THINGS + r" ?(point )?(no|nr|num|number|idx|index|count|counter)( ?\d+)?"
 )
 
 
@@ -108,7 +107,9 @@ def bookkeeping(name: str, unit: str, values: Array, seconds: Array, role: str) 
         return "is a counter that only runs on"
     if role != "other input" or unit in _COUNTER_UNITS:
         return ""
-    if not unit and _ID.fullmatch(words) and (values == np.round(values)).all():
+    whole = bool((values == np.round(values)).all())
+    one_by_one = bool(np.isin(steps, (0.0, 1.0)).all())
+    if not unit and whole and (_ID.fullmatch(words) or (one_by_one and re.fullmatch(_THINGS, words))):
         return "numbers rows or devices"
     clock = time_unit(unit) is not None or _says_time(words)
     steady = float(np.corrcoef(values, seconds)[0, 1])

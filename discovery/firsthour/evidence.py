@@ -177,6 +177,8 @@ def value_odds(form: Shape, unit: str | None) -> list[tuple[str, Mapping[str, fl
                     "flow": -1.0,
                     "torque": -1.5,
                     "voltage": -0.5,
+                    "position": -2.0,  # an axis is driven from place to place
+                    "other": 0.2,
                 },
             )
         )

@@ -13,12 +13,22 @@ if TYPE_CHECKING:
 
 MODELS = {
     "file": 'a model of your own: { file = "model.toml" }, a sparse sum of terms with named parameters',
-    "regression": "ridge regression on the inputs, without memory: the least that a model has to beat",
+    "regression": "ridge regression on the inputs, without memory: the minimum that a model has to beat",
     "reduced": "equation (9): each error first order, driven by all inputs together, fitted from one cycle",
     "superposition": "equation (8): each error a sum of parts, each first order and driven by one input",
     "thermobalance": "section 3: five bodies of a rotary table, cutting fluid by equations (1) to (6)",
     "sindy": "discovered: the fewest terms of a large library that predict parts of the data left out",
-    "pysindy": "PySINDy as its users take it, threshold by cross-validation: to compare with",
+    "pysindy": "PySINDy with its usual settings, threshold by cross-validation: for comparison",
+}
+
+# the names that `discovery new` gives to the models of an experiment
+FIRST_MODELS = {
+    "regression": MODELS["regression"],
+    "reduced": MODELS["reduced"],
+    "first_order": "one thermal mass for each output, warmed by the inputs and cooled by the room",
+    "two_masses": "two thermal masses for each output, a fast one and a slow one",
+    "discovered": MODELS["sindy"].removeprefix("discovered: "),
+    "pysindy": MODELS["pysindy"],
 }
 
 

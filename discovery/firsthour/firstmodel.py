@@ -39,7 +39,7 @@ def first_model(
             blocks.append(_error(output, guesses, inputs, masses))
     count = "first order" if masses == 1 else "two masses"
     lines = [
-        "# The simplest model that could work, to be bettered. Each output for itself.",
+        "# The simplest model that could work. Improve it. Each output has its own equation.",
         f'name = "{count}"',
         "",
         "[parameters]",

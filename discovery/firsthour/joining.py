@@ -107,7 +107,7 @@ def _offset(first: OwnTable, second: OwnTable) -> tuple[float, str]:
     if first.first and second.first:
         a, b = (datetime.fromisoformat(one.first) for one in (first, second))
         return (b - a).total_seconds(), "by the dates of both"
-    return 0.0, "taken to begin together, as not both have dates"
+    return 0.0, "assumed to begin together, because not both have dates"
 
 
 def _said(shift: Shift, second: OwnTable) -> str:

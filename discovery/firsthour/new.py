@@ -16,7 +16,9 @@ from discovery.firsthour.plan import Plan, plan
 from discovery.firsthour.recorded import Recorded, never_moves, recorded
 from discovery.firsthour.room import unknown_room
 from discovery.firsthour.table import OwnTable, read_tables
+from discovery.firsthour.tableguess import sensors_as_inputs
 from discovery.firsthour.texts import campaign_text, clock_doubt, csv_text
+from discovery.firsthour.zeros import from_first_readings
 from discovery.progress import Progress, silent
 from discovery.recordings.campaignfile import CampaignForm
 from discovery.runfolder import temporary_folder
@@ -63,6 +65,8 @@ def new(
     guesses = with_statements(found.seen, found.guesses, said, room)
     if ask is not None:
         guesses = answered(guesses, questions(found.seen, guesses), ask)
+    guesses = sensors_as_inputs(guesses)
+    found = from_first_readings(found, guesses)
     outputs = _outputs(found, guesses)
     if not outputs:
         raise UserError(

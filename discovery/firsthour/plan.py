@@ -13,6 +13,7 @@ import numpy as np
 from discovery.experiment import load_experiment
 from discovery.files import read_toml, write_atomic
 from discovery.firsthour.choosing import CANDIDATES, NOT_TRIED, Score, choose
+from discovery.firsthour.explain import FIRST_MODELS
 from discovery.firsthour.firstmodel import first_model, usual_inputs
 from discovery.firsthour.guess import Guess, drives
 from discovery.firsthour.inputs import strongest
@@ -60,7 +61,7 @@ def plan(
     guesses = {name: _as_guess(name, one, campaign, fit) for name, one in form.channels.items()}
     outputs = measured(campaign, fit)
     room = next((n for n, one in guesses.items() if one.role == "ambient temperature"), None)
-    progress("looking for what drives the outputs")
+    progress("looking for the inputs that drive the outputs")
     # a constant drives no error
     thermal = all(guesses[name].role != "other output" for name in outputs)
     drivers = strongest(campaign, fit, outputs, usual_inputs(guesses, room, thermal=thermal))
@@ -142,7 +143,8 @@ def _decided(
         chosen = list(dict.fromkeys([*best, *references]))
         said = [
             f"first model: {helping[0]}; on {how} left out of its fit, its rms is {scores[0].ratio:.0%} of "
-            f"the rms without a model ({', '.join(told[1:])})"
+            f"the rms without a model ({', '.join(told[1:])})",
+            f"  {helping[0]}: {FIRST_MODELS[helping[0]]}; `discovery list models` explains the others",
         ]
     else:
         chosen = [next(iter(lines))]

@@ -23,6 +23,7 @@ from discovery.recordings.timeunit import time_odds
 from discovery.recordings.units import UnitError, conversion
 
 _LAST_THIRD = 2 / 3
+_ELSEWHERE = 30.0  # times what a column moves in a run
 _ELECTRIC = ("current", "voltage")
 
 
@@ -243,7 +244,7 @@ def _says_nothing(
         if has_load:
             return "is a set point, no measurement: left out"
     if not np.isfinite(column.values).any():
-        return "holds nothing in what is fitted: left out"
+        return "has no values in the recordings to fit: left out"
     inputs = one.role == "other input" or (
         one.role not in TEMPERATURES and one.role != "error" and not one.sure
     )
@@ -256,7 +257,15 @@ def _named(column: Column) -> str:
 
 
 def _joined(column: Column, runs: Sequence[OwnTable]) -> Column:
-    return replace(column, values=np.concatenate([v for run in runs for v in _values(run, column.name)]))
+    """The column of all runs, end to end. What starts elsewhere in each run, far beyond what it moves, has an
+    arbitrary zero: its runs are joined at their first readings, so that its span is that of a run.
+    """
+    values = [v for run in runs for v in _values(run, column.name)]
+    known = [one for v in values if (one := v[np.isfinite(v)]).size]
+    spans, firsts = [np.ptp(one) for one in known], [one[0] for one in known]
+    if known and np.ptp(firsts) > _ELSEWHERE * max(spans) > 0.0:
+        values = [v - v[np.isfinite(v)][:1].sum() + firsts[0] for v in values]
+    return replace(column, values=np.concatenate(values))
 
 
 def _values(run: OwnTable, name: str) -> list[Array]:

@@ -46,8 +46,8 @@ def unknown_room(
         return None, ""
     if not any(guesses[name].role == "temperature" for name in outputs):
         return None, (
-            "no room temperature was recorded, and none is made up: what the air does to the errors stays in "
-            "them. Record it, or name a substitute with --room COLUMN"
+            "no room temperature was recorded, and none is assumed: the effect of the air stays in the "
+            "errors. Record it, or name a substitute with --room COLUMN"
         )
     cold = [degrees for run in runs for degrees in [_cold_start(run, guesses)] if degrees is not None]
     if cold and len(cold) == len(runs):

@@ -84,7 +84,9 @@ def read_sheets(path: Path) -> list[Sheet]:
         return _worksheets(path)
     text, notes = decode(read_table(path), path)
     lines = [
-        (k, line.rstrip()) for k, line in enumerate(io.StringIO(text), start=1) if line.strip(" \t;,\r\n")
+        (k, line.rstrip(" \r\n"))
+        for k, line in enumerate(io.StringIO(text), start=1)
+        if line.strip(" \t;,\r\n")
     ]
     remarks = [line.lstrip("# ") for _, line in lines if line.lstrip().startswith("#")]
     kept = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
@@ -178,7 +180,15 @@ def _sheet(
     check_shape(path, rows, width)
     header = (*head[at][1], *[""] * width)[:width]
     above = (*remarks, *("  ".join(filter(None, cells)) for _, cells in head[:at]))
-    said = (*notes, *([f"{at} lines above the header were passed over"] if at else ()), *left)
+    said = (
+        *notes,
+        *(
+            [f"{at} line{'s' * (at > 1)} above the header {'were' if at > 1 else 'was'} passed over"]
+            if at
+            else ()
+        ),
+        *left,
+    )
     groups = [group or _explained(word, head[:at]) for group, word in zip(groups, header, strict=True)]
     return Sheet(
         path,

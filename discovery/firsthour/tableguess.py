@@ -34,6 +34,7 @@ Hints = Mapping[str, Sequence[tuple[str, Mapping[str, float]]]]
 
 _HELD = 0.5  # share of readings that repeat the one before: what is set, not measured
 _ONE_OF_SEVERAL = re.compile(r"\d+|(?<![^\W\d_])(d ?)?[xyz](?![^\W\d_])")
+_BRACKETS = re.compile(r"[\[(（][^\])）]*[\])）]")
 _PUSHES = ("torque", "current", "signal", "flow", "power", "speed")
 
 
@@ -51,12 +52,18 @@ def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str
     guesses = _one_unit(columns, guesses)
     guesses = _the_fluid(_one_room(columns, guesses))
     guesses = _corrections(columns, _signed(columns, _answers(columns, guesses)))
+    return sensors_as_inputs(guesses)
+
+
+def sensors_as_inputs(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """Where an error is measured, temperatures of the machine are inputs of it, unless a person said so."""
+    found = dict(guesses)
     if any(one.role == "error" for one in guesses.values()):
         for name, one in guesses.items():
-            if one.role == "temperature" and one.unit in DEGREES:
+            if one.role == "temperature" and one.unit in DEGREES and not one.said:
                 why = f"{one.why}; a sensor on the machine is an input of the errors"
-                guesses[name] = replace(one, role=OTHER, why=why)
-    return guesses
+                found[name] = replace(one, role=OTHER, why=why)
+    return found
 
 
 def _alike(column: Column, columns: Sequence[Column]) -> list[Column]:
@@ -141,7 +148,7 @@ def _answers(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[st
         return found
     for name, held in holds.items():
         if held is False and found[name].role == OTHER:
-            why = "it never holds its value, as what somebody sets does; nothing else is measured"
+            why = "it never holds its value, so nobody sets it; nothing else is measured"
             found[name] = found[name].doubtful(why, role="other output")
     return found
 
@@ -176,7 +183,8 @@ def _air(column: Column) -> tuple[float, int]:
     says = max((word.says.get("air", 0.0) for word in words), default=0.0)
     more = sum("air" not in word.says and word.gloss != "temp" for word in words)
     named = sum(len(word.said) for word in words)
-    rest = max(0, len(re.sub(r"[\W\d_]", "", fold(column.header))) - named)
+    bare = _BRACKETS.sub("", column.header)  # a unit in brackets is no further word
+    rest = max(0, len(re.sub(r"[\W\d_]", "", fold(bare))) - named)
     return -says, more + (rest > 0)
 
 

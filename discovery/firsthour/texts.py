@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from discovery.files import format_toml
 from discovery.firsthour.asking import doubt
+from discovery.firsthour.explain import FIRST_MODELS
 from discovery.firsthour.guess import Guess
 from discovery.firsthour.measures import DEGREES
 from discovery.firsthour.recorded import Recorded
@@ -87,10 +88,8 @@ def campaign_text(
         if header and "role =" in line and header != line.split(" ")[0]:
             lines[index] = f"{line}  # {header}"
     head = [
-        "# Written by `discovery new`. Look at each role and unit (`discovery list roles` explains "
-        "them); where it",
-        "# says guessed, delete those words once you have looked. Roles corrected: `discovery new "
-        "DIR --again`.",
+        "# Written by `discovery new`. Check each role and unit (`discovery list roles` explains them).",
+        "# Delete `guessed = ...` where a guess is right. Roles corrected: `discovery new DIR --again`.",
         *(["# " + about_room.replace("\n", " ")] if about_room else []),
     ]
     return "\n".join([*head, *lines]) + "\n"
@@ -127,10 +126,11 @@ def experiment_text(
     name = re.sub(r"[^\w .+-]+", "_", title).lstrip(" .+-") or "experiment"
     width = max(map(len, models))
     lines = [f"{model:{width}} = {entry}" for model, entry in models.items()]
+    meant = [f"# {model}: {FIRST_MODELS[model]}" for model in models if model in FIRST_MODELS]
     told = "\n".join(f"# {line}" for line in remarks)
-    why = "# What does this model lack? The plainest one that predicts."
+    why = "# The diagnosis asks what this model lacks. It is the simplest one that predicts."
     diagnosed = f'\n{why}\n[mismatch]\nmodel = "{mismatch}"\n' if mismatch else ""
-    return f"""# Written by `discovery new`. Fits see the recordings under fit alone.
+    return f"""# Written by `discovery new`. Fits use only the recordings under fit.
 name = "{name}"
 campaign = "campaign.toml"
 outputs  = [{listed(outputs)}]
@@ -139,5 +139,5 @@ held_out = [{listed(names[-1:])}]
 
 {told}
 [models]
-{chr(10).join(lines)}
+{chr(10).join([*meant, *lines])}
 {diagnosed}"""

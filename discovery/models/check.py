@@ -114,7 +114,7 @@ def _check_unit(unit: str, channels: Mapping[str, str], where: str) -> None:
             if None not in ratios and 1.0 not in ratios:
                 wanted = "degC, in differences K" if counted == ("K",) else " or ".join(counted)
                 raise UserError(
-                    f"{where}: '{unit}' counts in {short(atom)}, and nothing is converted inside a model; "
+                    f"{where}: '{unit}' counts in {short(atom)}, and a model converts no units; "
                     f"write unit, value and bounds in {wanted}"
                 )
 

@@ -59,8 +59,8 @@ class StateForm(Strict):
     )
     start_with: dict[str, float] = Field(
         default_factory=dict,
-        description="by state above: how much of what that one begins off its start this one begins "
-        "off, too; start_sd is then the spread of the rest (written by a discovery)",
+        description="by a state listed above: share of its start offset that this state has, too; start_sd "
+        "is then the spread of the rest (written by a discovery)",
     )
     memory: bool = Field(False, description="true: what a lag() remembers, no body (written by a fit)")
 

@@ -27,7 +27,7 @@ def clock_findings(file: Path, columns: Columns) -> list[Finding]:
         do = "sort the lines, or record with a clock that is not put back (UTC)"
         findings.append(Finding("error", file, int(columns.lines[back[0] + 1]), what, do))
     if (twice := np.flatnonzero(steps == 0)).size:
-        what = f"the stamp of the line before comes again{more(twice.size)}"
+        what = f"the time stamp of the line before is repeated{more(twice.size)}"
         do = "delete one of the two, or write the stamps with more digits"
         findings.append(Finding("error", file, int(columns.lines[twice[0] + 1]), what, do))
     forward = steps[steps > 0]

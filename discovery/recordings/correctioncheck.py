@@ -43,7 +43,9 @@ def _findings(
     gaps = [gap for gap in long_gaps(columns.time, known) if gap[0] > first]
     alone = np.flatnonzero(inside(gaps, known.size) & read)
     if alone.size:
-        what = f"'{error}' is read where its correction '{name}' is not known for long{more(alone.size)}"
+        what = (
+            f"'{error}' has readings long after the last value of its correction '{name}'{more(alone.size)}"
+        )
         do = "the correction before is taken; fill it in, or empty these readings"
         yield Finding("warning", file, int(columns.lines[alone[0]]), what, do)
     largest = float(np.max(np.abs(values[name][known])))

@@ -80,6 +80,6 @@ def _alone(
     rows = {one: np.flatnonzero(readings & empty) for one, empty in uncovered.items()}
     for one, alone in rows.items():
         if alone.size:
-            what = f"{alone.size} of {readings.sum()} readings of '{name}' stand where '{one}' is not known"
+            what = f"'{one}' is not known at {alone.size} of {readings.sum()} readings of '{name}'"
             do = f"record '{one}' as long as the readings, or leave these readings out"
             yield Finding("warning", file, int(columns.lines[alone[0]]), what, do)

@@ -169,11 +169,12 @@ def merged(runs: Sequence[Run], folder: Path, chosen: Sequence[int] | None = Non
 
 
 def _recordings(run: Run) -> list[str]:
-    return list(
-        dict.fromkeys(
-            name for entry in run.results.get("models", {}).values() for name in entry.get("recordings", {})
-        )
-    )
+    """Recordings of the fit and held-out ones; not those that only some of its models are fitted to."""
+    scored = {
+        name for entry in run.results.get("models", {}).values() for name in entry.get("recordings", {})
+    }
+    named = dict.fromkeys([*run.results.get("fit", []), *run.results.get("held_out", [])])
+    return [name for name in named if name in scored]
 
 
 def _together(runs: Sequence[Run], key: str) -> dict[str, Any]:

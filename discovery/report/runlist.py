@@ -169,7 +169,7 @@ def _score(run: Run, model: str | None) -> str:
 def _verdict(run: Run) -> str:
     """Verdict of the diagnosis, with the effects that it names."""
     if not run.diagnosis:
-        return "not asked"
+        return "no diagnosis"
     named = [
         f"{words(str(one['effect']))} ({percent(one.get('probability'))})"
         for one in run.diagnosis.get("physics") or []

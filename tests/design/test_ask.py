@@ -202,6 +202,7 @@ def test_large_sizes_are_written_out() -> None:
     runs = [changed(simulated(s), speed=simulated(s).values["speed"] / 30) for s in (1, 2)]
     said = diagnose(model(), campaign(*runs), ["r1", "r2"]).question
     assert "would have shown" in said
+    assert not re.search(r" of [\d.e-]+ 1\b", said)  # a number alone has no unit
     assert "e+" not in said
 
 

@@ -19,7 +19,10 @@ ROOT = Path(__file__).parents[2]
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
 PAGES = sorted(
     str(path.relative_to(ROOT))
-    for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"))
+    for path in (
+        *(*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")),
+        *(*ROOT.glob("benchmarks/*.md"), *ROOT.glob("datasets/**/README.md")),
+    )
     if "CHANGELOG" not in path.name
 )
 CLOSE = 0.15  # figures of the tutorial: within 15 %

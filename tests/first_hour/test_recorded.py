@@ -179,7 +179,7 @@ def test_a_single_sensor_shows_no_room(tmp_path: Path) -> None:
 
 def test_nothing_stands_for_a_room_that_would_drive_errors(tmp_path: Path) -> None:
     said, rig = _made(tmp_path, "time,P [W],E_Z [um]", lambda k: f"{k},{k % 3},{k * k / 90:.2f}")
-    assert "none is made up" in said
+    assert "none is assumed" in said
     assert "T_env" not in _campaign(rig)["channels"]
 
 
@@ -213,5 +213,64 @@ def test_rooms_beside_the_air_outside_are_outputs(tmp_path: Path) -> None:
 
 def test_a_column_that_is_empty_where_models_are_fitted_stays_out(tmp_path: Path) -> None:
     said, rig = _made(tmp_path, "time,P,T1,T2", lambda k: f"{k},{k % 3},{20 + k % 7},{'' if k < 40 else 20}")
-    assert "column 'T2' holds nothing in what is fitted: left out" in said
+    assert "column 'T2' has no values in the recordings to fit: left out" in said
     assert "T2" not in _campaign(rig)["channels"]
+
+
+def test_a_room_in_japanese_and_empty_cells_behind_the_last_tab(tmp_path: Path) -> None:
+    rows = [f"{k}\t{21 + k % 5 / 9}\t{100 * (k // 9 % 2)}\t{'' if k % 9 else k / 7}" for k in range(90)]
+    text = "\n".join(["経過時間[分]\t室温[℃]\t主軸電力[W]\t変位X[μm]", *rows])
+    (tmp_path / "run.txt").write_bytes(text.encode("shift_jis"))
+    command = ["new", str(tmp_path / "rig"), "--quick", "--from", str(tmp_path / "run.txt")]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    channels = _campaign(tmp_path / "rig")["channels"]
+    assert channels["room"] == {"role": "ambient temperature", "unit": "degC"}
+    assert channels["disp_X"]["role"] == "error"
+
+
+def _probe(zero: float, further: float = 0.0) -> Row:
+    """A bed that is heated, a probe with an arbitrary zero that follows it, and the number of the sample."""
+    return lambda k: f"{k},{k // 3},{21 + k % 5 / 9},{25 + k * k / 90},{zero + further * (k == 59) - k / 2}"
+
+
+def _read(rig: Path, recording: str, column: str) -> list[float]:
+    header, *rows = (line.split(",") for line in (rig / f"{recording}.csv").read_text("utf-8").splitlines())
+    return [float(row[header.index(column)]) for row in rows]
+
+
+def test_an_error_far_from_zero_is_counted_from_its_first_reading(tmp_path: Path) -> None:
+    out, rig = _made(tmp_path, "time,sample,T_room,T_bed,dZ_um", _probe(-80532), _probe(-3051))
+    assert "'dZ' starts at -80532 in run0, far from zero" in out
+    assert "column 'sample' numbers rows or devices: left out" in out
+    for recording in ("run0", "run1"):
+        assert _read(rig, recording, "dZ") == [-k / 2 for k in range(60)]
+
+
+def test_parts_of_one_file_keep_its_zero(tmp_path: Path) -> None:
+    _, rig = _made(tmp_path, "time,sample,T_room,T_bed,dZ_um", _probe(500))
+    both = _read(rig, "first_part", "dZ") + _read(rig, "last_part", "dZ")
+    assert both == [-k / 2 for k in range(60)]
+
+
+def test_an_error_that_starts_near_zero_keeps_it(tmp_path: Path) -> None:
+    out, rig = _made(tmp_path, "time,sample,T_room,T_bed,dZ_um", _probe(7), _probe(9))
+    assert "counted from its first reading" not in out
+    assert _read(rig, "run0", "dZ")[0] == 7
+
+
+def test_a_position_that_never_jumps_is_asked_about(tmp_path: Path) -> None:
+    """With a zero of its own in each file, its span is that of a file."""
+    out, _ = _made(tmp_path, "time,sample,T_room,T_bed,mcu_pos_z", _probe(-80532), _probe(-3051), _probe(12))
+    [line] = [one for one in out.splitlines() if one.startswith("  mcu_pos_z")]
+    assert " ? " in line
+
+
+def test_sensors_are_inputs_of_an_error_that_a_person_names(tmp_path: Path) -> None:
+    header, row = "time,T_room,T_bed,CH1", _probe(0)
+    lines = [header, *(row(k).replace(f",{k // 3},", ",", 1) for k in range(60))]
+    (tmp_path / "run.csv").write_text("\n".join(lines), "utf-8")
+    command = ["new", str(tmp_path / "rig"), "--quick", "--is", "CH1=error,um"]
+    result = CliRunner().invoke(app, [*command, "--from", str(tmp_path / "run.csv")])
+    assert result.exit_code == 0, result.output
+    assert _campaign(tmp_path / "rig")["channels"]["T_bed"]["role"] == "other input"

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.tables import keep
 from discovery.files import format_toml
 from discovery.recordings import load_campaign
 from discovery.recordings.check import check_campaign
@@ -390,22 +391,22 @@ def others(one: Damage, found: list[Finding]) -> list[Finding]:
 
 
 def main(only: str = "") -> None:
-    """Print the table, or the lines of the damages whose names hold a word."""
-    print("| damage | recordings | found | first finding |\n|---|---|---|---|")
-    count = 0
+    """Print each damage, or those whose names hold a word, and what is found; keep the table of all."""
+    rows = []
     for one in [d for d in DAMAGES if only in d.name]:
         with tempfile.TemporaryDirectory() as folder:
             found = findings(one, Path(folder))
         named = is_named(one, found)
-        count += named
         said = next((f for f in found if is_named(one, [f])), None) or (found[0] if found else None)
         what = said.what.replace("|", "/") if said else "-"
-        print(
-            f"| {one.name} | {one.base} | {'yes' if named else 'NO'} | "
-            f"{what}{' +' + str(len(others(one, found))) + ' elsewhere' if others(one, found) else ''} |",
-            flush=True,
-        )
-    print(f"\n{count} of {len(DAMAGES)} found and named.")
+        elsewhere = f" +{len(others(one, found))} elsewhere" if others(one, found) else ""
+        rows.append((one.name, one.base, "yes" if named else "NO", what + elsewhere))
+        print(*rows[-1], sep=" | ", flush=True)
+    after = f"{sum(row[2] == 'yes' for row in rows)} of {len(rows)} found and named."
+    print(after)
+    if not only:
+        head = ("damage", "recordings", "found", "first finding")
+        keep("damages", "python -m tests.recordings.damages", head, rows, after)
 
 
 if __name__ == "__main__":

@@ -54,7 +54,7 @@ def test_nothing_is_wrong(write: Write) -> None:
         (with_line(9, "100,20,0,"), "error: fit.csv, line 9: time runs backwards by 260 s; sort"),
         (
             with_line(9, "360,20,0,"),
-            "error: fit.csv, line 9: the stamp of the line before comes again; delete",
+            "error: fit.csv, line 9: the time stamp of the line before is repeated; delete",
         ),
         ([*rows(), "90000,20,0,1"], "warning: fit.csv, line 62: time jumps by 86460 s where steps are 60 s"),
         (with_line(9, "420,2O,0,"), "error: fit.csv, line 9: 'T_env' is '2O', not a number; write a number"),
@@ -76,7 +76,7 @@ def test_nothing_is_wrong(write: Write) -> None:
         ),
         (
             with_column(2, ["1"] * 10 + [""] * 40 + ["1"] * 10),
-            "warning: fit.csv, line 12: 20 of 30 readings of 'E_Y0C' stand where 'speed' is not known",
+            "warning: fit.csv, line 12: 'speed' is not known at 20 of 30 readings of 'E_Y0C'",
         ),
         (
             with_column(1, [""] * 30 + [f"{20 + i % 3}" for i in range(30)]),

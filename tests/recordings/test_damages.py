@@ -57,3 +57,10 @@ def test_simulated_machines_are_warned_of_once_in_fifty_recordings_at_most(tmp_p
         warned += len({one.file for one in found})
     recordings = sum(len(simulated(seed).frames) for seed in SEEDS)
     assert warned <= np.ceil(0.02 * recordings)
+
+
+def test_a_poor_prediction_is_no_offset_of_a_sensor() -> None:
+    """Of so few recordings, `only_environment` is predicted badly: the room steps there, and nowhere else."""
+    nmv5000 = Path(__file__).parents[2] / "datasets" / "nmv5000"
+    some = ["fit", "validation", "left_nozzle", "height_100", "only_environment", "only_fluid", "warm_up"]
+    assert check_campaign(nmv5000, only=some) == []

@@ -144,7 +144,7 @@ def changed(line: int, text: str) -> list[str]:
         (changed(7, "300,20,abc,"), "fit.csv, line 7: 'speed' is 'abc', not a number"),
         (changed(7, "300,20,inf,"), "fit.csv, line 7: 'speed' is 'inf', not a number"),
         (changed(7, "100,20,0,"), "fit.csv, line 7: time runs backwards by 140 s"),
-        (changed(7, "240,20,0,"), "fit.csv, line 7: the stamp of the line before comes again"),
+        (changed(7, "240,20,0,"), "fit.csv, line 7: the time stamp of the line before is repeated"),
         (changed(7, "soon,20,0,"), "fit.csv, line 7: the stamp 'soon' is not a number of seconds"),
         (changed(7, ",20,0,"), "fit.csv, line 7: no stamp in the column time"),
         (changed(7, "300,20"), "fit.csv, line 7: 2 cells under 4 columns; look for an incomplete line"),

@@ -404,6 +404,18 @@ def test_a_comparison_counts_as_unseen_only_what_no_run_has_fitted(folder: Path,
     assert "compared on “validation”" in page
 
 
+def test_a_recording_that_only_some_models_are_fitted_to_is_not_compared(
+    folder: Path, tmp_path: Path
+) -> None:
+    """As `also` does: it is neither of the fit nor held out."""
+    other = sample.write_sample(tmp_path / "second")
+    for run in (folder, other):
+        results = json.loads((run / "results.json").read_text())
+        next(iter(results["models"].values()))["recordings"]["warm_up"] = {}
+        (run / "results.json").write_text(json.dumps(results))
+    assert shared_recordings(load_runs([folder, other])) == ["fit", "validation"]
+
+
 def test_runs_of_two_machines_are_listed_but_their_models_are_not_mixed(folder: Path, tmp_path: Path) -> None:
     """Recordings of the same name with other readings are not the same recordings."""
     other = sample.write_sample(tmp_path / "machine", hours=20.0)

@@ -103,7 +103,7 @@ void @PREFIX@_outputs(const @PREFIX@_state *s, const real u[], real y[])
 
 int @PREFIX@_step(@PREFIX@_state *s, const real u[], real y[])
 {
-    real d[@UP@_DELAYS + 1];
+    real d[@UP@_DELAYS + 1] = {R(0.0)}; /* without a delay nothing is written into it */
     real f[N + 1];
     real a[A + 1];
     real moved[@UP@_PLAYS + 1];

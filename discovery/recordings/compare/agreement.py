@@ -36,6 +36,7 @@ _GAIN, _TWO_GAIN = 1.3, 1.7  # among several recordings; of two that stand again
 _FAR, _BACK, _WHOLE = 3.0, 1.15, 0.75
 _AGREES = 3.0  # times the usual misfit, at most, after a repair
 _TWO_AGREES = 0.4  # of the movement itself
+_FREE_AGREES = 0.3  # of the movement: a drift or an offset of any size fits a little of a poor prediction
 # how much larger the gain of a less usual damage must be to go before a usual one
 _DOUBT = {
     "unit": 0.0,
@@ -49,6 +50,7 @@ _DOUBT = {
     "offset": 0.0,
 }
 _LATE = np.arange(0.002, 0.25, 0.001)  # of a recording: how late a channel may be
+_STEP = 0.05  # of a recording, on both sides of an offset: half of it has come there
 _MOST = 6  # repairs of a campaign that are looked for
 
 
@@ -108,7 +110,8 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
         b, a, limit = (
             float(np.sqrt(np.mean([of[y] ** 2 for y in touched]))) for of in (misfit, after, usual)
         )
-        agrees = a < _TWO_AGREES if two else a < min(_AGREES * limit, 0.6)
+        most = _FREE_AGREES if repair.kind in ("drift", "offset") else 0.6
+        agrees = a < _TWO_AGREES if two else a < min(_AGREES * limit, most)
         # the log likelihood of each output's readings; half of them by chance is as good as all by a little
         each = [np.log(max(misfit[y], LEAST) / max(after[y], LEAST)) for y in touched]
         gain = float(np.sum(each)) / len(touched) ** 0.5
@@ -133,8 +136,20 @@ def _candidates(
             left = known.residual(predicted, y, reading)
             yield drifting(one, y, float(np.polyfit(reading.at, left, 1)[0]))
     for y, reading in read.items():
-        step = _offset(reading.at, known.residual(predicted, y, reading))
-        yield offset(one, y, *step, known.channels[y].unit)
+        left = known.residual(predicted, y, reading)
+        since, size = _offset(reading.at, left)
+        near = _STEP * float(one.time[-1])
+        # a poor prediction may jump where the readings do not, or creep away from them
+        if all(_at_once(reading.at, values, since, size, near) for values in (left, reading.read)):
+            yield offset(one, y, since, size, known.channels[y].unit)
+
+
+def _at_once(at: Array, values: Array, since: float, size: float, near: float) -> bool:
+    """Whether half of an offset comes within `near` seconds on both sides."""
+    before, after = (values[(at > low) & (at <= low + near)] for low in (since - near, since))
+    if not (before.size and after.size):
+        return False
+    return bool((np.median(after) - np.median(before)) * np.sign(size) > 0.5 * abs(size) > 0.0)
 
 
 def _offset(at: Array, left: Array) -> tuple[float, float]:
