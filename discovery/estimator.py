@@ -22,7 +22,7 @@ from discovery.models.dimensions import with_coefficient_units
 from discovery.models.equations import equations
 from discovery.recordings import Campaign
 from discovery.schema import suggest
-from discovery.sparse import discover as discover_in
+from discovery.sparse.discover import discover as discover_in
 from discovery.sparse.options import SparseOptions
 
 if TYPE_CHECKING:

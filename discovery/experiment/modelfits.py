@@ -144,7 +144,7 @@ def discovered(
     experiment: Experiment, options: SparseOptions, progress: Progress = silent
 ) -> tuple[Model, dict[str, Any]]:
     """What the sparse search finds on the fit recordings."""
-    from discovery.sparse import discover
+    from discovery.sparse.discover import discover
 
     folder = experiment.path.parent
     found = discover(experiment.fitting, experiment.fit, experiment.outputs, options, progress, folder)
