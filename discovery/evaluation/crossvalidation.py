@@ -67,7 +67,9 @@ def cross_validate(
     """
 
     def by_output_error(seen: Campaign, kept: Sequence[str]) -> Fit:
-        return fit_model(model, seen, kept, outputs, noise=noise, max_rounds=ROUNDS)
+        in_parts = list(kept) == list(recordings)  # perhaps without their first readings
+        start = model.with_starts_held() if in_parts else model
+        return fit_model(start, seen, kept, outputs, noise=noise, max_rounds=ROUNDS)
 
     refit = refit or by_output_error
     left: dict[str, list[Array]] = {}

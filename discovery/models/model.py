@@ -92,6 +92,20 @@ class Model:
         starts = (state.start for state in self.states.values() if state.start is not None)
         return frozenset().union(*(names(start) for start in starts))
 
+    def with_starts_held(self) -> Model:
+        """The model with the parameters that only its start values use held where they are.
+
+        They belong to the first readings of a recording. A fit to the rest of it would bend them to whatever
+        else the model lacks there.
+        """
+        used = frozenset().union(*(names(expression) for expression in self.expressions()))
+        starting = self.start_names - used
+        parameters = {
+            name: replace(parameter, fixed=parameter.fixed or name in starting)
+            for name, parameter in self.parameters.items()
+        }
+        return replace(self, parameters=parameters)
+
     def expressions(self) -> list[Expression]:
         """Right-hand sides and outputs."""
         return [*(term.expression for term in self.terms), *self.outputs.values()]
