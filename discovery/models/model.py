@@ -20,6 +20,7 @@ class Parameter:
 
     `value` is the start value before a fit and the estimate after it, `low` and `high` its 95 % interval.
     With `per_recording` every recording has its own, kept in `values`, with its interval in `intervals`.
+    `prior` is what is known of it before a fit: mean and standard deviation.
     """
 
     value: float
@@ -32,6 +33,7 @@ class Parameter:
     high: float | None = None
     values: Mapping[str, float] = field(default_factory=dict)
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    prior: tuple[float, float] | None = None
 
     def at(self, recording: str) -> float:
         """Value in a recording; the common value where the recording has none of its own."""

@@ -36,6 +36,7 @@ class Response:
     gain: float
     pole: int
     chosen: Feature  # as the search chose it; the fit moves its time constant
+    spread: float = np.inf  # of the gain in its prior
 
     @property
     def lagged(self) -> bool:
@@ -88,7 +89,8 @@ def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
                 begun = driven if start in (None, Number(0.0)) else f"{text(start)} + {driven}"
                 states[state] = replace(states[state], start=parse(begun))
             terms.append(Term(f"{drive} through {state}", state, parse(f"{driven}/{tau}")))
-        parameters[gain] = Parameter(r.gain, per, low, high)
+        prior = (0.0, r.spread) if np.isfinite(r.spread) else None
+        parameters[gain] = Parameter(r.gain, per, low, high, prior=prior)
     if rules.zeroed and responses:
         states[f"{y}_zero"] = State(f"{y}_zero", unit, None, Number(0.0), rules.start_sd, 1.0)
     output = parse(" + ".join([*states, *direct]) or "0")
