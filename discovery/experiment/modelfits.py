@@ -64,10 +64,8 @@ def _refit(fit: Fit, report: Mapping[str, Any]) -> Refit:
     """How a discovered model is fitted to what a fold leaves."""
 
     def refit(campaign: Campaign, recordings: Sequence[str]) -> Fit:
-        in_parts = set(recordings) == {system.grid.recording for system in fit.problem.systems}
-        model = fit.model.with_starts_held() if in_parts else fit.model
         outputs = fit.problem.outputs
-        return _fitting(report)(model, campaign, recordings, outputs, noise=fit.noise, max_rounds=ROUNDS)
+        return _fitting(report)(fit.model, campaign, recordings, outputs, noise=fit.noise, max_rounds=ROUNDS)
 
     return refit
 

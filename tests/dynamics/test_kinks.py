@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from discovery.dynamics import make_grid, make_system, simulate
@@ -12,6 +13,7 @@ from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
 
+Array = NDArray[np.float64]
 TIME = np.arange(0.0, 1001.0, 4.0)
 U = np.where((TIME // 200) % 2 == 0, 4.0, 1.0)
 
@@ -42,13 +44,10 @@ def test_a_run_close_by_leads_to_the_same_trajectory(
         simulate(system, values, near=simulate(near, near.model.values())).x, alone, atol=1e-5
     )
     exact = [0.0]
-    for k in range(len(TIME) - 1):
-        ends = (TIME[k], TIME[k + 1])
-        solved = solve_ivp(
-            lambda _, y, u=U[k]: [after * u - 0.002 * y[0] - over * max(y[0] - level, 0.0)],
-            ends,
-            exact[-1:],
-            rtol=1e-8,
-        )
-        exact.append(solved.y[0, -1])
+    for begin, end, u in zip(TIME, TIME[1:], U, strict=False):
+
+        def rate(_: float, y: Array, u: float = u) -> Array:
+            return np.array([after * u - 0.002 * y[0] - over * max(y[0] - level, 0.0)])
+
+        exact.append(solve_ivp(rate, (begin, end), exact[-1:], rtol=1e-8).y[0, -1])
     np.testing.assert_allclose(alone[:, 0], exact, atol=0.1 * max(exact))  # in steps of 4 s over the edge
