@@ -19,7 +19,8 @@ from discovery.models import Model
 from discovery.models.modelfile import read_model
 from discovery.models.reduced import reduced
 from discovery.recordings import Campaign, load_campaign
-from discovery.sparse import SparseOptions, discover
+from discovery.sparse.discover import discover
+from discovery.sparse.options import SparseOptions
 
 DATA = Path(__file__).parents[1] / "datasets"
 ERRORS = ("E_Y0C", "E_Z0T", "E_R0T", "E_A0C")

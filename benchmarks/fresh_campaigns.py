@@ -23,8 +23,7 @@ import numpy as np
 from discovery.evaluation.paper import TABLE_3
 from discovery.experiment import Experiment, load_experiment
 from discovery.experiment.fitted import predict
-from discovery.experiment.modelfits import starting_model
-from discovery.fitting import fit_model
+from discovery.experiment.modelfits import fit_of
 from discovery.recordings import load_campaign
 from discovery.virtual.machine import Machine
 from discovery.virtual.network import Law
@@ -71,8 +70,7 @@ def scores(experiment: Experiment, name: str) -> Scores:
     """Free runs on the held-out recordings of a model fitted to the others."""
     entry = experiment.form.models[name]
     experiment = experiment.seen_by(entry)
-    model, _ = starting_model(experiment, name, entry)
-    fit = fit_model(model, experiment.fitting, experiment.fit, experiment.outputs)
+    fit = fit_of(experiment, name, entry)[2]
     return {recording: predict(fit, experiment, recording).scores() for recording in HELD_OUT}
 
 

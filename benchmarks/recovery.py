@@ -19,7 +19,8 @@ import numpy as np
 from recovery_data import LIBRARY, TRUTH, make_campaign
 
 from discovery.recordings import Campaign
-from discovery.sparse import SparseOptions, discover
+from discovery.sparse.discover import discover
+from discovery.sparse.options import SparseOptions
 
 FIT = ("r0", "r1")
 Found = dict[str, float]

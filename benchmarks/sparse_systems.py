@@ -29,7 +29,7 @@ from discovery.fitting import predict_recording
 from discovery.frames import campaign_from_frames
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.sparse import discover
+from discovery.sparse.discover import discover
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.plain import fit_plain, settings
 from discovery.terms import names

@@ -16,13 +16,14 @@ from sklearn.utils.validation import check_is_fitted
 from discovery.dynamics import make_grid, predict
 from discovery.dynamics.system import inputs_of
 from discovery.errors import UserError
-from discovery.fitting import fit_model, predict_recording
+from discovery.fitting import predict_recording
 from discovery.frames import campaign_from_frames
 from discovery.models.dimensions import with_coefficient_units
 from discovery.models.equations import equations
 from discovery.recordings import Campaign
 from discovery.schema import suggest
-from discovery.sparse import discover as discover_in
+from discovery.sparse.discover import discover as discover_in
+from discovery.sparse.discover import fitting
 from discovery.sparse.options import SparseOptions
 
 if TYPE_CHECKING:
@@ -147,7 +148,7 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         campaign = self._campaign(x, z)
         recordings = list(campaign.recordings)
         found = discover_in(campaign, recordings, self.outputs_, self._options())
-        fit = fit_model(found.model, campaign, recordings, self.outputs_)
+        fit = fitting(found.report)(found.model, campaign, recordings, self.outputs_)
         self.discovery_ = found
         self.model_ = with_coefficient_units(fit.model, campaign.channels)
         self.noise_ = fit.noise.white

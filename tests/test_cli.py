@@ -32,6 +32,19 @@ def test_help_is_quick_and_imports_nothing_heavy() -> None:
     assert "check" in done.stdout
 
 
+def test_reading_an_experiment_does_not_load_pysindy() -> None:
+    code = (
+        "import sys\n"
+        "from discovery.experiment import load_experiment\n"
+        "load_experiment('experiments/nmv5000.toml')\n"
+        "from discovery.sparse.options import SparseOptions\n"
+        "SparseOptions(optimiser='pysindy:SR3')\n"
+        "print('pysindy' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
 def test_version() -> None:
     result = runner.invoke(app, ["--version"])
     assert result.exit_code == 0

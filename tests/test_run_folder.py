@@ -208,9 +208,9 @@ def test_a_baseline_file_is_hashed_like_any_other_input(folder: Path) -> None:
 
 def test_a_model_is_discovered_once_and_then_diagnosed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import discovery.diagnosis
-    import discovery.sparse
+    import discovery.sparse.discover
 
-    really, searches, diagnosed = discovery.sparse.discover, [], []
+    really, searches, diagnosed = discovery.sparse.discover.discover, [], []
 
     def counted(*given: Any) -> Any:
         searches.append(given)
@@ -222,7 +222,7 @@ def test_a_model_is_discovered_once_and_then_diagnosed(folder: Path, monkeypatch
         written = SimpleNamespace(model_dump=lambda **_: document)
         return SimpleNamespace(repaired=None, document=lambda: written)
 
-    monkeypatch.setattr(discovery.sparse, "discover", counted)
+    monkeypatch.setattr(discovery.sparse.discover, "discover", counted)
     monkeypatch.setattr(discovery.diagnosis, "diagnose", noted)
     text = EXPERIMENT[: EXPERIMENT.index("[models]")]
     text += '[models]\nfound = { kind = "sindy", bootstraps = 4 }\n[mismatch]\nmodel = "found"\n'

@@ -46,7 +46,7 @@ def test_what_computes_for_long_is_pinned_and_keeps_its_signature() -> None:
 
     from discovery.diagnosis import diagnose
     from discovery.fitting import fit_model
-    from discovery.sparse import discover
+    from discovery.sparse.discover import discover
 
     for work in (fit_model, diagnose, discover):
         assert "campaign" in signature(work).parameters

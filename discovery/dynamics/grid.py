@@ -64,6 +64,11 @@ class Grid:
             means=self.means.part(rows, columns) if self.means else None,
         )
 
+    def between(self, begin: int, end: int) -> Grid:
+        """The grid from one node to another, both of them in it, without readings."""
+        time = self.time[begin : end + 1]
+        return replace(self, time=time, read=self.read[:0], readings=self.readings[:0], means=None)
+
     @cached_property
     def step(self) -> Array:
         """Interval lengths (T - 1,) in s."""

@@ -40,6 +40,11 @@ class System:
             self.programs[wrt] = compiled(tuple(t.expression for t in self.model.terms), wrt)
         return self.programs[wrt].run(values, memory)
 
+    def between(self, begin: int, end: int) -> System:
+        """The system from one node to another, without readings; what remembers inputs begins there."""
+        grid = self.grid.between(begin, end)
+        return replace(self, grid=grid, ends=Memory(grid, True), nodes=Memory(grid, False))
+
 
 def make_system(model: Model, grid: Grid) -> System:
     """Bind a model to a grid."""

@@ -23,6 +23,9 @@ _ROUNDS = 30  # of Newton on the trajectory
 _TOLERANCE = 1e-8  # largest change of a state in its unit, relative to 1 + its size
 _CLOSE = 1e-6  # change from which one step of Newton ends it
 _HELPS = 0.3  # factor by which steps with an old linearisation have to become shorter
+_LEAST = 8  # intervals of a trajectory that is not divided
+_FIRST = 3  # steps of Newton that may become longer
+_SHRINKS = 0.5  # factor by which later ones have to become shorter, else half of them is taken
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,9 @@ def simulate(
     """Free run of a model on a recording.
 
     Nonlinear terms are solved by Newton's method on the whole trajectory. Most of its time goes into the
-    exponentials of a new linearisation, so the last one is used again as long as its steps help.
+    exponentials of a new linearisation, so the last one is used again as long as its steps help. At the kink
+    of a threshold full steps may go to and fro over it for ever; half a step ends between. Where steps on the
+    whole trajectory lead away, as they do where something swings many times, its halves come first.
 
     Args:
         values: parameter values by name.
@@ -70,38 +75,59 @@ def simulate(
     first = start_values(system, values) if start is None else start
     last = None if system.affine else near
     x = last.x if last else np.tile(first, (len(system.grid.time), 1))
-    before = 1.0
-    for _ in range(1 if system.affine else _ROUNDS):
+    before, divided = 1.0, False
+    for count in range(1 if system.affine else _ROUNDS):
         with np.errstate(all="ignore"):
             x = _nearer(system, values, first, last, x) if last else x
             a, g0, g1 = _linearise(system, values, x)
         which, e, w0, w1 = kernel.transitions(a, system.grid.step)
         new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
         if not np.all(np.abs(new) < _FAR):
-            raise RunsAwayError(
-                f"model '{system.model.name}' diverges on recording '{system.grid.recording}'; "
-                "check signs, bounds and start values of its parameters"
-            )
+            last_round = system.affine or count + 1 == _ROUNDS
+            if last_round or divided or len(system.grid.step) < _LEAST:
+                raise RunsAwayError(
+                    f"model '{system.model.name}' diverges on recording '{system.grid.recording}'; "
+                    "check signs, bounds and start values of its parameters"
+                )
+            x, last, before, divided = _by_halves(system, values, first), None, 1.0, True
+            continue
         change = _change(x, new)
-        x, last = new, Trajectory(system, dict(values), new, a, which, e, w0, w1)
+        last = Trajectory(system, dict(values), new, a, which, e, w0, w1)
         # the next step shrinks at least as much as this one did, and the first one to less than its square
         if change * min(1.0, change / before) < _TOLERANCE:
             break
-        before = change
+        halved = count >= _FIRST and change > _SHRINKS * before
+        x, before = (0.5 * (x + new) if halved else new), change
     assert last is not None
     return last
 
 
+def _by_halves(system: System, values: Mapping[str, float], first: Array) -> Array:
+    """A trajectory (T, n) to begin from: that of the first half, and that of the second one from its end."""
+    nodes, x = len(system.grid.time), first
+    pieces = []
+    for begin, end in ((0, nodes // 2), (nodes // 2, nodes - 1)):
+        part = simulate(system.between(begin, end), values, x).x
+        pieces.append(part[: end - begin])
+        x = part[-1]
+    return np.concatenate([*pieces, x[None]])
+
+
 def _nearer(system: System, values: Mapping[str, float], first: Array, last: Trajectory, x: Array) -> Array:
-    """A trajectory (T, n) nearer to the solution, by steps with the last linearisation."""
-    before = np.inf
+    """A trajectory (T, n) nearer to the solution, by steps with the last linearisation.
+
+    The length of the step from a trajectory says how far it is from the solution. A step to where the next
+    one would be longer led away and is undone: behind the kink of a threshold the old linearisation does
+    not hold, and Newton's method may not come back from there.
+    """
+    before, earlier = np.inf, x
     for _ in range(_ROUNDS):
         g0, g1 = _left_over(_state_rates(system, _term_rates(system, values, x)), last.a, x)
         new = kernel.trajectory(last.which, last.e, last.w0, last.w1, g0, g1, first)
         change = _change(x, new)
         if not change < _HELPS * before:  # also NaN
-            return x
-        x, before = new, change
+            return x if change < before else earlier
+        before, earlier, x = change, x, new
         if change < _CLOSE:
             return x
     return x

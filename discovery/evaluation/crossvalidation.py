@@ -22,6 +22,7 @@ Window = tuple[float, float]  # s, from and up to
 Refit = Callable[[Campaign, Sequence[str]], Fit]
 
 ROUNDS = 6  # of Levenberg-Marquardt: the start is the fit to everything
+LEAD = 0.2  # of the first block, which stays: only there readings show where hidden states begin
 MOST_FOLDS = 4  # recordings are left out in groups when there are more
 
 
@@ -44,7 +45,8 @@ def folds(campaign: Campaign, recordings: Sequence[str], blocks: int = 3) -> lis
         windows = {}
         for name in recordings:
             span = float(campaign.recordings[name].time[-1])
-            windows[name] = (k * span / blocks, (k + 1) * span / blocks if k + 1 < blocks else np.inf)
+            begin, end = max(float(k), LEAD) * span / blocks, (k + 1) * span / blocks
+            windows[name] = (begin, end if k + 1 < blocks else np.inf)
         out.append(Fold(f"block {k + 1} of {blocks}", windows=windows))
     return out
 

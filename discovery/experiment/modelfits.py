@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from discovery.errors import UserError
+from discovery.evaluation.crossvalidation import ROUNDS, Refit
 from discovery.experiment.experiment import Experiment, only
 from discovery.experiment.fitted import Fitted, judged
 from discovery.experiment.form import (
@@ -46,10 +47,27 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
     else:
         model, report, fit = fit_of(experiment, name, entry, progress)
         seconds = clock.perf_counter() - began
-        fitted = judged(experiment, name, entry.kind, model, fit, report, seconds, progress)
+        refit = _refit(fit, report) if isinstance(entry, SparseOptions) else None
+        fitted = judged(experiment, name, entry.kind, model, fit, report, seconds, progress, refit)
     also = [recording for recording in experiment.fit if recording not in common]
     told = [f"also fitted to {', '.join(also)}"] if also else []
     return replace(fitted, notes=(*told, *fitted.notes), seconds=clock.perf_counter() - began)
+
+
+def _fitting(report: Mapping[str, Any]) -> Callable[..., Fit]:
+    from discovery.sparse.discover import fitting
+
+    return fitting(report)
+
+
+def _refit(fit: Fit, report: Mapping[str, Any]) -> Refit:
+    """How a discovered model is fitted to what a fold leaves."""
+
+    def refit(campaign: Campaign, recordings: Sequence[str]) -> Fit:
+        outputs = fit.problem.outputs
+        return _fitting(report)(fit.model, campaign, recordings, outputs, noise=fit.noise, max_rounds=ROUNDS)
+
+    return refit
 
 
 def fit_of(
@@ -79,6 +97,8 @@ def fit_of(
             f"{experiment.path}: model '{name}' gives none of the outputs {', '.join(outputs)}; "
             "write them under [outputs] of the model"
         )
+    if isinstance(entry, SparseOptions):
+        return model, report, _fitting(report)(model, campaign, recordings, given, max_rounds=max_rounds)
     loss: Loss = getattr(entry, "loss", "linear")
     return model, report, fit_model(model, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
 
@@ -144,7 +164,7 @@ def discovered(
     experiment: Experiment, options: SparseOptions, progress: Progress = silent
 ) -> tuple[Model, dict[str, Any]]:
     """What the sparse search finds on the fit recordings."""
-    from discovery.sparse import discover
+    from discovery.sparse.discover import discover
 
     folder = experiment.path.parent
     found = discover(experiment.fitting, experiment.fit, experiment.outputs, options, progress, folder)

@@ -266,7 +266,7 @@ def _parameter(
 ) -> Unknown:
     is_log = bool(prior and prior.is_log)
     low = max(p.min, 1e-12) if is_log else p.min
-    known = (prior.mean, prior.sd) if prior else None
+    known = (prior.mean, prior.sd) if prior else p.prior
     return Unknown(name, recording, False, p.at(recording or ""), low, p.max, known, is_log, belief)
 
 

@@ -20,6 +20,7 @@ class Parameter:
 
     `value` is the start value before a fit and the estimate after it, `low` and `high` its 95 % interval.
     With `per_recording` every recording has its own, kept in `values`, with its interval in `intervals`.
+    `prior` is what is known of it before a fit: mean and standard deviation.
     """
 
     value: float
@@ -32,6 +33,7 @@ class Parameter:
     high: float | None = None
     values: Mapping[str, float] = field(default_factory=dict)
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    prior: tuple[float, float] | None = None
 
     def at(self, recording: str) -> float:
         """Value in a recording; the common value where the recording has none of its own."""
@@ -91,6 +93,20 @@ class Model:
         """Names that the formulas of start values use."""
         starts = (state.start for state in self.states.values() if state.start is not None)
         return frozenset().union(*(names(start) for start in starts))
+
+    def with_starts_held(self) -> Model:
+        """The model with the parameters that only its start values use held where they are.
+
+        They belong to the first readings of a recording. A fit to the rest of it would bend them to whatever
+        else the model lacks there.
+        """
+        used = frozenset().union(*(names(expression) for expression in self.expressions()))
+        starting = self.start_names - used
+        parameters = {
+            name: replace(parameter, fixed=parameter.fixed or name in starting)
+            for name, parameter in self.parameters.items()
+        }
+        return replace(self, parameters=parameters)
 
     def expressions(self) -> list[Expression]:
         """Right-hand sides and outputs."""

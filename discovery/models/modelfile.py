@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from itertools import count
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -29,6 +29,9 @@ class ParameterForm(Strict):
     fixed: bool = Field(False, description="true: given, not fitted")
     per: Literal["recording"] | None = Field(
         None, description='"recording": a value of its own in each recording'
+    )
+    prior: Annotated[tuple[float, Annotated[float, Field(gt=0)]], Field(strict=False)] | None = Field(
+        None, description="mean and standard deviation known before a fit; default nothing but the limits"
     )
     low: float | dict[str, float] | None = Field(
         None, description="lower end of the 95 % interval, by recording where values are (written by a fit)"
@@ -156,6 +159,7 @@ def _parameter(entry: ParameterForm, place: str) -> Parameter:
         None if isinstance(entry.high, dict) else entry.high,
         entry.values,
         _intervals(entry),
+        entry.prior,
     )
 
 
@@ -224,6 +228,7 @@ def _parameter_entry(p: Parameter) -> dict[str, Any]:
 
     entry = _finite({"start": number(p.value), "unit": p.unit, "min": number(p.min), "max": number(p.max)})
     entry |= {"fixed": True} if p.fixed else {}
+    entry |= {"prior": [number(one) for one in p.prior]} if p.prior else {}
     entry |= {"per": "recording"} if p.per_recording else {}
     entry |= _finite({"low": p.low and number(p.low), "high": p.high and number(p.high)})
     entry |= {"values": {key: number(value) for key, value in p.values.items()}} if p.values else {}

@@ -121,8 +121,8 @@ def _clear(
     """The model of the chosen features, fitted by output error, without those whose interval holds zero;
     and these.
     """
-    found = zip(features, choice.terms.theta, choice.terms.pole, strict=True)
-    responses = [Response(f, float(gain), int(pole), f) for f, gain, pole in found]
+    found = zip(features, choice.terms.theta, choice.terms.pole, choice.spreads, strict=True)
+    responses = [Response(f, float(gain), int(pole), f, spread) for f, gain, pole, spread in found]
     if not options.refine:
         return mass_model(rules, responses), list(features)
 

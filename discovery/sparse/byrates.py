@@ -188,13 +188,7 @@ class Judge:
             whole = self.refit(terms, self.data.grids, self.noise, 25).model
         except RunsAwayError:
             return np.full(self.data.blocks.count, RAN_AWAY)
-
-        def fit_of(weights: Array, train: Mapping[str, Grid]) -> Fit:  # noqa: ARG001
-            recordings = [r for r in self.data.recordings if r in train]
-            outputs, campaign = self.data.outputs, self.data.campaign
-            return refit(whole, campaign, recordings, outputs, {}, train, self.noise, _ROUNDS)
-
-        return left_out(self.data, fit_of, self.whole)
+        return left_out(self.data, whole, self.noise, _ROUNDS, self.whole)
 
     def costs(self, problem: Problem, terms: Terms) -> tuple[float, ...]:
         """Share by which what the linearised fit leaves on left-out blocks grows without each term."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -33,6 +33,7 @@ class Choice:
     fit: tuple[float, ...] = ()  # rms of the fit to everything, of each
     row: int = 0  # the chosen one
     start_sd: float = 0.0  # spread of start values
+    spreads: tuple[float, ...] = ()  # of the coefficients in their prior
     costs: tuple[float, ...] = ()  # of each term: share by which the left-out rms grows without it
     stability: tuple[float, ...] = ()  # of each term: share of block bootstraps whose set has its family
 
@@ -58,6 +59,7 @@ def chosen(problem: Problem) -> Choice:
         if not ended:
             break
         problem = replace(problem, families=problem.families.limited(ended))
+    problem, terms = _believed(problem, terms)
     found = evidence(problem, terms)
     fit = [max(search.g.square - one.gain, 0.0) / search.g.count for one in path[: len(errors)]]
     return replace(
@@ -73,8 +75,39 @@ def evidence(problem: Problem, terms: Terms) -> Choice:
     """A set as a choice: what each term costs, and how stable it is."""
     left, costs = _costs(problem, terms)
     return Choice(
-        terms, (terms,), (left,), (float("nan"),), 0, problem.start_sd, costs, stability(problem, terms)
+        terms,
+        (terms,),
+        (left,),
+        (float("nan"),),
+        0,
+        problem.start_sd,
+        tuple(problem.spreads(terms).tolist()),
+        costs,
+        stability(problem, terms),
     )
+
+
+def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
+    """The problem with the prior of the parts against what a set leaves of readings that it has not seen, and
+    the set under it.
+
+    Every model lacks something. Its gains bend to that as well, so what it leaves of the readings that it was
+    fitted to says too little of how far it is off, and of how long it stays off.
+    """
+    if not problem.parts:
+        return problem, terms
+    left = [np.full(len(readings), np.nan) for readings in problem.readings]
+    for fold, search in problem.folds():
+        one = search.refined(terms.family, terms.place, terms.pole)
+        for i, run in _unseen(problem, one, fold):
+            here = np.isin(problem.blocks.of[i], fold)
+            left[i][here] = (problem.readings[i] - run)[here]
+    search = problem.search()
+    moved = (search.g.square - search.of(problem.always).gain) / search.g.count
+    off = float(np.nanmean(np.concatenate(left) ** 2))
+    independent = search.g.count / readings_as_one([r[:, None] for r in left])
+    firm = replace(problem, parts=off / moved / independent * len(terms))
+    return firm, firm.search().refined(terms.family, terms.place, terms.pole)
 
 
 def _with_spread(problem: Problem) -> Problem:
@@ -172,14 +205,20 @@ def _better(search: Search, path: Sequence[Terms], whole: Sequence[Terms]) -> li
 def _missed(problem: Problem, terms: Terms, fold: Ints, errors: Array) -> None:
     """Fill in the mean squared error (B,) of the free run on the blocks of a fold."""
     blocks = problem.blocks
-    gone = list(dict.fromkeys(blocks.recording[fold].tolist()))
-    begin = _begin(problem, terms, [i for i in range(len(problem.readings)) if i not in gone])
-    for i in gone:
-        left = problem.readings[i] - free_run(problem, terms, i, begin)
+    for i, run in _unseen(problem, terms, fold):
+        left = problem.readings[i] - run
         for b in fold[blocks.recording[fold] == i]:
             mine = left[(blocks.of[i] == b) & np.isfinite(left)]
             if len(mine):
                 errors[b] = max(float(np.mean(mine**2)), 1e-12)
+
+
+def _unseen(problem: Problem, terms: Terms, fold: Ints) -> Iterator[tuple[int, Array]]:
+    """Each trajectory of which a fold leaves something out, and its free run."""
+    gone = list(dict.fromkeys(problem.blocks.recording[fold].tolist()))
+    begin = _begin(problem, terms, [i for i in range(len(problem.readings)) if i not in gone])
+    for i in gone:
+        yield i, free_run(problem, terms, i, begin)
 
 
 def free_run(problem: Problem, terms: Terms, i: int, begin: tuple[Array, Array] | None = None) -> Array:

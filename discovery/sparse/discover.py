@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from discovery.dynamics import make_grid
 from discovery.errors import UserError
-from discovery.fitting import fit_model
+from discovery.fitting import Fit, fit_model
 from discovery.models.check import check_model
 from discovery.models.modelfile import read_model
 from discovery.progress import Progress, silent
@@ -25,7 +26,7 @@ from discovery.sparse.drives import Inputs, make_drives, make_inputs
 from discovery.sparse.families import candidates
 from discovery.sparse.folds import CLAIM, PREDICT, choose
 from discovery.sparse.growth import Growth, grown
-from discovery.sparse.masses import starts_of
+from discovery.sparse.masses import fit_masses
 from discovery.sparse.options import HIDDEN, SparseOptions
 from discovery.sparse.ratedata import make_rate_data
 from discovery.sparse.rates import with_candidates
@@ -93,7 +94,16 @@ def _begun(
     """Masses with their starts in a further recording: those of all outputs are warm together."""
     if not options.refine:
         return found
-    return replace(found, model=starts_of(fit_model(found.model, campaign, recordings, outputs)))
+    return replace(found, model=fit_masses(found.model, campaign, recordings, outputs).model)
+
+
+def fitting(report: Mapping[str, Any]) -> Callable[..., Fit]:
+    """How a discovered model is fitted, by the report of its discovery: `fit_model`, or `fit_masses` for one
+    of masses alone.
+    """
+    groups = report.get("groups", ())
+    masses = bool(groups) and all(group["form"] == "masses" for group in groups)
+    return fit_masses if masses else fit_model
 
 
 def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:

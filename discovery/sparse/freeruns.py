@@ -2,41 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid, predict
+from discovery.dynamics import predict
 from discovery.errors import RunsAwayError
-from discovery.fitting import Fit, predict_recording
+from discovery.fitting import Noise, predict_recording
+from discovery.models import Model
 from discovery.sparse.folds import make_folds
 from discovery.sparse.ratedata import RateData, has_reading
-from discovery.sparse.rates import masked
+from discovery.sparse.rates import masked, refit
 
 Array = NDArray[np.float64]
-FitOf = Callable[[Array, Mapping[str, Grid]], Fit]  # weights of the blocks (B,), grids of what may be seen
 
 RAN_AWAY = 1e12  # instead of the squared error of a model that runs away
 
 
-def left_out(data: RateData, fit_of: FitOf, whole: bool = True) -> Array:
+def left_out(data: RateData, model: Model, noise: Noise, rounds: int, whole: bool = True) -> Array:
     """Mean squared error (B,) of the free run on each block, over outputs, by fits that have not seen its
     fold.
 
+    They begin at the numbers of the model. Where parts of recordings are left out, so may the first readings
+    be, which alone show where hidden states begin: these starts stay.
+
     Args:
-        fit_of: makes a fit without a fold.
+        rounds: of each fit.
         whole: leave whole recordings out, where there are several.
     """
-    blocks, noise = data.blocks, np.array(data.size)
+    blocks, size = data.blocks, np.array(data.size)
     errors = np.full(blocks.count, np.nan)
     for fold in make_folds(blocks, whole):
         keep = {r: ~np.isin(block, fold) for r, block in zip(data.recordings, blocks.of, strict=True)}
         train = {r: masked(data.grids[r], keep[r]) for r in data.recordings if keep[r].any()}
-        weights = np.ones(blocks.count)
-        weights[fold] = 0.0
+        in_parts = any(some.any() and not some.all() for some in keep.values())
+        start = model.with_starts_held() if in_parts else model
         try:
-            fit = fit_of(weights, train)
+            fit = refit(start, data.campaign, list(train), data.outputs, {}, train, noise, rounds)
             trajectories = {t.system.grid.recording: t for t in fit.trajectories}
             for i, r in enumerate(data.recordings):
                 mine = [b for b in fold if blocks.recording[b] == i]
@@ -45,7 +46,7 @@ def left_out(data: RateData, fit_of: FitOf, whole: bool = True) -> Array:
                 trajectory = trajectories.get(r) or predict_recording(
                     fit.model, data.campaign, r, data.outputs, fit.noise.white, data.grids[r]
                 )
-                left = (data.grids[r].readings - predict(trajectory)) / noise
+                left = (data.grids[r].readings - predict(trajectory)) / size
                 for b in mine:
                     here = left[blocks.of[i] == b] ** 2
                     errors[b] = np.nanmean(here) if np.isfinite(here).any() else np.nan

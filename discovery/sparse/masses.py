@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
-from discovery.fitting import Fit
+from discovery.fitting import Fit, Noise, fit_model
 from discovery.models import Model, Parameter, State
 from discovery.models.dimensions import unit_of
+from discovery.recordings import Campaign
 from discovery.sparse.library import Feature
-from discovery.terms import Number, Term, evaluate, parse, text
+from discovery.terms import Apply, Expression, Number, Term, evaluate, parse, text
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,7 @@ class Response:
     gain: float
     pole: int
     chosen: Feature  # as the search chose it; the fit moves its time constant
+    spread: float = np.inf  # of the gain in its prior
 
     @property
     def lagged(self) -> bool:
@@ -88,7 +90,8 @@ def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
                 begun = driven if start in (None, Number(0.0)) else f"{text(start)} + {driven}"
                 states[state] = replace(states[state], start=parse(begun))
             terms.append(Term(f"{drive} through {state}", state, parse(f"{driven}/{tau}")))
-        parameters[gain] = Parameter(r.gain, per, low, high)
+        prior = (0.0, r.spread) if np.isfinite(r.spread) else None
+        parameters[gain] = Parameter(r.gain, per, low, high, prior=prior)
     if rules.zeroed and responses:
         states[f"{y}_zero"] = State(f"{y}_zero", unit, None, Number(0.0), rules.start_sd, 1.0)
     output = parse(" + ".join([*states, *direct]) or "0")
@@ -137,6 +140,24 @@ def within(rules: Rules, responses: Sequence[Response]) -> list[Response]:
     return found
 
 
+def fit_masses(
+    model: Model,
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    noise: Noise | None = None,
+    max_rounds: int = 60,
+) -> Fit:
+    """The fit of a model of masses alone, whose model says where they start in a further recording.
+
+    These starts belong to the numbers of that fit: a slow mass may start warmer, and the offset make up for
+    it, without a change in the recordings that were fitted.
+    """
+    fit = fit_model(model, campaign, recordings, outputs, noise=noise, max_rounds=max_rounds)
+    begun = replace(fit.problem.model, states=starts_of(fit).states)
+    return replace(fit, problem=replace(fit.problem, model=begun))
+
+
 def starts_of(fit: Fit) -> Model:
     """The fitted model with the starts of its masses in a further recording: means, spreads, and how the
     start of each follows those of the masses above it.
@@ -158,11 +179,21 @@ def starts_of(fit: Fit) -> Model:
         declared = states[name].start or Number(0.0)
         states[name] = replace(
             states[name],
-            start=parse(f"{text(declared)} + {mean[i]:.6g}"),
+            start=_later(declared, float(mean[i])),
             start_sd=float(np.sqrt(rest)),
             start_with=dict(zip(order[:i], follows.tolist(), strict=True)),
         )
     return replace(fit.model, states=states)
+
+
+def _later(declared: Expression, by: float) -> Expression:
+    """A start moved by a number."""
+    match declared:
+        case Number(value):
+            return Number(float(f"{value + by:.6g}"))
+        case Apply("+", (rest, Number(value))):
+            return Apply("+", (rest, Number(float(f"{value + by:.6g}"))))
+    return Apply("+", (declared, Number(float(f"{by:.6g}"))))
 
 
 def _population(fit: Fit) -> tuple[Array, Array]:

@@ -100,6 +100,7 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
             left_out=tuple(noise * rms for rms in found.left_out),
             fit=tuple(noise * rms for rms in found.fit),
             start_sd=found.start_sd * noise,
+            spreads=tuple(noise * one for one in found.spreads),
         )
 
     def _problem(self, x: Array, target: Array, k: int) -> tuple[Problem, float]:

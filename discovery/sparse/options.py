@@ -96,10 +96,13 @@ class SparseOptions(Strict):
     @field_validator("optimiser")
     @classmethod
     def _optimiser_of_pysindy(cls, one: Any) -> Any:
-        from pysindy.optimizers.base import BaseOptimizer
+        if isinstance(one, str):
+            good = re.fullmatch(OPTIMISER, one) is not None
+        else:
+            from pysindy.optimizers.base import BaseOptimizer  # takes seconds, and a file has only names
 
-        named = isinstance(one, str) and re.fullmatch(OPTIMISER, one)
-        if not (named or isinstance(one, BaseOptimizer)):
+            good = isinstance(one, BaseOptimizer)
+        if not good:
             raise ValueError(
                 f"{one!r} is not an optimiser of PySINDy; give 'search' or a name, as in 'pysindy:SR3'. An "
                 "object works from Python, if its class is derived from pysindy.optimizers.BaseOptimizer "

@@ -4,7 +4,7 @@ searched.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from discovery.sparse.folds import Blocks, Ints, make_folds
 from discovery.sparse.gram import Gram, gram, project_out, total
 from discovery.sparse.pursuit import POINTS
-from discovery.sparse.search import Families, Search, Terms
+from discovery.sparse.search import Families, Search, Terms, on_grid
 
 Array = NDArray[np.float64]
 
@@ -79,14 +79,34 @@ class Problem:
         """
         if not self.parts:
             return g
+        matrix = g.matrix.copy()
+        for mine, moved in self._moved(g):
+            matrix[mine, mine] += self.parts * moved
+        return replace(g, matrix=matrix)
+
+    def _moved(self, g: Gram) -> Iterator[tuple[slice, Array]]:
+        """Columns of each family, and their normal equations without what is always in the set."""
         fixed = self.families.start[self.always]
         inverse = np.linalg.pinv(g.matrix[np.ix_(fixed, fixed)])
-        matrix = g.matrix.copy()
         for first, count in zip(self.families.start, self.families.count, strict=True):
             mine = slice(first, first + count)
             across = g.matrix[mine, fixed]
-            matrix[mine, mine] += self.parts * (g.matrix[mine, mine] - across @ inverse @ across.T)
-        return replace(g, matrix=matrix)
+            yield mine, g.matrix[mine, mine] - across @ inverse @ across.T
+
+    def spreads(self, terms: Terms) -> Array:
+        """Standard deviation (k,) of the coefficient of each term in the prior of the parts."""
+        moved = [some for _, some in self._moved(self.pooled())]
+        found = np.full(len(terms), np.inf)
+        for k, f in enumerate(terms.family):
+            if f in self.always or not self.parts:
+                continue
+            alone = replace(
+                terms, family=terms.family[k : k + 1], place=terms.place[k : k + 1], theta=np.ones(1)
+            )
+            first = self.families.start[f]
+            column = on_grid(alone, self.families)[first : first + self.families.count[f]]
+            found[k] = (self.parts * max(column @ moved[f] @ column, 1e-300)) ** -0.5
+        return found
 
     def folds(self) -> list[tuple[Ints, Search]]:
         """What is left out in each fold, and the search on the rest."""

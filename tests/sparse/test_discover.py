@@ -14,8 +14,10 @@ from discovery.fitting import predict_recording
 from discovery.models import Model, Parameter, State
 from discovery.models.modelfile import read_model, write_model
 from discovery.recordings import Campaign, Channel, Recording
-from discovery.sparse import Discovery, SparseOptions, discover
+from discovery.sparse.discover import discover
+from discovery.sparse.discovery import Discovery
 from discovery.sparse.growth import Growth, _exchanged
+from discovery.sparse.options import SparseOptions
 from discovery.sparse.ratedata import make_rate_data, rough_noise
 from discovery.sparse.rates import Candidate, with_candidates
 from discovery.terms import Number, Term, parse

@@ -16,9 +16,10 @@ from discovery.experiment.form import ExperimentForm
 from discovery.experiment.modelfits import starting_model
 from discovery.files import read_toml
 from discovery.recordings import Campaign, Channel, Recording
-from discovery.sparse import SparseOptions, discover
+from discovery.sparse.discover import discover
 from discovery.sparse.library import FilteredInputs
 from discovery.sparse.optimiser import SparseSearch
+from discovery.sparse.options import SparseOptions
 from discovery.sparse.plain import fit_plain, settings
 
 Array = NDArray[np.float64]

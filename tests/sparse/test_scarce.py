@@ -10,9 +10,11 @@ from discovery.dynamics import predict
 from discovery.fitting import fit_model, predict_recording
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
-from discovery.sparse import Discovery, SparseOptions, discover
 from discovery.sparse.byrates import plainer
+from discovery.sparse.discover import discover
+from discovery.sparse.discovery import Discovery
 from discovery.sparse.gram import gram
+from discovery.sparse.options import SparseOptions
 from discovery.sparse.rates import without_idle
 from discovery.sparse.search import Search, plain
 from discovery.sparse.temperatures import second_masses
