@@ -81,7 +81,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
     best = max(rest, key=lambda m: m.evidence)
     short = best.evidence - _alone(context, found, answer, named)
-    if short > _by_chance(found):
+    if short > max(thresholds.SHORT, thresholds.REST * (best.evidence - found.baseline.evidence)):
         if best.forced:
             reasons.append(f"heat of unknown cause at {best.forced} explains more than what can be named")
         reasons.append(f"what can be named explains too little (log evidence {short:.0f} below the best)")

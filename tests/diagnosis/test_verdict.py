@@ -15,7 +15,7 @@ from discovery.diagnosis.posterior import Posterior
 from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
-from discovery.diagnosis.thresholds import CHANCE, SHORT
+from discovery.diagnosis.thresholds import REST, SHORT
 from discovery.diagnosis.verdict import Verdict, decide, idle, refuted
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis, Key
@@ -185,8 +185,8 @@ def test_a_fault_is_told_from_physics() -> None:
 @pytest.mark.parametrize(
     ("gain", "unknown", "word"),
     [
-        (200.0, 199.9 + CHANCE * 20.0, "missing physics"),  # what chance does, sqrt(2 G) of 20
-        (200.0, 200.1 + CHANCE * 20.0, "unexplained"),
+        (200.0, 199.9 / (1 - REST), "missing physics"),  # a share of all log evidence
+        (200.0, 200.1 / (1 - REST), "unexplained"),
         (12.0, 11.9 + SHORT, "missing physics"),  # or so much
         (12.0, 12.1 + SHORT, "unexplained"),
     ],
