@@ -25,7 +25,7 @@ RESOLUTION = {  # finer gives the same answer in more time
     "evidence/form_error.py": "LAWS EDGES",
     "evidence/latent_force.py": "BLOCKS SIZES MEMORY_BLOCKS",
     "evidence/process_noise.py": "_TRIED _BLOCKS JITTER",
-    "evidence/whitening.py": "_AT_BOUND _UNSEEN",
+    "evidence/whitening.py": "_AT_BOUND _UNSEEN _REMEMBERED",
     "diagnosis/context.py": "MOST_READINGS NODES",
     "diagnosis/diagnose.py": "ANOTHER_NOISE",
     "diagnosis/posterior.py": "FAR MOST IN_PLAY SETTINGS",

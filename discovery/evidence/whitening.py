@@ -28,6 +28,7 @@ Ints = NDArray[np.intp]
 
 _AT_BOUND = 1e-6
 _UNSEEN = 1e-20  # of the largest entry of the normal equations
+_REMEMBERED = 8  # normal equations of the last noises; they differ in form errors next, and are large
 
 
 @dataclass(frozen=True)
@@ -222,6 +223,7 @@ class Whitened:
         if same is None:
             same = self._blocks(unit)
             known.append((unit, same))
+            del known[:-_REMEMBERED]
         prior, constant = self.prior
         return Grams(noise, *same, prior, constant, self._scale(noise))
 
