@@ -29,6 +29,7 @@ _NODES, _WEIGHTS = hermegauss(11)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 _FINE = np.linspace(-3.5, 3.5, 43)  # standard deviations of the logarithm, for flat likelihoods
 _NARROW = 4.0  # standard deviations from zero beyond which the posterior is taken as Gaussian
+_ROUNDING = 1e-9  # of the square of a signature: what is left of less is lost in the last digits
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,8 @@ def project(seen: Whitened, setting: Setting, columns: Sequence[Array]) -> Proje
 def _projected(z: Array, gone: Absorbed) -> Projected:
     inside = gone.basis.T @ z
     length = np.einsum("na,na->a", z, z)
-    gram = np.maximum(length - np.einsum("ua,ua->a", inside, inside), 0.0)
+    left = length - np.einsum("ua,ua->a", inside, inside)
+    gram = np.maximum(left, _ROUNDING * length)  # of what a refit absorbs whole, rounding is left
     return Projected(z, gone.basis, z.T @ gone.residual - inside.T @ gone.slope, gram, np.sqrt(length))
 
 
@@ -239,7 +241,7 @@ def _jointly(part: Projected, slab: Slab, mine: NDArray[np.intp]) -> float:
     """Log Bayes factor of an effect with several amplitudes. One that the first order gives the wrong sign
     does not count: a refit says what it is once the others act.
     """
-    matrix = part.block(mine) + 1e-9 * np.diag(part.length[mine] ** 2 + 1e-30)
+    matrix = part.block(mine) + _ROUNDING * np.diag(part.length[mine] ** 2 + 1e-30)
     inverse = np.linalg.inv(matrix)
     at = inverse @ part.dot[mine]
     wrong = (at * slab.sign[mine] < 0) & (np.abs(at) > np.sqrt(np.diag(inverse)))
@@ -254,7 +256,7 @@ def _jointly(part: Projected, slab: Slab, mine: NDArray[np.intp]) -> float:
 
 
 def _score(h: Hypothesis, gain: float, part: Projected, mine: NDArray[np.intp], noise: int) -> Score:
-    matrix = part.block(mine) + 1e-9 * np.diag(part.length[mine] ** 2 + 1e-30)
+    matrix = part.block(mine) + _ROUNDING * np.diag(part.length[mine] ** 2 + 1e-30)
     size = np.linalg.solve(matrix, part.dot[mine])
     t = float(np.sqrt(max(float(part.dot[mine] @ size), 0.0)))
     t = float(np.copysign(t, size[0])) if len(mine) == 1 else t

@@ -14,10 +14,10 @@ from scipy.stats import lognorm, norm
 from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
-from discovery.evidence.bayes import Projected, Slab, _ranked, scan
+from discovery.evidence.bayes import Projected, Slab, _projected, _ranked, scan
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.signatures import signatures
-from discovery.evidence.whitening import Whitened
+from discovery.evidence.whitening import Whitened, absorbed
 from discovery.fitting import Noise, fit_model
 from tests import machine
 
@@ -121,6 +121,15 @@ def test_an_effect_that_is_on_or_off_has_nothing_to_integrate() -> None:
 
 def test_what_shows_nothing_gains_nothing() -> None:
     assert gain_of("sensor_offset", projected(0, scale=0.0), 1, slab()) == -np.inf
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_what_a_refit_absorbs_whole_gains_nothing(scale: float) -> None:
+    """Only rounding is left of it, with which any size would look certain."""
+    z = scale * Z[:, :1]
+    part = _projected(z, absorbed(np.column_stack([RESIDUAL, Z[:, :1]]), np.zeros((2, 2))))
+    assert part.gram[0] / part.length[0] ** 2 < 1e-8
+    assert gain_of("sensor_offset", part, 1, slab(scale**-1)) < 1.0
 
 
 def test_noise_settings_and_shapes_are_summed_over() -> None:
