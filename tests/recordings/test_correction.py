@@ -146,7 +146,10 @@ def test_a_correction_that_belongs_to_nothing(write: Write, text: str, said: str
             ["", "", "", *["2"] * 57],
             "line 2: 'E_Y0C' is read before its correction 'corr' is known (and 1 more",
         ),
-        (["2"] * 10 + [""] * 40 + ["2"] * 10, "line 12: 'E_Y0C' is read where its correction 'corr' is not"),
+        (
+            ["2"] * 10 + [""] * 40 + ["2"] * 10,
+            "line 12: 'E_Y0C' has readings long after the last value of its correction 'corr'",
+        ),
         (["0.002"] * 60, "line 2: the applied correction 'corr' is never more than 0.002; no controller"),
         (["9000"] * 60, "line 2: 'corr' is 9000 um, unusual for a channel of role applied correction"),
         ([""] * 60, "fit.csv: the applied correction 'corr' has no value at all; record it, or say set"),
