@@ -36,6 +36,7 @@ _GAIN, _TWO_GAIN = 1.3, 1.7  # among several recordings; of two that stand again
 _FAR, _BACK, _WHOLE = 3.0, 1.15, 0.75
 _AGREES = 3.0  # times the usual misfit, at most, after a repair
 _TWO_AGREES = 0.4  # of the movement itself
+_BEGINS = 5.0  # K: by so much more a temperature begins elsewhere than in any other recording
 _FREE_AGREES = 0.3  # of the movement: a drift or an offset of any size fits a little of a poor prediction
 # how much larger the gain of a less usual damage must be to go before a usual one
 _DOUBT = {
@@ -104,6 +105,8 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
         touched = [y for y in misfit if y in repair.channels] or list(misfit)
         if not two and not set(touched) & wrong:
             continue
+        if _begins_elsewhere(known, one, repair):
+            continue
         after = _after(known, predicted, repair, touched)
         if len(after) < len(touched):
             continue
@@ -121,6 +124,26 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
         if agrees and (whole or (gain > least and repair.kind != "offset")):
             found.append((gain - 2 * _DOUBT[repair.kind], Disagreement(one.name, repair, b, a, limit, gain)))
     return found
+
+
+def _begins_elsewhere(known: CrossPrediction, one: Seen, repair: Repair) -> bool:
+    """Whether a temperature begins as it does in another recording, but not once its unit is changed.
+
+    Its unit is right then, because machines begin at about the temperature of the room.
+    """
+    for name in repair.channels if repair.kind == "unit" else ():
+        others = [_first(other, name) for other in known.recordings.values() if other.name != one.name]
+        if known.channels[name].unit == "degC" and np.isfinite(others).any():
+            now, then = (np.nanmin(np.abs(_first(s, name) - np.array(others))) for s in (one, repair.made))
+            if then > now + _BEGINS:
+                return True
+    return False
+
+
+def _first(one: Seen, name: str) -> float:
+    values = one.values[name] if name in one.values else np.empty(0)
+    known = values[np.isfinite(values)]
+    return float(known[0]) if known.size else np.nan
 
 
 def _candidates(
