@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 NO_MODEL = "no model"
 BETTER = 0.95  # of the error without a model: less is no improvement worth the name
-_SIMPLER = 1.03  # a simpler kind that is so near wins
+_SIMPLER = 1.1  # a simpler kind that is so near may win, where the parts cannot tell the two apart
 _FEWEST, _MOST = 600, 6000  # instants of a recording: enough to choose by
 _IN_TIME_SCALE = 10  # instants in the time in which readings forget half of what they were
 _ROUNDS = 20  # of Levenberg-Marquardt
@@ -88,12 +88,22 @@ def choose(experiment: Experiment, progress: Progress = silent) -> list[Score]:
         each = tuple(float(np.sqrt(np.mean(left / of))) for left, of in mine)
         scores.append(Score(name, float(np.sqrt(np.mean(pooled))), each))
     order = sorted(scores, key=lambda one: one.ratio)
-    best = order[0].ratio
-    for name in experiment.form.models:  # simplest first
-        found = next(one for one in scores if one.name == name)
-        if found.helps and found.ratio < _SIMPLER * best:
+    for found in scores:  # simplest first
+        if found.helps and as_good(found, order[0]):
             return [found, *(one for one in order if one is not found)]
     return order
+
+
+def as_good(one: Score, best: Score) -> bool:
+    """Whether a kind is near the best, and worse by no more than one standard error of their difference over
+    the parts (Hastie, Tibshirani & Friedman, The Elements of Statistical Learning, 2009, sect. 7.10).
+    """
+    if one.ratio > _SIMPLER * best.ratio:
+        return False
+    worse = np.log(np.maximum(one.folds, 1e-12)) - np.log(np.maximum(best.folds, 1e-12))
+    if len(worse) < 2:
+        return one is best
+    return bool(np.mean(worse) <= np.std(worse, ddof=1) / np.sqrt(len(worse)))
 
 
 def _left_out(experiment: Experiment, name: str, entry: ModelEntry, fold: Fold) -> tuple[Array, Array]:

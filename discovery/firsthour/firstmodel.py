@@ -10,6 +10,7 @@ from discovery.firsthour.measures import DEGREES
 from discovery.recordings.units import UnitError, conversion
 
 _FAST, _SLOW = "5e-3", "2e-4"  # 1/s, where a fit begins: 3 minutes and 1.4 hours
+# gains begin at zero: a load that no recording to fit shows warms nothing
 
 
 def first_model(
@@ -86,7 +87,7 @@ def _temperature(
         heat, per = (f"{load}**2", f"{unit}**2") if squared(guesses[load]) else (load, unit)
         # a load that is counted below zero, as a discharge is, may warm all the same
         least = "" if guesses[load].below_zero and heat == load else "0.0"
-        gain = block.parameter(f"gain_{output}_{load}", _start(per), f"K/{per}/s", least=least)
+        gain = block.parameter(f"gain_{output}_{load}", "0.0", f"K/{per}/s", least=least)
         block.term(f"{load} warms {output}", output, f"{gain}*{heat}")
     for fan in [name for name, one in guesses.items() if one.quantity == "fan"] if room else []:
         more = block.parameter(f"{fan}_{output}", "1e-4", "1/s", least="0.0")
@@ -176,10 +177,6 @@ def canonical(one: Guess) -> str:
         return conversion(one.unit, one.role).unit
     except UnitError:  # the check of the campaign says so
         return one.unit
-
-
-def _start(unit: str) -> str:
-    return "1e-3" if unit in ("percent", "1") else "1e-5"
 
 
 def _first(guesses: Mapping[str, Guess], role: str) -> str | None:

@@ -22,6 +22,7 @@ from discovery.fitting.problem import FORMER, Prior, Problem, make_problem
 from discovery.fitting.solve import Loss, Solution, solve
 from discovery.models import Model
 from discovery.recordings import Campaign
+from discovery.terms import names
 from discovery.threads import one_thread
 
 if TYPE_CHECKING:
@@ -150,6 +151,8 @@ def fit_model(
     stated = {name: campaign.channels[name].noise for name in problem.outputs}
     theta = _beginning(problem, guess or {}, begin)
     least = resolution([system.grid.single for system in problem.systems])
+    if not guess and begin is None:
+        theta = _gains_first(problem, theta, noise or _first_noise(problem, theta, stated, least))
     current = noise or _first_noise(problem, theta, stated, least)
     nuisance = any(u.is_nuisance for u in problem.unknowns)
     problem = problem.spread(current, _first_spreads(problem, theta))
@@ -232,6 +235,35 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
         covariance=fit.covariance[np.ix_(index, index)],
         trajectories=tuple(problem.run(s, theta) for s in problem.systems),
     )
+
+
+def _gains_first(problem: Problem, theta: Array, noise: Noise) -> Array:
+    """Where a fit begins once the gains of inputs are right for everything else.
+
+    Outputs are linear in them, so one step finds them. With gains that are wrong by orders, a fit bends rates
+    and rooms to what the gains miss, and does not come back.
+    """
+    gains = _gains(problem.model)
+    if not gains:
+        return theta
+    held = tuple(
+        u if u.name in gains and not u.is_nuisance else replace(u, low=float(x), high=float(x))
+        for u, x in zip(problem.unknowns, theta, strict=True)
+    )
+    try:
+        return solve(replace(problem, unknowns=held), theta, noise, "linear", 1, 0.0).theta
+    except RunsAwayError:
+        return theta
+
+
+def _gains(model: Model) -> set[str]:
+    """Free parameters that stand next to inputs only, never in a term or an output with a state."""
+    found = set(model.free)
+    for expression in model.expressions():
+        used = names(expression)
+        if used & set(model.states):
+            found -= used
+    return found & frozenset().union(*(names(term.expression) for term in model.terms))
 
 
 def _first_noise(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,11 @@ from discovery.fitting.solve import Solution, solve
 from discovery.fitting.starts import warm_start
 from discovery.models import Model, Parameter, State
 from discovery.models.reduced import reduced
-from discovery.recordings import Campaign, Channel, Recording
+from discovery.recordings import Campaign, Channel, Recording, load_campaign
 from discovery.terms import Number, Term, parse
 
 Array = NDArray[np.float64]
+ROOT = Path(__file__).parents[2]
 CHANNELS = {
     "u": Channel("u", "heat load", "W", None, "held"),
     "v": Channel("v", "ambient temperature", "degC", None, "held"),
@@ -52,6 +54,40 @@ def model(**changes: Parameter) -> Model:
     state = State("y", "um", None, Number(0.0), 1.0, 1 / 3600)
     terms = tuple(Term(e, "y", parse(e)) for e in ("-a*y", "g*u", "k*v"))
     return Model("first order", parameters, {"y": state}, terms, {}, "h")
+
+
+@pytest.mark.parametrize("gain", [0.0, 4e-7, 1.0])
+def test_a_gain_that_is_wrong_by_orders_bends_no_room_and_no_rate(gain: float) -> None:
+    """Two real heaters, each with an inner mass, in a room that nobody recorded: without the right gain, the
+    room takes what the heaters do, and a fit ends there.
+    """
+    heaters = load_campaign(ROOT / "datasets" / "tclab")
+    runs = ["random_both_01", "random_h2_04"]
+    room = replace(heaters.channels["T_env"], spread=5.0)
+
+    def unknown(r: Recording) -> dict[str, Array]:
+        return {"T_env": np.full(len(r.time[::3]), 22.0)}
+
+    thin = {
+        name: replace(r, time=r.time[::3], values={c: v[::3] for c, v in r.values.items()} | unknown(r))
+        for name, r in heaters.recordings.items()
+        if name in runs
+    }
+    heaters = replace(heaters, channels={**heaters.channels, "T_env": room}, recordings=thin)
+    parameters: dict[str, Parameter] = {}
+    states: dict[str, State] = {}
+    terms: list[Term] = []
+    for k in "12":
+        y, core = f"T{k}", f"core{k}"
+        rates = {f"loss{k}": 1e-3, f"into{k}": 2e-3, f"back{k}": 4e-4, f"gain{k}": gain}
+        parameters |= {name: Parameter(value, "1", 0.0) for name, value in rates.items()}
+        states |= {y: State(y), core: State(core, "degC", None, parse("T_env"), 5.0)}
+        flows = (f"loss{k}*(T_env - {y})", f"gain{k}*heater{k}", f"into{k}*({core} - {y})")
+        terms += [Term(e, y, parse(e)) for e in flows]
+        terms.append(Term(core, core, parse(f"back{k}*({y} - {core})")))
+    built = Model("two masses", parameters, states, tuple(terms), {})
+    right = fit_model(built, heaters, runs, guess={"gain1": 5e-3, "gain2": 2.5e-3})
+    assert fit_model(built, heaters, runs).cost == pytest.approx(right.cost, rel=0.02)
 
 
 def test_intervals_cover_the_truth_19_times_in_20() -> None:
