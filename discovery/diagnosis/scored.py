@@ -27,7 +27,6 @@ Array = NDArray[np.float64]
 
 ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
 KEPT = 4  # noise settings of a model, the most likely ones
-NEAR = 4.0  # log evidence below the best within which a noise setting leads to its neighbours
 
 
 @dataclass(frozen=True)
@@ -257,8 +256,8 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
 
 
 def _over_noise(context: Context, bare: Scored, forces: Sequence[UnknownHeat] = ()) -> Scored:
-    """The score over the noise settings that matter: from the one of the fit to the most likely one, and all
-    that lie next to a likely one.
+    """The score over the noise settings that matter, from the one of the fit on: a setting is asked for its
+    neighbours until those that are kept have all been asked.
 
     Args:
         forces: what heat of unknown cause at a state may be like; all of it is integrated over, too.
@@ -278,21 +277,19 @@ def _over_noise(context: Context, bare: Scored, forces: Sequence[UnknownHeat] = 
         return replace(bare, settings=(setting,), grams=(bare.seen.grams(setting.noise),))
 
     start = min(usual, key=lambda k: _distance(context.settings[k].noise, bare.fit.noise)), 0
-    known, open_ends, best = {start: tried(start)}, [start], -inf
-
-    def level(node: tuple[int, int]) -> float:
-        return float(known[node].levels[0])
-
-    while open_ends and level(here := max(open_ends, key=level)) >= best - NEAR:
-        best = max(best, level(here))
-        fresh = {node: tried(node) for node in near(here) if node not in known}
-        known |= fresh
-        open_ends = [node for node in (*open_ends, *fresh) if node != here]
-    order = sorted(known, key=lambda node: -level(node))[:KEPT]
+    kept, known, asked = {start: tried(start)}, {start}, set[tuple[int, int]]()
+    while open_ends := [node for node in kept if node not in asked]:
+        here = max(open_ends, key=lambda node: float(kept[node].levels[0]))
+        asked.add(here)
+        fresh = [node for node in near(here) if node not in known]
+        known.update(fresh)
+        kept |= {node: tried(node) for node in fresh}
+        order = sorted(kept, key=lambda node: -float(kept[node].levels[0]))
+        kept = {node: kept[node] for node in order[:KEPT]}  # normal equations are large
     return replace(
         bare,
-        settings=tuple(known[node].settings[0] for node in order),
-        grams=tuple(known[node].grams[0] for node in order),
+        settings=tuple(one.settings[0] for one in kept.values()),
+        grams=tuple(one.grams[0] for one in kept.values()),
     )
 
 

@@ -12,7 +12,8 @@ which is a one-dimensional integral; shape parameters, noise settings and instan
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
@@ -22,6 +23,8 @@ from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.signatures import signatures
 from discovery.evidence.whitening import Absorbed, Whitened, absorbed, log_sum_exp
+from discovery.fitting import Noise
+from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -29,6 +32,7 @@ _NODES, _WEIGHTS = hermegauss(11)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 _FINE = np.linspace(-3.5, 3.5, 43)  # standard deviations of the logarithm, for flat likelihoods
 _NARROW = 4.0  # standard deviations from zero beyond which the posterior is taken as Gaussian
+_BATCH = 256  # hypotheses whose signatures are whitened at a time
 _ROUNDING = 1e-9  # of the square of a signature: what is left of less is lost in the last digits
 
 
@@ -114,15 +118,14 @@ class Projected:
     """
 
     columns: Array
-    basis: Array  # (N, U)
+    inside: Array  # (U, A) the signatures along the basis of what a refit absorbs
     dot: Array
     gram: Array
     length: Array
 
     def block(self, index: Sequence[int] | NDArray[np.intp]) -> Array:
         """Gram matrix of some of the signatures."""
-        z = self.columns[:, list(index)]
-        inside = self.basis.T @ z
+        z, inside = self.columns[:, list(index)], self.inside[:, list(index)]
         return np.asarray(z.T @ z - inside.T @ inside)
 
 
@@ -131,12 +134,19 @@ def project(seen: Whitened, setting: Setting, columns: Sequence[Array]) -> Proje
     return _projected(seen.whiten(setting.noise, columns)[0], seen.absorbed(setting.noise))
 
 
+def project_one(seen: Whitened, setting: Setting, recording: int, columns: Array) -> Projected:
+    """As `project`, of columns (R, Y, A) that are zero but in one recording."""
+    gone, here = seen.absorbed(setting.noise), seen.places[recording]
+    z = seen.whiten_one(setting.noise, recording, columns)
+    return _projected(z, replace(gone, residual=gone.residual[here], basis=gone.basis[here]))
+
+
 def _projected(z: Array, gone: Absorbed) -> Projected:
     inside = gone.basis.T @ z
     length = np.einsum("na,na->a", z, z)
     left = length - np.einsum("ua,ua->a", inside, inside)
     gram = np.maximum(left, _ROUNDING * length)  # of what a refit absorbs whole, rounding is left
-    return Projected(z, gone.basis, z.T @ gone.residual - inside.T @ gone.slope, gram, np.sqrt(length))
+    return Projected(z, inside, z.T @ gone.residual - inside.T @ gone.slope, gram, np.sqrt(length))
 
 
 @dataclass(frozen=True)
@@ -164,38 +174,85 @@ def scan(
         slab: prior of each amplitude, in their order.
     """
     runs = seen.fit.trajectories
-    columns = [signatures(t, hypotheses) for t in runs]
-    if without:
-        back = [np.stack([w.shown[k] for w in without], axis=2) for k in range(len(runs))]
-        columns = [np.concatenate([c, b], axis=2) for c, b in zip(columns, back, strict=True)]
-    count = len(slab.median)
+    batches = _batches(hypotheses)
+    columns = side_by_side(lambda batch: [signatures(t, batch) for t in runs], batches)
+    back = [np.stack([w.shown[k] for w in without], axis=2) for k in range(len(runs))] if without else []
     levels = np.zeros((1 + len(without), len(settings)))
-    parts: list[list[Projected]] = [[] for _ in levels]
+    parts: list[list[Products]] = [[] for _ in levels]
     for k, setting in enumerate(settings):
-        z, log = seen.whiten(setting.noise, columns)
-        rows, prior = seen.rows(setting.noise)[0], seen.prior[0]
+        rows, log = seen.rows(setting.noise)  # the filter is made here, for all batches
         gone = [seen.absorbed(setting.noise)]
+        shown = seen.whiten(setting.noise, back)[0] if without else rows[:, :0]
         for i, one in enumerate(without):
             kept = np.setdiff1d(np.arange(rows.shape[1]), 1 + one.columns)
             fewer = rows[:, kept]
-            fewer[:, 0] += z[:, count + i]
-            gone.append(absorbed(fewer, prior[np.ix_(kept, kept)]))
-        for view, part in zip(gone, parts, strict=True):
-            part.append(_projected(z[:, :count], view))
+            fewer[:, 0] += shown[:, i]
+            gone.append(absorbed(fewer, seen.prior[0][np.ix_(kept, kept)]))
+
+        def looked(
+            pair: tuple[Sequence[Hypothesis], list[Array]],
+            noise: Noise = setting.noise,
+            gone: Sequence[Absorbed] = gone,
+        ) -> list[Products]:
+            z = seen.whiten(noise, pair[1])[0]
+            return [_products(_projected(z, view), pair[0]) for view in gone]
+
+        pieces = side_by_side(looked, list(zip(batches, columns, strict=True)))
+        for i, part in enumerate(parts):
+            part.append(_joined([piece[i] for piece in pieces]))
         levels[:, k] = [view.level - float(log.sum()) + setting.log_weight for view in gone]
     return [_ranked(hypotheses, slab, level, part) for level, part in zip(levels, parts, strict=True)]
 
 
+def _batches(hypotheses: Sequence[Hypothesis]) -> list[Sequence[Hypothesis]]:
+    """Hypotheses in the order in which they come, so many at a time that their columns fit into memory."""
+    return [hypotheses[k : k + _BATCH] for k in range(0, len(hypotheses), _BATCH)]
+
+
+@dataclass(frozen=True)
+class Products:
+    """Inner products of the signatures (A,) of hypotheses under one noise, as in `Projected`.
+
+    `matrices` (H,): those of the signatures of each hypothesis with each other, (K, K).
+    """
+
+    dot: Array
+    gram: Array
+    length: Array
+    matrices: tuple[Array, ...]
+
+
+def _products(part: Projected, hypotheses: Sequence[Hypothesis]) -> Products:
+    edges = np.concatenate([[0], np.cumsum([len(h.amplitudes) for h in hypotheses])]).tolist()
+    least = _ROUNDING * (part.length**2 + 1e-30)
+    matrices = tuple(
+        np.maximum(part.gram[a:b], least[a:b])[:, None]
+        if b - a == 1
+        else part.block(range(a, b)) + np.diag(least[a:b])
+        for a, b in pairwise(edges)
+    )
+    return Products(part.dot, part.gram, part.length, matrices)
+
+
+def _joined(pieces: Sequence[Products]) -> Products:
+    def whole(name: str) -> Array:
+        return np.concatenate([np.zeros(0), *(getattr(piece, name) for piece in pieces)])
+
+    return Products(
+        whole("dot"), whole("gram"), whole("length"), tuple(m for p in pieces for m in p.matrices)
+    )
+
+
 def _ranked(
-    hypotheses: Sequence[Hypothesis], slab: Slab, levels: Array, parts: Sequence[Projected]
+    hypotheses: Sequence[Hypothesis], slab: Slab, levels: Array, parts: Sequence[Products]
 ) -> list[Score]:
     """One score for each claim, over noise settings and shapes."""
     if not hypotheses:
         return []
-    owners = np.array([i for i, h in enumerate(hypotheses) for _ in h.amplitudes], dtype=np.intp)
-    single = np.array([len(h.amplitudes) == 1 for h in hypotheses])
+    counts = np.array([len(h.amplitudes) for h in hypotheses])
+    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     fixed = np.array([h.effect.amplitude.fixed or 0.0 for h in hypotheses])
-    factors = np.array([_factors(p, hypotheses, owners, single, fixed, slab) for p in parts])
+    factors = np.array([_factors(p, first, counts, fixed, slab) for p in parts])
     weights = np.array([h.log_weight for h in hypotheses])
     total = float(log_sum_exp(levels))
     with np.errstate(invalid="ignore"):
@@ -208,58 +265,50 @@ def _ranked(
     for mine in groups.values():
         top = max(mine, key=lambda i: gains[i] + weights[i])
         joint = float(log_sum_exp(np.array([gains[i] + weights[i] for i in mine])))
-        found.append(
-            _score(hypotheses[top], joint, parts[best[top]], np.flatnonzero(owners == top), best[top])
-        )
+        found.append(_score(hypotheses[top], joint, parts[best[top]], top, int(best[top]), first[top]))
     return sorted(found, key=lambda s: -s.odds)
 
 
 def _factors(
-    part: Projected,
-    hypotheses: Sequence[Hypothesis],
-    owners: NDArray[np.intp],
-    single: NDArray[np.bool_],
-    fixed: Array,
-    slab: Slab,
+    part: Products, first: NDArray[np.intp], counts: NDArray[np.intp], fixed: Array, slab: Slab
 ) -> Array:
     """Log Bayes factor (H,) of each hypothesis under one noise."""
     gram = np.maximum(part.gram, 1e-30)
     mean, variance = part.dot / gram, 1.0 / gram
     alone = 0.5 * part.dot**2 / gram + slab.average(mean, variance) + 0.5 * np.log(2 * np.pi * variance)
-    out = np.zeros(len(hypotheses))
-    first = np.searchsorted(owners, np.arange(len(hypotheses)))
-    out[single] = alone[first[single]]
+    out = np.where(counts == 1, alone[first], 0.0)
     on = np.flatnonzero(fixed)
     out[on] = fixed[on] * part.dot[first[on]] - 0.5 * fixed[on] ** 2 * part.gram[first[on]]
-    for i in np.flatnonzero(~single):
-        out[i] = _jointly(part, slab, np.flatnonzero(owners == i))
-    nothing = part.length[first] <= 0
-    return np.where(nothing, -np.inf, out)
+    for i in np.flatnonzero(counts != 1):
+        mine = np.arange(first[i], first[i] + counts[i])
+        out[i] = _jointly(part.matrices[i], part.dot[mine], slab.take(mine))
+    return np.where(part.length[first] <= 0, -np.inf, out)
 
 
-def _jointly(part: Projected, slab: Slab, mine: NDArray[np.intp]) -> float:
+def _jointly(matrix: Array, dot: Array, slab: Slab) -> float:
     """Log Bayes factor of an effect with several amplitudes. One that the first order gives the wrong sign
     does not count: a refit says what it is once the others act.
     """
-    matrix = part.block(mine) + _ROUNDING * np.diag(part.length[mine] ** 2 + 1e-30)
     inverse = np.linalg.inv(matrix)
-    at = inverse @ part.dot[mine]
-    wrong = (at * slab.sign[mine] < 0) & (np.abs(at) > np.sqrt(np.diag(inverse)))
+    at = inverse @ dot
+    wrong = (at * slab.sign < 0) & (np.abs(at) > np.sqrt(np.diag(inverse)))
     if wrong.any() and not wrong.all():
-        return _jointly(part, slab, mine[~wrong])
+        kept = np.flatnonzero(~wrong)
+        return _jointly(matrix[np.ix_(kept, kept)], dot[kept], slab.take(kept))
     return (
-        0.5 * float(part.dot[mine] @ at)
-        + float(np.sum(slab.take(mine).average(at, np.diag(inverse))))
-        + 0.5 * len(mine) * float(np.log(2 * np.pi))
+        0.5 * float(dot @ at)
+        + float(np.sum(slab.average(at, np.diag(inverse))))
+        + 0.5 * len(dot) * float(np.log(2 * np.pi))
         - 0.5 * float(np.linalg.slogdet(matrix)[1])
     )
 
 
-def _score(h: Hypothesis, gain: float, part: Projected, mine: NDArray[np.intp], noise: int) -> Score:
-    matrix = part.block(mine) + _ROUNDING * np.diag(part.length[mine] ** 2 + 1e-30)
-    size = np.linalg.solve(matrix, part.dot[mine])
-    t = float(np.sqrt(max(float(part.dot[mine] @ size), 0.0)))
-    t = float(np.copysign(t, size[0])) if len(mine) == 1 else t
+def _score(h: Hypothesis, gain: float, part: Products, index: int, noise: int, first: int) -> Score:
+    mine = slice(first, first + len(h.amplitudes))
+    dot, matrix = part.dot[mine], part.matrices[index]
+    size = np.linalg.solve(matrix, dot)
+    t = float(np.sqrt(max(float(dot @ size), 0.0)))
+    t = float(np.copysign(t, size[0])) if len(dot) == 1 else t
     length = float(part.length[mine].max())
     share = float(np.sqrt(part.gram[mine].max())) / length if length > 0 else 0.0
-    return Score(h, gain, t, tuple(size.tolist()), share, int(noise))
+    return Score(h, gain, t, tuple(size.tolist()), share, noise)

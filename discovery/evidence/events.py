@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, sensitivities
 from discovery.effects.hypothesis import Hypothesis
-from discovery.evidence.bayes import Projected, Slab, project
+from discovery.evidence.bayes import Projected, Slab, project_one
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.whitening import Whitened, log_sum_exp
 from discovery.threads import side_by_side
@@ -69,10 +69,7 @@ class _Search:
 
     def projected(self, columns: Array) -> Projected:
         """Columns (R, Y, M) of the recording, seen through what a refit absorbs."""
-        shapes = [t.system.grid.readings.shape for t in self.seen.fit.trajectories]
-        padded = [np.zeros((*shape, columns.shape[2])) for shape in shapes]
-        padded[self.index] = columns
-        return project(self.seen, self.setting, padded)
+        return project_one(self.seen, self.setting, self.index, columns)
 
     def rough(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
         """The claim at the best of evenly spread instants, with what share of them the readings leave, and

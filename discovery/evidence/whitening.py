@@ -164,28 +164,57 @@ class Whitened:
             found.append(np.broadcast_to(number[:, None], grid.measured.shape)[grid.measured])
         return np.concatenate(found)
 
+    @cached_property
+    def places(self) -> list[slice]:
+        """Where the whitened readings of each recording stand."""
+        counts = [int(np.count_nonzero(p.measured)) for p in self.filters]
+        edges = np.concatenate([[0], np.cumsum(counts)]).tolist()
+        return [slice(a, b) for a, b in pairwise(edges)]
+
     def whiten(self, noise: Noise, columns: Sequence[Array]) -> tuple[Array, Array]:
         """Columns (R, Y, M) by recording whitened and stacked (N, M), and the logarithms (N,) of the standard
         deviations of the innovations.
         """
-        parts = [p.whitened(noise, c) for p, c in zip(self.filters, columns, strict=True)]
+        unit = _unit(noise)
+        parts = [p.whitened(unit, c) for p, c in zip(self.filters, columns, strict=True)]
         return np.concatenate([z for z, _ in parts]), np.concatenate([log for _, log in parts])
+
+    def whiten_one(self, noise: Noise, recording: int, columns: Array) -> Array:
+        """Columns (R, Y, M) of one recording whitened, (readings of it, M)."""
+        return self.filters[recording].whitened(_unit(noise), columns)[0]
 
     def rows(self, noise: Noise) -> tuple[Array, Array]:
         """Whitened residual and sensitivities (N, 1 + U), logarithms (N,) as in `whiten`."""
-        rows, log = self._rows(replace(noise, form=1.0, edge=1.0))
+        rows, log = self._rows(_unit(noise))
         return rows * self._scale(noise), log
 
     def _rows(self, unit: Noise) -> tuple[Array, Array]:
         """The rows with a form error of one; those of the last noise are kept."""
         if "rows" not in self.last or self.last["rows"][0] != unit:
-            joined = [
-                np.concatenate([r[:, :, None], j], axis=2)
-                for r, j in zip(self.residuals, self.jacobians, strict=True)
-            ]
-            self.last["rows"] = (unit, self.whiten(unit, joined))
+            parts = [self._part(k, unit) for k in range(len(self.filters))]
+            rows = np.zeros((len(self.block), self.jacobians[0].shape[2] + 1))
+            for here, columns, (part, _) in zip(self.places, self.acting, parts, strict=True):
+                rows[here, columns] = part
+            self.last["rows"] = (unit, (rows, np.concatenate([log for _, log in parts])))
         known: tuple[Array, Array] = self.last["rows"][1]
         return known
+
+    @cached_property
+    def joined(self) -> list[Array]:
+        """Residuals and sensitivities by recording, (R, Y, C) of the C columns that act there."""
+        return [
+            np.concatenate([r[:, :, None], j[:, :, columns[1:] - 1]], axis=2)
+            for r, j, columns in zip(self.residuals, self.jacobians, self.acting, strict=True)
+        ]
+
+    @cached_property
+    def acting(self) -> list[Ints]:
+        """Columns (C,) of 1 + U + E that are not zero in a recording: starts and offsets belong to one."""
+        return [np.concatenate([[0], 1 + np.flatnonzero(j.any(axis=(0, 1)))]) for j in self.jacobians]
+
+    def _part(self, k: int, unit: Noise) -> tuple[Array, Array]:
+        """Rows (N, C) and logarithms (N,) of one recording."""
+        return self.filters[k].whitened(unit, self.joined[k])
 
     def _scale(self, noise: Noise) -> Array:
         """What multiplies the columns (1 + U,) under the form error of a noise."""
@@ -217,7 +246,7 @@ class Whitened:
 
     def grams(self, noise: Noise) -> Grams:
         """The fit under one noise setting, as normal equations by block."""
-        unit = replace(noise, form=1.0, edge=1.0)
+        unit = _unit(noise)
         known = self.last.setdefault("grams", [])
         same: tuple[Array, Array] | None = next((pieces for other, pieces in known if other == unit), None)
         if same is None:
@@ -229,14 +258,17 @@ class Whitened:
 
     def _blocks(self, unit: Noise) -> tuple[Array, Array]:
         """Normal equations (B, 1 + U, 1 + U) and log determinants (B,) by block of time."""
-        rows, log = self._rows(unit)
-        count = self.blocks * len(self.fit.trajectories)
-        order = np.argsort(self.block, kind="stable")
-        edges = np.searchsorted(self.block[order], np.arange(count + 1))
-        rows, log = rows[order], log[order]
-        parts = list(pairwise(edges.tolist()))
-        pieces = [rows[a:b].T @ rows[a:b] for a, b in parts]
-        return np.array(pieces), np.array([float(np.sum(log[a:b])) for a, b in parts])
+        size = self.jacobians[0].shape[2] + 1
+        pieces = np.zeros((self.blocks * len(self.filters), size, size))
+        dets = np.zeros(len(pieces))
+        for k, (here, columns) in enumerate(zip(self.places, self.acting, strict=True)):
+            rows, log = self._part(k, unit)
+            first = k * self.blocks  # readings stand in the order of time
+            edges = np.searchsorted(self.block[here], np.arange(first, first + self.blocks + 1)).tolist()
+            for number, (a, b) in enumerate(pairwise(edges), first):
+                pieces[number][np.ix_(columns, columns)] = rows[a:b].T @ rows[a:b]
+                dets[number] = float(np.sum(log[a:b]))
+        return pieces, dets
 
 
 @dataclass(frozen=True)
@@ -267,6 +299,11 @@ def absorbed(rows: Array, prior: Array) -> Absorbed:
     quadratic = float(rows[:, 0] @ rows[:, 0]) + float(prior[0, 0]) - float(slope @ slope)
     volume = 0.5 * float(np.sum(np.log(size))) + float(np.sum(np.log(scale)))
     return Absorbed(rows[:, 0], rows[:, 1:] @ root, slope, -0.5 * quadratic - volume)
+
+
+def _unit(noise: Noise) -> Noise:
+    """A noise with form errors of one: they are columns, and no filter depends on them."""
+    return replace(noise, form=1.0, edge=1.0)
 
 
 def _scale(diagonal: Array) -> Array:

@@ -14,7 +14,7 @@ from scipy.stats import lognorm, norm
 from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
-from discovery.evidence.bayes import Projected, Slab, _projected, _ranked, scan
+from discovery.evidence.bayes import Projected, Slab, _products, _projected, _ranked, scan
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.signatures import signatures
 from discovery.evidence.whitening import Whitened, absorbed
@@ -79,12 +79,12 @@ def projected(*which: int, scale: float = 1.0) -> Projected:
     """Some columns of Z as signatures, nothing absorbed."""
     z = scale * Z[:, which]
     gram = np.einsum("na,na->a", z, z)
-    return Projected(z, np.zeros((30, 0)), z.T @ RESIDUAL, gram, np.sqrt(gram))
+    return Projected(z, np.zeros((0, len(which))), z.T @ RESIDUAL, gram, np.sqrt(gram))
 
 
 def gain_of(word: str, part: Projected, amplitudes: int, prior_of: Slab) -> float:
     h = Hypothesis(catalogue()[word], (), tuple(f"a{k}" for k in range(amplitudes)))
-    (found,) = _ranked([h], prior_of, np.zeros(1), [part])
+    (found,) = _ranked([h], prior_of, np.zeros(1), [_products(part, [h])])
     return found.gain
 
 
@@ -138,7 +138,7 @@ def test_noise_settings_and_shapes_are_summed_over() -> None:
     two = [h.at({"t": 1.0}, np.log(0.3)), h.at({"t": 2.0}, np.log(0.7))]
     levels = np.array([0.0, 1.5])
     parts = [projected(0, 1), projected(0, 1, scale=1.3)]
-    (found,) = _ranked(two, slab(sign=1.0, count=2), levels, parts)
+    (found,) = _ranked(two, slab(sign=1.0, count=2), levels, [_products(part, two) for part in parts])
     weights = np.exp(levels) / np.exp(levels).sum()
     expected = sum(
         weight * share * factor_of(scale * Z[:, column], sign=1.0)
@@ -200,7 +200,7 @@ def test_a_scan_integrates_everything_that_a_refit_could_absorb() -> None:
 
 def test_odds_of_a_place_do_not_change_what_the_readings_say() -> None:
     h = Hypothesis(catalogue()["sensor_offset"], (), ("a",))
-    (plain,) = _ranked([h], slab(), np.zeros(1), [projected(0)])
-    (rare,) = _ranked([replace(h, log_odds=-5.0)], slab(), np.zeros(1), [projected(0)])
+    (plain,) = _ranked([h], slab(), np.zeros(1), [_products(projected(0), [h])])
+    (rare,) = _ranked([replace(h, log_odds=-5.0)], slab(), np.zeros(1), [_products(projected(0), [h])])
     assert rare.gain == plain.gain
     assert rare.odds == pytest.approx(plain.odds - 5.0)

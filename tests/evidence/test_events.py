@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from discovery.dynamics import make_grid
-from discovery.evidence.bayes import Slab, scan
+from discovery.evidence.bayes import Slab, project, project_one, scan
 from discovery.evidence.events import _span, heat_steps, place_events
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.whitening import Whitened
@@ -49,6 +49,16 @@ def seen_of(*runs: Recording) -> Whitened:
     seen, outputs = machine.campaign(*runs), list(machine.SEEN)
     grids = {r.name: make_grid(seen, r.name, machine.INPUTS, outputs) for r in runs}
     return Whitened(fit_model(machine.model(), seen, list(grids), outputs, grids=grids), 12)
+
+
+def test_columns_of_one_recording_are_projected_as_those_of_all() -> None:
+    """The others are zero there: same products, without whitening them."""
+    seen = seen_of(machine.simulated(1), machine.simulated(2))
+    columns = np.random.default_rng(0).standard_normal((*seen.residuals[1].shape, 4))
+    whole = project(seen, SETTING, [np.zeros((*seen.residuals[0].shape, 4)), columns])
+    alone = project_one(seen, SETTING, 1, columns)
+    np.testing.assert_allclose(alone.dot, whole.dot, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(alone.block(range(4)), whole.block(range(4)), rtol=1e-9, atol=1e-9)
 
 
 def test_heat_of_some_hours_is_found_where_and_when_it_acted() -> None:
