@@ -41,35 +41,44 @@ def model_form(fit: Fit, white: Array) -> tuple[list[Array], int]:
     basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0]
     kept = [
         _directions(columns, _stacked(runs, columns, white), basis, most)
-        for columns, most in ((_laws(runs), LAWS), (_edges(runs), EDGES))
+        for columns, most in ((_laws(runs), LAWS), ([edge_columns(run) for run in runs], EDGES))
     ]
     return [np.concatenate(pair, axis=2) for pair in zip(*kept, strict=True)], kept[0][0].shape[2]
 
 
 def _laws(runs: Sequence[Trajectory]) -> list[Array]:
-    """What the readings show more where each flow, and each output, is off by its own size times each psi."""
-    scales, found = _scales(runs), []
-    for k, run in enumerate(runs):
-        pieces: list[Column] = []
-        count = 0
-        for term in _flows(run):
-            points = _points(run, scales, term.into, k, len(runs))
-            pieces += _pieces(run, term, points, count)
-            count += len(points)
-        flows = sensitivities(run, (), (), pieces, count=count)
-        found.append(np.concatenate([flows, _levers(run, scales, k, len(runs))], axis=2))
-    return found
+    scales = scales_of(runs)
+    return [law_columns(run, scales, k, len(runs)) for k, run in enumerate(runs)]
 
 
-def _edges(runs: Sequence[Trajectory]) -> list[Array]:
-    """What the readings show more where each flow enters each neighbour of its body in place of the body."""
-    found = []
-    for run in runs:
-        pieces: list[Column] = []
-        for term in _flows(run):
-            pieces += _beyond(run, term, len(pieces))
-        found.append(sensitivities(run, (), (), pieces, count=len(pieces)))
-    return found
+def law_columns(
+    run: Trajectory, scales: Mapping[str, tuple[float, float]], index: int = 0, count: int = 1
+) -> Array:
+    """What the readings show more (R, Y, M) where each flow, and each output, is off by its own size times
+    each psi.
+
+    Args:
+        scales: as of `scales_of`.
+        index: which of `count` recordings it is; with one, no psi distinguishes recordings.
+    """
+    pieces: list[Column] = []
+    owners = 0
+    for term in _flows(run):
+        points = _points(run, scales, term.into, index, count)
+        pieces += _pieces(run, term, points, owners)
+        owners += len(points)
+    flows = sensitivities(run, (), (), pieces, count=owners)
+    return np.concatenate([flows, _levers(run, scales, index, count)], axis=2)
+
+
+def edge_columns(run: Trajectory) -> Array:
+    """What the readings show more (R, Y, M) where each flow enters each neighbour of its body in place of the
+    body.
+    """
+    pieces: list[Column] = []
+    for term in _flows(run):
+        pieces += _beyond(run, term, len(pieces))
+    return sensitivities(run, (), (), pieces, count=len(pieces))
 
 
 def _flows(run: Trajectory) -> list[Term]:
@@ -95,7 +104,7 @@ def effect_form(trajectories: Sequence[Trajectory], hypotheses: Sequence[Hypothe
     """By recording, what the readings (R, Y, M) show more where the flow of each effect is off by its own
     size, once for each psi; and where a sensor is not quite what an effect without a size makes of it.
     """
-    scales = _scales(trajectories)
+    scales = scales_of(trajectories)
     lasting = [h for h in hypotheses if h.terms and not h.effect.is_event and h.effect.is_physics]
     sensors = [h for h in hypotheses if h.shown and not h.recording and h.effect.amplitude.fixed is not None]
     found = []
@@ -138,7 +147,7 @@ def _levers(run: Trajectory, scales: Mapping[str, tuple[float, float]], index: i
     return out
 
 
-def _scales(trajectories: Sequence[Trajectory]) -> dict[str, tuple[float, float]]:
+def scales_of(trajectories: Sequence[Trajectory]) -> dict[str, tuple[float, float]]:
     """Mean and spread of each series that moves, inputs and states, over all recordings."""
     found = {}
     for name in (*trajectories[0].system.grid.samples, *trajectories[0].system.states):

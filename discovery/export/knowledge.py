@@ -1,110 +1,272 @@
-"""What the recordings of a fit say about the fitted model, kept with it: the residual it leaves, and how well
-its parameters are known. An update weighs new readings against it."""
+"""What the recordings of a fit say about the fitted model, kept with it: an update weighs new readings
+against it.
+
+Around the fitted model, the residual of any recording is
+
+    r = J_p dp + J_e e + noise,      e ~ N(0, form^2)
+
+with errors dp of the parameters and form errors e of the laws (`discovery.evidence.form_error`). Form errors
+stay with the operating point, so the fit has seen most of those that new recordings hold. The whitened
+readings of the fit, compressed to as many rows [r, J_p, J_e] as they determine directions, say what it knows
+of both (square-root information filter; Bierman, Factorization Methods for Discrete Sequential Estimation,
+1977).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.context import process_prior, thinned
+from discovery.dynamics import Trajectory
+from discovery.errors import UserError
+from discovery.evidence.form_error import edge_columns, law_columns, scales_of
+from discovery.evidence.process_noise import floors, reading_noise
+from discovery.evidence.whitening import Whitened
+from discovery.fitting import Fit, Noise
+from discovery.fitting.noise import resolution, white_noise
 from discovery.fitting.problem import Problem, make_problem
 from discovery.models import Model
 from discovery.recordings import Campaign
+from discovery.threads import one_thread
 
 Array = NDArray[np.float64]
 
-SLOW_S = 7200.0  # for which slow noise of sensors and small random heat stay alike
+UNKNOWN = 2.0  # relative standard deviation of a parameter before any reading
+HEATS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # unrecorded heat, in floors of the diagnosis
+SHARES = (
+    0.002,
+    0.005,
+    0.01,
+    0.02,
+    0.04,
+    0.08,
+    0.25,
+    0.8,
+)  # of what flows through a body, off from hour to hour
+SLOW = (0.0, 0.15, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0)  # slow noise of outputs, in reading noises
+FORMS = (0.0, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25)  # by which laws are off at an operating point ...
+EDGES = (0.0, 0.02, 0.05, 0.1, 0.25)  # ... and of flows that enter the neighbours of a body
+SEEN = 1e-3  # of the information before any reading, below which a direction is not kept
 
 
 @dataclass(frozen=True)
 class Knowledge:
-    """`residual`: rms of readings minus model by output (None: not read), `slow_share` of its variance is
-    slow noise. `covariance` (P, P) of `parameters`, wide enough for that."""
+    """What a fit knows. `residual`: rms of readings minus model by output (None: not read). `noise`: the most
+    likely one on the ladders of the diagnosis; None: nothing was read. `floor`: usual unknown heat of each
+    state, W or a rate. `scales`: mean and spread of each series, from which operating points are counted.
+    `rows` (K, 1 + P + E): whitened residual and slopes of `parameters`, then of form errors.
+    """
 
     residual: Mapping[str, float | None]
-    slow_share: float
     parameters: tuple[str, ...]
-    covariance: Array
+    noise: Noise | None
+    floor: Mapping[str, float]
+    scales: Mapping[str, tuple[float, float]]
+    rows: Array
+
+    def document(self) -> dict[str, Any]:
+        """As it stands in an exported model."""
+        return {
+            "residual": dict(self.residual),
+            "parameters": list(self.parameters),
+            "noise": None if self.noise is None else _plain(self.noise),
+            "floor": dict(self.floor),
+            "scales": {name: list(pair) for name, pair in self.scales.items()},
+            "rows": [[float(f"{v:.6g}") for v in row] for row in self.rows.tolist()],
+        }
 
 
+def _plain(noise: Noise) -> dict[str, Any]:
+    return {key: list(v) if isinstance(v, tuple) else v for key, v in asdict(noise).items()}
+
+
+def read_knowledge(model: str, written: Mapping[str, Any]) -> Knowledge:
+    """The knowledge of an exported model.
+
+    Raises:
+        UserError: an export that does not say how well its parameters are known.
+    """
+    if not (written.get("parameters") and written.get("noise") and written.get("rows")):
+        raise UserError(
+            f"model '{model}' does not say how well its parameters are known; export it again from its run"
+        )
+    noise: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in written["noise"].items()}
+    return Knowledge(
+        written["residual"],
+        tuple(written["parameters"]),
+        Noise(**noise),
+        written["floor"],
+        {name: (pair[0], pair[1]) for name, pair in written["scales"].items()},
+        np.array(written["rows"]).reshape(len(written["rows"]), -1),
+    )
+
+
+@one_thread
 def knowledge(model: Model, campaign: Campaign, recordings: Sequence[str]) -> Knowledge:
     """What the recordings say of a model fitted to them; parameters of one recording alone are left out."""
     outputs = [
         name for name in model.outputs if name in campaign.channels and _read(campaign, recordings, name)
     ]
-    free = tuple(name for name in model.free if not model.parameters[name].per_recording)
+    names = tuple(name for name in model.free if not model.parameters[name].per_recording)
     if not outputs:
-        return Knowledge(dict.fromkeys(model.outputs), 0.0, (), np.zeros((0, 0)))
-    problem = make_problem(model, campaign, recordings, outputs)
-    residuals, jacobians = settle_starts(problem)
-    level, share = {}, 0.0
-    for j, name in enumerate(outputs):
-        series = np.concatenate([r[:, j][np.isfinite(r[:, j])] for r in residuals])
-        level[name] = max(float(np.sqrt(np.mean(series**2))), 1e-6)
-        rho = (
-            float(np.corrcoef(series[1:], series[:-1])[0, 1])
-            if len(series) > 10 and series.std() > 0
-            else 0.0
-        )
-        share = min(max(share, rho), 0.9)
-    times = [system.grid.time[system.grid.read] for system in problem.systems]
-    factor = max(stretch(share, time) for time in times)
-    information = prior_information(problem)
-    for residual, jacobian in zip(residuals, jacobians, strict=True):
-        seen = np.isfinite(residual)
-        rows = (jacobian / np.array([level[name] for name in outputs])[None, :, None])[seen]
-        information += rows.T @ rows / factor
-    index = [i for i, u in enumerate(problem.unknowns) if not u.is_start and u.name in free]
-    covariance = np.linalg.pinv(information, rcond=1e-13, hermitian=True)[np.ix_(index, index)]
-    names = tuple(problem.unknowns[i].name for i in index)
+        return Knowledge(dict.fromkeys(model.outputs), (), None, {}, {}, np.zeros((0, 1)))
+    problem = problem_of(model, campaign, recordings, outputs)
+    theta, runs = settle_starts(problem)
+    residuals = [problem.residual(run) for run in runs]
+    level = {
+        name: max(float(np.sqrt(np.nanmean(np.concatenate([r[:, j] for r in residuals]) ** 2))), 1e-6)
+        for j, name in enumerate(outputs)
+    }
+    stated = {name: campaign.channels[name].noise for name in outputs}
+    least = resolution([system.grid.single for system in problem.systems])
+    white = white_noise(outputs, stated, residuals, least)
+    fit = Fit(problem, theta, np.zeros((len(theta),) * 2), white, runs, 0.0, (), 0.0)
+    ambient = [n for n, channel in campaign.channels.items() if channel.role == "ambient temperature"]
+    floor = floors(fit, thresholds.FLOOR, ambient, thresholds.AIR)
+    scales = scales_of(runs)
+    laws = [law_columns(run, scales) for run in runs]
+    edges = [edge_columns(run) for run in runs]
+    form = tuple(np.concatenate(pair, axis=2) for pair in zip(laws, edges, strict=True))
+    seen = Whitened(fit, 1, form, np.ones(form[0].shape[2]), (laws[0].shape[2], edges[0].shape[2]))
+    noise = _likely(seen, reading_noise(fit, stated, floor, process_prior()), floor)
     return Knowledge(
-        {name: level.get(name) for name in model.outputs}, share, names, 0.5 * (covariance + covariance.T)
+        {name: level.get(name) for name in model.outputs},
+        names,
+        noise,
+        floor,
+        scales,
+        _compressed(seen, noise, names),
     )
 
 
-def stretch(slow_share: float, times: Array) -> float:
-    """Readings that count as one independent reading: those close together share the slow part of the noise.
+def problem_of(
+    model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]
+) -> Problem:
+    """A model on recordings, with no more readings than an answer in reasonable time allows."""
+    problem = make_problem(model, campaign, recordings, outputs)
+    grids = {system.grid.recording: system.grid for system in problem.systems}
+    return make_problem(model, campaign, recordings, outputs, grids=thinned(grids))
 
-    1 + 2 sum_k rho(k gap) for rho(t) = slow_share exp(-t/SLOW_S): how much slow noise widens the variance of
-    a mean.
+
+def spreads(known: Knowledge, model: Model, laws: int, edges: int) -> Array:
+    """(P + E,) standard deviations of parameters and form errors before any reading. A parameter that presses
+    against a bound stays there.
+
+    Raises:
+        UserError: what is known is of another model.
     """
-    if len(times) < 2:
-        return 1.0
-    decay = float(np.exp(-np.median(np.diff(times)) / SLOW_S))
-    return 1.0 + 2.0 * slow_share * decay / (1.0 - decay)
+    assert known.noise is not None
+    if known.rows.shape[1] != 1 + len(known.parameters) + laws + edges:
+        raise UserError(
+            f"model '{model.name}': its knowledge of its fit belongs to another model; "
+            "export it again from its run"
+        )
+    own = [_free(model, name) * UNKNOWN * abs(model.parameters[name].value) for name in known.parameters]
+    return np.concatenate([own, np.full(laws, known.noise.form), np.full(edges, known.noise.edge)])
 
 
-def settle_starts(problem: Problem) -> tuple[list[Array], list[Array]]:
-    """Two Gauss-Newton steps on the start values alone: residuals (R, Y) and Jacobians (R, Y, U)."""
+def _free(model: Model, name: str) -> bool:
+    p = model.parameters[name]
+    near = 1e-6 * max(1.0, abs(p.value))
+    return p.min + near < p.value < p.max - near
+
+
+def settle_starts(problem: Problem) -> tuple[Array, tuple[Trajectory, ...]]:
+    """Two Gauss-Newton steps on the start values alone: unknowns (U,) and the free runs there."""
     theta = problem.start
     starts = [i for i, u in enumerate(problem.unknowns) if u.is_nuisance]
-    for last in (False, False, True):
-        trajectories = [problem.run(system, theta) for system in problem.systems]
-        residuals = [problem.residual(t) for t in trajectories]
-        jacobians = [problem.jacobian(t) for t in trajectories]
-        if last or not starts:
-            break
-        information, pull = prior_information(problem)[np.ix_(starts, starts)], np.zeros(len(starts))
-        pull -= np.diag(information) * (theta - problem.start)[starts]
-        for residual, jacobian in zip(residuals, jacobians, strict=True):
+    for _ in range(2 if starts else 0):
+        information = np.diag(_spreads_of_starts(problem)[starts] ** -2.0)
+        pull = -np.diag(information) * (theta - problem.start)[starts]
+        for system in problem.systems:
+            trajectory = problem.run(system, theta)
+            residual = problem.residual(trajectory)
             seen = np.isfinite(residual)
-            rows = jacobian[seen][:, starts]
+            rows = problem.jacobian(trajectory)[seen][:, starts]
             information = information + rows.T @ rows
             pull += rows.T @ residual[seen]
         theta = theta.copy()
         theta[starts] += np.linalg.solve(information, pull)
-    return residuals, jacobians
+    return theta, tuple(problem.run(system, theta) for system in problem.systems)
 
 
-def prior_information(problem: Problem) -> Array:
-    """(U, U) of start values before any reading; a little for the rest, so that it can be inverted."""
-    sizes = [1.0 / u.prior[1] ** 2 if u.prior else 1e-12 / max(u.start**2, 1e-6) for u in problem.unknowns]
-    return np.diag(np.array(sizes))
+def _spreads_of_starts(problem: Problem) -> Array:
+    """(U,) standard deviations of what is known before any reading, one where nothing is."""
+    return np.array([u.prior[1] if u.prior else 1.0 for u in problem.unknowns])
 
 
-def _read(campaign: Campaign, recordings: Sequence[str], name: str) -> bool:
+def _likely(seen: Whitened, white: Noise, floor: Mapping[str, float]) -> Noise:
+    """The most likely noise on the ladders, all steps as likely before; what the readings do not determine is
+    integrated out.
+    """
+    ladders = (HEATS, SHARES, SLOW, FORMS, EDGES)
+
+    def noise(at: tuple[int, ...]) -> Noise:
+        heat, share, slow, form, edge = (ladder[k] for ladder, k in zip(ladders, at, strict=True))
+        return replace(
+            white,
+            slow=tuple(slow * w for w in white.white),
+            heat={name: heat * value for name, value in floor.items()},
+            share=share,
+            form=form,
+            edge=edge,
+        )
+
+    known: dict[tuple[int, ...], float] = {}
+
+    def level(at: tuple[int, ...]) -> float:
+        if at not in known:
+            known[at] = seen.grams(noise(at)).level()
+        return known[at]
+
+    best = tuple(len(ladder) // 2 for ladder in ladders)
+    while True:
+        near = [
+            (*best[:k], best[k] + step, *best[k + 1 :])
+            for k, ladder in enumerate(ladders)
+            for step in (-1, 1)
+            if 0 <= best[k] + step < len(ladder)
+        ]
+        higher = max(near, key=level)
+        if level(higher) <= level(best):
+            return noise(best)
+        best = higher
+
+
+def _compressed(seen: Whitened, noise: Noise, names: Sequence[str]) -> Array:
+    """Rows (K, 1 + P + E) that say of parameters and form errors what all readings say, start values and
+    other unknowns of the recordings integrated out.
+    """
+    unit, _ = seen.rows(replace(noise, form=1.0, edge=1.0))
+    unknowns = [seen.fit.problem.unknowns[i] for i in seen.moving]
+    count = len(unknowns)
+    place = {u.name: 1 + k for k, u in enumerate(unknowns) if u.recording is None and u.name in names}
+    own = [1 + k for k, u in enumerate(unknowns) if 1 + k not in place.values()]
+    gram = unit.T @ unit
+    if own:
+        inner = gram[np.ix_(own, own)] + seen.prior[0][np.ix_(own, own)]
+        gram = gram - gram[:, own] @ np.linalg.pinv(inner, hermitian=True) @ gram[own]
+    kept = [0, *(place[n] for n in names if n in place), *range(1 + count, len(gram))]
+    where = [0, *(1 + names.index(n) for n in names if n in place)]
+    where += list(range(1 + len(names), 1 + len(names) + len(gram) - 1 - count))
+    model = seen.fit.problem.model
+    sd = np.array([UNKNOWN * abs(model.parameters[n].value) for n in names if n in place])
+    scale = np.concatenate([[1.0], sd, np.full(seen.form[0], noise.form), np.full(seen.form[1], noise.edge)])
+    size, axes = np.linalg.eigh(gram[np.ix_(kept, kept)] * np.outer(scale, scale))
+    told = size > SEEN
+    rows = np.zeros((int(told.sum()), 1 + len(names) + len(gram) - 1 - count))
+    inverse = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+    rows[:, where] = np.sqrt(size[told])[:, None] * axes[:, told].T * inverse
+    return rows
+
+
+def _read(campaign: Campaign, recordings: Collection[str], name: str) -> bool:
     return any(
         name in campaign.recordings[r].values and np.isfinite(campaign.recordings[r].values[name]).any()
         for r in recordings

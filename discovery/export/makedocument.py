@@ -7,13 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-import numpy as np
-
 from discovery import __version__
 from discovery.errors import UserError
 from discovery.export.compiled import compile_model
 from discovery.export.document import FORMAT, VERSION
-from discovery.export.knowledge import Knowledge, knowledge
+from discovery.export.knowledge import knowledge
 from discovery.export.ranges import OutputRange, input_range, output_ranges
 from discovery.export.stepper import INTEGRATOR
 from discovery.models import Model, Parameter, State, expanded
@@ -108,7 +106,7 @@ def make_document(
         "states": [_state(state) for state in model.states.values()],
         "terms": [_term(term) for term in model.terms],
         "outputs": [_output(campaign, name, e, limits[name]) for name, e in model.outputs.items()],
-        "knowledge": _knowledge(knowledge(model, campaign, recordings)),
+        "knowledge": knowledge(model, campaign, recordings).document(),
         "provenance": {
             "tool": f"discovery {__version__}",
             "campaign": campaign.name,
@@ -150,17 +148,6 @@ def _term(term: Term) -> dict[str, Any]:
         "from": term.source,
         "expression": text(term.expression),
         "effect": term.effect,
-    }
-
-
-def _knowledge(known: Knowledge) -> dict[str, Any]:
-    """`first`: standard deviations, which do not change when an update changes the covariance."""
-    return {
-        "residual": dict(known.residual),
-        "slow_share": known.slow_share,
-        "parameters": list(known.parameters),
-        "covariance": known.covariance.tolist(),
-        "first": np.sqrt(np.diag(known.covariance)).tolist(),
     }
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from discovery.export.knowledge import Knowledge, knowledge, stretch
+from discovery.errors import UserError
+from discovery.export.knowledge import Knowledge, knowledge, read_knowledge
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import parse
@@ -20,7 +23,7 @@ CHANNELS = {
 COUNT = 400
 TIMES = np.linspace(0.0, 900.0 * (COUNT - 1), COUNT)
 U = np.random.default_rng(5).uniform(1.0, 3.0, COUNT)
-SIGNS = np.tile([1.0, -1.0], COUNT // 2)
+NOISE = np.random.default_rng(9).normal(0.0, 1.0, COUNT)
 
 
 def known(left: dict[str, Array], outputs: dict[str, str], start_sd: float = 0.0, **own: float) -> Knowledge:
@@ -38,51 +41,49 @@ def known(left: dict[str, Array], outputs: dict[str, str], start_sd: float = 0.0
 
 
 def test_a_slope_is_known_as_well_as_regression_says() -> None:
-    found = known({"E": 0.5 * SIGNS}, {"E": "k*u"})
-    assert found.residual == {"E": pytest.approx(0.5)}
-    assert (found.slow_share, found.parameters) == (0.0, ("k",))
-    assert found.covariance == pytest.approx(np.array([[0.25 / np.sum(U**2)]]))
-
-
-def test_a_start_that_nobody_knows_is_found_first_and_costs_certainty() -> None:
-    """3 um beside the line are where the body began: with a free intercept the spread of u alone tells."""
-    found = known({"E": 3.0 + 0.5 * SIGNS}, {"E": "k*u + zero"}, start_sd=100.0)
-    assert found.residual["E"] == pytest.approx(0.5, rel=1e-3)
+    found = known({"E": NOISE}, {"E": "k*u"})
+    assert found.residual == {"E": pytest.approx(np.sqrt(np.mean(NOISE**2)))}
     assert found.parameters == ("k",)
-    assert found.covariance[0, 0] == pytest.approx(0.25 / np.sum((U - U.mean()) ** 2), rel=0.02)
+    assert found.noise is not None
+    assert (found.noise.white, found.noise.slow, found.noise.form) == ((1.0,), (0.0,), 0.0)
+    assert found.rows[:, 1] @ found.rows[:, 1] == pytest.approx(np.sum(U**2))
+    # what the rows say is what the readings say: the same pull on the slope
+    assert found.rows[:, 0] @ found.rows[:, 1] == pytest.approx(NOISE @ U, rel=1e-4)
 
 
-def test_each_error_is_weighed_by_what_it_leaves() -> None:
-    found = known({"E": 0.5 * SIGNS, "F": 2.0 * SIGNS}, {"E": "k*u", "F": "k*u"})
-    assert found.residual == {"E": pytest.approx(0.5), "F": pytest.approx(2.0)}
-    assert found.covariance[0, 0] == pytest.approx(1 / (np.sum(U**2) * (1 / 0.25 + 1 / 4.0)))
+def test_a_start_that_nobody_knows_costs_certainty() -> None:
+    """3 um beside the line are where the body began: with a free intercept only the spread of u informs."""
+    found = known({"E": 3.0 + NOISE}, {"E": "k*u + zero"}, start_sd=100.0)
+    assert found.residual["E"] == pytest.approx(np.std(NOISE), rel=1e-3)
+    about = found.rows[:, 1] @ found.rows[:, 1]
+    assert about == pytest.approx(np.sum((U - U.mean()) ** 2), rel=0.02)
 
 
-@pytest.mark.parametrize(("keep", "share"), [(0.5, 0.5), (1.0, 0.9)])
-def test_what_stays_alike_from_reading_to_reading_widens_it(keep: float, share: float) -> None:
-    """First-order noise by its lag-1 correlation, at most 0.9."""
+def test_slow_noise_is_found_and_costs_certainty() -> None:
     rng, slow = np.random.default_rng(2), np.zeros(COUNT)
     for k in range(1, COUNT):
-        slow[k] = keep * slow[k - 1] + rng.normal(0, 1)
-    found = known({"E": slow}, {"E": "k*u"})
-    assert found.slow_share == pytest.approx(share, abs=0.1 if share < 0.9 else 1e-12)
-    wider = stretch(found.slow_share, TIMES)
-    assert wider > 3.0
-    assert found.covariance[0, 0] == pytest.approx(np.mean(slow**2) * wider / np.sum(U**2))
+        slow[k] = np.exp(-900.0 / 7200.0) * slow[k - 1] + rng.normal(0, 1)
+    found = known({"E": slow + NOISE}, {"E": "k*u"})
+    assert found.noise is not None
+    assert 1.0 < found.noise.slow[0] < 4.5
+    assert np.linalg.norm(found.rows[:, 1]) < np.linalg.norm(U)
 
 
-def test_the_slowest_error_counts() -> None:
-    slow = np.cumsum(np.random.default_rng(2).normal(0, 1, COUNT))
-    for outputs in (("E", "F"), ("F", "E")):
-        assert known({"E": slow, "F": SIGNS}, dict.fromkeys(outputs, "k*u")).slow_share == 0.9
+def test_what_is_written_is_what_is_read() -> None:
+    found = known({"E": NOISE}, {"E": "k*u"})
+    again = read_knowledge("line", json.loads(json.dumps(found.document())))
+    assert again.noise == found.noise
+    assert again.rows == pytest.approx(found.rows, rel=1e-5)
+    with pytest.raises(UserError, match="export it again from its run"):
+        read_knowledge("line", {**found.document(), "noise": None})
 
 
 def test_what_was_not_read_is_not_known() -> None:
-    found = known({"E": 0.5 * SIGNS}, {"E": "k*u", "F": "k*u"})
-    assert found.residual == {"E": pytest.approx(0.5), "F": None}
+    found = known({"E": NOISE}, {"E": "k*u", "F": "k*u"})
+    assert found.residual["F"] is None
     nothing = known({}, {"E": "k*u"})
-    assert (nothing.residual, nothing.parameters, nothing.covariance.shape) == ({"E": None}, (), (0, 0))
+    assert (nothing.residual, nothing.parameters, nothing.noise) == ({"E": None}, (), None)
 
 
 def test_what_belongs_to_one_recording_is_left_out() -> None:
-    assert known({"E": 0.5 * SIGNS}, {"E": "k*u"}, r=2.0).parameters == ()
+    assert known({"E": NOISE}, {"E": "k*u"}, r=2.0).parameters == ()

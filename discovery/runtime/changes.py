@@ -1,0 +1,226 @@
+"""What new readings say of a possible change of a machine, as normal equations.
+
+Around the model at work, the whitened residual of new recordings is
+
+    r = J_p (dp + a) + J_e e + J_s ds + J_c c + J_h h + white noise
+
+The fit left unknown: errors dp of the parameters and form errors e of the laws, as far as its readings say
+(`discovery.export.knowledge`), and start values ds. What may have changed: parameters by a, the sensors of
+inputs by offsets c, and unknown heat h at the bodies. All are Gaussian with mean zero. So what the fit left
+unknown is integrated out once, and the odds of each change are a Gaussian integral in closed form (marginal
+likelihood; Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006, section 2.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics import Trajectory, sensitivities
+from discovery.dynamics.trajectory import flows
+from discovery.evidence.events import heat_steps
+from discovery.evidence.form_error import edge_columns, law_columns
+from discovery.export.knowledge import Knowledge, spreads
+from discovery.fitting.kalman import make_filter
+from discovery.fitting.noise import Noise
+from discovery.fitting.problem import Problem
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+BLOCKS = 192  # in which unknown heat is one number, over all recordings
+
+
+@dataclass(frozen=True)
+class Change:
+    """Something that may have changed: columns of the slopes, and a square root (len(columns), K) of the
+    covariance of their coefficients.
+    """
+
+    columns: Ints
+    root: Array
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Readings with what the fit left unknown integrated out: normal equations (1 + K, 1 + K) of the
+    residual, then of the slopes of what may have changed.
+    """
+
+    gram: Array
+
+    def log_odds(self, change: Change) -> float:
+        """Log of the probability of the readings with a change over that without."""
+        normal, pull = self._normal(change)
+        factor = np.linalg.cholesky(normal)
+        solved = np.linalg.solve(factor, pull)
+        return float(0.5 * solved @ solved - np.log(np.diag(factor)).sum())
+
+    def size(self, change: Change) -> tuple[Array, Array]:
+        """Most likely coefficients (len(columns),) of a change, and their standard deviations."""
+        normal, pull = self._normal(change)
+        inverse = np.linalg.inv(normal)
+        variance = np.einsum("ck,kl,cl->c", change.root, inverse, change.root)
+        return change.root @ (inverse @ pull), np.sqrt(np.maximum(variance, 0.0))
+
+    def _normal(self, change: Change) -> tuple[Array, Array]:
+        at = 1 + change.columns
+        normal = change.root.T @ self.gram[np.ix_(at, at)] @ change.root
+        return normal + np.eye(len(normal)), change.root.T @ self.gram[at, 0]
+
+
+@dataclass(frozen=True)
+class Heat:
+    """Unknown heat at a state in blocks of time: its columns of the slopes, rms flow (b,) through the state
+    in each block, and a square root (b, b) of the correlation of the blocks.
+    """
+
+    columns: Ints
+    flow: Array
+    root: Array
+
+    def change(self, floor: float, share: float) -> Change:
+        """Heat of a usual size: the root of `floor`^2 (W, or a rate) and (`share` times the flow)^2."""
+        return Change(self.columns, np.hypot(floor, share * self.flow)[:, None] * self.root)
+
+    def flow_to(self, other: Heat, floor: float, share: float) -> Change:
+        """Heat of a usual size that leaves this state and enters another; the smaller flow of both counts."""
+        size = np.hypot(floor, share * np.minimum(self.flow, other.flow))[:, None] * self.root
+        return Change(np.concatenate([self.columns, other.columns]), np.concatenate([-size, size]))
+
+
+@dataclass(frozen=True)
+class Table:
+    """Whitened readings (N,) of the fit and of new recordings, with their slopes.
+
+    `base` (N, B): what the fit left unknown, in standard deviations; `slopes` (N, K): of what may have
+    changed, parameters, then offsets of channels, then heat. `age` (N,): how long [s] before the end each was
+    read, zero for the fit.
+    """
+
+    residual: Array
+    base: Array
+    slopes: Array
+    heat: dict[str, Heat]
+    age: Array
+
+    def seen(self, memory: float = np.inf) -> Seen:
+        """With what the fit left unknown integrated out; what was read counts less with its age over `memory`
+        [s].
+        """
+        fade = np.exp(-self.age / memory)[:, None]
+        columns, base = np.column_stack([self.residual, self.slopes]) * fade, self.base * fade
+        factor = np.linalg.cholesky(base.T @ base + np.eye(base.shape[1]))
+        inside = np.linalg.solve(factor, base.T @ columns)
+        return Seen(columns.T @ columns - inside.T @ inside)
+
+
+def make_table(known: Knowledge, problem: Problem, channels: Sequence[str]) -> Table:
+    """What the readings of a problem and of the fit say, whitened with the noise of the fit.
+
+    Args:
+        problem: the model at work on new recordings; start values count as unknown.
+        channels: inputs whose sensors may have an offset.
+
+    Raises:
+        UserError: what is known is of another model.
+    """
+    runs = [problem.run(system, problem.start) for system in problem.systems]
+    starts = [u for u in problem.unknowns if u.is_start]
+    noise = _noise(known, problem.outputs)
+    edges = _block_edges(runs, noise)
+    own, shared = len(known.parameters), len(known.parameters) + len(channels)
+    laws, bounds = law_columns(runs[0], known.scales).shape[2], edge_columns(runs[0]).shape[2]
+    form = laws + bounds
+    states = [name for name, floor in known.floor.items() if floor > 0]
+    blocks = np.cumsum([0, *((len(e) - 1) * len(states) for e in edges)])
+    width = 1 + shared + form + len(starts) + int(blocks[-1])
+    parts, ages, after = [], [], sum(float(run.system.grid.time[-1]) for run in runs)
+    for k, run in enumerate(runs):
+        grid = run.system.grid
+        mine = [i for i, u in enumerate(starts) if u.recording == grid.recording]
+        heat = [-np.diff(heat_steps(run, state, edges[k]), axis=2) for state in states]
+        data = [
+            problem.residual(run)[:, :, None],
+            sensitivities(run, [*known.parameters, *channels]),
+            law_columns(run, known.scales),
+            edge_columns(run),
+            sensitivities(run, (), [starts[i].name for i in mine]),
+            *heat,
+        ]
+        white = make_filter(run).whitened(noise, np.concatenate(data, axis=2))[0]
+        first = 1 + shared + form
+        places = [*range(first), *(first + i for i in mine)]
+        places += range(first + len(starts) + blocks[k], first + len(starts) + blocks[k + 1])
+        parts.append(np.zeros((len(white), width)))
+        parts[-1][:, places] = white
+        rows = np.broadcast_to(grid.time[grid.read][:, None], grid.measured.shape)
+        ages.append(after - rows[grid.measured])
+        after -= float(grid.time[-1])
+    new = np.concatenate(parts)
+    spread = np.concatenate(
+        [spreads(known, problem.model, laws, bounds), [u.prior[1] if u.prior else 1.0 for u in starts]]
+    )
+    moving = [*range(1, 1 + own), *range(1 + shared, 1 + shared + form + len(starts))]
+    fitted = np.zeros((len(known.rows), len(moving)))
+    fitted[:, : own + form] = known.rows[:, 1:]
+    changing = [*range(1, 1 + shared), *range(1 + shared + form + len(starts), width)]
+    return Table(
+        np.concatenate([known.rows[:, 0], new[:, 0]]),
+        np.concatenate([fitted, new[:, moving]]) * spread,
+        np.concatenate([np.zeros((len(fitted), len(changing))), new[:, changing]]),
+        {
+            state: _heat(runs, edges, i, noise.heat_time, shared + blocks, state)
+            for i, state in enumerate(states)
+        },
+        np.concatenate([np.zeros(len(fitted)), *ages]),
+    )
+
+
+def _noise(known: Knowledge, outputs: Sequence[str]) -> Noise:
+    """The noise of the fit, of the outputs that were read now."""
+    assert known.noise is not None
+    at = [known.noise.outputs.index(name) for name in outputs]
+    white = tuple(known.noise.white[k] for k in at)
+    slow = tuple(known.noise.slow[k] for k in at) if known.noise.slow else ()
+    return replace(known.noise, outputs=tuple(outputs), white=white, slow=slow)
+
+
+def _block_edges(runs: Sequence[Trajectory], noise: Noise) -> list[Array]:
+    """Edges (b + 1,) of the blocks of each recording: a quarter of the memory of heat apart, or more."""
+    lasts = [float(run.system.grid.time[-1]) for run in runs]
+    width = max(sum(lasts) / BLOCKS, noise.heat_time / 4)
+    return [np.linspace(0.0, last, 1 + max(1, round(last / width))) for last in lasts]
+
+
+def _heat(
+    runs: Sequence[Trajectory],
+    edges: Sequence[Array],
+    i: int,
+    memory: float,
+    first: Ints,
+    state: str,
+) -> Heat:
+    """Unknown heat at a state, number `i` of those with columns; those of a recording begin at `first`."""
+    columns, flow, count = [], [], sum(len(e) - 1 for e in edges)
+    root, done = np.zeros((count, count)), 0
+    for k, run in enumerate(runs):
+        size = len(edges[k]) - 1
+        columns.append(first[k] + i * size + np.arange(size))
+        time = run.system.grid.time
+        block = np.clip(
+            np.searchsorted(edges[k], 0.5 * (time[1:] + time[:-1]), side="right") - 1, 0, size - 1
+        )
+        weight = np.bincount(block, run.system.grid.step, size)
+        square = np.bincount(
+            block, run.system.grid.step * flows(run)[:, run.system.states.index(state)] ** 2, size
+        )
+        flow.append(np.sqrt(square / np.maximum(weight, 1e-300)))
+        lag = np.abs(np.subtract.outer(edges[k][:-1], edges[k][:-1]))
+        own = slice(done, done + size)
+        root[own, own] = np.linalg.cholesky(np.exp(-lag / memory) + 1e-9 * np.eye(size))
+        done += size
+    return Heat(np.concatenate(columns), np.concatenate(flow), root)
