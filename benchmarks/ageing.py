@@ -1,21 +1,25 @@
 """Does `discovery update` say what happened? Unchanged machines, wear, a faulty sensor, and new physics.
 
-    python benchmarks/ageing.py [first seed] [recordings]
+    python benchmarks/ageing.py [first seed] [recordings] [file that keeps what is done]
 
 Part one: recordings of an unchanged machine, each compared alone: how many would write a revision. Part two:
 the five cases of an outside review, three recordings of 72 h each, with all readings and with eight a day.
 Part three: days on which losses fall by 1 % each, an update every day with eight readings since the last
 revision; the error is judged on all readings of the next day, which no update has seen.
+
+With a file, a run that was stopped goes on where it was; without one it begins anew.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,24 +82,52 @@ def sealed(model: Model, campaign: Campaign) -> Exported:
     return from_document(*open_seal(render(make_document(model, campaign, ["fit"])), "model"), "model")
 
 
-def unchanged(exported: Exported, campaign: Campaign, first: int, count: int) -> None:
+@dataclass
+class Done:
+    """Results by name, in a file that a later run reads."""
+
+    path: Path | None
+    results: dict[str, list[str | float]] = field(default_factory=dict)
+
+    def __call__(self, name: str, ask: Callable[[], list[str | float]]) -> list[str | float]:
+        """A result: the one that is kept, else a new one."""
+        if name not in self.results:
+            self.results[name] = ask()
+            if self.path:
+                self.path.write_text(json.dumps(self.results, indent=0))
+        return self.results[name]
+
+
+def unchanged(exported: Exported, campaign: Campaign, first: int, count: int, done: Done) -> None:
     """How often an unchanged machine would be changed."""
     for title, hours, readings, cycle in (
         ("24 h, eight readings", 24.0, 8, "fit"),
         ("24 h, all readings", 24.0, None, "fit"),
         ("72 h, all readings, other cycle", 72.0, None, "validation"),
     ):
-        verdicts: Counter[str] = Counter()
-        most = -np.inf
-        for k in range(count):
-            one = recorded(campaign, 1, hours, first + k, readings=readings, cycle=cycle)
+
+        def asked(
+            seed: int, hours: float = hours, readings: int | None = readings, cycle: str = cycle
+        ) -> list[str | float]:
+            one = recorded(campaign, 1, hours, seed, readings=readings, cycle=cycle)
             found = compare(exported, one, ["r0"])
-            verdicts[found.verdict] += 1
-            most = max(most, *(v for n, v in found.odds.items() if n != "nothing"))
-        print(f"unchanged, {title}: {dict(verdicts)} of {count}; largest log odds {most:.1f}", flush=True)
+            signed = revision_of(exported, one, found) is not None
+            most = max(v for n, v in found.odds.items() if n != "nothing")
+            return [found.verdict + (", revision" if signed else ""), found.odds["wear"], most]
+
+        rows = [
+            done(f"{title}, {seed}", lambda seed=seed: asked(seed))  # type: ignore[misc]
+            for seed in range(first, first + count)
+        ]
+        wear, most = (max(float(row[k]) for row in rows) for k in (1, 2))
+        print(
+            f"unchanged, {title}: {dict(Counter(row[0] for row in rows))} of {count}; "
+            f"largest log odds {most:.1f}, of wear {wear:.1f}",
+            flush=True,
+        )
 
 
-def cases(exported: Exported, campaign: Campaign, seed: int) -> None:
+def cases(exported: Exported, campaign: Campaign, seed: int, done: Done) -> None:
     """The five cases of the review."""
 
     def warm(values: Values) -> None:
@@ -107,17 +139,24 @@ def cases(exported: Exported, campaign: Campaign, seed: int) -> None:
     hysteresis = (Request("cooling_hysteresis", 1.5, ("c_body_2",)),)
     for readings in (None, 8):
         given = "all readings" if readings is None else f"{readings} readings a day"
-        for title, options in (
+        changes: tuple[tuple[str, dict[str, Any]], ...] = (
             ("flooded gap 25 W/K", {"effects": gap}),
             ("fan, air +60 %", {"plant": fan}),
             ("room sensor +1.5 K", {"spoil": warm}),
             ("hysteresis 1.5 K", {"effects": hysteresis}),
             ("wear, losses -10 %", {"effects": worn(0.9)}),
-        ):
-            these = recorded(campaign, 3, 72.0, seed, readings=readings, **options)
-            found = compare(exported, these, list(these.recordings))
-            signed = revision_of(exported, these, found) is not None
-            print(f"{title}, {given}: {found}; {'revision' if signed else 'no revision'}", flush=True)
+        )
+        for title, options in changes:
+
+            def asked(
+                readings: int | None = readings, options: dict[str, Any] = options
+            ) -> list[str | float]:
+                these = recorded(campaign, 3, 72.0, seed, readings=readings, **options)
+                found = compare(exported, these, list(these.recordings))
+                signed = revision_of(exported, these, found) is not None
+                return [f"{found}; {'revision' if signed else 'no revision'}"]
+
+            print(f"{title}, {given}: {done(f'{title}, {given}', asked)[0]}", flush=True)
 
 
 def error_left(model: Model, campaign: Campaign) -> float:
@@ -150,16 +189,18 @@ def days(exported: Exported, campaign: Campaign, seed: int, count: int) -> None:
     )
 
 
-def main(seed: int, count: int) -> None:
+def main(seed: int, count: int, kept: Path | None = None) -> None:
     """Print all three parts."""
     began = time.perf_counter()
+    done = Done(kept, json.loads(kept.read_text()) if kept and kept.is_file() else {})
     campaign = load_campaign(DATA / "campaign.toml", only=["fit"])
     exported = sealed(fit_model(read_model(DATA / "thermobalance.toml"), campaign, ["fit"]).model, campaign)
-    unchanged(exported, campaign, seed, count)
-    cases(exported, campaign, seed + 1000)
+    unchanged(exported, campaign, seed, count, done)
+    cases(exported, campaign, seed + 1000, done)
     days(exported, campaign, seed + 2000, 30)
     print(f"{time.perf_counter() - began:.0f} s")
 
 
 if __name__ == "__main__":
-    main(*(int(word) for word in (sys.argv[1:] + ["9000", "60"][len(sys.argv) - 1 :])))
+    words = sys.argv[1:] + ["9000", "60"][len(sys.argv) - 1 :]
+    main(int(words[0]), int(words[1]), *(Path(word) for word in words[2:3]))

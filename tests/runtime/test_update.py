@@ -191,7 +191,8 @@ def test_mistakes_are_sentences(machine: Campaign, at_work: Path, exported: Expo
     with pytest.raises(UserError, match="holds no reading"):
         update_file(at_work, blind, ["d0"], tmp_path / "new.json")
     former = {"covariance": [[1.0]], "first": [1.0], "slow_share": 0.5}  # what version 0.2 kept
-    for own in ({"parameters": []}, {"parameters": ["hA_b1"], **former}):
+    cases: list[dict[str, object]] = [{"parameters": []}, {"parameters": ["hA_b1"], **former}]
+    for own in cases:
         unknown = {"residual": exported.document["knowledge"]["residual"], **own}
         write_document(tmp_path / "unknown.json", {**exported.document, "knowledge": unknown})
         with pytest.raises(UserError, match="how well its parameters are known"):
