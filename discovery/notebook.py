@@ -23,9 +23,15 @@ class RunResults:
 
     Args:
         folder: of a finished `discovery run`, for example "runs/tclab".
+
+    Raises:
+        UserError: no results in the folder.
     """
 
     folder: Path
+
+    def __post_init__(self) -> None:
+        read_results(Path(self.folder))
 
     def __fspath__(self) -> str:
         return str(self.folder)
@@ -36,11 +42,7 @@ class RunResults:
         return Path(self.folder) / "report.html"
 
     def summary(self) -> str:
-        """What the command prints: rms of each model on each recording, notes, the place of the report.
-
-        Raises:
-            UserError: no results in the folder.
-        """
+        """What the command prints: rms of each model on each recording, notes, the place of the report."""
         from discovery.experiment.summary import summary
 
         return "\n".join(summary(Path(self.folder)))
