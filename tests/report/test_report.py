@@ -157,7 +157,7 @@ def test_kelvins_and_micrometres_are_not_mixed(tmp_path: Path, together: bool) -
     assert (
         "Its rms is 0.3 K and 0.64 µm (median rms over 3 outputs and 1 recording; largest: 0.4 K and" in page
     )
-    assert "rms [K, µm], over all outputs of a unit" in page
+    assert "rms [K, µm], held-out recordings, over all outputs of a unit" in page
     assert f"{float(np.sqrt((0.2**2 + 0.4**2) / 2)):.3f}, 0.64<" in page
     assert "T_head [K]" in page
     assert "dZ [µm]" in page
@@ -448,6 +448,28 @@ def test_runs_of_two_machines_are_listed_but_their_models_are_not_mixed(folder: 
     write_report(other)
     page = write_comparison(runs, tmp_path).read_text("utf-8")
     assert 'href="machine/report.html"' in page
+
+
+def test_many_recordings_are_one_table_in_the_terminal(tmp_path: Path) -> None:
+    both = [tmp_path / name for name in ("first", "second")]
+    for run in both:
+        path = sample.write_sample(run) / "results.json"
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"experiment": run.name}))
+    few = "\n".join(comparison(load_runs(both)))
+    assert "Recording 'validation' (held out)" in few
+    copies = [f"validation {k}" for k in range(8)]
+    for run in both:
+        path = run / "results.json"
+        results = json.loads(path.read_text())
+        for model in results["models"].values():
+            model["recordings"] |= dict.fromkeys(copies, model["recordings"]["validation"])
+        path.write_text(json.dumps(results | {"held_out": ["validation", *copies]}))
+        for name in copies:
+            shutil.copy(run / "predictions" / "validation.csv", run / "predictions" / f"{name}.csv")
+    many = "\n".join(comparison(load_runs(both)))
+    assert "Recording 'validation" not in many
+    assert "Removed rms [%], held-out recordings, geometric mean over all errors" in many
+    assert re.search(r"discovered, second .* 0 %", many)
 
 
 def test_runs_of_several_machines_are_compared_machine_by_machine(tmp_path: Path) -> None:
