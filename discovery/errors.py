@@ -1,4 +1,4 @@
-"""The one exception that a user sees, and two kinds of it that callers have to distinguish."""
+"""The exception that a user sees, and two kinds of it that callers have to distinguish."""
 
 
 class UserError(Exception):
@@ -10,8 +10,8 @@ class UserError(Exception):
 
 
 class UsageError(UserError):
-    """Words or options of a command that no file could make right; the command line ends with status 2."""
+    """Wrong words or options of a command, whatever the files hold; the command line ends with status 2."""
 
 
 class RunsAwayError(UserError):
-    """A free run of a model does not stay finite; where models are compared, the others are shown as ever."""
+    """A free run of a model does not stay finite. A comparison still shows the other models."""

@@ -43,21 +43,23 @@ def discover(
     channels: Channels | None = None,
     **options: Any,
 ) -> SparseDiscovery:
-    """A sparse model of some columns of frames, driven by the others.
+    """Discover a sparse model of some columns of frames; the other columns are its inputs.
 
     Args:
-        frames: recordings by name, or a single one; the index is time (seconds, or a DatetimeIndex), NaN
-        means "not
-            measured then".
-        outputs: columns that are to be predicted.
-        channels: column -> {"role": ..., "unit": ...} as in a campaign file; a column without an entry is
-            another input or output without a unit.
+        frames: recordings by name, or a single one. The index is time (seconds, or a DatetimeIndex); NaN
+            means that nothing was measured at that time.
+        outputs: columns that the model predicts.
+        channels: column -> {"role": ..., "unit": ...} as in a campaign file; default roles are "other input"
+            and "other output", without a unit.
         options: as in an experiment file (`form`, `library`, `bounds`, `keep`, `optimiser`, ...); `optimiser`
             may also be an optimiser of PySINDy, as in `pysindy.STLSQ(threshold=0.05)`, or an object of your
             own class derived from `pysindy.optimizers.BaseOptimizer`.
 
+    Returns:
+        The fitted estimator.
+
     Raises:
-        UserError: a column that is missing, an option that does not fit.
+        UserError: a column is missing, or an option does not fit.
     """
     recordings = dict(frames) if isinstance(frames, Mapping) else {"recording": frames}
     if not recordings:
@@ -81,21 +83,21 @@ def _is_text(one: Any) -> bool:
 
 
 class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
-    """Sparse dynamics of outputs y driven by inputs X: `fit`, `predict`, `score`, `coefficients`, `summary`.
+    """Sparse dynamics of outputs y driven by inputs X, as a scikit-learn estimator.
 
-    X and y are frames or arrays with a row for each instant. The index of a frame is time; with two levels
-    it is (recording, time). Rows of an array are `step` seconds apart. A frame keeps its time in the folds
-    of `GridSearchCV`, an array does not: cut it with `TimeSeriesSplit`.
+    X and y are frames or arrays with a row for each instant. The index of a frame is time, or (recording,
+    time). Rows of an array are `step` seconds apart. In the folds of `GridSearchCV`, a frame keeps its time
+    and an array does not: use `TimeSeriesSplit` for arrays.
 
     Args:
-        channels: column -> {"role": ..., "unit": ...}; default inputs and outputs without unit.
-        step: s between rows of an array.
+        channels: column -> {"role": ..., "unit": ...}; default inputs and outputs without a unit.
+        step: time between two rows of an array [s].
         form, library, max_terms, time_constants, hidden, stable, keep, forbid, bounds, optimiser,
             optimiser_arguments, tolerance, bootstraps, seed: as in an experiment file.
 
     Attributes:
-        model_: the model, with 95 % intervals of its numbers.
-        discovery_: path, stability, costs of terms.
+        model_: the fitted model; its parameters have 95 % intervals.
+        discovery_: the path of the search, and stability and cost of each term.
     """
 
     def __init__(
@@ -138,7 +140,7 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """Discover a model of y (T,) or (T, outputs) driven by X (T, inputs).
 
         Raises:
-            UserError: X and y of different length, an option or a channel that does not fit.
+            UserError: X and y differ in length, or an option or a channel does not fit.
         """
         x, z = _framed(X, self.step, "x"), _framed(y, self.step, "y")
         if len(x) != len(z):
@@ -156,11 +158,18 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return self
 
     def predict(self, X: Any, first: Any = None) -> Array:
-        """Free run as an array (T,), or (T, outputs) for several: no reading is used but the first one, where
-        it is given.
+        """Run the model freely: only the first reading is used, if it is given.
 
         Args:
-            first: (outputs,) reading at the first instant of each recording; default that of the fit.
+            X: (T, inputs).
+            first: (outputs,) readings at the first instant, or (recordings, outputs); default those of the
+                fit.
+
+        Returns:
+            (T,), or (T, outputs) for several outputs.
+
+        Raises:
+            UserError: X has other columns than in the fit.
         """
         check_is_fitted(self, "model_")
         x = _framed(X, self.step, "x")
@@ -174,7 +183,7 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return out[:, 0] if out.shape[1] == 1 else out
 
     def score(self, X: Any, y: Any, sample_weight: Any = None) -> float:
-        """R2 of free runs that begin at the first reading of each recording, mean over outputs."""
+        """Return R2 of free runs from the first reading of each recording, as a mean over the outputs."""
         from sklearn.metrics import r2_score
 
         z = _framed(y, self.step, "y")
@@ -186,7 +195,7 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return float(r2_score(readings[known], predicted[known], sample_weight=weight))
 
     def coefficients(self) -> pd.DataFrame:
-        """Value, 95 % interval and unit of each number of the model."""
+        """Return a row for each parameter of the model: value, low and high (95 % interval), unit."""
         import pandas as pd
 
         check_is_fitted(self, "model_")
@@ -197,12 +206,12 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "low", "high", "unit"])
 
     def to_frame(self) -> pd.DataFrame:
-        """The coefficients, under the name that other results have for their table."""
+        """Return the coefficients; other results have their table under this name."""
         return self.coefficients()
 
     def plot(self) -> Figure:
-        """Error against size: the rms of each model that the search tried, by its number of terms; the chosen
-        one is marked.
+        """Plot the rms of each model that the search tried against its number of terms; mark the chosen
+        one.
         """
         from matplotlib.figure import Figure
 
@@ -223,14 +232,14 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return figure
 
     def equations(self) -> list[str]:
-        """A line for each state and output."""
+        """Return the equations of the model: a line for each state and output."""
         check_is_fitted(self, "model_")
         return equations(self.model_)
 
     def summary(self) -> str:
-        """Equations, numbers with intervals, and what each term costs: a page of text."""
+        """Return a page of text: equations, parameters with intervals, and the cost of each term."""
         table = self.coefficients()
-        lines = ["Equations", *(f"  {line}" for line in self.equations()), "", "Numbers (95 % interval)"]
+        lines = ["Equations", *(f"  {line}" for line in self.equations()), "", "Parameters (95 % interval)"]
         for name, p in self.model_.parameters.items():
             known = p.low is not None and p.high is not None
             interval = f"[{p.low:.4g}, {p.high:.4g}]" if known else "fixed" if p.fixed else "not determined"

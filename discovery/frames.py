@@ -26,11 +26,14 @@ if TYPE_CHECKING:
 def campaign_from_frames(
     frames: Mapping[str, pd.DataFrame], channels: Mapping[str, Mapping[str, Any]], name: str = "notebook"
 ) -> Campaign:
-    """A campaign of pandas frames.
+    """Make a campaign from pandas frames.
 
     Args:
-        frames: recordings by name; the index is time (seconds, or a DatetimeIndex), NaN is "not measured".
-        channels: column -> {"role": ..., "unit": ...} as in a campaign file; further columns are left out.
+        frames: recordings by name; the index is time (seconds, or a DatetimeIndex), NaN means "not measured".
+        channels: column -> {"role": ..., "unit": ...} as in a campaign file; other columns are not used.
+
+    Returns:
+        The campaign, in canonical units.
 
     Raises:
         UserError: an unknown role or unit, a column that is missing, an index that does not run forward.
@@ -78,7 +81,11 @@ def _seconds(key: str, frame: pd.DataFrame) -> NDArray[np.float64]:
 
 
 def recording_frame(campaign: Campaign, recording: str) -> pd.DataFrame:
-    """A recording as a frame: index time [s], a column for each channel in its canonical unit."""
+    """Return a recording as a frame: index time [s], a column for each channel in its canonical unit.
+
+    Raises:
+        UserError: no such recording.
+    """
     import pandas as pd
 
     data = campaign.recordings[recording]
@@ -88,8 +95,16 @@ def recording_frame(campaign: Campaign, recording: str) -> pd.DataFrame:
 def prediction_frame(
     model: Model, campaign: Campaign, recording: str, outputs: Sequence[str]
 ) -> pd.DataFrame:
-    """Free run of a model on a recording: index time [s] of the readings, for each output NAME the reading,
-    what the model predicts (NAME|model) and what is left over (NAME|left)."""
+    """Run a model freely on a recording.
+
+    Returns:
+        A frame with the index time [s] of the readings. Each output NAME has three columns: the reading
+        (NAME), the prediction (NAME|model) and the residual, reading minus prediction (NAME|left).
+
+    Raises:
+        UserError: no such recording or channel.
+        RunsAwayError: the model does not stay finite.
+    """
     import pandas as pd
 
     from discovery.dynamics import predict

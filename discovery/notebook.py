@@ -23,9 +23,15 @@ class RunResults:
 
     Args:
         folder: of a finished `discovery run`, for example "runs/tclab".
+
+    Raises:
+        UserError: no results in the folder.
     """
 
     folder: Path
+
+    def __post_init__(self) -> None:
+        read_results(Path(self.folder))
 
     def __fspath__(self) -> str:
         return str(self.folder)
@@ -36,17 +42,13 @@ class RunResults:
         return Path(self.folder) / "report.html"
 
     def summary(self) -> str:
-        """What the command prints: rms of each model on each recording, notes, the place of the report.
-
-        Raises:
-            UserError: no results in the folder.
-        """
+        """Return what the command prints: rms of each model, notes, and the place of the report."""
         from discovery.experiment.summary import summary
 
         return "\n".join(summary(Path(self.folder)))
 
     def to_frame(self) -> pd.DataFrame:
-        """Errors of free runs: a row for each recording, model and output.
+        """Return the errors of free runs: a row for each recording, model and output.
 
         Columns: recording, part ("fit" or "held_out"), model, output, unit, rms, peak (P_V), mean (M_V),
         variance (Q_M); `model` is "uncompensated" for the readings themselves.
@@ -68,7 +70,10 @@ class RunResults:
         return pd.DataFrame(rows, columns=["recording", "part", "model", "output", "unit", *CRITERIA])
 
     def plot(self, recording: str | None = None) -> Figure:
-        """Readings and predictions of a recording, a panel for each output; default the first held-out one.
+        """Plot readings and predictions of a recording, with a panel for each output.
+
+        Args:
+            recording: default the first held-out one.
 
         Raises:
             UserError: no such recording.
@@ -103,14 +108,14 @@ class RunResults:
 
 
 def run(experiment: Path | str, out: Path | str | None = None) -> RunResults:
-    """Do what an experiment file says, as `discovery run` does: fit, discover, compare, diagnose, report.
+    """Run an experiment file, as `discovery run` does: fit, discover, compare, diagnose, report.
 
     Args:
         experiment: the experiment file.
-        out: folder of the results; default runs/<experiment name>.
+        out: folder for the results; default runs/<experiment name>.
 
     Raises:
-        UserError: a mistake in a file, a model that cannot be fitted.
+        UserError: a mistake in a file, or a model that cannot be fitted.
     """
     from discovery.experiment import run as run_experiment
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from pydantic import BaseModel
 
 from discovery import __version__, limits
 from discovery.diagnosis import thresholds
@@ -35,15 +36,16 @@ def blocks(page: str, language: str) -> list[str]:
 @pytest.mark.parametrize("text", [text for page in PAGES for text in blocks(page, "toml")])
 def test_a_file_that_a_page_shows_has_keys_that_exist(text: str) -> None:
     given = tomllib.loads(text)
+    form: type[BaseModel] = ExperimentForm
+    content = EXPERIMENT | given
     if "url" in given:
-        ConnectionForm.model_validate(given)
+        form, content = ConnectionForm, given
     elif "states" in given:
-        ModelForm.model_validate(given)
+        form, content = ModelForm, given
     elif all(isinstance(one, dict) and "role" in one for one in given.values()):
         recordings = {"a": {"file": "a.csv"}}
-        CampaignForm.model_validate({"name": "x", "channels": given, "recordings": recordings})
-    else:
-        ExperimentForm.model_validate(EXPERIMENT | given)
+        form, content = CampaignForm, {"name": "x", "channels": given, "recordings": recordings}
+    assert form.model_validate(content).model_fields_set == set(content)
 
 
 def small(seed: int, count: int = 150) -> pd.DataFrame:

@@ -111,3 +111,5 @@ def test_a_run_shows_itself(tmp_path: Path) -> None:
     assert "first" in results._repr_html_()
     with pytest.raises(UserError, match="no recording 'x'"):
         results.plot("x")
+    with pytest.raises(UserError, match=r"no results\.json there; name the folder of a finished"):
+        discovery.RunResults(tmp_path)

@@ -63,7 +63,7 @@ class Diagnosis:
 
     @property
     def repaired(self) -> Model | None:
-        """The model with what was named, fitted and written plainly; None where nothing is named."""
+        """The model with the named effects, fitted and in plain form; None if nothing is named."""
         return written(self.after.model, [n.hypothesis for n in self.verdict.named]) if self.after else None
 
     @property
@@ -74,8 +74,10 @@ class Diagnosis:
         return explained(self.held_out)
 
     def interval(self, h: Hypothesis, name: str) -> tuple[float | None, float | None]:
-        """95 % interval of a parameter of what was named: of the diagnosis and of the fit that goes out,
-        which need not agree, each wider by what a law slightly off in form leaves open.
+        """95 % interval of a parameter of a named effect.
+
+        It covers the interval of the diagnosis and that of the fitted repaired model, which may differ. Each
+        is wider than in its fit, because the form of the law may be slightly wrong.
         """
         assert self.after is not None
         p = self.after.model.parameters[name]
@@ -87,25 +89,25 @@ class Diagnosis:
         return None if low is None else max(low, p.min), None if high is None else min(high, p.max)
 
     def document(self) -> DiagnosisDocument:
-        """The content of diagnosis.json, contract section 6."""
+        """Return the content of diagnosis.json; `docs/mismatch.md` describes its keys."""
         from discovery.diagnosis.document import document
 
         return document(self)
 
     def summary(self) -> str:
-        """What the command prints: verdict, effects with sizes, rivals, proof, next experiment."""
+        """Return what the command prints: verdict, effects with sizes, rivals, proof, next experiment."""
         from discovery.diagnosis.summary import lines_of
 
         return "\n".join(lines_of(self.document().model_dump()))
 
     def to_frame(self) -> pd.DataFrame:
-        """A row for each parameter of each named effect, with its 95 % interval."""
+        """Return a row for each parameter of each named effect, with its 95 % interval."""
         from discovery.diagnosis.shown import to_frame
 
         return to_frame(self.document())
 
     def plot(self) -> Figure:
-        """rms of free runs before and after the repair, for fitted and held-out recordings."""
+        """Plot the rms of free runs before and after the repair, for fitted and held-out recordings."""
         from discovery.diagnosis.shown import plot
 
         return plot(self.document())
@@ -128,20 +130,23 @@ def diagnose(
     fitted: Fit | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
-    """Find what a model leaves out.
+    """Find the physics that a model leaves out; `docs/mismatch.md` describes the method.
 
     Args:
-        model: the baseline, start values as its author believes them.
-        fit: recordings that fits and searches see.
-        held_out: recordings for the proof at the end, touched by nothing before.
+        model: the model to diagnose; its start values are beliefs of its author.
+        fit: recordings for fits and searches.
+        held_out: recordings for the proof; nothing else uses them.
         outputs: measured channels; default all that model and campaign share.
-        effects: entries added to the catalogue's, or replacing those of the same word.
-        physical: the start values of the model are an engineer's beliefs (not those of a builder).
-        fitted: the baseline as an experiment has fitted it already.
-        tell: receives what begins.
+        effects: further effects; one with the same word replaces that of the catalogue.
+        physical: whether an engineer chose the start values of the model (not a program).
+        fitted: the fit of the model, if there is one already.
+        tell: is called with a few words when a step begins.
+
+    Returns:
+        Verdict, named effects, rivals, location and proof.
 
     Raises:
-        UserError: a model that does not run, or recordings without readings.
+        UserError: the model predicts no measured channel or does not run, or the recordings have no readings.
     """
     from discovery.design.question import ask  # it asks about what is found here
 

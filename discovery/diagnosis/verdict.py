@@ -229,8 +229,8 @@ def _coarse(found: Search) -> tuple[str, ...]:
 def _apart(found: Search, answer: Scored, rest: Sequence[Named]) -> tuple[str, ...]:
     """A sentence for each effect of the answer that is not sure enough to be named."""
     return tuple(
-        f"{n.hypothesis.effect.word} at {n.hypothesis.where} is possible (probability {n.probability:.2f}, "
-        f"log evidence {_added(found, answer, n.hypothesis):.0f})"
+        f"{n.hypothesis.effect.word} at {n.hypothesis.where} is possible but not sure enough to be named "
+        f"(probability {n.probability:.2f}, log evidence {_added(found, answer, n.hypothesis):.0f})"
         for n in rest
     )
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from statistics import median
 from typing import Any
 
 from discovery.evaluation.paper import EQUATION, TABLE_1, TABLE_1_COLUMNS, TABLE_3
 
 CRITERIA = {"peak": "P_V", "mean": "M_V", "variance": "Q_M"}
+_MOST_RECORDINGS = 6  # with a column each
+_SMALL_HEAT = 0.1  # MJ
 
 
 @dataclass(frozen=True)
@@ -75,19 +78,37 @@ def table_3(
 
 
 def budget_tables(found: Mapping[str, Any]) -> tuple[Table, ...]:
-    """Heat by term and fluid by recording, a column for each recording."""
-    recordings = list(found)
-    terms = list(dict.fromkeys(t for one in found.values() for t in one["entering"]))
-    rows: list[tuple[str | float | None, ...]] = [
-        (t, *(found[r]["entering"].get(t) for r in recordings)) for t in terms
+    """Heat by term, and what the fluid did: a column for each recording; of many, the smallest value, the
+    median and the largest one.
+    """
+    each = list(found.values())
+    terms = dict.fromkeys(t for one in each for t in one["entering"])
+    heat = {t: [one["entering"].get(t) for one in each] for t in terms}
+    heat["stored in the bodies"] = [sum(one["stored"].values()) for one in each]
+    heat["entered, not stored"] = [one["gap"] for one in each]
+    largest = max((abs(v) for row in heat.values() for v in row if v is not None), default=0.0)
+    scale, unit = (1.0, "MJ") if largest >= _SMALL_HEAT else (1e3, "kJ")
+    fluid = {
+        k: [one["fluid"].get(k) for one in each]
+        for k in dict.fromkeys(k for one in each for k in one["fluid"])
+    }
+    few = len(each) <= _MOST_RECORDINGS
+    head = tuple(found) if few else (f"smallest of {len(each)} recordings", "median", "largest")
+
+    def row(name: str, values: Sequence[float | None], times: float = 1.0) -> tuple[str | float | None, ...]:
+        scaled = [None if v is None else times * v for v in values]
+        known = [v for v in scaled if v is not None]
+        return (name, *(scaled if few else (min(known), median(known), max(known))))
+
+    tables = [
+        Table(
+            f"Heat into the bodies [{unit}]",
+            ("Term", *head),
+            tuple(row(t, v, scale) for t, v in heat.items()),
+        )
     ]
-    rows.append(("stored in the bodies", *(sum(found[r]["stored"].values()) for r in recordings)))
-    rows.append(("entered, not stored", *(found[r]["gap"] for r in recordings)))
-    fluid = list(dict.fromkeys(k for one in found.values() for k in one["fluid"]))
-    tables = [Table("Heat into the bodies [MJ]", ("Term", *recordings), tuple(rows))]
     if fluid:
-        lines = tuple((k, *(found[r]["fluid"].get(k) for r in recordings)) for k in fluid)
-        tables.append(Table("Cutting fluid", ("Quantity", *recordings), lines))
+        tables.append(Table("Cutting fluid", ("Quantity", *head), tuple(row(k, v) for k, v in fluid.items())))
     return tuple(tables)
 
 

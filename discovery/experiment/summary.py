@@ -10,22 +10,23 @@ from typing import Any
 from discovery.evaluation.rolematrix import matrix
 from discovery.evaluation.tables import Table, as_text
 from discovery.models.units import differences
-from discovery.report.compare import groups, labels_of, shared_recordings
-from discovery.report.run import Run
+from discovery.report.compare import groups, labels_of, merged, shared_recordings
+from discovery.report.printed import Printed
+from discovery.report.printed import summary as all_held_out
+from discovery.report.run import Run, load_run
 from discovery.report.runlist import run_list
 from discovery.runfolder import read_results
 
 MOST_NOTES = 5  # of a model, in the terminal
 _MOST_TABLES = 4  # runs whose models are printed one by one
+_MOST_RECORDINGS = 6  # with a table each
 _PARTS = {"fitted": "fit", "held out": "held_out"}
 
 
 def summary(folder: Path) -> Iterator[str]:
-    """rms of each model on each recording, the notes, and where the report is."""
+    """rms of each model, on each recording or over many, the notes, and where the report is."""
     results = read_results(folder)
-    for recording in (*results["fit"], *results["held_out"]):
-        yield as_text(rms_table({"": results}, recording))
-        yield ""
+    yield from _rms(load_run(folder), {"": results}, (*results["fit"], *results["held_out"]))
     if roles := results.get("role_matrix"):
         for error in results["outputs"]:
             yield as_text(matrix(roles, error, differences(results["units"].get(error, ""))))
@@ -71,9 +72,23 @@ def comparison(runs: Sequence[Run]) -> Iterator[str]:
         yield "These runs share no recording, so their models are not compared side by side."
     for of in together:
         results = {labels[k]: runs[k].results for k in of}
-        for recording in shared_recordings([runs[k] for k in of]):
-            yield as_text(rms_table(results, recording))
-            yield ""
+        yield from _rms(merged(runs, Path(), of), results, shared_recordings([runs[k] for k in of]))
+
+
+def _rms(run: Run, results: Mapping[str, Mapping[str, Any]], recordings: Sequence[str]) -> Iterator[str]:
+    """A table for each recording; of many, the table of all held-out ones that the report shows."""
+    if len(recordings) <= _MOST_RECORDINGS:
+        tables = [rms_table(results, recording) for recording in recordings]
+    else:
+        tables = [_plain(table) for table in (all_held_out(run),) if table]
+    for table in tables:
+        yield as_text(table)
+        yield ""
+
+
+def _plain(table: Printed) -> Table:
+    """A table of the page for the terminal."""
+    return Table(table.title, table.header, tuple(row.cells for row in table.rows))
 
 
 def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:

@@ -18,7 +18,7 @@ from discovery.firsthour.room import unknown_room
 from discovery.firsthour.table import OwnTable, read_tables
 from discovery.firsthour.tableguess import sensors_as_inputs
 from discovery.firsthour.texts import campaign_text, clock_doubt, csv_text
-from discovery.firsthour.zeros import from_first_readings
+from discovery.firsthour.zeros import again_from_first_readings, from_first_readings
 from discovery.progress import Progress, silent
 from discovery.recordings.campaignfile import CampaignForm
 from discovery.runfolder import temporary_folder
@@ -58,6 +58,10 @@ def new(
     there = (folder / "campaign.toml").exists()
     _check_request(folder, sources, joins, there=there, again=again)
     if not sources:
+        if statements or room:
+            raise UsageError(
+                f"--is and --room need --from; without it, write the roles into {folder}/campaign.toml"
+            )
         return _planned_again(folder, progress, quick=quick)
     said, clock = read_statements(statements)
     tables = _tables(sources, joins, progress)
@@ -93,6 +97,7 @@ def new(
     return [
         *room_line,
         *_said(tables, found, guesses),
+        _predicted(outputs, found, guesses),
         *made.said,
         *notes,
         "",
@@ -133,17 +138,21 @@ def _planned_again(folder: Path, progress: Progress, *, quick: bool) -> list[str
     before = touched(folder)
     if before is not None:
         names = [*(n for n in names if n not in before.held_out), *(n for n in names if n in before.held_out)]
+    counted, about_zeros = again_from_first_readings(folder, campaign, names)
     with temporary_folder(folder) as temporary:
         for recording in campaign.recordings.values():
-            source = (folder / recording.file).resolve()
-            if source.is_file():
-                target = temporary / recording.file
-                target.parent.mkdir(parents=True, exist_ok=True)
+            source, target = (folder / recording.file).resolve(), temporary / recording.file
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if recording.file in counted:
+                write_atomic(target, counted[recording.file])
+            elif source.is_file():
                 target.symlink_to(source)
         (temporary / "campaign.toml").write_text((folder / "campaign.toml").read_text("utf-8"), "utf-8")
         made = plan(temporary, folder.resolve().name, names, progress, quick=quick)
+        for file in counted:
+            (temporary / file).replace(folder / file)
         notes = rewrite(folder, made)
-    return [*made.said, *notes, "", *_next(folder, {}, None)]
+    return [*about_zeros, *made.said, *notes, "", *_next(folder, {}, None)]
 
 
 def _written(folder: Path) -> dict[str, dict[str, object]]:
@@ -204,6 +213,20 @@ def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Gue
     names = list(found.recordings)
     lines.append(f"recordings: fit {', '.join(names[:-1])}; held out {names[-1]}")
     return lines
+
+
+def _predicted(outputs: Sequence[str], found: Recorded, guesses: Mapping[str, Guess]) -> str:
+    """Which columns the models predict; how to name an error where none was recognised."""
+    line = f"predicted: {', '.join(outputs)}"
+    if any(guesses[name].role in ("error", "other output") for name in outputs):
+        return line
+    other = [
+        column.header
+        for column in found.seen
+        if (guesses[column.name].role, guesses[column.name].unit) == ("other input", "1")
+    ]
+    example = f'--is "{(*other, "CH1")[0]}=error,um"'
+    return f"{line}; no column is taken for an error: if one is, say so, as in {example}"
 
 
 def _duration(seconds: float) -> str:

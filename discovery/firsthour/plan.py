@@ -189,6 +189,12 @@ def missing(
     found = []
     loads = drives(guesses)
     still = [name for name in loads if not _moves(campaign, fit, name)]
+    bodies = [n for n, one in guesses.items() if one.role == "temperature" and n not in outputs]
+    if bodies:
+        found.append(
+            f"{', '.join(bodies)}: measured temperatures, which no model uses as inputs; "
+            "give one the role 'other input' if the errors follow it"
+        )
     if not loads:
         found.append("record what heats the machine: a power, current, speed or switch")
     elif len(still) == len(loads):

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from discovery.firsthour.guess import Guess
 from discovery.firsthour.recorded import Recorded
 from discovery.firsthour.table import Array, OwnTable
+from discovery.recordings.campaignfile import CampaignForm
 
 _FAR = 3.0  # times the span: no thermal error starts so far from zero
+
+Zeros = dict[str, dict[str, float]]  # by recording and error: what its readings are counted from
 
 
 def from_first_readings(found: Recorded, guesses: Mapping[str, Guess]) -> Recorded:
@@ -20,32 +24,87 @@ def from_first_readings(found: Recorded, guesses: Mapping[str, Guess]) -> Record
     That is so if it starts in any recording further from zero than it then moves, several times over. All
     recordings are treated alike. Parts of one file keep the zero of that file.
     """
-    runs = found.recordings
     errors = [name for name, one in guesses.items() if one.role == "error"]
-    shifted = [name for name in errors if any(_far(_values(run, name)) for run in list(runs.values())[:-1])]
-    if not shifted:
-        return found
-    zeros: dict[tuple[object, str, str], float] = {}  # by file and channel: the first part comes first
-    for run in runs.values():
-        for name in shifted:
-            known = _known(_values(run, name))
-            if known.size:
-                zeros.setdefault((run.path, run.name, name), float(known[0]))
+    read = {name: {error: _values(run, error) for error in errors} for name, run in found.recordings.items()}
+    zeros = _zeros(read, {name: (run.path, run.name) for name, run in found.recordings.items()})
 
-    def counted(run: OwnTable) -> OwnTable:
-        zero = {name: zeros.get((run.path, run.name, name), 0.0) for name in shifted}
-        columns = tuple(replace(c, values=c.values - zero.get(c.name, 0.0)) for c in run.columns)
-        return replace(run, columns=columns)
+    def counted(run: OwnTable, zero: Mapping[str, float]) -> OwnTable:
+        return replace(
+            run, columns=tuple(replace(c, values=c.values - zero.get(c.name, 0.0)) for c in run.columns)
+        )
 
-    (first, run), *_ = runs.items()
-    notes = tuple(
-        f"'{name}' starts at {zeros[run.path, run.name, name]:g} in {first}, far from zero compared with how "
-        "much it moves: in each file it is counted from its first reading"
-        for name in shifted
-        if (run.path, run.name, name) in zeros
+    moved = {name: counted(run, zeros[name]) for name, run in found.recordings.items()}
+    return replace(found, recordings=moved, notes=(*found.notes, *_notes(zeros)))
+
+
+def again_from_first_readings(
+    folder: Path, campaign: CampaignForm, names: Sequence[str]
+) -> tuple[dict[str, str], list[str]]:
+    """The same for the recordings of a folder, after a person said in its campaign file what is an error.
+
+    Args:
+        names: recordings of the campaign, the last one held out.
+
+    Returns:
+        Texts of the CSV files that change, by file, and lines about them.
+    """
+    import pandas as pd
+
+    errors = [name for name, one in campaign.channels.items() if one.role == "error"]
+    entries = {name: campaign.recordings[name] for name in names}
+    frames = {
+        name: pd.read_csv(folder / entry.file, dtype=str, keep_default_na=False)
+        for name, entry in entries.items()
+        if Path(entry.file).suffix == ".csv" and (folder / entry.file).is_file()
+    }
+    read = {
+        name: {e: pd.to_numeric(frame[e], errors="coerce").to_numpy(float) for e in errors if e in frame}
+        for name, frame in frames.items()
+    }
+    zeros = _zeros(read, {name: entries[name].note for name in frames})
+    texts = {}
+    for name, zero in zeros.items():
+        frame = frames[name]
+        for error, first in zero.items():
+            counted = read[name][error] - first
+            frame[error] = ["" if np.isnan(one) else f"{one:.10g}" for one in counted]
+        if zero:
+            texts[entries[name].file] = frame.to_csv(index=False, lineterminator="\n")
+    return texts, _notes(zeros)
+
+
+def _zeros(read: Mapping[str, Mapping[str, Array]], files: Mapping[str, Hashable]) -> Zeros:
+    """The first readings of all errors of which one starts far from zero in a recording of the fit.
+
+    Args:
+        read: readings by recording (the last one is held out) and error. files: of which file each recording
+            is a part.
+    """
+    shifted = dict.fromkeys(
+        error for errors in list(read.values())[:-1] for error, values in errors.items() if _far(values)
     )
-    moved = {name: counted(run) for name, run in runs.items()}
-    return replace(found, recordings=moved, notes=(*found.notes, *notes))
+    first: dict[tuple[Hashable, str], float] = {}  # the first part of a file comes first
+    zeros: Zeros = {name: {} for name in read}
+    for name, errors in read.items():
+        for error in shifted:
+            known = _known(errors.get(error, np.empty(0)))
+            if known.size:
+                first.setdefault((files[name], error), float(known[0]))
+            if (files[name], error) in first:
+                zeros[name][error] = first[files[name], error]
+    return zeros
+
+
+def _notes(zeros: Zeros) -> list[str]:
+    notes: dict[str, str] = {}
+    for name, zero in zeros.items():
+        for error, first in zero.items():
+            notes.setdefault(
+                error,
+                f"'{error}' starts at {first:g} in {name}, far from zero compared with how much it moves: in "
+                "each file it is counted from its first reading",
+            )
+    return list(notes.values())
 
 
 def _far(values: Array) -> bool:

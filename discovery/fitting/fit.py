@@ -81,19 +81,21 @@ class Fit:
         return {name: found[recording][0] for name, found in self.offsets.items() if recording in found}
 
     def summary(self) -> str:
-        """Parameters with 95 % intervals, rms of the residual by recording, what is not determined."""
+        """Return a page of text: parameters with 95 % intervals, rms of the residual of each recording, and
+        the parameters that these recordings do not determine.
+        """
         from discovery.fitting.shown import summary
 
         return summary(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """A row for each parameter: value, low and high (95 % interval), unit, fixed."""
+        """Return a row for each parameter: value, low and high (95 % interval), unit, fixed."""
         from discovery.fitting.shown import to_frame
 
         return to_frame(self)
 
     def plot(self) -> Figure:
-        """Readings and model of each fitted recording (columns) and output (rows)."""
+        """Plot readings and model: a column for each fitted recording, a row for each output."""
         from discovery.fitting.shown import plot
 
         return plot(self)
@@ -122,22 +124,25 @@ def fit_model(
 ) -> Fit:
     """Fit the free parameters and start values of a model to recordings.
 
-    Minimises the sum over recordings of rho(L (y - y_model)) plus ((x0 - start)/start_sd)^2 plus
-    (offset/spread)^2 for inputs known only within a spread, these priors n times, where L whitens with the
-    noise model and n readings count as one (`readings_as_one`: 1 where the model lacks nothing). A state that
-    is read starts at its first reading, known to its noise. Without `noise` the reading
-    noise is the channel's `noise` where the campaign states it, else it is estimated from the residual.
+    Minimises, summed over the recordings,
+
+        rho(L (y - y_model)) + n ((x0 - start)/start_sd)^2 + n (offset/spread)^2
+
+    L whitens with the noise model. The last term is for inputs with a spread. n is the number of correlated
+    readings that count as one (`readings_as_one`: 1 if the model lacks nothing). A measured state starts at
+    its first reading, with the reading noise as spread. The reading noise is the `noise` of the channel, or
+    is estimated from the residual if the campaign states none.
 
     Args:
-        model: start values, bounds and which parameters are free.
-        recordings: names of the recordings to fit; nothing else is looked at.
+        model: start values, bounds, and which parameters are free.
+        recordings: names of the recordings to fit; others are not used.
         outputs: measured channels to compare; default all that model and campaign share.
-        noise: covariance of what the model leaves; default white.
-        loss: "soft_l1", "huber" or "cauchy" bound the pull of outliers (scipy.optimize.least_squares).
+        noise: covariance of the residual; default white.
+        loss: "soft_l1", "huber" or "cauchy" limit the weight of outliers (scipy.optimize.least_squares).
         grids: grids to share between fits.
         priors, belief: as in `make_problem`.
-        guess: parameter values to begin from, where they differ from the model's start values.
-        begin: a fit to begin from, of a model that has most of the unknowns; `guess` goes before it.
+        guess: first values of parameters, if they differ from the start values of the model.
+        begin: a fit to start from, of a model that has most of the unknowns; `guess` overrides it.
         max_rounds: of Levenberg-Marquardt.
         tolerance: relative change of the cost that ends them.
         goal: the cost that is good enough to matter; a fit that would not reach it ends early.

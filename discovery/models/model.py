@@ -95,10 +95,10 @@ class Model:
         return frozenset().union(*(names(start) for start in starts))
 
     def with_starts_held(self) -> Model:
-        """The model with the parameters that only its start values use held where they are.
+        """The model with fixed values of the parameters that only its start values use.
 
-        They belong to the first readings of a recording. A fit to the rest of it would bend them to whatever
-        else the model lacks there.
+        They belong to the first readings of a recording. A fit to later readings would change them to absorb
+        what the model lacks.
         """
         used = frozenset().union(*(names(expression) for expression in self.expressions()))
         starting = self.start_names - used
@@ -133,7 +133,7 @@ class Model:
         )
 
     def with_values(self, values: Mapping[str, float]) -> Model:
-        """The model with other parameter values (intervals dropped)."""
+        """The model with other parameter values and without their intervals."""
         parameters = {
             name: replace(parameter, value=float(values[name]), low=None, high=None, intervals={})
             if name in values

@@ -90,7 +90,7 @@ class ModelForm(Strict):
 
 
 def read_model(path: Path) -> Model:
-    """Model of a file in the form of contract section 2.
+    """Read a model file; `docs/own_model.md` describes its form.
 
     Raises:
         UserError: a mistake in the file, with file, line and key.

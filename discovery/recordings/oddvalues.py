@@ -84,7 +84,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
     )
     if channel.role not in _SENSORS or known.size < FEW:
         return
-    zeros = np.setdiff1d(_zeros(read), words)
+    zeros = np.setdiff1d(_zeros(channel, read), words)
     yield from _told(
         file,
         lines[known],
@@ -122,7 +122,7 @@ def odd_readings(channel: Channel, read: Array) -> Lines:
     words = _logger_words(read)
     if channel.role not in _SENSORS or read.size < FEW:
         return words
-    return np.unique(np.concatenate((words, _zeros(read), lone_readings(read))))
+    return np.unique(np.concatenate((words, _zeros(channel, read), lone_readings(read))))
 
 
 def impossible_readings(channel: Channel, read: Array) -> Lines:
@@ -165,10 +165,15 @@ def _logger_words(read: Array) -> Lines:
     return np.unique(np.concatenate(found))
 
 
-def _zeros(read: Array) -> Lines:
-    """Rows of exact zeros where the last and the next other reading are far from zero."""
+def _zeros(channel: Channel, read: Array) -> Lines:
+    """Rows of exact zeros where the last and the next other reading are far from zero.
+
+    An error may begin with zeros: its probe was set to zero there.
+    """
     rows = np.flatnonzero(read == 0.0)
     others = np.flatnonzero(read != 0.0)
+    if channel.role == "error" and others.size:
+        rows = rows[rows > others[0]]
     if not rows.size or others.size < FEW or rows.size > 0.4 * read.size:
         return np.zeros(0, dtype=np.intp)
     usual = 1.4826 * float(np.median(np.abs(np.diff(read[others])))) or 1e-12

@@ -294,7 +294,9 @@
       button.type = "button"; button.textContent = form;
       button.setAttribute("aria-label", `Save as ${form}: ${title}`);
       button.addEventListener("click", () => {
-        const rows = [...table.rows].map((row) => [...row.cells].map((cell) => cell.textContent.replace(/\s+/g, " ").trim()));
+        const part = (node) => (node.nodeName === "BR" ? " · " : node.textContent);
+        const text = (cell) => [...cell.childNodes].map(part).join("").replace(/\s+/g, " ").trim();
+        const rows = [...table.rows].map((row) => [...row.cells].map(text));
         const file = title.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60);
         save(`${file}.${form === "CSV" ? "csv" : "tex"}`, write(rows));
       });

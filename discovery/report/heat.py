@@ -96,7 +96,9 @@ def heat_charts(run: Run) -> list[Chart]:
             continue
         bins = Series("bins", x, heat, "points", "0")
         panel = Panel(label, (*_curves(x, heat, 1.96 * error), bins), zero=True)
-        charts.append(Chart(f"heat-against-{name}", f"Against {name}", _axis(run, name), (panel,)))
+        charts.append(
+            Chart(f"heat-against-{name}", f"Against {name}", with_unit(name, unit_of(run, name)), (panel,))
+        )
     return charts
 
 
@@ -107,12 +109,12 @@ def _curves(x: Array, mean: Array, half: Array) -> tuple[Series, ...]:
     )
 
 
-def _axis(run: Run, name: str) -> str:
+def unit_of(run: Run, name: str) -> str:
+    """The unit of a state of the diagnosed model or of an input; empty where it has none."""
     model = diagnosed(run)
     if model and name in model.states:
-        return with_unit(name, pretty_unit(model.states[name].unit))
-    unit = (run.results.get("input_units") or {}).get(name)
-    return with_unit(name, pretty_unit(str(unit))) if unit else name
+        return pretty_unit(model.states[name].unit)
+    return pretty_unit(str((run.results.get("input_units") or {}).get(name, "")))
 
 
 def heat_unit(run: Run) -> str:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from discovery.report.heat import heat_charts, heat_unit, subject
+from discovery.report.heat import heat_charts, heat_unit, subject, unit_of
 from discovery.report.printed import Line, Printed
 from discovery.report.ranking import rms_unit
 from discovery.report.run import Run, pretty_unit
@@ -63,11 +63,20 @@ def _about(run: Run, d: Mapping[str, Any]) -> str:
     text = f"Verdict on “{subject(run)}”: {d.get('verdict', 'unknown')}."
     location = d.get("location") or {}
     if location.get("regime"):
-        text += f" The mismatch appears where {location['regime']}."
+        text += f" The mismatch appears where {_with_units(run, location['regime'])}."
     if location.get("alike"):
         groups = listed([listed(group) for group in location["alike"]], "; and")
         text += f" These readings do not separate heat at {groups}."
     return text
+
+
+def _with_units(run: Run, rule: str) -> str:
+    """A rule over inputs and states with the units of its numbers: flow > 2 l/min."""
+    return re.sub(
+        r"(\w+) ([<>]=?) (\S+)",
+        lambda found: f"{found[1]} {found[2]} {found[3]} {unit_of(run, found[1])}".rstrip(),
+        rule,
+    )
 
 
 def sizes(one: Mapping[str, Any]) -> list[str]:

@@ -75,6 +75,7 @@ def render(run: Run, runs: Printed | None = None, groups: Sequence[Run] = ()) ->
         "predictions": predictions,
         "shaded": any(chart.shades for chart in curves),
         "curves": _legend(run, order, curves),
+        "not_drawn": listed([model for model in _predicted(run) if model not in order]),
         "summary": summary(run),
         "held_out": bool(run.held_out),
         "by_output": best_by_output(run),
@@ -206,12 +207,17 @@ def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def shown_models(run: Run) -> list[str]:
     """Models with predictions, best first, as many as the eye can distinguish."""
-    having = list(dict.fromkeys(model for p in run.predictions.values() for model in p.models))
-    order = [model for model in ranked(run) if model in having]
-    order += [model for model in having if model not in order]
+    order = _predicted(run)
     pair = [model for model in before_and_after(run) if model in order]
     others = [model for model in order if model not in pair][: _MOST_CURVES - len(pair)]
     return [model for model in order if model in (*pair, *others)]
+
+
+def _predicted(run: Run) -> list[str]:
+    """Models with predictions, best first."""
+    having = list(dict.fromkeys(model for p in run.predictions.values() for model in p.models))
+    order = [model for model in ranked(run) if model in having]
+    return order + [model for model in having if model not in order]
 
 
 def before_and_after(run: Run) -> list[str]:

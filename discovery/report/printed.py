@@ -131,7 +131,8 @@ def summary(run: Run) -> Printed | None:
         look = "best" if model == order[0] else ""
         line = (model, *size, *figures, times, number(entry.get("seconds"), 2))
         rows.append(Line(line, look, about=", ".join(made)))
-    title = f"{what}, {'geometric mean over all errors' if errors else 'over all outputs of a unit'}"
+    seen = "held-out recordings" if run.held_out else "recordings of the fit"
+    title = f"{what}, {seen}, {'geometric mean over all errors' if errors else 'over all outputs of a unit'}"
     against = None
     if 1 < len(order) <= _MOST_CHOSEN:
         choices = tuple(
@@ -212,11 +213,9 @@ def rms_tables(run: Run) -> list[Printed]:
             ]
             seen = "held out" if recording in run.held_out else "fitted"
             named = output if len(units) == 1 else with_unit(output, rms_unit(run, output))
-            first = Line((recording, seen, named, *map(number, scores)), "first")
-            rows.append(
-                first if index == 0 else Line(("", "", named, *map(number, scores)), repeated=recording)
-            )
+            first = Line((recording, named, *map(number, scores)), "first", about=seen)
+            rows.append(first if index == 0 else Line(("", named, *map(number, scores)), repeated=recording))
     said = [with_unit(model, units[0]) if len(units) == 1 else model for model in order]
-    header = ("Recording", "", "Output", *said)
+    header = ("Recording", "Output", *said)
     title = "rms of the residual" + (f", best {len(order)} of {len(every)} models" if order != every else "")
-    return [Printed(title, header, tuple(rows), frozenset({1, 2}))] if rows else []
+    return [Printed(title, header, tuple(rows), frozenset({1}))] if rows else []

@@ -163,7 +163,7 @@ def _score(run: Run, model: str | None) -> str:
     if is_error(run) and np.isfinite(share := removed(run, model)):
         return f"{number(share, 2)}\u00a0%"
     scored = rms_by_unit(run, model).items()
-    return ", ".join(f"{number(float(np.median(rms)), 2)} {unit}".strip() for unit, rms in scored) or "–"
+    return ", ".join(f"{number(float(np.median(rms)), 2)}\u00a0{unit}".strip() for unit, rms in scored) or "–"
 
 
 def _verdict(run: Run) -> str:
@@ -174,7 +174,9 @@ def _verdict(run: Run) -> str:
         f"{words(str(one['effect']))} ({percent(one.get('probability'))})"
         for one in run.diagnosis.get("physics") or []
     ]
-    return listed(named).replace(" %", "\u00a0%") if named else str(run.diagnosis.get("verdict", "unknown"))
+    if not named:
+        return str(run.diagnosis.get("verdict", "unknown"))
+    return listed(list(dict.fromkeys(named))).replace(" %", "\u00a0%")  # an effect at two places: once
 
 
 def _about(run: Run) -> str:

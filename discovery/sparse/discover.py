@@ -46,21 +46,21 @@ def discover(
     progress: Progress = silent,
     folder: Path | None = None,
 ) -> Discovery:
-    """Discover a sparse model of `outputs` from `recordings`; no other recording is looked at.
+    """Discover a sparse model of `outputs` from `recordings`; other recordings are not used.
 
-    Errors become sums of filtered inputs; measured temperatures, systems that a library of states is asked
-    of, and baseline files get terms in the rates of their states; for other outputs both are tried. Sizes
-    are chosen by free runs on what was left out (recordings, or parts of a few); numbers are fitted by
-    output error and carry 95 % intervals.
+    Errors become sums of filtered inputs. Measured temperatures, baseline files, and systems with a library
+    of states get terms in the rates of their states. For other outputs both forms are tried. Free runs on
+    left-out data (recordings, or parts of a few) choose the number of terms. All parameters are fitted by
+    output error and have 95 % intervals.
 
     Args:
         recordings: names of the recordings to fit.
         outputs: measured channels.
-        progress: called with a few words on what is being done.
-        folder: where a relative baseline file is looked for; default the campaign's folder.
+        progress: is called with a few words when a step begins.
+        folder: folder of a relative baseline file; default that of the campaign.
 
     Raises:
-        UserError: an option that does not fit the campaign.
+        UserError: an option does not fit the campaign.
     """
     began = clock.perf_counter()
     inputs = make_inputs(campaign, recordings, options.inputs)

@@ -49,25 +49,23 @@ class Feature:
 
 
 class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
-    """Inputs at once and through first-order lags tau ds/dt = u - s, exactly, at irregular stamps.
+    """Inputs without a lag and through first-order lags, tau ds/dt = u - s: exact, also at irregular stamps.
 
-    After `fit` the features stand on a grid of time constants; an optimiser that can move them
-    (`SparseSearch(library)`) leaves the few that it chose, at the time constants that it found.
+    After `fit` the features have a grid of time constants. `SparseSearch(library)` moves the time constants,
+    and the library then holds only the chosen features.
 
     Args:
-        names: of the columns of each trajectory (T, len(names)): one is "time" [s], increasing; one may be
-        "read",
-            1 in the rows that are wanted (default all); the others are inputs.
+        names: names of the columns of each trajectory (T, len(names)). One is "time" [s], increasing. One
+            may be "read", 1 in the rows that are used (default all); the others are inputs.
         drives: expressions of the inputs that go through lags; default each input.
-        time_constants: least and greatest of the grid [s]; default a tenth of the distance of two readings
-        (the
-            distance of two inputs, where that is more) and the length of the longest trajectory.
+        time_constants: smallest and largest of the grid [s]; default a tenth of the time between two readings
+            (the time between two inputs, if that is longer) and the length of the longest trajectory.
         linear: inputs that run straight between their stamps; the others are held.
-        settled: drives whose lag begins in balance with its first value; the others begin at zero.
-        at_once: whether a drive may act without a lag, too.
-        integrals: drives that may be added up without bound, as charge is.
-        offset: whether a constant is offered.
-        zeroed: whether each trajectory has a zero of its own, as a probe that is set to zero at its start.
+        settled: drives whose lag starts in balance with the first value; the others start at zero.
+        at_once: whether a drive may also act without a lag.
+        integrals: drives that may be integrated without limit, such as a current (charge).
+        offset: whether the library has a constant.
+        zeroed: whether each trajectory has its own zero, as a probe that is set to zero at the start.
     """
 
     def __init__(
@@ -94,7 +92,7 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
 
     @x_sequence_or_item
     def fit(self, x_full: Sequence[Any], y: Any = None) -> Self:  # noqa: ARG002
-        """Lay out the grid of features."""
+        """Make the grid of features."""
         if "time" not in self.names:
             raise ValueError(f"names must have a column 'time'; got {list(self.names)}")
         width = x_full[0].shape[-1]

@@ -24,23 +24,22 @@ Bounds = Mapping[str, tuple[float, float]]
 
 
 class SparseSearch(BaseOptimizer):  # type: ignore[misc]
-    """Orthogonal matching pursuit on normal equations, its size chosen by what is left out.
+    """Orthogonal matching pursuit on normal equations; left-out data choose the number of terms.
 
-    With a `FilteredInputs` library the time constants move continuously, and after `fit` the library holds
-    the chosen features alone. With any other library the columns stay where they are.
+    With a `FilteredInputs` library the search moves the time constants, and after `fit` the library holds
+    only the chosen features. With any other library the columns do not change.
 
     Args:
-        library: the library of the same `SINDy`, where it is one of this package; None: plain columns.
-        max_terms: most terms of one target, those of `keep` not counted.
-        bounds: smallest and largest coefficient by drive (by number of the column without a library); (0,
-        inf) is
-            a sign.
+        library: the library of the same `SINDy`, if it is one of this package; None: plain columns.
+        max_terms: largest number of terms of one target, without those of `keep`.
+        bounds: smallest and largest coefficient by drive (without a library: by number of the column); (0,
+            inf) fixes the sign.
         keep: drives (columns) that are in every set.
         noise: standard deviation of a reading of each target; default estimated from the readings.
-        tolerance: standard errors by which a sparser set may be worse on what was left out.
-        blocks: pieces that the trajectories are cut into for these standard errors.
-        bootstraps, seed: block bootstraps for the stability of the terms.
-        select: makes the `Choice` of a `Problem`; default by free runs on what was left out.
+        tolerance: a sparser set may be worse on left-out data by so many standard errors.
+        blocks: number of pieces of the trajectories for these standard errors.
+        bootstraps, seed: number and seed of block bootstraps for the stability of the terms.
+        select: makes the `Choice` of a `Problem`; default by free runs on left-out data.
     """
 
     def __init__(
@@ -73,13 +72,13 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
 
         Args:
             x_: (N, M) columns of all trajectories, one below the other.
-            y: (N,) or (N, targets) readings, NaN where there are none.
+            y: (N,) or (N, targets) readings; NaN means no reading.
 
         Raises:
-            ValueError: weights of samples, a bound or a kept term that the library does not have.
+            ValueError: sample weights, or a bound or kept term that the library does not have.
         """
         if sample_weight is not None:
-            raise ValueError("SparseSearch takes no sample_weight; repeat rows or leave them out")
+            raise ValueError("SparseSearch has no sample_weight; repeat rows or leave them out")
         x, targets = np.asarray(x_, dtype=float), np.asarray(y, dtype=float)
         targets = targets.reshape(len(x), -1)
         self.choices_ = [self._choose(x, target, k) for k, target in enumerate(targets.T)]

@@ -1,4 +1,4 @@
-"""What a user may say about a discovery, in an experiment file: `discovered = { kind = "sindy", ... }`."""
+"""Options of a discovery in an experiment file: `discovered = { kind = "sindy", ... }`."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class SparseOptions(Strict):
         None,
         description="channels that terms may use; default every input that moves in the recordings to fit",
     )
-    baseline: str = Field("eq9", description='"eq9", or a gray-box model file whose terms are built upon')
+    baseline: str = Field("eq9", description='"eq9", or a model file to which terms are added')
     keep_baseline: bool | None = Field(
         None,
-        description="true: the baseline's terms are always in; false: free to leave; default true for a "
-        "file, false for eq9",
+        description="true: the terms of the baseline always stay; false: the search may remove them; default "
+        "true for a file, false for eq9",
     )
     form: Literal["auto", "masses", "rates"] = Field(
         "auto",
@@ -50,47 +50,47 @@ class SparseOptions(Strict):
     into: Words | None = Field(
         None, description="states of a baseline file that candidates may enter; default all"
     )
-    max_terms: int = Field(15, ge=1, le=60, description="most terms of one output")
+    max_terms: int = Field(15, ge=1, le=60, description="largest number of terms of one output")
     time_constants: Annotated[tuple[float, float], FROM_LIST] | None = Field(
         None,
-        description="least and greatest time constant of the hidden masses [s]; default by the sampling",
+        description="smallest and largest time constant of the hidden masses [s]; default from the sampling",
     )
     hidden: Literal["auto", "own", "rate", "upstream"] = Field(
         "auto",
-        description='what is behind an output in rates: "own": nothing; "rate": its rate is a hidden '
-        'state (a mass on a spring); "upstream": a hidden body empties into it (a tank above a tank); '
-        '"auto": what predicts best',
+        description='hidden state behind an output in rates: "own": none; "rate": the rate of the output (a '
+        'mass on a spring); "upstream": a body that empties into it (a tank above a tank); "auto": the one '
+        "that predicts best",
     )
-    stable: bool = Field(
-        True, description="no pole in the right half plane: states are drawn back, not driven away"
-    )
-    keep: Words = Field((), description="terms that stay")
-    forbid: Words = Field((), description="terms that are not offered")
+    stable: bool = Field(True, description="no pole in the right half plane: every state returns to rest")
+    keep: Words = Field((), description="terms that always stay")
+    forbid: Words = Field((), description="terms that the search must not use")
     bounds: dict[str, Annotated[tuple[Bound, Bound], FROM_LIST]] = Field(
         default_factory=dict,
-        description="smallest and largest coefficient of a term, by its expression; [0, inf] is a sign; in "
-        "the units of the equations, for rates of errors and temperatures per hour",
+        description="smallest and largest coefficient of a term, by its expression; [0, inf] fixes the sign; "
+        "units are those of the equations (rates of errors and temperatures: per hour)",
     )
     optimiser: Annotated[Any, WithJsonSchema({"type": "string", "pattern": OPTIMISER})] = Field(
         "search",
-        description='"search": our own; "pysindy:SR3": an optimiser of PySINDy by its name; from Python also '
-        "an object",
+        description='"search": our own search; "pysindy:SR3": an optimiser of PySINDy by its name; from '
+        "Python also an object",
     )
     optimiser_arguments: dict[str, Any] = Field(
-        default_factory=dict, description="of the optimiser of PySINDy, as { threshold = 0.1 }"
+        default_factory=dict, description="arguments of the optimiser of PySINDy, as { threshold = 0.1 }"
     )
     tolerance: float | None = Field(
         None,
         ge=0,
-        description="standard errors by which a sparser model may be worse on what was left out; default 1 "
-        "for masses, which are to predict, 2 for rates, 3 for what is added to a baseline file",
+        description="a sparser model may be worse on left-out data by so many standard errors; default 1 for "
+        "masses, 2 for rates, 3 for terms that are added to a baseline file",
     )
-    blocks: int = Field(
-        24, ge=4, le=500, description="blocks that the recordings are cut into for bootstraps"
+    blocks: int = Field(24, ge=4, le=500, description="number of blocks of the recordings for bootstraps")
+    bootstraps: int = Field(
+        40, ge=0, le=1000, description="number of block bootstraps for the stability of each term"
     )
-    bootstraps: int = Field(40, ge=0, le=1000, description="block bootstraps for the stability of each term")
-    refine: bool = Field(True, description="fit all numbers of the chosen model by output error at the end")
-    seed: int = Field(0, ge=0, description="of the bootstraps")
+    refine: bool = Field(
+        True, description="fit all parameters of the chosen model by output error at the end"
+    )
+    seed: int = Field(0, ge=0, description="seed of the bootstraps")
     also: Words = Field((), description="recordings that this model is fitted to in addition to `fit`")
 
     @field_validator("optimiser")
@@ -115,12 +115,12 @@ class SparseOptions(Strict):
         for name, (low, high) in self.bounds.items():
             if not low <= high:
                 raise ValueError(
-                    f"the bounds of '{name}' are {low:g} and {high:g}: the smaller one comes first"
+                    f"the bounds of '{name}' are {low:g} and {high:g}; write the smaller one first"
                 )
         if self.time_constants and not 0 < self.time_constants[0] < self.time_constants[1]:
-            raise ValueError("time_constants are two positive times in s, the shorter one first")
+            raise ValueError("time_constants: write two positive times in s, the shorter one first")
         if self.form == "masses" and self.baseline != "eq9":
-            raise ValueError('a baseline file is built upon by rates; leave out form = "masses"')
+            raise ValueError('terms are added to a baseline file in rates; remove form = "masses"')
         return self
 
     @property

@@ -11,6 +11,8 @@ are those of PySINDy: nothing is fitted afterwards.
 
 from __future__ import annotations
 
+import contextlib
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +37,7 @@ Array = NDArray[np.float64]
 THRESHOLDS = (0.01, 0.03, 0.1, 0.3)  # of coefficients of standardised outputs and inputs, per time scale
 DEGREES = (1, 2)
 TEST_FUNCTIONS = 500  # of the weak form in each recording
-GAP = 6.0  # distances of two readings: across a longer one nothing is interpolated
+GAP = 6.0  # usual distances of two readings: across a longer one nothing is interpolated
 WINDOW = 11  # readings that the smoother of the plain form sees
 FOLDS = 4
 RIDGE = 0.05  # STLSQ's own default
@@ -76,28 +78,45 @@ def fit_plain(
 ) -> tuple[Fit, Setting, dict[str, Any]]:
     """A PySINDy model of the outputs, and what was chosen.
 
+    Of several settings, the one is taken that is best on what is left out and stays finite on the recordings;
+    no term where none does.
+
     Args:
         inputs: channels u.
-        tried: settings of which the best on what is left out is taken; a single one is not compared.
+        tried: settings; a single one is not compared.
         seed: of the test functions.
+
+    Raises:
+        RunsAwayError: the model of a single setting does not stay finite.
     """
     grids = {r: make_grid(campaign, r, inputs, outputs) for r in recordings}
     frame = _Frame.of(grids, outputs, inputs)
     tables = {r: frame.tables(grid) for r, grid in grids.items()}
-    errors, best = [float("nan")], tried[0]
-    if len(tried) > 1:
-        folds = _folds(list(tables), tables)
-        errors = [_left_out(frame, folds, campaign, grids, one, seed) for one in tried]
-        best = tried[int(np.argmin(errors))]
     everything = [table for some in tables.values() for table in some]
-    model = frame.model(_coefficients(everything, best, seed), best.degree, campaign)
-    report = {
-        "form": "weak" if best.weak else "plain",
-        "degree": best.degree,
-        "threshold": best.threshold,
-        "left_out_rms": float(min(errors)),
+
+    def held(stretches: Sequence[Table], one: Setting) -> Fit:
+        model = frame.model(_coefficients(frame, stretches, one, seed), one.degree, campaign)
+        return held_fit(model, campaign, recordings, outputs)
+
+    if len(tried) == 1:
+        return held(everything, tried[0]), tried[0], _report(tried[0], math.nan)
+    folds = _folds(list(tables), tables)
+    errors = [_left_out(frame, folds, campaign, grids, one, seed) for one in tried]
+    order = [int(k) for k in np.argsort(errors, kind="stable")]
+    for k in order:
+        with contextlib.suppress(RunsAwayError):
+            return held(everything, tried[k]), tried[k], _report(tried[k], errors[k])
+    best = tried[order[0]]
+    return held([], best), best, _report(best, errors[order[0]])
+
+
+def _report(one: Setting, error: float) -> dict[str, Any]:
+    return {
+        "form": "weak" if one.weak else "plain",
+        "degree": one.degree,
+        "threshold": one.threshold,
+        "left_out_rms": error,
     }
-    return held_fit(model, campaign, recordings, outputs), best, report
 
 
 Fold = tuple[dict[str, tuple[float, float]], list[Table]]  # what is left out, and what stays
@@ -133,7 +152,8 @@ class _Frame:
     def tables(self, grid: Grid) -> list[Table]:
         """The stretches of a recording without long gaps, on equal steps."""
         stamps = grid.time[grid.read]
-        cuts = np.flatnonzero(np.diff(stamps) > GAP * self.step) + 1
+        distances = np.diff(stamps)
+        cuts = np.flatnonzero(distances > GAP * max(self.step, _usual(distances))) + 1
         parts = np.split(np.arange(len(stamps)), cuts)
         made = [self._table(grid, stamps[one], grid.readings[one]) for one in parts]
         return [table for table in made if table is not None]
@@ -173,15 +193,27 @@ class _Frame:
         return Model("PySINDy", parameters, states, tuple(terms), {}, "h")
 
 
+def _usual(distances: Array) -> float:
+    """The distance of two readings in which half of the recording lies: of three readings in a row and then a
+    minute without any, the minute.
+    """
+    if not distances.size:
+        return 0.0
+    ordered = np.sort(distances)
+    return float(ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())])
+
+
 def _powers(count: int, degree: int) -> list[tuple[int, ...]]:
     """Factors of each column of `PolynomialLibrary(degree)`, in its order."""
     return [c for d in range(degree + 1) for c in combinations_with_replacement(range(count), d)]
 
 
-def _coefficients(tables: Sequence[Table], setting: Setting, seed: int) -> Array:
-    """Coefficients (Y, F) that STLSQ leaves."""
+def _coefficients(frame: _Frame, tables: Sequence[Table], setting: Setting, seed: int) -> Array:
+    """Coefficients (Y, F) that STLSQ leaves; all zero where no stretch is long enough for a derivative."""
     import pysindy
 
+    if not tables:
+        return np.zeros((len(frame.outputs), len(_powers(len(frame.spread), setting.degree))))
     library = pysindy.PolynomialLibrary(degree=setting.degree)
     optimiser = pysindy.STLSQ(threshold=setting.threshold, alpha=RIDGE)
     with warnings.catch_warnings():
@@ -236,7 +268,7 @@ def _left_out(
     for out, train in folds:
         if not train:
             continue
-        model = frame.model(_coefficients(train, setting, seed), setting.degree, campaign)
+        model = frame.model(_coefficients(frame, train, setting, seed), setting.degree, campaign)
         for name, (begin, end) in out.items():
             try:
                 run = predict_recording(model, campaign, name, frame.outputs, None, grids[name])

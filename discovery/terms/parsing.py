@@ -1,6 +1,6 @@
 """Expressions of model files: read by Python's own parser, behind an allow-list.
 
-No text of a file is ever run. `parse` reads the text with `ast`, keeps the few node kinds of the contract
+No text of a file is ever run. `parse` reads the text with `ast`, keeps the few allowed node kinds
 and refuses the rest.
 """
 
@@ -41,7 +41,7 @@ def parse(source: str | float, where: str = "expression") -> Expression:
     """Tree of an expression text.
 
     Args:
-        source: text in the grammar of the contract, or a plain number.
+        source: text in the grammar of model files, or a plain number.
         where: how messages name the place ("model.toml, line 12, key terms[2].expression").
 
     Raises:

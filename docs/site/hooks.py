@@ -19,6 +19,10 @@ REPOSITORY = {
     "SECURITY.md": "project/security.md",
     "benchmarks/RESULTS.md": "project/results.md",
     "benchmarks/challenge.md": "project/challenge.md",
+    "benchmarks/damages.md": "project/damages.md",
+    "benchmarks/diagnosis.md": "project/diagnosis_figures.md",
+    "benchmarks/fuzzing.md": "project/fuzzing.md",
+    "benchmarks/paper.md": "project/paper_figures.md",
     "benchmarks/runtime.md": "project/runtime_figures.md",
     "datasets/README.md": "datasets/index.md",
     "datasets/nmv5000/README.md": "datasets/nmv5000.md",
@@ -26,18 +30,7 @@ REPOSITORY = {
     "datasets/tclab/README.md": "datasets/tclab.md",
 }
 NO_PAGE = "]\0"  # behind the words of a link to a file that is no page
-IF_THERE = {
-    "Security": ("SECURITY.md", "project/security.md"),
-    "Licences": ("docs/licences.md", "licences.md"),
-}
 LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)]*)?\))")
-
-
-def on_config(config: Any) -> Any:
-    """Pages that not every state of the repository has come at the end of the navigation."""
-    project = next(entry["Project"] for entry in config["nav"] if "Project" in entry)
-    project += [{title: page} for title, (source, page) in IF_THERE.items() if (ROOT / source).exists()]
-    return config
 
 
 def on_files(files: Any, config: Any) -> Any:
@@ -56,8 +49,7 @@ def on_files(files: Any, config: Any) -> Any:
 
     made: dict[str, str | bytes] = {}
     for source, page in REPOSITORY.items():
-        if (ROOT / source).exists():
-            made[page] = _linked((ROOT / source).read_text("utf-8"), source, page)
+        made[page] = _linked((ROOT / source).read_text("utf-8"), source, page)
     for maker in (commands, forms, gallery, notebooks, python_api):
         made |= maker.pages()
     for page, content in made.items():

@@ -8,6 +8,8 @@ AXE is axe.min.js of the package axe-core. Needs Chromium and its driver (Debian
 from __future__ import annotations
 
 import argparse
+import csv
+import io
 import json
 from pathlib import Path
 
@@ -41,7 +43,7 @@ def check(page: Path, axe: str, session: Browser, pictures: Path | None) -> list
                 wrong.append(f"{where}: wider than the window")
             if pictures:
                 session.screenshot(pictures / f"{page.parent.name}-{page.stem}-{width}-{scheme}.png")
-    wrong += _keyboard(session) + _zoom(session)
+    wrong += _keyboard(session) + _zoom(session) + _saved(session)
     if pictures:
         session.pdf(pictures / f"{page.parent.name}-{page.stem}.pdf")
     wrong += [
@@ -124,6 +126,29 @@ def _zoom(session: Browser) -> list[str]:
         )
         else ["dragging over a chart does not zoom"]
     )
+
+
+def _saved(session: Browser) -> list[str]:
+    """Each table is saved row by row; a second line within a cell is set apart."""
+    found = session.run_async(
+        "const done = arguments[0], kept = [], make = URL.createObjectURL;"
+        "URL.createObjectURL = (blob) => (kept.push(blob), 'data:,');"
+        "HTMLAnchorElement.prototype.click = () => {};"
+        "const all = [...document.querySelectorAll('.tools button')];"
+        "const buttons = all.filter(b => b.textContent === 'CSV');"
+        "buttons.forEach(b => b.dispatchEvent(new MouseEvent('click')));"
+        "URL.createObjectURL = make; delete HTMLAnchorElement.prototype.click;"
+        "Promise.all(kept.map(b => b.text())).then(texts => done(buttons.map((b, k) => {"
+        " const table = b.closest('table');"
+        " return [table.caption.firstChild.textContent, texts[k] || '', table.rows.length,"
+        "  table.querySelectorAll('th .tag').length]})))"
+    )
+    wrong = []
+    for title, text, rows, seconds in found:
+        lines = list(csv.reader(io.StringIO(text)))
+        if len(lines) != rows or sum(" · " in line[0] for line in lines) < seconds:
+            wrong.append(f"saved as CSV: {title}: {text[:80]!r}")
+    return wrong
 
 
 def _requests(session: Browser, page: Path) -> list[str]:

@@ -140,7 +140,8 @@ def test_a_name_needs_its_probability(probability: float, word: str) -> None:
     assert found.word == word
     if word == "unexplained":
         assert found.candidates[0].hypothesis is FLUID
-        assert any("is possible (probability 0.69, log evidence 100)" in text for text in found.reasons)
+        said_of = "is possible but not sure enough to be named (probability 0.69, log evidence 100)"
+        assert any(said_of in text for text in found.reasons)
     else:
         assert found.named[0].probability == pytest.approx(min(probability, 0.98))
         assert found.reasons == ()
@@ -161,7 +162,8 @@ def test_a_name_needs_evidence_of_its_own() -> None:
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
     assert [n.hypothesis for n in found.named] == [FLUID]
     assert found.reasons == (
-        f"friction_speed at {FRICTION.where} is possible (probability 0.95, log evidence 24)",
+        f"friction_speed at {FRICTION.where} is possible but not sure enough to be named "
+        "(probability 0.95, log evidence 24)",
     )
     both = pair(FLUID, FRICTION, 123.7, 100.0, 30.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})

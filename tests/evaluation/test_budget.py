@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from discovery.evaluation.budget import budget
+from discovery.evaluation.tables import budget_tables
 from discovery.fitting import predict_recording
 from discovery.models import Model, State
 from discovery.recordings import Campaign, Channel, Recording
@@ -67,3 +68,16 @@ def test_the_fluid_cools_by_what_it_gives() -> None:
 def test_a_model_without_heat_capacities_has_no_budget() -> None:
     campaign, model = run((Term("itself", "x", parse("20 - x")),), capacity=None)
     assert budget(predict_recording(model, campaign, "r", ["E"]), campaign) is None
+
+
+def test_a_table_of_many_recordings_has_three_columns() -> None:
+    """Sizes of a small board, 1 to 8 kJ, in the unit that they need."""
+    one = {"stored": {"board": 0.001}, "gap": 0.0, "fluid": {}}
+    found = {f"run {k}": one | {"entering": {"heater": k * 1e-3}} for k in (3, 1, 2, 8, 5, 7, 4, 6)}
+    (heat,) = budget_tables(found)
+    assert heat.title == "Heat into the bodies [kJ]"
+    assert heat.header == ("Term", "smallest of 8 recordings", "median", "largest")
+    assert heat.rows[0][0] == "heater"
+    assert heat.rows[0][1:] == pytest.approx((1.0, 4.5, 8.0))
+    (heat,) = budget_tables({name: found[name] for name in list(found)[:3]})
+    assert heat.header == ("Term", "run 3", "run 1", "run 2")

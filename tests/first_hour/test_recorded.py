@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -245,6 +246,34 @@ def test_an_error_far_from_zero_is_counted_from_its_first_reading(tmp_path: Path
     assert "column 'sample' numbers rows or devices: left out" in out
     for recording in ("run0", "run1"):
         assert _read(rig, recording, "dZ") == [-k / 2 for k in range(60)]
+
+
+def test_an_error_that_a_person_names_later_is_counted_from_its_first_reading(tmp_path: Path) -> None:
+    """In the campaign file, with --again: as --is says it at once."""
+    probes = _probe(-80532), _probe(-3051), _probe(12)
+    out, rig = _made(tmp_path, "time,sample,T_room,T_bed,mcu_pos_z", *probes)
+    assert (
+        'predicted: T_bed; no column is taken for an error: if one is, say so, as in --is "mcu_pos_z=' in out
+    )
+    text = (rig / "campaign.toml").read_text("utf-8")
+    text = re.sub(r"mcu_pos_z *= .*", 'mcu_pos_z = { role = "error", unit = "um" }', text)
+    (rig / "campaign.toml").write_text(text, "utf-8")
+    before = _read(rig, "run1", "T_bed")
+    for said in ("'mcu_pos_z' starts at -80532 in run0, far from zero", ""):  # once, and not again
+        again = CliRunner().invoke(app, ["new", str(rig), "--again", "--quick"])
+        assert again.exit_code == 0, again.output
+        assert said in again.output
+    assert "far from zero" not in again.output
+    for recording in ("run0", "run1", "run2"):
+        assert _read(rig, recording, "mcu_pos_z") == [-k / 2 for k in range(60)]
+    assert _read(rig, "run1", "T_bed") == before
+
+
+def test_what_a_person_says_needs_the_files(tmp_path: Path) -> None:
+    _, rig = _made(tmp_path, "time,sample,T_room,T_bed,dZ_um", _probe(7), _probe(9))
+    again = CliRunner().invoke(app, ["new", str(rig), "--again", "--is", "dZ=error,mm"])
+    assert again.exit_code == 2
+    assert "--is and --room need --from" in again.output
 
 
 def test_parts_of_one_file_keep_its_zero(tmp_path: Path) -> None:

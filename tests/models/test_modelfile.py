@@ -253,6 +253,7 @@ def test_the_clock_of_one_recording_may_be_early(tmp_path: Path) -> None:
     shift = '[parameters]\nshift = { start = 0.0, per = "recording", values = { r = -900.0 } }'
     model = read_model(written(tmp_path, late.replace("[parameters]", shift)))
     check_model(model, {"P": "W", "T_env": "degC"}, "m.toml")
+    assert model.parameters["shift"].values == {"r": -900.0}
 
 
 def test_a_parameter_hides_no_channel(tmp_path: Path) -> None:
@@ -291,6 +292,7 @@ def test_nothing_is_converted_inside(tmp_path: Path, old: str, new: str, said: s
 def test_what_models_count_in(tmp_path: Path, unit: str) -> None:
     model = read_model(written(tmp_path, GOOD.replace('"W/K"', f'"{unit}"')))
     check_model(model, {"P": "W", "T_env": "degC"}, "m.toml")
+    assert unit in {parameter.unit for parameter in model.parameters.values()}
 
 
 def test_a_unit_that_a_channel_has_is_counted_in(tmp_path: Path) -> None:

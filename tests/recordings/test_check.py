@@ -387,3 +387,17 @@ def test_a_heat_load_below_zero(write: Write, unit: str, loads: list[int], told:
     if told:
         assert "fit.csv, line 3: 'speed' is -" in lines[0]
         assert "(and 19 more like it)" in lines[0]
+
+
+def test_an_error_may_begin_at_zero(write: Write) -> None:
+    """Its probe was set to zero there; a zero in the middle is a missing reading."""
+    readings = [4.0 + k // 3 for k in range(58)]
+    begins = [0.0, 0.0, *readings]
+    assert not any(
+        "exactly zero" in line for line in found(write(with_column(3, [f"{v:g}" for v in begins])))
+    )
+    hole = [*readings[:30], 0.0, *readings[30:], 24.0]
+    assert any(
+        "line 32: 'E_Y0C' is 0, exactly zero between" in line
+        for line in found(write(with_column(3, [f"{v:g}" for v in hole])))
+    )

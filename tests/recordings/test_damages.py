@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from discovery.recordings.check import check_campaign
@@ -27,6 +28,9 @@ NOT_FOUND = {
     "a clock that runs 20 % fast",
     "a clock one hour off",
 }
+NMV5000 = Path(__file__).parents[2] / "datasets" / "nmv5000"
+CYCLES = ["fit", "validation", "left_nozzle", "height_100", "worn"]  # the flow is at 0 or at 8 l/min
+FLOWS = {"pump": ("fluid flow", "1"), "flow": ("fluid flow", "l/min"), "E_Y0C": ("error", "um")}
 SEEDS = range(12)  # the thresholds were set on 100 others: benchmarks/damages.md
 
 
@@ -61,6 +65,19 @@ def test_simulated_machines_are_warned_of_once_in_fifty_recordings_at_most(tmp_p
 
 def test_a_poor_prediction_is_no_offset_of_a_sensor() -> None:
     """Of so few recordings, `only_environment` is predicted badly: the room steps there, and nowhere else."""
-    nmv5000 = Path(__file__).parents[2] / "datasets" / "nmv5000"
     some = ["fit", "validation", "left_nozzle", "height_100", "only_environment", "only_fluid", "warm_up"]
-    assert check_campaign(nmv5000, only=some) == []
+    assert check_campaign(NMV5000, only=some) == []
+
+
+def test_a_pump_that_stays_on_at_new_flows_is_not_frozen() -> None:
+    assert check_campaign(NMV5000, only=[*CYCLES, "nozzle_long"]) == []
+
+
+def test_a_pump_that_stays_on_at_known_flows_is_frozen(tmp_path: Path) -> None:
+    frames = {}
+    for name in CYCLES:
+        frame = pd.read_csv(NMV5000 / f"{name}.csv.gz")
+        frames[name] = {column: frame[column].to_numpy(copy=True) for column in ("time", *FLOWS)}
+    frames["worn"]["pump"][1500:] = 1.0
+    found = check_campaign(write_campaign(tmp_path / "frozen", "machine", FLOWS, frames))
+    assert [one.what[:18] for one in found if one.kind == "stuck"] == ["'pump' stays at 1 "]

@@ -26,6 +26,7 @@ from discovery.report.chart import thinned
 from discovery.report.compare import groups, load_runs, shared_recordings
 from discovery.report.lead import lead_over
 from discovery.report.mismatch import NEAR, section, sizes
+from discovery.report.page import render
 from discovery.report.printed import behind
 from discovery.report.ranking import ranked, ratio
 from discovery.report.run import load_run
@@ -156,7 +157,7 @@ def test_kelvins_and_micrometres_are_not_mixed(tmp_path: Path, together: bool) -
     assert (
         "Its rms is 0.3 K and 0.64 µm (median rms over 3 outputs and 1 recording; largest: 0.4 K and" in page
     )
-    assert "rms [K, µm], over all outputs of a unit" in page
+    assert "rms [K, µm], held-out recordings, over all outputs of a unit" in page
     assert f"{float(np.sqrt((0.2**2 + 0.4**2) / 2)):.3f}, 0.64<" in page
     assert "T_head [K]" in page
     assert "dZ [µm]" in page
@@ -209,6 +210,26 @@ def test_a_simulated_machine_is_said_first_and_inputs_are_drawn(tmp_path: Path) 
         write_report(folder)
 
 
+def test_models_that_are_not_drawn_are_named(folder: Path, page: str) -> None:
+    assert "Not drawn" not in page
+    run = load_run(folder)
+    models = run.results["models"]
+    copies = {f"copy {k}": {**models["superposition"], "kind": "superposition"} for k in range(3)}
+    predictions = {
+        name: dataclasses.replace(
+            data, models={**data.models, **dict.fromkeys(copies, data.models["superposition"])}
+        )
+        for name, data in run.predictions.items()
+    }
+    more = dataclasses.replace(
+        run, results={**run.results, "models": {**models, **copies}}, predictions=predictions
+    )
+    drawn = {one["name"] for one in _data(render(more))["charts"][0]["panels"][0]["series"]}
+    (named,) = re.findall(r"Not drawn, since [^:]*: ([^.]*)\.", render(more))
+    assert len(set(copies) - drawn) == 1
+    assert {named} == set(copies) - drawn
+
+
 def test_the_tables_beside_the_papers_name_units(page: str) -> None:
     tables = page[page.index("Comparison of the models") :]
     assert re.search(r"E_Y0C \[µm\]\s*</t[hd]>", tables)
@@ -229,7 +250,7 @@ def test_the_missing_physics_is_named_with_size_and_certainty(page: str) -> None
     assert "flooded gap at c_body_1 and b_corpus (98 % sure)" in page
     assert "G_gap = 38.3 W/K (95 %: 35.1 to 41.6)" in page
     assert "less than 1 in 1000" in page
-    assert "pump &gt; 0.5 and speed &gt; 750" in page
+    assert "pump &gt; 0.5 and speed &gt; 750 rpm." in page
     shades = [chart["shades"] for chart in _data(page)["charts"] if chart["key"] == "fit-E_Y0C"]
     assert shades == [[[4, 10, "mismatch at b_corpus, 81 W"]]]
 
@@ -427,6 +448,28 @@ def test_runs_of_two_machines_are_listed_but_their_models_are_not_mixed(folder: 
     write_report(other)
     page = write_comparison(runs, tmp_path).read_text("utf-8")
     assert 'href="machine/report.html"' in page
+
+
+def test_many_recordings_are_one_table_in_the_terminal(tmp_path: Path) -> None:
+    both = [tmp_path / name for name in ("first", "second")]
+    for run in both:
+        path = sample.write_sample(run) / "results.json"
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"experiment": run.name}))
+    few = "\n".join(comparison(load_runs(both)))
+    assert "Recording 'validation' (held out)" in few
+    copies = [f"validation {k}" for k in range(8)]
+    for run in both:
+        path = run / "results.json"
+        results = json.loads(path.read_text())
+        for model in results["models"].values():
+            model["recordings"] |= dict.fromkeys(copies, model["recordings"]["validation"])
+        path.write_text(json.dumps(results | {"held_out": ["validation", *copies]}))
+        for name in copies:
+            shutil.copy(run / "predictions" / "validation.csv", run / "predictions" / f"{name}.csv")
+    many = "\n".join(comparison(load_runs(both)))
+    assert "Recording 'validation" not in many
+    assert "Removed rms [%], held-out recordings, geometric mean over all errors" in many
+    assert re.search(r"discovered, second .* 0 %", many)
 
 
 def test_runs_of_several_machines_are_compared_machine_by_machine(tmp_path: Path) -> None:

@@ -157,3 +157,30 @@ def test_pysindy_as_its_users_take_it_finds_a_single_mass(form: str) -> None:
     readings = np.concatenate([t.system.grid.readings for t in fit.trajectories])
     left = np.concatenate(list(fit.residuals().values()))
     assert np.sqrt(np.mean(left**2)) < 0.5 * np.std(readings)
+
+
+def test_readings_in_bursts_are_not_torn_apart() -> None:
+    """Three readings, 4 s apart, then a pause of 52 s: as a probe that is pressed thrice."""
+    burst = np.concatenate([60.0 * k + np.array([0.0, 4.0, 8.0]) for k in range(90)])
+    level = 3.0 * (1.0 - np.exp(-burst / 900.0))
+    fit, _, _ = fit_plain(_one(burst, level), ["a"], ["E"], ["P"], settings("plain"))
+    left = np.concatenate(list(fit.residuals().values()))
+    assert fit.model.terms
+    assert np.sqrt(np.mean(left**2)) < 0.1 * np.std(level)
+
+
+def test_readings_too_few_for_a_derivative_leave_no_term() -> None:
+    few = np.arange(0.0, 900.0, 60.0)
+    fit, _, report = fit_plain(_one(few, few / 300.0), ["a"], ["E"], ["P"], settings())
+    assert fit.model.terms == ()
+    assert report["left_out_rms"] > 1.0
+
+
+def _one(time: Array, level: Array) -> Campaign:
+    """A heat load that is switched on at the start, and an error that follows it."""
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "E": Channel("E", "error", "um", 0.01, "linear"),
+    }
+    values = {"P": np.full(time.size, 100.0), "E": level}
+    return Campaign("one", channels, {"a": Recording("a", time, values)}, Path("one"))

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Array
@@ -29,6 +30,7 @@ _LOWER = 0.97  # of what the other recordings reach
 _MINUTES = 360.0  # s
 _APART = 2.0  # times the usual spread: another level
 _STILL, _LINE = 0.1, 0.8  # of the recording; correlation elsewhere
+_NEAR, _HELD = 0.02, 0.01  # of the range elsewhere; of the readings elsewhere: a value that was held there
 _RELATED = 0.5  # of what a channel moves: what a straight line of its sibling leaves
 
 
@@ -260,6 +262,9 @@ def _exchanged(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterato
 def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Finding]:
     """An input that keeps one value while another one, with which it moves elsewhere, goes on: frozen or
     full.
+
+    Only values of the other input that occur elsewhere count. Nothing says where an input stands at others: a
+    pump stays on while its flow is set to new rates.
     """
     for b in inputs:
         for a in inputs:
@@ -276,9 +281,10 @@ def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Fi
                 values, counts = np.unique(y, return_counts=True)
                 value = float(values[np.argmax(counts)])
                 still = y == value
-                goes_on = float(np.std(x[still])) / (float(np.std(x)) or 1.0)
+                known = still & _occurs(x, np.concatenate([o[0] for o in others]))
+                goes_on = float(np.std(x[known])) / (float(np.std(x)) or 1.0) if known.any() else 0.0
                 usual = max((_goes_on(o) for o in others), default=0.0)
-                if still.mean() > _STILL and goes_on > 0.4 and usual < 0.5 * goes_on:
+                if known.mean() > _STILL and goes_on > 0.4 and usual < 0.5 * goes_on:
                     what = (
                         f"'{b.name}' stays at {value:.4g} in {still.mean():.0%} of the recording "
                         f"while '{a.name}', with "
@@ -286,6 +292,16 @@ def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Fi
                     )
                     do = "frozen, or at the end of its range: look at the sensor"
                     yield Finding("warning", one.file, None, what, do, "stuck", b.name, 3.0)
+
+
+def _occurs(values: Array, elsewhere: Array) -> NDArray[np.bool_]:
+    """Of each of `values` (N,), whether the readings `elsewhere` (M,) were held near it for a while."""
+    ordered = np.sort(elsewhere)
+    width = _NEAR * float(np.ptp(ordered))
+    near = np.searchsorted(ordered, values + width, "right") - np.searchsorted(
+        ordered, values - width, "left"
+    )
+    return near >= _HELD * ordered.size
 
 
 def _goes_on(pair: Array) -> float:
