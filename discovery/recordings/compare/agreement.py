@@ -35,6 +35,7 @@ _GAIN, _TWO_GAIN = 1.3, 1.7  # among several recordings; of two that stand again
 # needs less of a gain
 _FAR, _BACK, _WHOLE = 3.0, 1.15, 0.75
 _AGREES = 3.0  # times the usual misfit, at most, after a repair
+_POOR = 0.5  # of the movement: what others predict no better has causes that nobody recorded, and says nothing
 _TWO_AGREES = 0.4  # of the movement itself
 _BEGINS = 5.0  # K: by so much more a temperature begins elsewhere than in any other recording
 _FREE_AGREES = 0.3  # of the movement: a drift or an offset of any size fits a little of a poor prediction
@@ -97,6 +98,7 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
     read = {y: r for y in predicted.theta if (r := known.readings[one.name, y]) is not None}
     misfit = {y: m for y, r in read.items() if (m := known.misfit(predicted, y, r))}
     usual = {y: known.usual_misfit(one.name, y) for y in misfit}
+    misfit = {y: m for y, m in misfit.items() if two or usual[y] <= _POOR}
     wrong = {y for y, m in misfit.items() if m > _SUSPECT * usual[y]}
     if not wrong and not two:
         return []
