@@ -26,6 +26,8 @@ _HELPS = 0.3  # factor by which steps with an old linearisation have to become s
 _LEAST = 8  # intervals of a trajectory that is not divided
 _FIRST = 3  # steps of Newton that may become longer
 _SHRINKS = 0.5  # factor by which later ones have to become shorter, else half of them is taken
+_AWAY = 3  # steps of Newton that lead away from a trajectory that old linearisations have come close to ...
+_NEAR = 1e-5  # ... by steps as short as this: it is the solution, as well as can be known at the kink of a law
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,9 @@ def simulate(
     Nonlinear terms are solved by Newton's method on the whole trajectory. Most of its time goes into the
     exponentials of a new linearisation, so the last one is used again as long as its steps help. At the kink
     of a threshold full steps may go to and fro over it for ever; half a step ends between. Where steps on the
-    whole trajectory lead away, as they do where something swings many times, its halves come first.
+    whole trajectory lead away, as they do where something swings many times, its halves come first. Where
+    the slope of a law has no bound, as that of a root at zero, steps with an old linearisation come close and
+    those with a new one lead away: the closest trajectory is kept.
 
     Args:
         values: parameter values by name.
@@ -75,10 +79,10 @@ def simulate(
     first = start_values(system, values) if start is None else start
     last = None if system.affine else near
     x = last.x if last else np.tile(first, (len(system.grid.time), 1))
-    before, divided = 1.0, False
+    before, divided, away, closest = 1.0, False, 0, (np.inf, last)
     for count in range(1 if system.affine else _ROUNDS):
         with np.errstate(all="ignore"):
-            x = _nearer(system, values, first, last, x) if last else x
+            x, step = _nearer(system, values, first, last, x) if last else (x, np.inf)
             a, g0, g1 = _linearise(system, values, x)
         which, e, w0, w1 = kernel.transitions(a, system.grid.step)
         new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
@@ -92,6 +96,12 @@ def simulate(
             x, last, before, divided = _by_halves(system, values, first), None, 1.0, True
             continue
         change = _change(x, new)
+        if step < closest[0]:
+            closest = step, Trajectory(system, dict(values), x, a, which, e, w0, w1)
+        away += change > step
+        if away >= _AWAY and closest[0] < _NEAR:
+            last = closest[1]
+            break
         last = Trajectory(system, dict(values), new, a, which, e, w0, w1)
         # the next step shrinks at least as much as this one did, and the first one to less than its square
         if change * min(1.0, change / before) < _TOLERANCE:
@@ -113,8 +123,11 @@ def _by_halves(system: System, values: Mapping[str, float], first: Array) -> Arr
     return np.concatenate([*pieces, x[None]])
 
 
-def _nearer(system: System, values: Mapping[str, float], first: Array, last: Trajectory, x: Array) -> Array:
-    """A trajectory (T, n) nearer to the solution, by steps with the last linearisation.
+def _nearer(
+    system: System, values: Mapping[str, float], first: Array, last: Trajectory, x: Array
+) -> tuple[Array, float]:
+    """A trajectory (T, n) nearer to the solution, by steps with the last linearisation, and the length of the
+    step from it.
 
     The length of the step from a trajectory says how far it is from the solution. A step to where the next
     one would be longer led away and is undone: behind the kink of a threshold the old linearisation does
@@ -126,11 +139,11 @@ def _nearer(system: System, values: Mapping[str, float], first: Array, last: Tra
         new = kernel.trajectory(last.which, last.e, last.w0, last.w1, g0, g1, first)
         change = _change(x, new)
         if not change < _HELPS * before:  # also NaN
-            return x if change < before else earlier
+            return (x, change) if change < before else (earlier, before)
         before, earlier, x = change, x, new
         if change < _CLOSE:
-            return x
-    return x
+            return x, change
+    return x, before
 
 
 def _change(old: Array, new: Array) -> float:
