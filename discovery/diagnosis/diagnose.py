@@ -168,7 +168,7 @@ def diagnose(
     other = with_noise_of(context, found.best.fit)
     change = np.log(np.array(other.white.white) / np.array(context.white.white))
     if found.best.hypotheses and np.max(np.abs(change)) > ANOTHER_NOISE:
-        tell("once more, with the reading noise that the answer leaves")
+        tell("repeating with the reading noise of the answer")
         context, found = other, found.again(other)
     tell("weighing the answers")
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
@@ -275,6 +275,6 @@ def _reasons(
     """What a reader should know of the recordings and of what was asked for."""
     said = []
     if lost := ", ".join(r for r in read if r not in proof):
-        said.append(f"the model itself runs away on unseen recording {lost}: nothing can be proved there")
+        said.append(f"the free run of the model diverges on {lost}, so the repair cannot be tested there")
     said += not_offered(context.model, context.scene, effects)
     return [*said, *told(verdict.answer.fit)]

@@ -32,11 +32,13 @@ def lines_of(d: dict[str, Any]) -> list[str]:
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
         after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
         rms = f"rms {printed(i['rms_before'])} -> {after}{unit} (noise {printed(i['noise_floor'])})"
-        lines.append(f"  unseen recording {run}: {rms}{', worse than without' if run in worse else ''}")
+        lines.append(f"  held-out recording {run}: {rms}{', worse than without' if run in worse else ''}")
     if not d["physics"]:
         lines += _left(d["improvement"])
     if worse:
-        lines.append("  do not use the repaired model: unseen recordings contradict it; fit more recordings")
+        lines.append(
+            "  do not use the repaired model: held-out recordings contradict it; fit more recordings"
+        )
     lines.append(f"  next: {d['next_experiment']}")
     return lines
 

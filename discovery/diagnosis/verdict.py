@@ -83,8 +83,8 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     short = best.evidence - _alone(context, found, answer, named)
     if short > max(thresholds.SHORT, thresholds.REST * (best.evidence - found.baseline.evidence)):
         if best.forced:
-            reasons.append(f"heat of unknown cause at {best.forced} explains more than what can be named")
-        reasons.append(f"what can be named explains too little (log evidence {short:.0f} below the best)")
+            reasons.append(f"heat of unknown cause at {best.forced} explains more than effects do")
+        reasons.append(f"the surest effects explain too little (log evidence {short:.0f} below the best)")
         named = ()
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
     every = (*reasons, *_apart(found, answer, unsure))
@@ -119,8 +119,8 @@ def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None
         return None
     rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
     return (
-        f"{h.effect.word} at {h.where} does not make free runs better by what would matter on recordings "
-        f"that are left out of the fit (rms over the reading noise: {rms})"
+        f"{h.effect.word} at {h.where} does not improve free runs enough on recordings that are left out of "
+        f"the fit (rms over the reading noise: {rms})"
     )
 
 
@@ -171,7 +171,7 @@ def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdic
     if not verdict.named or _lower(runs) >= 0.5 * thresholds.MATTERS**2:
         return verdict
     reason = (
-        "what could be named changes free runs too little to matter (rms lower by "
+        "the surest effects change free runs too little to matter (rms lower by "
         f"{printed(100 * _lower(runs))} % on average over the recordings)"
     )
     reasons = (reason, *_coarse(found), *verdict.reasons)
@@ -196,11 +196,11 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in lasting)
     if _lower(proof.values()) >= 0:
         reason = (
-            f"{names} holds on the other unseen recordings but not on {', '.join(worse)}: check whether the "
+            f"{names} improves the other held-out recordings but not {', '.join(worse)}: check whether the "
             "machine was the same there"
         )
         return replace(verdict, reasons=(*verdict.reasons, reason))
-    reason = f"{names} is refuted on {', '.join(worse)}: with it, free runs there are worse than without it"
+    reason = f"with {names}, free runs on {', '.join(worse)} are worse than without"
     return replace(
         verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
     )
@@ -211,7 +211,7 @@ def _nothing(context: Context, found: Search, answer: Scored, candidates: tuple[
     if coarse := _coarse(found):
         return Verdict(UNEXPLAINED, answer, (), candidates, coarse)
     if context.outliers:
-        reason = f"{len(context.outliers)} single wrong readings, nothing else"
+        reason = f"only {len(context.outliers)} single wrong readings were found"
         return Verdict(FAULT, answer, (), (), (reason,))
     return Verdict(NO_MISMATCH, answer, (), (), _apart(found, answer, candidates))
 
@@ -221,8 +221,8 @@ def _coarse(found: Search) -> tuple[str, ...]:
     if found.baseline.coarse < thresholds.NAMED:
         return ()
     return (
-        f"the flows of the model are off by about {100 * found.baseline.off:.0f} %, more than is usual for a "
-        "lumped model, and no effect explains that",
+        f"the flows of the model are wrong by about {100 * found.baseline.off:.0f} %, more than is usual for "
+        "a lumped model, and no effect explains it",
     )
 
 

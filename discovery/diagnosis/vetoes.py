@@ -30,8 +30,8 @@ def every_clock(context: Context, answer: Scored, h: Hypothesis) -> str | None:
     if h.recording is not None and not shifted >= set(context.recordings):
         return None
     return (
-        "every recording would need its clock shifted; a dead time between what drives the machine and what "
-        "is read explains that as well"
+        "the clock of every recording would be shifted; a dead time between the inputs and the readings "
+        "explains this as well"
     )
 
 
@@ -40,7 +40,7 @@ def far_from_the_machine(_: Context, answer: Scored, h: Hypothesis) -> str | Non
     if answer.coarse < thresholds.NAMED or (h.effect.is_physics and not h.effect.is_event):
         return None
     return (
-        f"{h.effect.word} at {h.where} is not named: the flows of the model are off by about "
+        f"{h.effect.word} at {h.where} is not named: the flows of the model are wrong by about "
         f"{100 * answer.off:.0f} %, which may look the same"
     )
 

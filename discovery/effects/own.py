@@ -168,7 +168,7 @@ class EffectForm(Strict):
         used = names(formula)
         for name in sorted(used - known):
             raise UserError(
-                f"{where}: '{name}' means nothing in its formula; known: {', '.join(sorted(known))}"
+                f"{where}: '{name}' is not known in its formula; known are {', '.join(sorted(known))}"
             )
         if self.amplitude not in used:
             raise UserError(f"{where}: the amplitude '{self.amplitude}' is not in the formula")

@@ -72,4 +72,4 @@ def told(fit: Fit) -> list[str]:
         if u.is_late and u.prior and abs(value) > max(TOLD * error, SMALL * u.prior[1]):
             late = f"{abs(value):.0f} s {'late' if value > 0 else 'early'} in {u.recording}"
             found.setdefault(u.name, []).append(late)
-    return [f"{name} is logged {', '.join(runs)}: allowed for" for name, runs in found.items()]
+    return [f"{name} is logged {', '.join(runs)}; the fit allows for it" for name, runs in found.items()]

@@ -171,7 +171,7 @@ def fit_model(
         solution = solve(problem, theta, current, loss, most, tolerance, together, goal)
         theta = solution.theta
         if not np.isfinite(solution.jacobian).all():
-            raise RunsAwayError(f"model '{model.name}' answers its parameters with numbers without bound")
+            raise RunsAwayError(f"the sensitivities of model '{model.name}' to its parameters are not finite")
         if last or solution.ended_early:
             break
         left = [problem.residual(t) for t in solution.trajectories]
