@@ -1,4 +1,4 @@
-"""Effects of the user's own that can act nowhere, and why: nobody should wait for an answer about them."""
+"""Own effects that have no place in the model, with the reason."""
 
 from __future__ import annotations
 
