@@ -46,7 +46,7 @@ def written(model: Model, hypotheses: Sequence[Hypothesis]) -> Model:
 
 
 def _instead_of(term: Term, effect: Term, switches: Collection[str]) -> Expression | None:
-    """The law that an effect puts in place of a term; it is written as (new - term), perhaps with a switch."""
+    """The law that an effect puts in place of a term, written as (new - term), perhaps with a switch."""
     if not effect.effect or (term.into, term.source) != (effect.into, effect.source):
         return None
     match effect.expression:

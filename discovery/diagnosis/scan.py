@@ -20,7 +20,7 @@ from discovery.evidence.signatures import signatures
 
 @dataclass(frozen=True)
 class Scan:
-    """Candidates scored on the residual of a model, best odds first; and on the residual without one effect."""
+    """Candidates scored on the residual of a model, best odds first, and on that without one effect."""
 
     claims: tuple[Score, ...]
     without: Mapping[Key, tuple[Score, ...]]

@@ -1,1 +1,1 @@
-"""Effects that a model can lack: a catalogue with a file for each effect, and the places where each can act."""
+"""Effects that a model can lack: a catalogue with a file for each one, and the places where it can act."""

@@ -1,4 +1,4 @@
-"""The form of an effect in the catalogue: a formula with variables for bodies and channels, and its search."""
+"""An effect in the catalogue: a formula with variables for bodies and channels, and its search."""
 
 from __future__ import annotations
 

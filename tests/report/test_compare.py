@@ -88,7 +88,7 @@ def test_runs_of_several_machines_are_compared_machine_by_machine(tmp_path: Path
     runs = load_runs([tmp_path])
     assert groups(runs) == [[0, 1], [2, 3]]
     page = write_comparison(runs, tmp_path).read_text("utf-8")
-    assert "Not all of these runs share recordings" in page
+    assert "Runs are compared on the recordings that they share" in page
     for number, hours, label in ((1, 24, "again"), (2, 20, "twin")):
         part = page.partition(f'<section id="group-{number}"><h2>machine of {hours} h</h2>')[2]
         assert f"discovered, {label}" in part.partition("</section>")[0]
