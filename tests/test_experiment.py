@@ -395,7 +395,7 @@ def test_runs_side_by_side(folder: Path) -> None:
     (folder / "empty").mkdir()
     with pytest.raises(UsageError, match="two or more runs"):
         load_runs([first])
-    with pytest.raises(UserError, match="empty: no run is there"):
+    with pytest.raises(UserError, match="empty: there is no run"):
         load_runs([first, folder / "empty"])
 
 

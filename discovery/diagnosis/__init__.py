@@ -1,4 +1,4 @@
-"""Diagnosis: locate what a model leaves out, name it, model it and show the fit improve."""
+"""Diagnosis: find where a model lacks physics, name the effect, add it, and test the repaired model."""
 
 from discovery.diagnosis.diagnose import Diagnosis, diagnose
 

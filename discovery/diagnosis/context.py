@@ -1,4 +1,6 @@
-"""What a diagnosis works on: recordings it may see, noise to reckon with, and how large effects can be."""
+"""Context of a diagnosis: the recordings to fit, the noise settings, and the prior of the size of each
+effect.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,7 @@ NODES = 1000  # of a recording, about, and its readings: inputs are their means 
 
 
 def process_prior() -> Prior:
-    """What is believed of process noise before the recordings are read."""
+    """Prior of process noise."""
     return Prior(
         thresholds.FLOOR,
         thresholds.SHARE,
@@ -93,7 +95,7 @@ class Context:
 
     @cached_property
     def candidates(self) -> list[Hypothesis]:
-        """Every effect at every place where it could act in the model."""
+        """Every effect at every place of the model where it can act."""
         return candidates(self.model, self.effects, self.scene)
 
     def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:
@@ -128,7 +130,7 @@ class Context:
         return {n: v for n, v in flow_sizes(self.baseline).items() if n in self.model.states}
 
     def _shown(self, h: Hypothesis) -> list[tuple[float, float]]:
-        """For each amplitude: rms of what one of it shows, and the reading noise there."""
+        """For each amplitude: rms of the outputs for an amplitude of one, and the reading noise there."""
         white = dict(zip(self.outputs, self.white.white, strict=True))
         several = len(h.amplitudes) > 1
         names = list(h.shown) if several else [next(iter(h.shown))]
@@ -161,7 +163,7 @@ def make_context(
     after: Mapping[str, tuple[str, ...]],
     physical: bool = True,
 ) -> Context:
-    """Fit the baseline jointly and find the noise levels that tests must reckon with.
+    """Fit the baseline to all recordings together and find the noise levels for the tests.
 
     Only `recordings` are looked at.
 
@@ -225,7 +227,7 @@ def make_context(
 
 
 def with_noise_of(context: Context, fit: Fit) -> Context:
-    """The context with the reading noise that a better fit leaves, where the campaign states none."""
+    """The context with the reading noise of a better fit, if the campaign states none."""
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
     white = reading_noise(fit, stated, context.floor, process_prior())
     unsure = any(g.unsure for g in context.grids.values())
@@ -233,7 +235,7 @@ def with_noise_of(context: Context, fit: Fit) -> Context:
 
 
 def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:
-    """The grids with every k-th reading, where there are more than a search can use in reasonable time.
+    """The grids with every k-th reading, if there are more than a search can use in reasonable time.
 
     Sensors that are read every second say little more than every few seconds: slow noise limits a diagnosis.
     """
@@ -256,12 +258,12 @@ def _inputs(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str
 
 
 def _largest(campaign: Campaign, recordings: Sequence[str], name: str) -> float:
-    """Largest magnitude of an input that moves, over some recordings; zero of one that stands still."""
+    """Largest magnitude of an input that moves in some recordings; zero for an input that does not move."""
     series = np.concatenate([campaign.recordings[r].values[name] for r in recordings])
     series = series[np.isfinite(series)]
     return float(np.abs(series).max()) if np.ptp(series) > 0 else 0.0
 
 
 def _within(effect: Effect, spacing: float, duration: float) -> Effect:
-    """The effect with generic time constants within what the recordings can show."""
+    """The effect, its generic time constants limited to those that the recordings can show."""
     return replace(effect, shapes=tuple(s.within(0.5 * spacing, duration) for s in effect.shapes))

@@ -1,4 +1,4 @@
-"""Free runs on recordings left out of the fit: a name has to hold where the fit has not been."""
+"""Free runs on recordings that are left out of the fit: a named effect has to improve them."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> 
 def _residuals(
     context: Context, answer: Scored, chosen: Sequence[Hypothesis], fold: Fold
 ) -> dict[str, Array]:
-    """Readings minus free run (R, Y) over the reading noise, of what is left out and does not run away."""
+    """Residuals (R, Y) over the reading noise on left-out recordings, if the free run stays finite."""
     model, found = with_effects(context.model, chosen), answer.fit.model.parameters
     model = model.with_values({n: found[n].value for n in model.free if n in found})
     white = np.array(context.white.white)

@@ -1,4 +1,4 @@
-"""When no effect of the catalogue fits: a formula that describes the missing heat, clearly not its cause.
+"""A formula that describes missing heat if no effect of the catalogue fits. It is a description, not a cause.
 
 SINDy in the filtered form: a library of powers, products, thresholds, saturations and lags of the inputs and
 of the body's own temperature, each seen through the model, chosen one after the other by evidence.

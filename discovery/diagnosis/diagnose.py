@@ -1,4 +1,4 @@
-"""The diagnosis from start to end: fit, noise, search, posterior, verdict, proof, location, what to do."""
+"""A diagnosis from start to end: fit, noise, search, posterior, verdict, proof, location, next experiment."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def diagnose(
     other = with_noise_of(context, found.best.fit)
     change = np.log(np.array(other.white.white) / np.array(context.white.white))
     if found.best.hypotheses and np.max(np.abs(change)) > ANOTHER_NOISE:
-        tell("once more, with the reading noise that the answer leaves")
+        tell("repeating with the reading noise of the answer")
         context, found = other, found.again(other)
     tell("weighing the answers")
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
@@ -212,8 +212,8 @@ def diagnose(
 
 
 def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """By recording to fit, the recordings of the campaign made then or later: by their dates where all have
-    one, else in the order of the campaign.
+    """For each recording to fit, the recordings of the campaign from then on: by their dates if all have one,
+    else in the order of the campaign.
     """
     origin = {name: recording.origin for name, recording in campaign.recordings.items()}
     names = list(campaign.recordings)
@@ -223,7 +223,7 @@ def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]
 
 
 def _unknown(context: Context, found: Search) -> list[Scored]:
-    """A latent force at each state: instead of everything, and with the best answer."""
+    """A latent force at each state: alone, and with the best answer."""
     models = list({one.keys: one for one in (found.baseline, found.best)}.values())
 
     def at_each_state(one: Scored) -> list[Scored]:  # what it has whitened is kept from one state to the next
@@ -235,7 +235,7 @@ def _unknown(context: Context, found: Search) -> list[Scored]:
 def _repaired(
     context: Context, answer: Scored, chosen: Sequence[Hypothesis], model: Model, seen: Campaign
 ) -> Fit:
-    """The model with effects of an answer, fitted as the baseline of the proof is."""
+    """The model with effects of an answer, fitted in the same way as the baseline of the proof."""
     grown = with_effects(model, chosen)
     values = answer.fit.model.parameters
     start = {n: values[n].value for n in grown.free if n in values}
@@ -253,7 +253,7 @@ def _repaired(
 
 
 def _gain(context: Context, answer: Scored, model: Model, seen: Campaign, before: Fit) -> float:
-    """What an answer explains of the free runs of the fitted recordings, rms in reading noises."""
+    """rms in reading noises that an answer explains in free runs of the fitted recordings."""
     if not answer.hypotheses:
         return inf  # what is left has no name, if anything is
     try:
@@ -272,9 +272,9 @@ def _reasons(
     proof: dict[str, Improvement],
     effects: Sequence[Effect],
 ) -> list[str]:
-    """What a reader should know of the recordings and of what was asked for."""
+    """Notes for the reader about the recordings and the effects of the experiment."""
     said = []
     if lost := ", ".join(r for r in read if r not in proof):
-        said.append(f"the model itself runs away on unseen recording {lost}: nothing can be proved there")
+        said.append(f"the free run of the model diverges on {lost}, so the repair cannot be tested there")
     said += not_offered(context.model, context.scene, effects)
     return [*said, *told(verdict.answer.fit)]

@@ -73,7 +73,7 @@ class Alternative(Claim):
 
 
 class Considered(Claim):
-    """A claim on what the baseline leaves, from the first scan."""
+    """A candidate effect of the first scan, scored on the residual of the baseline."""
 
     channels: list[str] = Field(default_factory=list, description="inputs that it follows")
     instants_s: list[float] | None = None
@@ -84,7 +84,7 @@ class Considered(Claim):
 
 
 class Detection(Strict):
-    """What the baseline leaves, and the noise it is held against."""
+    """Residual of the baseline, and the noise that it is compared with."""
 
     p_value: Number = Field(description="probability that nothing is missing")
     log_evidence: Number = Field(description="log posterior odds of the answer over the baseline")
@@ -232,7 +232,7 @@ def document(d: Diagnosis) -> DiagnosisDocument:
 
 
 def number(value: float | None, digits: int = 5) -> Number:
-    """A number as JSON holds it: so many digits, null for what is none."""
+    """A number for JSON, rounded to so many digits; null for NaN and infinity."""
     return None if value is None or not np.isfinite(value) else float(f"{value:.{digits}g}")
 
 
@@ -277,7 +277,7 @@ def _physics(d: Diagnosis, n: Named) -> Physics:
 
 
 def _wrong_readings(d: Diagnosis) -> list[Physics]:
-    """Single wrong readings, largest first, where they are all that is wrong."""
+    """Single wrong readings, largest first, if nothing else is wrong."""
     if d.verdict.word != FAULT:
         return []
     entry, rows = catalogue()["outlier"], []
@@ -357,7 +357,7 @@ def _detection(d: Diagnosis) -> Detection:
 
 
 def _rms(residual: np.ndarray) -> float:
-    """NaN of an output that was never read."""
+    """rms of a residual; NaN of an output without readings."""
     read = residual[np.isfinite(residual)]
     return float(np.sqrt(np.mean(read**2))) if len(read) else float("nan")
 

@@ -45,7 +45,7 @@ class Location:
 def locate(
     context: Context, baseline: Scored, verdict: Verdict, posterior: Posterior, forces: Sequence[Force]
 ) -> Location:
-    """Location of what the baseline leaves.
+    """Locate the residual of the baseline.
 
     Outputs by what the answer removes of their residual, states by the posterior, windows and regime from the
     missing heat itself.
@@ -78,7 +78,7 @@ def _outputs(baseline: Scored, best: Scored) -> dict[str, float]:
 
 
 def _states(posterior: Posterior, forces: Sequence[Force]) -> dict[str, float]:
-    """Share of each state in the posterior of what acts; of the latent force where nothing does."""
+    """Share of each state in the posterior of the effects, or of the latent force if there is none."""
     weight: dict[str, float] = {f.state: 0.0 for f in forces}
     for model, p in zip(posterior.models, posterior.shares, strict=True):
         places = [h.states for h in model.hypotheses if h.states]

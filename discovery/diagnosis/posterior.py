@@ -1,4 +1,4 @@
-"""How sure an answer is: the posterior over everything that was tried, bagged.
+"""The probability of an answer: the bagged posterior over all models that the search tried.
 
 A posterior of approximate models is too sure of itself: a little more data, other priors or one recording
 less and another model wins. So it is averaged over resampled blocks of time and over wider and narrower
@@ -42,7 +42,7 @@ class Posterior:
 
     @property
     def best(self) -> Scored:
-        """The most likely model, with what has no name."""
+        """The most likely model, also among those with heat of unknown cause."""
         return max(self.models, key=lambda m: m.evidence)
 
     @property
@@ -59,7 +59,7 @@ class Posterior:
         return float(np.mean(1.0 / (1.0 + np.exp(-np.clip(odds, -500, 500)))))
 
     def of_claim(self, h: Hypothesis) -> float:
-        """Probability that an effect acts, wherever, in the recordings in which a hypothesis has it."""
+        """Probability that an effect acts at any place, in the recordings of a hypothesis."""
         claim = (h.effect.word, h.recording)
         return self.of(lambda m: any((o.effect.word, o.recording) == claim for o in m.hypotheses))
 
@@ -78,7 +78,9 @@ def posterior(context: Context, models: Collection[Scored], seed: int = 0) -> Po
 
 
 def _draws(recordings: int, blocks: int, seed: int) -> tuple[Array, Array]:
-    """How often each block counts (D, B), the number in each recording kept; the width of priors (D,)."""
+    """Count of each block (D, B) in each draw, with the same number of blocks in each recording; width of
+    priors (D,).
+    """
     rng = np.random.default_rng(seed)
     count = thresholds.DRAWS
     one = [rng.multinomial(blocks, np.full(blocks, 1 / blocks), count) for _ in range(recordings)]

@@ -1,4 +1,4 @@
-"""The proof: free runs of the fitted baseline and of the repaired model, as every table shows them.
+"""The proof: free runs of the fitted baseline and of the repaired model, as in every table.
 
 Both models are fitted as any model of an experiment is, and start as it does; what a fit allowed for in the
 diagnosis (process noise, starts) helps neither. Single wrong readings are set aside.
@@ -31,7 +31,7 @@ BLOCKS = 8  # of a recording, resampled: what a free run misses lasts for hours
 
 @dataclass(frozen=True)
 class Improvement:
-    """rms of a recording before and after the repair, and what noise alone leaves of a free run.
+    """rms of a recording before and after the repair, and the rms of noise alone in a free run.
 
     `low` and `high` bound the improvement of the rms (before - after) by block bootstrap, 95 %; `outputs` has
     the plain rms of each output before and after, in its unit. `after` is infinite where the repaired model
@@ -70,7 +70,7 @@ class FreeRuns:
 def free_runs(
     campaign: Campaign, recordings: Sequence[str], before: Fit, after: Fit, noise: Noise
 ) -> dict[str, FreeRuns]:
-    """Free runs on each recording; one on which the baseline runs away proves nothing and is left out."""
+    """Free runs on each recording; a recording on which the baseline diverges is left out."""
     one, white, found = size_of(campaign, noise), np.array(noise.white), {}
     for run in recordings:
         old, new = _run(before, campaign, run), _run(after, campaign, run)
@@ -90,7 +90,7 @@ def free_runs(
 
 
 def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement:
-    """What the repair changes over some recordings, each reading counting alike."""
+    """Change of the rms by the repair over some recordings; each reading has the same weight."""
     before = np.concatenate([r.before for r in runs])
     lost = any(r.after is None for r in runs)
     after = before if lost else np.concatenate([r.after for r in runs if r.after is not None])
@@ -138,7 +138,7 @@ def explained(found: Mapping[str, Improvement]) -> float | None:
 
 
 def _run(fit: Fit, campaign: Campaign, run: str) -> Trajectory | None:
-    """None where the model, or an output of it, does not stay finite."""
+    """Free run of a model; None if it, or an output, does not stay finite."""
     try:
         trajectory = predict_recording(
             fit.model,

@@ -1,4 +1,6 @@
-"""In which regime heat is missing: a rule over inputs and states, as an expression of a model file has it."""
+"""The regime in which heat is missing: a rule over inputs and states, written as an expression of a model
+file.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +31,8 @@ HOLDS = 0.9  # share of a rule's instants at which the heat acts, of the others 
 
 
 def of_effects(best: Scored, effects: Sequence[Hypothesis], baseline: Model) -> str | None:
-    """When the lasting effects of an answer act, by what drives the baseline; None where they always do, or
-    where no rule of two conditions says it.
+    """When the lasting effects of an answer act, in terms of the inputs and states of the baseline; None if
+    they always act, or if no rule of two conditions describes it.
     """
     x: list[Array] = []
     heat: list[Array] = []
@@ -63,7 +65,7 @@ def of_effects(best: Scored, effects: Sequence[Hypothesis], baseline: Model) -> 
 
 
 def of_free_heat(baseline: Scored, f: Force, seed: int = 0) -> str | None:
-    """When heat of unknown cause acts; None where no rule of two conditions says it.
+    """When heat of unknown cause acts; None if no rule of two conditions describes it.
 
     The tree must beat 95 % of trees grown on heat whose days were shuffled.
     """
@@ -100,8 +102,8 @@ def of_free_heat(baseline: Scored, f: Force, seed: int = 0) -> str | None:
 
 
 def heat_of(best: Scored, trajectory: Trajectory, h: Hypothesis, body: str = "") -> Array:
-    """What an effect lets flow into a body (default: its first), or into all where it has none, at the ends
-    of the steps (2 K,), W or rate.
+    """Heat flow of an effect into a body (default: its first; all bodies if it has none) at the ends of the
+    steps (2 K,), W or rate.
     """
     body = body or (h.states[0] if h.states else "")
     heat = np.zeros(2 * len(trajectory.system.grid.step))
@@ -125,7 +127,7 @@ def _tree(x: Array, target: Array, least: int, depth: int = 2) -> DecisionTreeRe
 
 
 def _switches(x: Array, names: Sequence[str]) -> set[str]:
-    """Variables that are on or off and nothing between."""
+    """Variables that are only on or off."""
     return {name for name, column in zip(names, x.T, strict=True) if np.isin(column, (0.0, 1.0)).all()}
 
 

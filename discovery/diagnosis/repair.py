@@ -1,4 +1,4 @@
-"""The repaired model as it goes out: written as an engineer would write it."""
+"""The repaired model as a file: written in the form that an engineer would use."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from discovery.terms.expression import rewrite
 
 
 def written(model: Model, hypotheses: Sequence[Hypothesis]) -> Model:
-    """The fitted model with no switch that is always on, and each term that an effect replaces gone."""
+    """The fitted model without switches that are always on and without terms that an effect replaces."""
     switches = {
         h.amplitudes[0] for h in hypotheses if h.effect.amplitude.fixed is not None and not h.recording
     }
@@ -46,7 +46,7 @@ def written(model: Model, hypotheses: Sequence[Hypothesis]) -> Model:
 
 
 def _instead_of(term: Term, effect: Term, switches: Collection[str]) -> Expression | None:
-    """What an effect puts in the place of a term: it is written as (new - term), perhaps with a switch."""
+    """The law that an effect puts in place of a term, written as (new - term), perhaps with a switch."""
     if not effect.effect or (term.into, term.source) != (effect.into, effect.source):
         return None
     match effect.expression:

@@ -1,4 +1,4 @@
-"""The scan: every effect at every place, scored at first order on what a model leaves."""
+"""The scan: every effect at every place, scored on the residual of a model to first order."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from discovery.evidence.signatures import signatures
 
 @dataclass(frozen=True)
 class Scan:
-    """Claims on what a model leaves, the best odds first; and on what it leaves without one effect."""
+    """Candidates scored on the residual of a model, best odds first, and on that without one effect."""
 
     claims: tuple[Score, ...]
     without: Mapping[Key, tuple[Score, ...]]
 
 
 def scan_model(context: Context, current: Scored) -> Scan:
-    """Every effect at every place, scored on what a model leaves."""
+    """Score every effect at every place on the residual of a model."""
     found = [h for h in context.candidates if h.key not in current.keys]
     found = [h for h in found if h.effect.search != "single readings"]
     settings = _in_play(context, current)
@@ -55,7 +55,7 @@ def _at_instants(h: Hypothesis, other: Hypothesis) -> Hypothesis:
 
 
 def _without(current: Scored, h: Hypothesis) -> Without:
-    """One of the effects of a model, to be taken out: what it shows, and its unknowns."""
+    """The contribution of one effect of a model, to be removed, and its unknowns."""
     fitted = current.fit.model.parameters
     sizes = {name: fitted[name].value for name in (*h.amplitudes, *h.shapes)}
     here = replace(h, shapes={name: sizes[name] for name in h.shapes})
@@ -68,8 +68,8 @@ def _without(current: Scored, h: Hypothesis) -> Without:
 
 
 def _in_play(context: Context, current: Scored) -> list[Setting]:
-    """Noise settings to scan under: the most likely one first, and one with little process noise, for which
-    what is missing may have passed.
+    """Noise settings for the scan: the most likely one, and one with little process noise, because process
+    noise may have absorbed the missing physics.
     """
     best = current.settings[current.best]
     other = next(s for s in context.settings if s.place == (*best.place[:2], 0, 0, 0))
@@ -79,7 +79,7 @@ def _in_play(context: Context, current: Scored) -> list[Setting]:
 def attempt(
     context: Context, current: Scored, others: Sequence[Hypothesis], claim: Score, goal: float = inf
 ) -> Scored | None:
-    """Refit with others and a claim, from the sizes that the scan gives; `goal` as in `fit_model`."""
+    """Refit with a further candidate, starting from the sizes of the scan; `goal` as in `fit_model`."""
     h = claim.hypothesis
     sizes: dict[str, float] = {}
     if h.effect.amplitude.fixed is None:

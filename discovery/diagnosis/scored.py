@@ -31,7 +31,7 @@ KEPT = 4  # noise settings of a model, the most likely ones
 
 @dataclass(frozen=True)
 class Scored:
-    """A model with a set of effects, fitted, and how likely it makes the readings.
+    """A fitted model with a set of effects, and its log marginal likelihood.
 
     `settings` are those that were tried, `grams` under each; `sizes` (A,) index of each free amplitude among
     the unknowns that move, -1 for one that presses against zero.
@@ -86,13 +86,13 @@ class Scored:
 
     @cached_property
     def coarse(self) -> float:
-        """Probability that more is off than is usual for a lumped model, among the settings tried."""
+        """Probability that the error is larger than usual for a lumped model, over the settings tried."""
         coarse = np.array([not is_usual(s) for s in self.settings])
         return float(np.exp(self.levels - log_sum_exp(self.levels)) @ coarse)
 
     @property
     def off(self) -> float:
-        """The share of flows by which the model is off under the most likely noise."""
+        """Share of the flows by which the model is wrong under the most likely noise."""
         return off_by(self.settings[self.best])
 
     def level(self, k: int) -> float:
@@ -102,7 +102,7 @@ class Scored:
         return float(log_sum_exp(np.array([self._level(g, k) for g in self._forms(k)])))
 
     def _forms(self, k: int) -> tuple[Grams, ...]:
-        """The laws of the effects as they are, and each off by a share that the operating point sets."""
+        """Form errors of the effects: each law is wrong by a share that depends on the operating point."""
         spread = self.seen.spread[sum(self.seen.form) :]
         return (self.grams[k].without(spread), self.grams[k]) if len(spread) else (self.grams[k],)
 
@@ -145,7 +145,7 @@ class Scored:
         return max(middle - half, unknowns[index].low), min(middle + half, unknowns[index].high)
 
     def rms(self, apart: Collection[str] = ()) -> float:
-        """Root mean square of the residuals over their reading noise, but those of some recordings."""
+        """Root mean square of the residuals over their reading noise, without some recordings."""
         white = np.array(self.grams[0].noise.white)
         runs = [t.system.grid.recording for t in self.fit.trajectories]
         parts = zip(runs, self.seen.residuals, strict=True)
@@ -154,7 +154,7 @@ class Scored:
 
 
 def with_effects(model: Model, chosen: Sequence[Hypothesis]) -> Model:
-    """The model with effects added, nothing fitted."""
+    """The model with effects added, not fitted."""
     # what moves the zero of a sensor comes behind what smooths it: no lag makes a slope of a jump
     for h in sorted(chosen, key=lambda h: h.shifts_the_zero):
         model = h.added_to(model)
@@ -218,8 +218,7 @@ def score(
     sizes: Mapping[str, float] | None = None,
     goal: float = inf,
 ) -> Scored | None:
-    """Refit with a set of effects and score it; None where the model runs away: what it cannot run with is no
-    explanation.
+    """Refit with a set of effects and score it; None if the model does not stay finite.
 
     Args:
         goal: as in `fit_model`.
@@ -294,7 +293,7 @@ def _over_noise(context: Context, bare: Scored, forces: Sequence[UnknownHeat] = 
 
 
 def _distance(one: Noise, other: Noise) -> float:
-    """How far two noises are apart in slow noise, form error, heat that nobody records, and jitter."""
+    """Distance of two noise settings in slow noise, form error, unrecorded heat and jitter."""
     slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
     form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
     here, there = (sum((noise.heat or {}).values()) for noise in (one, other))
@@ -303,12 +302,12 @@ def _distance(one: Noise, other: Noise) -> float:
 
 
 def is_usual(setting: Setting) -> bool:
-    """Whether a model is off by no more than is usual."""
+    """Whether the error of a model is not larger than usual."""
     return off_by(setting) <= thresholds.SHARE
 
 
 def off_by(setting: Setting) -> float:
-    """The share of flows by which a model is off: its laws, its flows, or heat that nobody records."""
+    """Share of the flows by which a model is wrong: its laws, its flows, or unrecorded heat."""
     return max(setting.noise.share, setting.noise.form, setting.level * thresholds.FLOOR)
 
 
@@ -320,5 +319,5 @@ def with_force(context: Context, one: Scored, state: str) -> Scored:
 
 
 def light(one: Scored) -> Scored:
-    """A score without what takes memory and is not asked for again: its sensitivities."""
+    """The score without its sensitivities, which take memory and are not needed again."""
     return replace(one, seen=replace(one.seen, last={}))

@@ -1,4 +1,4 @@
-"""The search for the set of effects that makes the readings most likely, one refit at a time.
+"""Search for the most likely set of effects, one refit at a time.
 
 Effects are added while they add to the posterior; then each one is questioned: is it needed, and would
 another one stand better in its place? Everything that is refitted on the way is kept: these models share the
@@ -52,7 +52,7 @@ class Search:
 
     @property
     def claims(self) -> tuple[Score, ...]:
-        """Claims on what the baseline leaves, as they were first seen."""
+        """Candidates as the first scan scored them on the residual of the baseline."""
         return self.first or self.scanned(self.baseline).claims
 
     @property
@@ -79,7 +79,7 @@ class Search:
                 return self
 
     def again(self, context: Context) -> Search:
-        """The search under another noise, from what was tried: scored again, and gone on with."""
+        """Repeat the search under another noise: score the tried models again, and continue."""
         best = self.best.evidence
         other = Search(context, self.tell, first=self.claims)
         near = [one for one in self.tried.values() if not one.hypotheses or one.evidence > best - FAR]
@@ -92,19 +92,19 @@ class Search:
         return other.run()
 
     def keep(self, one: Scored) -> Scored:
-        """Note a refit where none of the same effects is better."""
+        """Store a refit if no refit of the same effects is better."""
         if one.keys not in self.tried or self.tried[one.keys].evidence < one.evidence:
             self.tried[one.keys] = _lighter(one)
         return one
 
     def scanned(self, one: Scored) -> Scan:
-        """What the scan says of a model."""
+        """The scan of a model."""
         if one.keys not in self.scans:
             self.scans[one.keys] = scan_model(self.context, one)
         return self.scans[one.keys]
 
     def _grown(self, current: Scored) -> Scored:
-        """Add the claim that adds most, or let an effect act at more places, while one of these adds."""
+        """Add the best candidate, or let an effect act at more places, as long as the posterior grows."""
         while len(current.hypotheses) < MOST:
             best = self._refitted(current, current.hypotheses, _hopeful(self.scanned(current).claims, REFITS))
             best = max(best, self._widened(current), key=lambda one: one.evidence)
@@ -115,7 +115,7 @@ class Search:
         return current
 
     def _widened(self, current: Scored) -> Scored:
-        """The best refit in which an effect acts at its places and more; `current` where none is better."""
+        """The best refit with an effect at its places and more; `current` if none is better."""
         best = current
         for h in current.hypotheses:
             others = tuple(o for o in current.hypotheses if o.key != h.key)
@@ -124,7 +124,7 @@ class Search:
         return best
 
     def _questioned(self, current: Scored) -> Scored:
-        """Take each effect out, and see whether it is needed and what would stand in its place."""
+        """Remove each effect, and try its rivals instead."""
         scan = self.scanned(current) if current.hypotheses else None
         for h in current.hypotheses if scan else ():
             others = tuple(o for o in current.hypotheses if o.key != h.key)
@@ -143,7 +143,7 @@ class Search:
         return current
 
     def _refitted(self, start: Scored, others: Sequence[Hypothesis], pool: Sequence[Score]) -> Scored:
-        """The best refit with one of some claims added to others; `start` where none is better."""
+        """The best refit with one of some candidates added; `start` if none is better."""
         own = [o.key for o in others]
         keys = [frozenset((*own, claim.hypothesis.key)) for claim in pool]
         known = {*self.tried, *self.lost}
@@ -164,7 +164,7 @@ class Search:
         return best
 
     def _goal(self, noise: Noise) -> float:
-        """Cost of a fit under a noise from which it may take part in the answer."""
+        """Cost of a fit from which it can be part of the answer."""
         best = self.best.fit
         return FAR + cost_under(best.problem, best.theta, best.trajectories, noise)
 
@@ -175,8 +175,8 @@ def _lighter(one: Scored) -> Scored:
 
 
 def _alike(h: Hypothesis, claims: Sequence[Score]) -> list[Score]:
-    """The best claim of the same effect elsewhere, and of each one that it is confused with: of what looks
-    the same, the first order need not show which one is better.
+    """The best candidate of the same effect elsewhere, and of each effect that looks the same: to first order
+    the scan need not show which is better.
     """
     words = (h.effect.word, *h.effect.confused_with)
     found = [next((c for c in claims if c.hypothesis.effect.word == word), None) for word in words]
@@ -184,6 +184,6 @@ def _alike(h: Hypothesis, claims: Sequence[Score]) -> list[Score]:
 
 
 def _hopeful(claims: Sequence[Score], most: int, reached: float = -inf) -> list[Score]:
-    """The claims that are worth a refit: the scan sees but the first order of a large effect."""
+    """Candidates that are worth a refit: the scan sees a large effect only to first order."""
     best = max([reached, *(c.odds for c in claims[:1])])
     return [c for c in claims[:most] if c.odds > max(-HOPE, HALF * best - HOPE)]

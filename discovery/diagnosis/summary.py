@@ -11,12 +11,12 @@ from discovery.runfolder import read_diagnosis
 
 
 def summary(folder: Path) -> list[str]:
-    """Lines that say what the diagnosis.json of a folder says."""
+    """Lines for the terminal about the diagnosis.json of a folder."""
     return lines_of(read_diagnosis(folder))
 
 
 def lines_of(d: dict[str, Any]) -> list[str]:
-    """Lines that say what the content of a diagnosis.json says."""
+    """Lines for the terminal about the content of a diagnosis.json."""
     lines = [f"{d['verdict']} in '{d['model']}'"]
     for p in d["physics"]:
         sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q, p))
@@ -32,17 +32,19 @@ def lines_of(d: dict[str, Any]) -> list[str]:
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
         after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
         rms = f"rms {printed(i['rms_before'])} -> {after}{unit} (noise {printed(i['noise_floor'])})"
-        lines.append(f"  unseen recording {run}: {rms}{', worse than without' if run in worse else ''}")
+        lines.append(f"  held-out recording {run}: {rms}{', worse than without' if run in worse else ''}")
     if not d["physics"]:
         lines += _left(d["improvement"])
     if worse:
-        lines.append("  do not use the repaired model: unseen recordings contradict it; fit more recordings")
+        lines.append(
+            "  do not use the repaired model: held-out recordings contradict it; fit more recordings"
+        )
     lines.append(f"  next: {d['next_experiment']}")
     return lines
 
 
 def _left(improvement: dict[str, Any]) -> list[str]:
-    """What free runs of the model leave, next to what the noise that the diagnosis found accounts for."""
+    """rms of free runs of the model, and the rms that noise explains."""
     runs = {"recordings to fit": improvement["fit"]} | {
         f"unseen recording {run}": i for run, i in improvement["held_out"].items()
     }
@@ -56,7 +58,7 @@ def _left(improvement: dict[str, Any]) -> list[str]:
 
 
 def _unit(improvement: dict[str, Any]) -> str:
-    """The unit of the proof as it stands behind a number."""
+    """The unit of the proof, to be printed behind a number."""
     unit = improvement.get("unit") or "1"
     return "" if unit == "1" else f" {unit}"
 
@@ -69,9 +71,7 @@ def _place(claim: dict[str, Any]) -> str:
 
 
 def _is_told(q: dict[str, Any], claim: dict[str, Any]) -> bool:
-    """Whether a number says something: a switch that is fixed at 1 only says that its effect is there, and a
-    jump that may be none says nothing.
-    """
+    """Whether a parameter is printed: not a switch that is fixed at 1, nor a jump that may be zero."""
     if claim.get("moved") and q.get("output", claim["moved"][0]) not in claim["moved"]:
         return False
     switch = q["unit"] == "1" and q["low"] == q["value"] == q["high"] == 1.0
@@ -79,7 +79,7 @@ def _is_told(q: dict[str, Any], claim: dict[str, Any]) -> bool:
 
 
 def _size(name: str, q: dict[str, Any]) -> str:
-    """A number with its unit, the speed it is a size at, and its 95 % interval."""
+    """A parameter with its unit, the speed at which it is stated, and its 95 % interval."""
     unit = "" if q["unit"] == "1" else f" {q['unit']}"
     unit += f" at {q['at']}" if q.get("at") else ""
     interval = f" ({printed(q['low'], 4)} to {printed(q['high'], 4)})" if q["low"] != q["high"] else ""

@@ -1,4 +1,4 @@
-"""The verdict: what is named, how sure it is, what else it could be, and when to say that nothing is known.
+"""The verdict: the named effects, their probability, their rivals, or that the cause is unknown.
 
 An effect is named where its probability says so, where it also predicts recordings that a fit has not seen,
 and where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
@@ -83,8 +83,8 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     short = best.evidence - _alone(context, found, answer, named)
     if short > max(thresholds.SHORT, thresholds.REST * (best.evidence - found.baseline.evidence)):
         if best.forced:
-            reasons.append(f"heat of unknown cause at {best.forced} explains more than what can be named")
-        reasons.append(f"what can be named explains too little (log evidence {short:.0f} below the best)")
+            reasons.append(f"heat of unknown cause at {best.forced} explains more than effects do")
+        reasons.append(f"the surest effects explain too little (log evidence {short:.0f} below the best)")
         named = ()
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
     every = (*reasons, *_apart(found, answer, unsure))
@@ -99,7 +99,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
 def _proved(
     context: Context, found: Search, answer: Scored, chosen: Sequence[Named]
 ) -> tuple[tuple[Named, ...], dict[Key, str]]:
-    """Those that make free runs better outside the fit, and why each other one is not named."""
+    """Effects that improve free runs outside the fit, and why each other one is not named."""
     kept, idle = tuple(chosen), dict[Key, str]()
     while kept:
         whole = _only(context, found, answer, kept) or answer
@@ -113,20 +113,20 @@ def _proved(
 
 
 def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None:
-    """Why an effect is not named for what recordings left out of the fit show; None where it may be."""
+    """Why left-out recordings do not support an effect; None if they do."""
     outside = proofs[h.key]
     if outside is None or outside.explained >= thresholds.MATTERS:
         return None
     rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
     return (
-        f"{h.effect.word} at {h.where} does not make free runs better by what would matter on recordings "
-        f"that are left out of the fit (rms over the reading noise: {rms})"
+        f"{h.effect.word} at {h.where} does not improve free runs enough on recordings that are left out of "
+        f"the fit (rms over the reading noise: {rms})"
     )
 
 
 def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> list[Named]:
-    """Those without which a model of them alone would be short: each one has to add evidence of its own, and
-    more than by chance next to large effects.
+    """Effects that are all needed: each adds evidence to a model of the others, and more than chance does
+    next to large effects.
     """
     kept = list(chosen)
     least = _by_chance(found)
@@ -147,14 +147,14 @@ def _by_chance(found: Search) -> float:
 
 
 def _alone(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> float:
-    """Log evidence of a model with these effects and no other; -inf where it runs away."""
+    """Log evidence of a model with only these effects; -inf if it does not stay finite."""
     model = _only(context, found, answer, chosen)
     return -inf if model is None else model.evidence
 
 
 def _only(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> Scored | None:
-    """The model with these effects and no other, fitted where the search has not been; None where it runs
-    away.
+    """The model with only these effects, fitted if the search has not fitted it; None if it does not stay
+    finite.
     """
     keys = frozenset(n.hypothesis.key for n in chosen)
     if keys not in found.tried or found.tried[keys].fit.ended_early:
@@ -171,7 +171,7 @@ def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdic
     if not verdict.named or _lower(runs) >= 0.5 * thresholds.MATTERS**2:
         return verdict
     reason = (
-        "what could be named changes free runs too little to matter (rms lower by "
+        "the surest effects change free runs too little to matter (rms lower by "
         f"{printed(100 * _lower(runs))} % on average over the recordings)"
     )
     reasons = (reason, *_coarse(found), *verdict.reasons)
@@ -180,7 +180,7 @@ def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdic
 
 
 def _lower(runs: Iterable[Improvement]) -> float:
-    """Mean over recordings of the logarithm by which the rms of free runs is lower."""
+    """Mean over the recordings of the logarithm by which the rms of free runs falls."""
     logs = [log(max(i.before, 1e-12) / max(i.after, 1e-12)) if isfinite(i.after) else -inf for i in runs]
     return sum(logs) / max(len(logs), 1)
 
@@ -196,33 +196,35 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in lasting)
     if _lower(proof.values()) >= 0:
         reason = (
-            f"{names} holds on the other unseen recordings but not on {', '.join(worse)}: check whether the "
+            f"{names} improves the other held-out recordings but not {', '.join(worse)}: check whether the "
             "machine was the same there"
         )
         return replace(verdict, reasons=(*verdict.reasons, reason))
-    reason = f"{names} is refuted on {', '.join(worse)}: with it, free runs there are worse than without it"
+    reason = f"with {names}, free runs on {', '.join(worse)} are worse than without"
     return replace(
         verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
     )
 
 
 def _nothing(context: Context, found: Search, answer: Scored, candidates: tuple[Named, ...]) -> Verdict:
-    """Nothing is missing, unless the model is so coarse that process noise explains whatever there is."""
+    """Verdict without a name: "no mismatch", or "unexplained" if the model is so coarse that process noise
+    explains any residual.
+    """
     if coarse := _coarse(found):
         return Verdict(UNEXPLAINED, answer, (), candidates, coarse)
     if context.outliers:
-        reason = f"{len(context.outliers)} single wrong readings, nothing else"
+        reason = f"only {len(context.outliers)} single wrong readings were found"
         return Verdict(FAULT, answer, (), (), (reason,))
     return Verdict(NO_MISMATCH, answer, (), (), _apart(found, answer, candidates))
 
 
 def _coarse(found: Search) -> tuple[str, ...]:
-    """What is said of a model that is off by more than is usual; nothing of any other."""
+    """A sentence about a model whose error is larger than usual; nothing about any other."""
     if found.baseline.coarse < thresholds.NAMED:
         return ()
     return (
-        f"the flows of the model are off by about {100 * found.baseline.off:.0f} %, more than is usual for a "
-        "lumped model, and no effect explains that",
+        f"the flows of the model are wrong by about {100 * found.baseline.off:.0f} %, more than is usual for "
+        "a lumped model, and no effect explains it",
     )
 
 

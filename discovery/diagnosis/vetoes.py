@@ -1,4 +1,4 @@
-"""Vetoes: what data cannot overrule. Each is a sentence, or None where it does not apply to an effect."""
+"""Vetoes: laws of physics that data cannot overrule. Each is a sentence, or None if it does not apply."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Veto = Callable[[Context, Scored, Hypothesis], str | None]
 
 
 def one_recording(context: Context, _: Scored, h: Hypothesis) -> str | None:
-    """Heat that nothing records, for some hours, is an event only where another recording is without it."""
+    """Unrecorded heat for some hours is an event only if another recording is without it."""
     if len(context.recordings) > 1 or h.effect.search != "window":
         return None
     return (
@@ -23,24 +23,26 @@ def one_recording(context: Context, _: Scored, h: Hypothesis) -> str | None:
 
 
 def every_clock(context: Context, answer: Scored, h: Hypothesis) -> str | None:
-    """Clocks that are wrong in every recording are as well a dead time of the machine."""
+    """If the clocks of all recordings are wrong, a dead time of the machine explains it as well."""
     if h.effect.place != "inputs of a recording":
         return None
     shifted = {o.recording for o in answer.hypotheses if o.effect.place == h.effect.place}
     if h.recording is not None and not shifted >= set(context.recordings):
         return None
     return (
-        "every recording would need its clock shifted; a dead time between what drives the machine and what "
-        "is read explains that as well"
+        "the clock of every recording would be shifted; a dead time between the inputs and the readings "
+        "explains this as well"
     )
 
 
 def far_from_the_machine(_: Context, answer: Scored, h: Hypothesis) -> str | None:
-    """What happens in one recording, or in the measuring chain, is told from a model that is nearly right."""
+    """Events of one recording and faults of the measuring chain can only be recognised with a model that is
+    nearly right.
+    """
     if answer.coarse < thresholds.NAMED or (h.effect.is_physics and not h.effect.is_event):
         return None
     return (
-        f"{h.effect.word} at {h.where} is not named: the flows of the model are off by about "
+        f"{h.effect.word} at {h.where} is not named: the flows of the model are wrong by about "
         f"{100 * answer.off:.0f} %, which may look the same"
     )
 
@@ -49,5 +51,5 @@ VETOES: tuple[Veto, ...] = (one_recording, every_clock, far_from_the_machine)
 
 
 def vetoed(context: Context, answer: Scored, h: Hypothesis) -> str | None:
-    """The first reason for which an effect may not be named; None where there is none."""
+    """The first reason for which an effect must not be named; None if there is none."""
     return next((text for veto in VETOES if (text := veto(context, answer, h))), None)

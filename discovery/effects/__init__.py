@@ -1,1 +1,1 @@
-"""What can be left out of a model: a catalogue with a file for each effect, and where each could act."""
+"""Effects that a model can lack: a catalogue with a file for each one, and the places where it can act."""

@@ -1,4 +1,4 @@
-"""Where each effect of the catalogue could act in a model: a hypothesis for each effect, place and shape."""
+"""Candidates of a diagnosis: a hypothesis for each effect, place and shape."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Scene:
 
 
 def candidates(model: Model, effects: Sequence[Effect], scene: Scene) -> list[Hypothesis]:
-    """Every effect at every place where it can act, with its prior odds, at its middle shape values.
+    """Every effect at every place where it can act, with prior odds and the middle values of its shapes.
 
     An effect has the same odds whatever the number of places at which it could act.
     """
@@ -123,15 +123,15 @@ def _is_flow(channel: Channel) -> bool:
 
 
 def _is_second(name: str, scene: Scene) -> bool:
-    """Whether a flow is none that the laws of the fluid follow: these are the model's, or all of a dry
-    one.
+    """Whether a flow is not the one in the laws of the fluid: that one is in the model, or any flow if the
+    model is dry.
     """
     flows = [n for n, c in scene.channels.items() if c.role == "fluid flow"]
     return name in scene.unused and not scene.unused.issuperset(flows)
 
 
 def _stands(channel: str, spot: Spot, model: Model, effect: Effect) -> bool:
-    """Whether the model already has that input at that body, in proportion: a refit would absorb it."""
+    """Whether the model already has that input at that body, in proportion; then a refit would absorb it."""
     if spot.outputs or len(spot.bodies) != 1 or "other" in effect.formula or "ambient" in effect.formula:
         return False
     return any(
@@ -233,7 +233,7 @@ def _extras(effect: Effect, model: Model, spot: Spot) -> tuple[str, ...]:
 
 
 def _is_exchange(effect: Effect, spot: Spot) -> bool:
-    """Whether what enters the first body leaves the second."""
+    """Whether the heat that enters the first body leaves the second one."""
     pair = len(spot.bodies) == 2 and not spot.each and not spot.terms
     return pair and effect.place != "driven and another"
 
@@ -241,7 +241,7 @@ def _is_exchange(effect: Effect, spot: Spot) -> bool:
 def _changes(
     effect: Effect, model: Model, spot: Spot, naming: _Naming, scene: Scene
 ) -> tuple[tuple[Term, ...], dict[str, Expression]]:
-    """Terms that come in addition, and what outputs show more."""
+    """Terms that are added, and changes of outputs."""
     formula = parse(effect.formula, f"effect {effect.word}")
     if spot.terms:
         inputs = set(scene.channels) - set(model.states)
@@ -277,8 +277,8 @@ def _flow(
 def _changed(
     effect: Effect, formula: Expression, naming: _Naming, spot: Spot, term: Term, inputs: set[str]
 ) -> Term:
-    """What a term changes by: the formula where it names the term, else the term with a channel replaced
-    by the formula, less the term.
+    """The change of a term: the formula if it names the term, else the term with a channel replaced by the
+    formula, minus the term.
     """
     known = naming.sized(effect)
     if TERM in names(formula):

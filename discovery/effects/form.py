@@ -1,4 +1,4 @@
-"""What the catalogue knows of an effect: a formula with holes for bodies and channels, how it is searched."""
+"""An effect in the catalogue: a formula with variables for bodies and channels, and its search."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ class Hypothesis:
         return model.with_terms(*self.terms, parameters=parameters, outputs=outputs)
 
     def shows(self, model: Model) -> dict[str, Expression]:
-        """What outputs show in addition where the effect comes to a model: whatever else that one has."""
+        """Change of the outputs when the effect is added to any model."""
         found: dict[str, Expression] = {}
         for name, change in self.shown.items():
             y = model.outputs.get(name, Name(name))

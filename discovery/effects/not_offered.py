@@ -1,4 +1,4 @@
-"""Effects of the user's own that can act nowhere, and why: nobody should wait for an answer about them."""
+"""Own effects that have no place in the model, with the reason."""
 
 from __future__ import annotations
 
@@ -38,5 +38,5 @@ def not_offered(model: Model, scene: Scene, own: Sequence[Effect]) -> list[str]:
             if lacking
             else f"the model has no place of the kind '{effect.place}' where its channels could act"
         )
-        said.append(f"{effect.word} was not looked for: {why}")
+        said.append(f"{effect.word} was not searched: {why}")
     return said

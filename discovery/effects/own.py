@@ -1,4 +1,4 @@
-"""An effect of the user's own, as lines of an experiment file ([[mismatch.effects]])."""
+"""An own effect, as lines of an experiment file ([[mismatch.effects]])."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _is_a_factor(amplitude: str, formula: Expression) -> bool:
 
 
 class ShapeForm(Strict):
-    """A parameter inside the formula, and what is believed of it before the recordings are read.
+    """A parameter inside the formula, with its prior.
 
     With `factor`: 68 % of values lie within this factor of `middle`. With `spread`: within so much of it.
     Neither: any time that the recordings can show. `instant`: a time in the recording, found by search.
@@ -168,7 +168,7 @@ class EffectForm(Strict):
         used = names(formula)
         for name in sorted(used - known):
             raise UserError(
-                f"{where}: '{name}' means nothing in its formula; known: {', '.join(sorted(known))}"
+                f"{where}: '{name}' is not known in its formula; known are {', '.join(sorted(known))}"
             )
         if self.amplitude not in used:
             raise UserError(f"{where}: the amplitude '{self.amplitude}' is not in the formula")

@@ -91,7 +91,7 @@ class Slab:
 
 @dataclass(frozen=True)
 class Score:
-    """What the linear scan says of a claim.
+    """Score of a candidate in the linear scan.
 
     `gain`: log Bayes factor against the model without it, integrated over noise settings and shapes; `t` the
     signed score in standard deviations at the best of them, `size` its amplitudes there, `share` what a refit
@@ -166,8 +166,8 @@ def scan(
     slab: Slab,
     without: Sequence[Without] = (),
 ) -> list[list[Score]]:
-    """Every claim among the hypotheses scored on what a fit leaves, the best odds first; then on what it
-    leaves with one of its own effects taken out, to first order, for each of `without`.
+    """Score every candidate on the residual of a fit, best odds first; then on the residual without one of
+    its effects, to first order, for each of `without`.
 
     Args:
         hypotheses: claims at all their shape values.

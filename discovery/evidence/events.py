@@ -1,4 +1,4 @@
-"""The search of events: when did an unknown heat act, when did a sensor jump.
+"""The search for events: when an unknown heat acts, and when a sensor jumps.
 
 Steps at many instants are seen through the model at once; a window is the difference of two of them, so all
 windows of a recording are scored from one Gram matrix. Every instant is as likely as any other before the
@@ -78,7 +78,7 @@ class _Search:
         return self._rough_window(h, slab) if h.effect.search == "window" else self._rough_step(h, slab)
 
     def close(self, h: Hypothesis, slab: Slab) -> Hypothesis:
-        """The claim at the best instants near those where it stands."""
+        """The candidate at the best instants near its present ones."""
         return self._close_window(h, slab) if h.effect.search == "window" else self._close_step(h, slab)
 
     def _rough_window(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
@@ -205,7 +205,7 @@ def _around(on: float, off: float, width: float, first: float, last: float) -> A
 
 
 def _span(gains: Array, instants: Array) -> tuple[float, float]:
-    """Where an instant lies at 95 %, by its log evidence: from one tried instant outside to another."""
+    """95 % interval of an instant from its log evidence, between the tried instants just outside."""
     share = np.cumsum(np.exp(gains - np.max(gains)))
     first, last = np.searchsorted(share / share[-1], (0.025, 0.975))
     return float(instants[max(first - 1, 0)]), float(instants[min(last + 1, len(instants) - 1)])

@@ -1,4 +1,4 @@
-"""Form error that stays with the operating point: no law of a lumped model is quite that of nature.
+"""Form error that depends on the operating point: no law of a lumped model is exactly that of nature.
 
     q_k (1 + sum_m e_km psi_m),   e_km ~ N(0, share^2)
 
@@ -86,7 +86,7 @@ def _flows(run: Trajectory) -> list[Term]:
 
 
 def _directions(columns: Sequence[Array], seen: Array, basis: Array, most: int) -> list[Array]:
-    """The few combinations of columns that hold most of what a basis (N, U) leaves of them, `seen` (N, M)."""
+    """The few combinations of columns that explain most of a basis (N, U) outside of `seen` (N, M)."""
     left = seen - basis @ (basis.T @ seen)
     size, axes = np.linalg.eigh(left.T @ left)
     kept = axes[:, np.argsort(-size)[:most]]
@@ -136,7 +136,7 @@ def _beyond(run: Trajectory, term: Term, first: int) -> list[Column]:
 
 
 def _levers(run: Trajectory, scales: Mapping[str, tuple[float, float]], index: int, count: int) -> Array:
-    """What each output shows more (R, Y, M) where it is off by a share of its change since the start."""
+    """Change of the readings (R, Y, M) if the gain of each output is wrong by a share."""
     shown, read = predict(run), run.system.grid.read
     shown = shown - shown[:1]
     points = [p[np.minimum(2 * read, len(p) - 1)] for p in _points(run, scales, "", index, count)]

@@ -1,5 +1,5 @@
-"""Inputs that may be logged late: where bodies answer fast and readings show it, a switch that comes some
-seconds before its stamp looks like missing heat.
+"""Inputs that may be logged late: with fast bodies and frequent readings, a switch some seconds before its
+stamp looks like missing heat.
 
 A logger that holds what it sampled, or smooths it, is late by up to about one of its intervals. That is an
 unknown of each recording, like the offset of an input known only within a spread. Where the fastest body
@@ -27,7 +27,9 @@ SMALL = 0.25  # of an interval, below which it is not
 
 
 def perhaps_late(fit: Fit, grids: Mapping[str, Grid]) -> dict[str, Grid]:
-    """The grids with what inputs may be logged late by, where it can matter to the model of a fit."""
+    """Grids with an unknown shift in time of each input that may be logged late, if the recordings could show
+    it.
+    """
     fastest = min(_fastest(t) for t in fit.trajectories)
     return {name: replace(grid, unsure=_unsure(grid, fastest)) for name, grid in grids.items()}
 
@@ -58,7 +60,7 @@ def _unsure(grid: Grid, fastest: float) -> dict[str, float]:
 
 
 def _fastest(trajectory: Trajectory) -> float:
-    """Time constant in s with which a model answers fastest, anywhere on a trajectory."""
+    """The shortest time constant in s of a model anywhere on a trajectory."""
     kinds, first = np.unique(trajectory.which, return_index=True)
     size = np.abs(np.linalg.eigvals(trajectory.e[kinds])).min(axis=1)
     decay = -np.log(np.clip(size, 1e-300, 1.0)) / trajectory.system.grid.step[first]
@@ -66,10 +68,10 @@ def _fastest(trajectory: Trajectory) -> float:
 
 
 def told(fit: Fit) -> list[str]:
-    """A sentence for each input that was found to be logged late, or early."""
+    """A sentence for each input that is logged late or early."""
     found: dict[str, list[str]] = {}
     for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
         if u.is_late and u.prior and abs(value) > max(TOLD * error, SMALL * u.prior[1]):
             late = f"{abs(value):.0f} s {'late' if value > 0 else 'early'} in {u.recording}"
             found.setdefault(u.name, []).append(late)
-    return [f"{name} is logged {', '.join(runs)}: allowed for" for name, runs in found.items()]
+    return [f"{name} is logged {', '.join(runs)}; the fit allows for it" for name, runs in found.items()]

@@ -1,4 +1,4 @@
-"""A latent force: smooth heat of unknown cause at one body, and what the readings say of it over time.
+"""A latent force: smooth heat of unknown cause at one body, and its curve over time.
 
 The heat is piecewise constant over blocks with a first-order covariance of unknown size; its curve follows in
 closed form. It asks for no catalogue: it says where something is missing, when, and how much any explanation
@@ -88,7 +88,7 @@ def _at(seen: Whitened, setting: Setting, state: str, usual: float) -> Force:
 
 
 def alike(forces: Sequence[Force], limit: float = 0.9) -> list[tuple[str, ...]]:
-    """States whose latent force looks the same in the readings: places that cannot be told apart."""
+    """States that these readings cannot separate: their latent forces look the same."""
     groups: list[list[Force]] = []
     for f in forces:
         for group in groups:

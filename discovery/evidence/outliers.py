@@ -1,4 +1,4 @@
-"""Single wrong readings: found on the residual of the baseline, set aside before any test, reported."""
+"""Single wrong readings: found on the residual of the baseline, set aside before any test, and reported."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ class Outlier:
 
 
 def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Outlier]:
-    """Readings far from those around while these agree; residuals are compared, so steps of inputs pass.
+    """Readings far from their neighbours, which agree; residuals are compared, so steps of inputs do not
+    count.
 
     Args:
         grids: all readings of each recording, also where the fit saw only some.

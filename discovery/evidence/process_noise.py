@@ -1,4 +1,4 @@
-"""What a model misses everywhere: process noise that grows with the flows, slow sensors, late switches.
+"""Noise that is always there: process noise that grows with the flows, slow sensor noise, late switches.
 
     s_i(t)^2 = (level floor_i)^2 + (share flow_i(t))^2
 
@@ -31,7 +31,7 @@ _CLIPPED = 4.0  # standard deviations beyond which an innovation counts no more:
 
 @dataclass(frozen=True)
 class Setting:
-    """A noise that may be, and the logarithm of its prior weight."""
+    """A possible noise, and the logarithm of its prior weight."""
 
     noise: Noise
     log_weight: float
@@ -41,7 +41,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class UnknownHeat:
-    """Heat of unknown cause at a state, in place of its process noise: "none of these" (a latent force)."""
+    """Heat of unknown cause at a state instead of its process noise: "none of these" (a latent force)."""
 
     state: str
     heat: float  # W, or a rate
@@ -57,7 +57,7 @@ class UnknownHeat:
 
 @dataclass(frozen=True)
 class Prior:
-    """What is believed of process noise and slow noise before the recordings are read (`thresholds.py`)."""
+    """Priors of process noise and slow noise (`thresholds.py`)."""
 
     floor: float  # of the largest rms flow of the model, at level one
     share: float  # of the flow through each state that a usual lumped model is off by
@@ -91,7 +91,7 @@ def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float =
 
 
 def flow_sizes(fit: Fit) -> dict[str, float]:
-    """rms of what flows through each state, W or a rate, in the recording where it is largest."""
+    """rms of the flow through each state, W or a rate, in the recording where it is largest."""
     found: dict[str, float] = {}
     for trajectory in fit.trajectories:
         size = np.sqrt(np.mean(flows(trajectory) ** 2, axis=0))
@@ -142,7 +142,7 @@ def neighbours(places: Sequence[tuple[int, ...]]) -> tuple[tuple[int, ...], ...]
 def unknown_heat(
     state: str, floor: float, times: Sequence[float], shares: Sequence[float]
 ) -> tuple[UnknownHeat, ...]:
-    """Heat of unknown cause at a state, each size as likely as any other.
+    """Heat of unknown cause at a state; every size is equally likely.
 
     Args:
         floor: process noise of the state at level one, W or a rate.
@@ -172,7 +172,7 @@ def _noise(
 def reading_noise(
     fit: Fit, stated: Mapping[str, float | None], floor: Mapping[str, float], prior: Prior
 ) -> Noise:
-    """White reading noise: what is stated, else the most likely level with slow noise and process noise of
+    """White reading noise: the stated one, else the most likely level with slow noise and process noise of
     any size.
 
     Process noise far above the usual is offered, so that a mismatch passes for that and not for reading
@@ -224,7 +224,7 @@ def _white_with(
 
 
 def noise_in_free_runs(trajectory: Trajectory, noise: Noise) -> float:
-    """rms that reading noise, slow noise and process noise leave in a free run, in reading noises."""
+    """rms of a free run from reading noise, slow noise and process noise, in reading noises."""
     white = np.array(noise.white)
     slow = np.array(noise.slow or np.zeros(len(white)))
     variance = np.tile(1.0 + (slow / white) ** 2, (len(trajectory.system.grid.read), 1))

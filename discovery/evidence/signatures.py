@@ -1,4 +1,4 @@
-"""Signatures: what the readings would show more if a unit of an effect acted, seen through the model."""
+"""Signatures: the change of the readings for a unit of an effect, through the dynamics of the model."""
 
 from __future__ import annotations
 

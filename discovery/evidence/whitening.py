@@ -1,4 +1,4 @@
-"""A fit as the noise model sees it: whitened residual and sensitivities, kept as normal equations by block.
+"""A fit under a noise model: whitened residual and sensitivities, stored as normal equations of each block.
 
 Everything that is asked afterwards (evidence with all unknowns integrated out, what a refit would absorb of a
 signature, the posterior on resampled blocks) is algebra on these small matrices:
@@ -147,7 +147,7 @@ class Whitened:
 
     @cached_property
     def moving(self) -> Ints:
-        """Unknowns that do not press against a bound."""
+        """Unknowns that are not at a bound."""
         low, high = self.fit.problem.bounds
         theta = self.fit.theta
         scale = _AT_BOUND * np.maximum(1.0, np.abs(theta))

@@ -46,7 +46,8 @@ def remarks(folder: Path) -> Iterator[str]:
         for note in notes[:MOST_NOTES]:
             said.setdefault(note, []).append(name)
         if len(notes) > MOST_NOTES:
-            said[f"{len(notes) - MOST_NOTES} more notes on {name} in results.json"] = [name]
+            more = len(notes) - MOST_NOTES
+            said.setdefault(f"{more} more note{'s' * (more > 1)} in results.json", []).append(name)
     yield from (f"note, {', '.join(models)}: {note}" for note, models in said.items())
     if findings := results["findings"]:
         worst = min(findings, key=lambda one: not one.startswith("error"))

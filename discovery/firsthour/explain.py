@@ -65,10 +65,12 @@ def _roles() -> Iterator[str]:
 
     for role, facts in ROLES.items():
         kind = (
-            "read now and then, compared with models"
+            "output: models predict it at the times of its readings"
             if facts.measured
             else f"input, {facts.between} between its stamps"
         )
+        if role == "temperature":
+            kind += "; a sensor that the errors follow is an 'other input'"
         if role == CORRECTION:
             kind = 'added to the readings of its error: corrects = "E_Y0C"'
         yield f"{role:20} {facts.said:12} {kind}"

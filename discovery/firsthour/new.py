@@ -226,7 +226,7 @@ def _predicted(outputs: Sequence[str], found: Recorded, guesses: Mapping[str, Gu
         if (guesses[column.name].role, guesses[column.name].unit) == ("other input", "1")
     ]
     example = f'--is "{(*other, "CH1")[0]}=error,um"'
-    return f"{line}; no column is taken for an error: if one is, say so, as in {example}"
+    return f"{line}; no column was recognised as an error: if one is, say so, as in {example}"
 
 
 def _duration(seconds: float) -> str:

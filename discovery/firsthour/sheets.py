@@ -19,16 +19,13 @@ import numpy as np
 from discovery.errors import UserError
 from discovery.firsthour.cells import holds_word, is_empty, is_number, is_stamp, is_switch
 from discovery.firsthour.encodings import decode
-from discovery.firsthour.measures import known_unit, time_unit, unit_in
+from discovery.firsthour.header import Row, explained, find_header, is_data
 from discovery.firsthour.workbooks import is_workbook, read_workbook
 from discovery.limits import check_shape, read_table
 from discovery.recordings.columns import Lines
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-Row = tuple[int, list[str]]
-"""Number of the line, and its cells."""
 
 FEWEST = 10  # rows of a recording
 _HEAD = 400  # lines in which the first reading has to stand
@@ -94,7 +91,7 @@ def read_sheets(path: Path) -> list[Sheet]:
         raise UserError(f"{path}: a header and rows of numbers are expected")
     mark = _mark([line for _, line in kept])
     first = _split(kept[0][1], mark)
-    if remarks and _is_data(first) and len(_split(remarks[-1], mark)) == len(first):
+    if remarks and is_data(first) and len(_split(remarks[-1], mark)) == len(first):
         kept.insert(0, (kept[0][0] - 1, remarks[-1]))  # the header is a remark
     return [_sheet(path, "", _Lines(kept, mark), mark, tuple(remarks), notes)]
 
@@ -168,8 +165,8 @@ def _sheet(
     head = list(lines.cut(0, _HEAD))
     middle = list(lines.cut(len(lines) // 2, len(lines) // 2 + _HEAD))
     width, spare = _width(head, middle)
-    first = next((k for k, (_, c) in enumerate(head) if len(c) in (width, spare) and _is_data(c)), None)
-    at, units, groups = _header(path, head, first, width)
+    first = next((k for k, (_, c) in enumerate(head) if len(c) in (width, spare) and is_data(c)), None)
+    at, units, groups = find_header(path, head, first, width)
     body = first if first is not None else at + 1
     columns, numbers, left = _body(path, lines, body, width, spare, head[at][1])
     rows = len(numbers)
@@ -189,7 +186,7 @@ def _sheet(
         ),
         *left,
     )
-    groups = [group or _explained(word, head[:at]) for group, word in zip(groups, header, strict=True)]
+    groups = [group or explained(word, head[:at]) for group, word in zip(groups, header, strict=True)]
     return Sheet(
         path,
         name,
@@ -216,69 +213,6 @@ def _width(head: Sequence[Row], middle: Sequence[Row]) -> tuple[int, int]:
     return (width - 1, width) if ended and names else (width, width + 1)
 
 
-def _header(
-    path: Path, head: Sequence[Row], first: int | None, width: int
-) -> tuple[int, list[str], list[str]]:
-    """Where the names stand, the units below or above them, and what stands over a group of names."""
-    if first == 0:
-        raise UserError(
-            f"{path}, line {head[0][0]}: numbers where the names of the columns should be; "
-            f"put a line of {width} names above them, such as time,heater,T1"
-        )
-    end = len(head) if first is None else first
-    rows = [(k, _fitted(head[k][1], width)) for k in range(end)]
-    full = [(k, cells) for k, cells in rows if cells is not None]
-    if not full:
-        _compare(path, head[:end], width)
-        raise UserError(
-            f"{path}: no header above the rows of {width} cells; write {width} names, starting with time"
-        )
-    if first is None:  # nothing can be read as data: the fullest row is the header
-        at = max(full, key=lambda one: (sum(map(bool, one[1])), -one[0]))[0]
-        return at, [""] * width, [""] * width
-    units = [""] * width
-    at, names = full[-1]
-    others = [one for one in full[:-1] if one[0] >= at - 3]
-    if others and _are_units(names):
-        units, (at, names) = names, others[-1]
-        others = others[:-1]
-    elif others and _are_units(others[-1][1]):
-        units, others = others[-1][1], others[:-1]
-    above = others[-1][1] if others and others[-1][0] == at - 1 else [""] * width
-    groups = _spread_out(above) if sum(map(bool, above)) > 1 else [""] * width
-    return at, [u if u == "-" or not is_empty(u) else "" for u in units], groups
-
-
-def _fitted(cells: list[str], width: int) -> list[str] | None:
-    """A line of names or units with as many cells as there are columns, or None."""
-    if len(cells) == width:
-        return cells
-    return cells[:width] if len(cells) == width + 1 and not cells[-1] else None
-
-
-def _are_units(cells: Sequence[str]) -> bool:
-    """Whether a row names units: most of its cells are such, or a "-"."""
-    known = [cell for cell in cells if cell]
-    named = [known_unit(cell) or time_unit(cell) or unit_in(f"x [{cell.strip('[]()')}]") for cell in known]
-    return sum(map(bool, named)) >= max(1, len(known) / 2)
-
-
-def _spread_out(cells: Sequence[str]) -> list[str]:
-    """A word over a group of columns stands over the first of them alone."""
-    found: list[str] = []
-    for cell in cells:
-        found.append(cell or (found[-1] if found else ""))
-    return found
-
-
-def _explained(name: str, above: Sequence[Row]) -> str:
-    """What a list of channels over the table says of a name such as CH1, or ""."""
-    rows = [
-        cells for _, cells in above if cells and cells[0].casefold() == name.casefold() and len(cells) > 1
-    ]
-    return next((cell for row in rows for cell in row[1:2] if holds_word(cell)), "")
-
-
 def _body(
     path: Path, lines: _Lines, first: int, width: int, spare: int, header: list[str]
 ) -> tuple[tuple[pa.ChunkedArray, ...], Lines, tuple[str, ...]]:
@@ -303,11 +237,11 @@ def _body(
         if len(cells) == spare and (spare < width or not cells[-1]):
             cells = cells[:width] if spare > width else [*cells, ""]
         last = len(lines) - index <= _TRAILER and index > first + FEWEST
-        if len(cells) != width or (last and not _is_data(cells) and holds_word(cells[0])):
+        if len(cells) != width or (last and not is_data(cells) and holds_word(cells[0])):
             cut_off = index == len(lines) - 1 and len(cells) < width
             if cells[:width] == header[:width]:
                 again += 1
-            elif last and (cut_off or not _is_data(cells)):
+            elif last and (cut_off or not is_data(cells)):
                 trailer.append(line)
             elif ragged is None:
                 ragged = line, len(cells)
@@ -339,23 +273,3 @@ def _body(
         np.array(numbers, dtype=np.int64),
         tuple(notes),
     )
-
-
-def _compare(path: Path, above: Sequence[Row], width: int) -> None:
-    """Raise a UserError where the line above the rows is a header with more or fewer names than they have."""
-    line, names = above[-1] if above else (0, [])
-    if len(names) > 1 and all(holds_word(name) for name in names):
-        raise UserError(
-            f"{path}, line {line}: the header has {len(names)} names, the rows {width} cells; "
-            f"{'add the missing names' if len(names) < width else 'a name too many or a column is missing'}"
-        )
-
-
-def _is_data(cells: Sequence[str]) -> bool:
-    """More numbers, stamps and switches than words; a header or a row of units has none.
-
-    Words for "not measured" count for neither: a logger often has nothing yet in its first row.
-    """
-    known = [cell for cell in cells if not is_empty(cell)]
-    readable = [c for c in known if is_number(c) or is_stamp(c) or is_switch(c)]
-    return len(readable) > len(known) / 2

@@ -1,4 +1,4 @@
-"""Fitting: parameters of a model from several recordings at once, with intervals that can be trusted."""
+"""Fitting: parameters of a model from several recordings at once, with reliable intervals."""
 
 from discovery.fitting.fit import Fit, fit_model
 from discovery.fitting.heldout import predict_recording

@@ -1,4 +1,4 @@
-"""How well a fit knows its numbers: their covariance, and what these recordings do not determine."""
+"""Covariance of the fitted parameters, and the parameters that these recordings do not determine."""
 
 from __future__ import annotations
 

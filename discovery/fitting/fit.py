@@ -1,6 +1,4 @@
-"""Output-error fit: the model runs freely, its outputs are compared with the readings where they were
-taken.
-"""
+"""Output-error fit: the model runs freely, and its outputs are compared with the readings at their times."""
 
 from __future__ import annotations
 
@@ -40,7 +38,7 @@ _ROUGH = 15  # of Levenberg-Marquardt in a round between the first and the last
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model and what is known about its numbers."""
+    """A fitted model with its residuals and the covariance of its parameters."""
 
     problem: Problem
     theta: Array  # (U,)
@@ -171,7 +169,7 @@ def fit_model(
         solution = solve(problem, theta, current, loss, most, tolerance, together, goal)
         theta = solution.theta
         if not np.isfinite(solution.jacobian).all():
-            raise RunsAwayError(f"model '{model.name}' answers its parameters with numbers without bound")
+            raise RunsAwayError(f"the sensitivities of model '{model.name}' to its parameters are not finite")
         if last or solution.ended_early:
             break
         left = [problem.residual(t) for t in solution.trajectories]
@@ -222,7 +220,7 @@ def _covariance(
 
 
 def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
-    """The fit with its model written in another way: same readings and numbers, nothing is fitted.
+    """The fit with its model in another form: same readings and parameters, nothing is fitted.
 
     Args:
         model: has no unknown that the fit has not.
@@ -274,8 +272,7 @@ def _gains(model: Model) -> set[str]:
 def _first_noise(
     problem: Problem, theta: Array, stated: Mapping[str, float | None], least: Sequence[float]
 ) -> Noise:
-    """The noise to begin with: what the model leaves where the fit begins, and no more than how rough the
-    readings are.
+    """The first noise: the residual at the start of the fit, but not more than the roughness of the readings.
 
     With too much noise, or outputs weighed otherwise than in the end, the first round forgets where it began.
     """
@@ -291,8 +288,8 @@ def _first_noise(
 
 
 def _rough(readings: Sequence[Array]) -> float:
-    """How rough the readings (R,) of a channel are, and no less than a small share of their spread: a logger
-    that interpolates leaves no roughness at all.
+    """Roughness of the readings (R,) of a channel, at least a small share of their spread, because a logger
+    that interpolates shows no roughness.
     """
     spread = np.concatenate(readings)
     return max(roughness(readings), _SMALL * float(np.std(spread)) if len(spread) else 0.0)

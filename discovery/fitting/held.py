@@ -1,4 +1,4 @@
-"""A model whose numbers were found elsewhere, as a fit: start values are fitted, the numbers stay."""
+"""A model with given parameters as a fit: only start values are fitted."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def held_fit(
     outputs: Sequence[str],
     errors: Mapping[str, float] | None = None,
 ) -> Fit:
-    """The fit that the numbers of a model are, as if they had been found here.
+    """Return a fit with the parameters of the model; only start values are fitted.
 
     Args:
         errors: standard errors of parameters, where they are known; the others have none.

@@ -76,7 +76,7 @@ def predict_recording(
 
 
 def _spread(system: System, state: State, white: Mapping[str, float]) -> float:
-    """How far a state may begin from its start; one that no fit has seen begins where it is said to."""
+    """How far a state may start from its start; a state that no fit has seen starts at its stated start."""
     if state.start_sd is not None:
         return state.start_sd
     return read_spread(system, state.name, white) if state.read_as else 0.0

@@ -1,4 +1,4 @@
-"""The whitening filter of a trajectory: what each reading says beyond those before it.
+"""The whitening filter of a trajectory: the information of each reading beyond those before it.
 
 White reading noise, slow sensor noise and small random heat at the bodies are one linear Gaussian state-space
 model around a trajectory,
@@ -265,7 +265,9 @@ def whiten(trajectory: Trajectory, noise: Noise, data: Array, part: Filter | Non
 
 
 def innovations(trajectory: Trajectory, noise: Noise, residual: Array) -> Array:
-    """What each reading (R, Y) says beyond those before it, in its standard deviations; NaN where none is."""
+    """Information of each reading (R, Y) beyond those before it, in its standard deviations; NaN without a
+    reading.
+    """
     out = np.full(residual.shape, np.nan)
     out[trajectory.system.grid.measured] = whiten(trajectory, noise, residual[:, :, None])[:, 0]
     return out

@@ -1,5 +1,5 @@
-"""What a model leaves in the readings: white reading noise, slow sensor noise, and small random heat at the
-bodies. `kalman.py` whitens what has such a covariance.
+"""Noise of a residual: white reading noise, slow sensor noise, and small random heat at the bodies.
+`kalman.py` whitens it.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def roughness(readings: Sequence[Array]) -> float:
 
 
 def resolution(readings: Sequence[Array]) -> tuple[float, ...]:
-    """Noise that the steps of each channel's numbers alone make, by (R, Y) readings: step/sqrt(12).
+    """Noise from the resolution of each channel, by (R, Y) readings: step/sqrt(12).
 
     A sensor that stands still or shows whole degrees says no more than that, however well a model meets it.
     """

@@ -1,4 +1,4 @@
-"""What a fit has to find: the unknowns of a model on a set of recordings, and the residual they leave."""
+"""The problem of a fit: the unknowns of a model on a set of recordings, and its residual."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MOST = 2.0  # of what is expected, the most that an input is logged late
 
 
 class Prior(NamedTuple):
-    """What is known of a parameter before: mean and standard deviation, of its logarithm with `is_log`."""
+    """Prior of a parameter: mean and standard deviation, of its logarithm with `is_log`."""
 
     mean: float
     sd: float
@@ -278,8 +278,8 @@ def _start_spread(state: State) -> tuple[float, Literal["given", "read", "fitted
 
 
 def read_spread(system: System, state: str, white: Mapping[str, float]) -> float:
-    """How well the first reading of a state knows its start: the noise of a reading, and what the state moves
-    from the first instant to it.
+    """Standard deviation of a start that is read: the reading noise, and the change of the state up to the
+    first reading.
     """
     output = system.model.states[state].read_as
     series = system.grid.readings[:, system.grid.outputs.index(output)]

@@ -1,4 +1,4 @@
-"""Ridge regression on the inputs, its strength by what is left out."""
+"""Ridge regression on the inputs; left-out data choose its strength."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def solve(
     together: float = 1.0,
     goal: float = inf,
 ) -> Solution:
-    """The unknowns (U,) with the least cost under a noise, sought from `theta` (U,).
+    """Find the unknowns (U,) of the smallest cost under a noise, from `theta` (U,).
 
     The whitening filter belongs to a trajectory. It follows steps that change something and is held for the
     rest, so that the cost of the last ones is one function.

@@ -1,4 +1,4 @@
-"""Start values of first-order models from the readings alone, so that a fit converges from nowhere.
+"""Start values of first-order models from the readings alone, so that a fit converges without a guess.
 
 With the time constants given, equations (7) to (9) are linear in everything else. So every input is filtered
 through a grid of time constants once; the best combination is a small linear regression for each, and the

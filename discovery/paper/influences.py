@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -109,7 +109,11 @@ def budgets(m: Material) -> Chapter | None:
         return None
     names = list(found)
     wide = [names[k : k + _COLUMNS] for k in range(0, len(names), _COLUMNS)]
-    tables = tuple(t for part in wide for t in budget_tables({name: found[name] for name in part}))
+    tables = tuple(
+        replace(table, title=f"{table.title}: {', '.join(part)}")
+        for part in wide
+        for table in budget_tables({name: found[name] for name in part})
+    )
     gap = max(abs(one["gap"]) for one in found.values())
     largest = max(sum(abs(q) for q in one["entering"].values()) for one in found.values())
     return Chapter(
@@ -119,8 +123,8 @@ def budgets(m: Material) -> Chapter | None:
         "none is given.",
         tables,
         shows=(
-            f"What enters and is not stored is at most {gap:.2g} MJ in a recording (heat exchanged: up to "
-            f"{largest:.3g} MJ): the budgets close, so the integration is right.",
+            f"Heat that enters and is not stored is at most {gap:.2g} MJ in a recording (exchanged: up to "
+            f"{largest:.3g} MJ). So the budgets close, and the integration is right.",
         ),
-        not_shown=("Whether the heat is what the machine had: these are flows of the fitted model.",),
+        not_shown=("Whether the machine had these heat flows: they are those of the fitted model.",),
     )

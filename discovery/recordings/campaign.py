@@ -40,7 +40,7 @@ class Channel:
 
     @property
     def measured(self) -> bool:
-        """Whether this is read now and then and compared with models, not fed to them."""
+        """Whether this is an output: models predict it and do not use it as an input."""
         return ROLES[self.role].measured
 
     @property

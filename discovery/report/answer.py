@@ -180,8 +180,8 @@ def _worst(run: Run, model: str) -> str:
     (low_r, low_o), low = min(scored.items(), key=lambda item: item[1])
     (high_r, high_o), high = max(scored.items(), key=lambda item: item[1])
     return (
-        f"Most is removed of {high_o} on {high_r} ({number(high, 2)} %), "
-        f"least of {low_o} on {low_r} ({number(low, 2)} %)."
+        f"The largest reduction is {number(high, 2)} % ({high_o} on {high_r}), "
+        f"the smallest {number(low, 2)} % ({low_o} on {low_r})."
     )
 
 
@@ -226,7 +226,7 @@ def _better(run: Run) -> list[str]:
         return []
     return [
         f"“{best}” predicts better than “{given}”: its rms is {_against(lead)}. The diagnosis found no "
-        "effect for the difference, or took it for noise."
+        "effect that explains the difference; it may be noise."
     ]
 
 

@@ -71,9 +71,9 @@ def load_runs(folders: Sequence[Path], against: Path | None = None) -> list[Run]
         )
     for folder, inside in found.items():
         if not inside:
-            raise UserError(f"{folder}: no run is there; name the folder of a finished `discovery run`")
+            raise UserError(f"{folder}: there is no run; name the folder of a finished `discovery run`")
     if len(places) < 2:
-        raise UserError(f"{places[0]}: a run cannot be compared with itself; name another one, too")
+        raise UserError(f"{places[0]}: a run cannot be compared with itself; name a second one")
     return [load_run(place) for place in places]
 
 

@@ -67,7 +67,7 @@ def write_figures(run_dir: Path) -> list[Path]:
     charts = charts_of(run)
     if not charts:
         raise UserError(
-            f"{run_dir}: no predictions are there to draw; make them with `discovery run EXPERIMENT`"
+            f"{run_dir}: there are no predictions to draw; make them with `discovery run EXPERIMENT`"
         )
     folder = run.folder / "figures"
     folder.mkdir(exist_ok=True)

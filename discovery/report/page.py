@@ -102,7 +102,7 @@ def _of_groups(groups: Sequence[Run]) -> Answer:
         text = "Only their list is shown. To compare models side by side, name runs of the same recordings."
         return Answer(Part("These runs share no recording", (text,)), Part())
     points = tuple(f"{_campaign(one)}: {_lower(answer(one).first.headline)}" for one in groups)
-    return Answer(Part("Not all of these runs share recordings", points), Part())
+    return Answer(Part("Runs are compared on the recordings that they share", points), Part())
 
 
 def _lower(sentence: str) -> str:
@@ -264,7 +264,7 @@ def _eyebrow(run: Run) -> str:
     if run.results.get("fit"):
         parts.append(f"fitted to {_brief(run.results['fit'])}")
     if run.held_out:
-        parts.append(f"compared on {_brief(run.held_out)}, which no fit and no choice of this run has used")
+        parts.append(f"compared on {_brief(run.held_out)}, which no fit and no choice has used")
     return " · ".join(parts)
 
 

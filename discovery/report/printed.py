@@ -201,7 +201,7 @@ def _in_units(run: Run, table: tables.Table) -> tables.Table:
 
 
 def rms_tables(run: Run) -> list[Printed]:
-    """What each model leaves of temperatures: a row for each recording and output, held-out ones first."""
+    """rms of the residuals of temperatures: a row for each recording and output, held-out ones first."""
     every, found = ranked(run), run.results.get("models", {})
     order = every[:_MOST_COLUMNS]
     rows, units = [], rms_units(run)

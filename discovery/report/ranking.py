@@ -116,9 +116,7 @@ def is_error(run: Run) -> bool:
 
 
 def rms_by_unit(run: Run, model: str, recording: str | None = None) -> dict[str, list[float]]:
-    """What a model leaves of each output (on a recording), by the unit it is said in: micrometres and kelvins
-    are not to be mixed.
-    """
+    """rms of each output (on a recording), by unit, because micrometres and kelvins must not be mixed."""
     found: dict[str, list[float]] = {}
     for (name, output), score in cells(run, model).items():
         if recording in (None, name) and _is_number(score.get("rms")):
@@ -137,7 +135,7 @@ def rms_unit(run: Run, output: str) -> str:
 
 
 def mean_rms(run: Run, model: str, recording: str) -> dict[str, float]:
-    """Quadratic mean over the outputs of each unit of what a model leaves on a recording."""
+    """Quadratic mean of the rms over the outputs of each unit, on a recording."""
     return {
         unit: math.sqrt(sum(rms**2 for rms in found) / len(found))
         for unit, found in rms_by_unit(run, model, recording).items()

@@ -1,4 +1,4 @@
-"""An optimiser of PySINDy in the place of our search, by its name and arguments."""
+"""An optimiser of PySINDy instead of our search, by name and arguments."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def discover_rates(
     plain: Sequence[str] = (),
     easy: Sequence[str] = (),
 ) -> Discovery:
-    """Choose which coefficients of a model stay, and fit the rest.
+    """Choose the coefficients of a model that stay, and fit them.
 
     Args:
         model: baseline and all candidates, coefficients at good start values.
@@ -97,7 +97,7 @@ def discover_rates(
 
 @dataclass(frozen=True)
 class Judge:
-    """Makes the choice of a linearised fit: each size refitted, and run freely on what was left out."""
+    """Makes the choice of a linearised fit: refits each size and runs it freely on left-out data."""
 
     data: RateData
     model: Model
@@ -111,7 +111,7 @@ class Judge:
     grown: bool
 
     def __call__(self, problem: Problem) -> Choice:
-        """The sparsest set within the tolerance of the best on what was left out."""
+        """The sparsest set within the tolerance of the best on left-out data."""
         search = problem.search()
         g, count = search.g, max(len(self.labels), 1)
         path = search.path(problem.max_terms)
@@ -146,7 +146,7 @@ class Judge:
         return select
 
     def evidence(self, problem: Problem, sets: Sequence[Terms], errors: Array, row: int) -> Choice:
-        """The choice of one of some sets, by their mean squared errors (sizes, B) on what was left out."""
+        """The choice of one of some sets, by their mean squared errors (sizes, B) on left-out data."""
         g = problem.pooled()
         return Choice(
             sets[row],
@@ -159,9 +159,7 @@ class Judge:
         )
 
     def refit(self, terms: Terms, grids: Mapping[str, Grid], noise: Noise | None, rounds: int) -> Fit:
-        """The model with the terms of a set alone, fitted by output error from where it stands and from their
-        coefficients.
-        """
+        """The model with only the terms of a set, fitted by output error from its present coefficients."""
         found = {self.names[f]: float(v) for f, v in zip(terms.family, terms.theta, strict=True)}
         small = without(self.model, [name for name in self.names if name not in found])
         recordings = [r for r in self.data.recordings if r in grids]
@@ -191,7 +189,7 @@ class Judge:
         return left_out(self.data, whole, self.noise, _ROUNDS, self.whole)
 
     def costs(self, problem: Problem, terms: Terms) -> tuple[float, ...]:
-        """Share by which what the linearised fit leaves on left-out blocks grows without each term."""
+        """Share by which the left-out error of the linearised fit grows without each term."""
         free = list(range(len(problem.always), len(terms)))
         left = np.zeros(len(free) + 1)
         for fold in make_folds(problem.blocks, False):

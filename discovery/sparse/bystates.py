@@ -304,7 +304,7 @@ def with_free_levels(data: RateData, model: Model) -> Model:
 
 
 def leaves_noise(campaign: Campaign, recordings: Sequence[str], model: Model, outputs: Sequence[str]) -> bool:
-    """Whether what a model leaves of all its readings is white: a further state has nothing to explain."""
+    """Whether the residual of a model is white: then a further state has nothing to explain."""
     fit = fit_model(model, campaign, recordings, outputs, max_rounds=_ROUNDS)
     return readings_as_one(list(fit.residuals().values())) < _WHITE
 

@@ -1,4 +1,4 @@
-"""Which set of terms: its size judged by free runs on what was left out, its members by what they cost."""
+"""Choice of a set of terms: free runs on left-out data choose its size, the cost of each term its members."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Choice:
 
 
 def chosen(problem: Problem) -> Choice:
-    """The smallest set within `tolerance` standard errors of the best on what was left out.
+    """The smallest set within `tolerance` standard errors of the best on left-out data.
 
     No set is larger than the one of the least extended BIC at the effective number of readings. No term
     ends at the slow end of the time constants: its family may then have one term fewer. Terms share a time
@@ -88,8 +88,7 @@ def evidence(problem: Problem, terms: Terms) -> Choice:
 
 
 def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
-    """The problem with the prior of the parts against what a set leaves of readings that it has not seen, and
-    the set under it.
+    """The problem with a prior that is scaled by the error on unseen readings, and the set under it.
 
     Every model lacks something. Its gains bend to that as well, so what it leaves of the readings that it was
     fitted to says too little of how far it is off, and of how long it stays off.
@@ -158,7 +157,7 @@ def _with_parts(problem: Problem) -> Problem:
 
 
 def _effective(problem: Problem, search: Search, terms: Terms) -> float:
-    """How many independent readings there are, as what a set leaves of them says."""
+    """Number of independent readings, from the residual of a set."""
     left = problem.residuals(on_grid(terms, problem.families))
     return float(search.g.count / readings_as_one([r[:, None] for r in left]))
 
@@ -278,7 +277,7 @@ def _begin(problem: Problem, terms: Terms, others: Sequence[int]) -> tuple[Array
 
 
 def _costs(problem: Problem, terms: Terms) -> tuple[float, tuple[float, ...]]:
-    """rms on what was left out, and the share by which it grows without each term."""
+    """rms on left-out data, and the share by which it grows without each term."""
     sets = [None, *range(len(problem.always), len(terms))]
     errors = np.full((len(sets), problem.blocks.count), np.nan)
     for fold, search in problem.folds():

@@ -1,4 +1,4 @@
-"""What an experiment file says about single terms (keep, forbid, bounds), matched to the terms of a
+"""Constraints of an experiment file on single terms (keep, forbid, bounds), matched to the terms of a
 library.
 """
 

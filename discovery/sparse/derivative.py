@@ -1,4 +1,4 @@
-"""The published way to a discrepancy: differentiate what a model leaves, regress it on a library, threshold.
+"""The published method for a discrepancy: differentiate the residual, regress it on a library, threshold.
 
 Kaheman et al. (arXiv:1909.08574, 2019). Kept to compare with: the workbench takes no derivative of a reading.
 """

@@ -1,4 +1,4 @@
-"""What is left out: folds over recordings (or blocks of a single one), and the choice of a size by them."""
+"""Folds over recordings (or blocks of a single one), and the choice of a size by them."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ def make_blocks(times: Sequence[Array], count: int) -> Blocks:
 
 
 def make_folds(blocks: Blocks, whole: bool = True) -> list[Ints]:
-    """Blocks left out in each fold: one recording at a time (several when there are many), else a quarter of
-    the one.
+    """Blocks that each fold leaves out: one recording at a time (several if there are many), else a quarter
+    of the one.
 
     Args:
         whole: leave out whole recordings where there are several. Else a quarter of each: recordings that
@@ -75,7 +75,7 @@ def bootstraps(blocks: int, count: int, seed: int) -> Iterator[Array]:
 
 
 def choose(errors: Array, tolerance: float) -> int:
-    """The sparsest row whose error on what was left out is within `tolerance` standard errors of the best.
+    """The sparsest row whose error on left-out data is within `tolerance` standard errors of the best.
 
     The standard error is that of the paired difference over blocks, of the logarithms and of the squares
     alike: logarithms hold where recordings of different violence stand side by side, squares where the

@@ -1,4 +1,4 @@
-"""Free runs on what a fit has not seen: how far off they are, block by block."""
+"""Free runs on data that a fit has not seen: mean squared error of each block."""
 
 from __future__ import annotations
 

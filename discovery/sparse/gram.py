@@ -56,7 +56,7 @@ def total(grams: Sequence[Gram], weights: Sequence[float] | None = None) -> Gram
 
 
 def project_out(g: Gram, nuisance: Ints, precision: Array) -> Gram:
-    """What is left for the other columns when the nuisance columns take all they can.
+    """Normal equations of the other columns with the nuisance columns projected out.
 
     Args:
         nuisance: indices of the columns to take out.

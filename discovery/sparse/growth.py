@@ -1,4 +1,4 @@
-"""Growth of a baseline: candidates enter one by one, where the residual asks for them."""
+"""Growth of a baseline: candidates enter one by one, by their score on the residual."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ class Growth:
 def grown(
     data: RateData, model: Model, labels: Mapping[str, str], growth: Growth, options: SparseOptions
 ) -> tuple[Model, dict[str, str]]:
-    """The baseline with the candidates that its residual asks for, one at a time, each time fitted anew.
+    """The baseline with the candidates that its residual supports, one at a time; each time everything is
+    fitted again.
 
     A candidate enters by its score: what its column, filtered through the present model, takes off the cost
     when all fitted parameters may follow. Growth ends where the extended criterion does not pay for the next
@@ -73,7 +74,7 @@ def _exchanged(
     noise: Noise,
     options: SparseOptions,
 ) -> tuple[Model, list[str]]:
-    """The terms that entered, or others in their place that do better together.
+    """The terms that entered, or others that are better together.
 
     The first terms enter a baseline that is bent by what it lacks; a proxy that came in then may keep the
     right one out. From where all fit together, every set of that size is ranked anew.
@@ -130,21 +131,21 @@ def _fitted_with(
 
 
 def _next(problem: Problem, library: int) -> Choice:
-    """What stays and the one term that the extended criterion pays for, if any."""
+    """The terms that stay, and the one term that lowers the extended criterion, if any."""
     search = problem.search()
     path = search.path(len(problem.always) + 1)
     return Choice(path[_least(search.g, path, library)])
 
 
 def _best_set(problem: Problem, library: int) -> Choice:
-    """The set of the least extended criterion."""
+    """The set with the smallest extended criterion."""
     search = problem.search()
     path = search.path(problem.max_terms)
     return Choice(path[_least(search.g, path, library)])
 
 
 def _least(g: Gram, path: Sequence[Terms], library: int) -> int:
-    """The set of a path with the least extended criterion."""
+    """The set of a path with the smallest extended criterion."""
     costs = [g.square - one.gain for one in path]
     dispersion = max(min(costs) / g.count, 1.0)
     return int(

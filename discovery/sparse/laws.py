@@ -49,7 +49,7 @@ def laws(
 
 
 def products(words: Sequence[str], variables: Sequence[str]) -> list[str]:
-    """Products of two variables, where the library asks for them.
+    """Products of two variables, if the library has them.
 
     >>> products(["product"], ["y", "u"])
     ['y*u']

@@ -125,8 +125,8 @@ def responses_of(fit: Fit, responses: Sequence[Response]) -> tuple[list[Response
 
 
 def within(rules: Rules, responses: Sequence[Response]) -> list[Response]:
-    """The responses with none at an end of the time constants: what settles at once has no mass, and what
-    never settles in these recordings leaves.
+    """The responses whose time constant is not at a limit: at the short end there is no mass, at the long end
+    the recordings do not determine it.
     """
     least, most = rules.time_constants
     found = []
@@ -148,7 +148,7 @@ def fit_masses(
     noise: Noise | None = None,
     max_rounds: int = 60,
 ) -> Fit:
-    """The fit of a model of masses alone, whose model says where they start in a further recording.
+    """Fit a model of masses alone; the model then says where masses start in another recording.
 
     These starts belong to the numbers of that fit: a slow mass may start warmer, and the offset make up for
     it, without a change in the recordings that were fitted.
@@ -159,7 +159,7 @@ def fit_masses(
 
 
 def starts_of(fit: Fit) -> Model:
-    """The fitted model with the starts of its masses in a further recording: means, spreads, and how the
+    """The fitted model with the start values of its masses in another recording: means, spreads, and how the
     start of each follows those of the masses above it.
 
     A recording may be cut out of a longer one; then the masses start anywhere in their range. That counts as
@@ -197,7 +197,8 @@ def _later(declared: Expression, by: float) -> Expression:
 
 
 def _population(fit: Fit) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n) of the masses' starts in a further recording, from the declared ones.
+    """Mean (n,) and covariance (n, n) of the start values of the masses in another recording, from the
+    declared ones.
 
     Known are the starts that the fit found, each with its covariance; a recording that is cut out of a longer
     one starts anywhere in the range of the masses.
@@ -211,7 +212,7 @@ def _population(fit: Fit) -> tuple[Array, Array]:
 
 
 def next_start(seen: Sequence[tuple[Array, Array]], unseen: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n) of the start values in a further recording.
+    """Mean (n,) and covariance (n, n) of the start values in another recording.
 
     A mixture: each recording that was seen has weight 1, and whatever was not seen has weight 1/count, so it
     counts less the more recordings have shown how they begin.
@@ -240,7 +241,7 @@ def _start_covariance(fit: Fit, trajectory: Trajectory) -> Array:
 
 
 def _begun(trajectory: Trajectory) -> Array:
-    """(T, n) where each mass would begin by its declared start if the recording began at each instant."""
+    """(T, n) declared start of each mass if the recording began at each instant."""
     grid = trajectory.system.grid
     known: dict[str, float | Array] = {**grid.nodes, **trajectory.values}
     return np.column_stack(

@@ -87,7 +87,7 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
         return self
 
     def _reduce(self, x: Any, y: Any) -> None:
-        """BaseOptimizer asks for it; `fit` does the work on normal equations."""
+        """Required by BaseOptimizer; `fit` works on normal equations instead."""
 
     def _choose(self, x: Array, target: Array, k: int) -> Choice:
         """The choice for one target, in its unit."""

@@ -46,7 +46,7 @@ FAR = 1e6  # instead of the error of a model that runs away, over the spread
 
 @dataclass(frozen=True)
 class Setting:
-    """What a user of PySINDy would try."""
+    """A setting that a user of PySINDy would try."""
 
     weak: bool
     degree: int
@@ -63,7 +63,7 @@ class Table:
 
 
 def settings(form: str = "auto") -> list[Setting]:
-    """What is tried: "plain", "weak", or both ("auto"), with every degree and threshold."""
+    """Settings to try: "plain", "weak", or both ("auto"), with every degree and threshold."""
     forms = {"auto": (False, True), "plain": (False,), "weak": (True,)}[form]
     return [Setting(*one) for one in product(forms, DEGREES, THRESHOLDS)]
 
@@ -194,8 +194,8 @@ class _Frame:
 
 
 def _usual(distances: Array) -> float:
-    """The distance of two readings in which half of the recording lies: of three readings in a row and then a
-    minute without any, the minute.
+    """The usual distance of two readings: that in which half of the recording lies. Of three readings in a
+    row and a minute without any, it is the minute.
     """
     if not distances.size:
         return 0.0
@@ -209,7 +209,7 @@ def _powers(count: int, degree: int) -> list[tuple[int, ...]]:
 
 
 def _coefficients(frame: _Frame, tables: Sequence[Table], setting: Setting, seed: int) -> Array:
-    """Coefficients (Y, F) that STLSQ leaves; all zero where no stretch is long enough for a derivative."""
+    """Coefficients (Y, F) of STLSQ; all zero if no stretch is long enough for a derivative."""
     import pysindy
 
     if not tables:
@@ -263,7 +263,7 @@ def _left_out(
     setting: Setting,
     seed: int,
 ) -> float:
-    """rms over the spread of free runs on what was left out, all outputs together."""
+    """rms of free runs on left-out data over the spread, all outputs together."""
     squares: list[Array] = []
     for out, train in folds:
         if not train:
@@ -283,7 +283,7 @@ def _left_out(
 
 
 def _folds(names: Sequence[str], tables: Mapping[str, list[Table]]) -> list[Fold]:
-    """What is left out (share of each recording), and the tables that stay."""
+    """The left-out share of each recording, and the remaining tables."""
     if len(names) > 1:
         parts = [names[k::FOLDS] for k in range(min(FOLDS, len(names)))]
         return [
@@ -301,6 +301,6 @@ def _folds(names: Sequence[str], tables: Mapping[str, list[Table]]) -> list[Fold
 
 
 def _outside(table: Table, begin: float, end: float) -> list[Table]:
-    """What a table holds before and after a stretch of time, where it is long enough."""
+    """The parts of a table before and after a stretch of time, if they are long enough."""
     parts = (table.time < begin, table.time > end)
     return [Table(table.time[k], table.x[k], table.u[k]) for k in parts if k.sum() > 2 * WINDOW]

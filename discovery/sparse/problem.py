@@ -1,6 +1,4 @@
-"""A sparse regression of one output on several trajectories: everything over its noise, ready to be
-searched.
-"""
+"""A sparse regression of one output on several trajectories, everything divided by its noise."""
 
 from __future__ import annotations
 
@@ -126,7 +124,7 @@ class Problem:
         return len(terms) + len(set(terms.pole[self.curved(terms)].tolist()))
 
     def residuals(self, theta: Array) -> list[Array]:
-        """What coefficients (M,) and the nuisance leave of the readings of each trajectory."""
+        """Residuals of the readings of each trajectory with coefficients (M,) and the nuisance."""
         left = []
         for x, d, y, precision in zip(
             self.columns, self.nuisance, self.readings, self.precision, strict=True

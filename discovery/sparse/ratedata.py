@@ -1,4 +1,4 @@
-"""What a choice of terms in rates works on: grids, thinned readings, blocks of time, and a rough noise."""
+"""Data for a choice of terms in rates: grids, thinned readings, blocks of time, and a rough noise."""
 
 from __future__ import annotations
 
@@ -57,8 +57,7 @@ def make_rate_data(
 
 
 def time_scale(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> float:
-    """Time [s] in which readings forget half of what they were: the lag at which their autocorrelation is
-    one half.
+    """Time [s] after which the autocorrelation of the readings is one half.
 
     The correlation at the smallest lag counts as one, which leaves white noise out.
     """

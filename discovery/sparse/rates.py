@@ -78,7 +78,7 @@ def parse_product(name: str, factor: str) -> Expression:
 
 
 def without(model: Model, gone: Sequence[str]) -> Model:
-    """The model with coefficients set to zero taken out: a term that holds nothing else disappears.
+    """The model without the coefficients that are zero; a term with nothing else disappears.
 
     A coefficient that shares its term with others becomes a fixed zero.
     """
@@ -279,7 +279,7 @@ def refit(
     noise: Noise | None = None,
     max_rounds: int = 25,
 ) -> Fit:
-    """Fit from values that are already near; a given noise is kept, else it is estimated along the way.
+    """Fit from values that are already near; a given noise is kept, else it is estimated.
 
     It ends where sizes are compared, not where the last digit stands: the chosen model is fitted once more.
     """

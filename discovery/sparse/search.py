@@ -1,4 +1,4 @@
-"""The search for a sparse set of terms on normal equations: sets of every size, poles shared where that is
+"""The search for a sparse set of terms on normal equations: sets of every size, with shared poles if that is
 cheaper.
 """
 
@@ -105,7 +105,7 @@ class Search:
         return self.refined(family, np.zeros(len(family)))
 
     def grown(self, terms: Terms) -> Terms | None:
-        """The set with the term that takes most off, all refined; None where none may enter.
+        """The set with the term that lowers the cost most, all refined; None if none may enter.
 
         A new term that runs into one of its own family was that one's other half: its place is barred. Two
         old ones that run into each other once the new one is there were standing in for it: they become
@@ -145,7 +145,7 @@ class Search:
         return self.refined(terms.family[rest], terms.place[rest], pole)
 
     def shrunk(self, terms: Terms) -> Terms:
-        """The set without the term whose loss costs least: theta_j^2 / (S^-1)_jj at fixed places.
+        """The set without the term of the smallest cost: theta_j^2 / (S^-1)_jj at fixed places.
 
         A coefficient at a bound of zero costs nothing and goes first.
         """

@@ -134,7 +134,7 @@ def balanced(data: RateData, chain: Structure, first: float, then: float) -> dic
 
 
 def quickest(data: RateData, unit: str) -> float:
-    """Greatest rate constant [1/unit] that readings can show: a tenth of their distance."""
+    """Largest rate constant [1/unit] that readings can show: from a tenth of their distance."""
     steps = [float(np.median(np.diff(g.time[g.read]))) for g in data.grids.values() if len(g.read) > 1]
     return FINER * TIME_UNITS[unit] / min(steps)
 

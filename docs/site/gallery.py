@@ -49,8 +49,9 @@ def _entry(name: str, effect: Any, factor: float) -> Iterator[str]:
     size = effect.amplitude
     sign = {1: "positive", -1: "negative"}.get(size.sign, "either sign")
     yield from (f"### {effect.title} {{ #{name} }}", "", f"`{effect.word}`: {_text(effect.signature)}.", "")
-    yield from (math(expression(parse(effect.formula)), block=True), "")
-    yield from ("| | |", "|---|---|", f"| formula | `{effect.formula}` |", f"| acts on | {effect.place} |")
+    formula = math(expression(parse(effect.formula)), block=True)
+    yield from (f'<div style="overflow-x: auto">{formula}</div>', "")
+    yield from (f"| formula | `{effect.formula}` |", "|---|---|", f"| acts on | {effect.place} |")
     if size.fixed is None:
         low, high = size.plausible / factor, size.plausible * factor
         unit = "" if size.unit == "1" else f" {size.unit}"

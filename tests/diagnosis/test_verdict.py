@@ -174,7 +174,7 @@ def test_single_wrong_readings_are_all_that_is_wrong() -> None:
     dry = Tried([Model((FLUID,), 1.0), Model((), 0.0)])
     found = said(dry, {"fluid_convection": 0.1}, World(outliers=("one", "two")))
     assert found.word == "measurement fault"
-    assert found.reasons == ("2 single wrong readings, nothing else",)
+    assert found.reasons == ("only 2 single wrong readings were found",)
 
 
 def test_a_fault_is_told_from_physics() -> None:
@@ -198,7 +198,7 @@ def test_what_has_no_name_may_not_explain_much_more(gain: float, unknown: float,
     verdict = said(found, {"fluid_convection": 0.9}, unknown=Model((FLUID,), unknown, forced="bed"))
     assert verdict.word == word
     if word == "unexplained":
-        assert verdict.reasons[0] == "heat of unknown cause at bed explains more than what can be named"
+        assert verdict.reasons[0] == "heat of unknown cause at bed explains more than effects do"
 
 
 @pytest.mark.parametrize(("by", "word"), [(-0.01, "no mismatch"), (0.01, "missing physics")])
@@ -211,7 +211,7 @@ def test_what_is_left_unnamed_may_not_carry_the_answer() -> None:
     both = pair(FLUID, FRICTION, 180.0, 100.0, 30.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.5})
     assert found.word == "unexplained"
-    assert "what can be named explains too little (log evidence 80 below the best)" in found.reasons
+    assert "the surest effects explain too little (log evidence 80 below the best)" in found.reasons
 
 
 def test_what_would_be_missed_most_is_named_first() -> None:
@@ -251,7 +251,7 @@ def test_what_changes_no_free_run_is_not_lacking(monkeypatch: pytest.MonkeyPatch
         pair(FLUID, FRICTION, 150.0, 100.0, 50.0), {"fluid_convection": 0.98, "friction_speed": 0.98}
     )
     assert [n.hypothesis for n in found.named] == [FLUID]
-    assert "does not make free runs better" in found.reasons[0]
+    assert "does not improve free runs enough" in found.reasons[0]
 
 
 @pytest.mark.parametrize(
@@ -273,12 +273,12 @@ def test_a_name_has_to_matter_on_recordings_left_out(
     ("models", "world", "words", "reason"),
     [
         ([Model((SUN,), 50.0)], World(("r2",)), {"unmeasured_heat": 0.98}, "record the machine once more"),
-        ([Model((OFFSET,), 50.0, off=0.24)], World(), {"sensor_offset": 0.98}, "off by about 24 %"),
+        ([Model((OFFSET,), 50.0, off=0.24)], World(), {"sensor_offset": 0.98}, "wrong by about 24 %"),
         (
             [Model(tuple(claim("clock_shift", recording=r) for r in ("r1", "r2")), 50.0)],
             World(),
             {"clock_shift": 0.98},
-            "every recording would need its clock shifted",
+            "the clock of every recording would be shifted",
         ),
     ],
 )
@@ -319,7 +319,7 @@ def test_unseen_recordings_withdraw_a_name_and_never_add_one() -> None:
     withdrawn = refuted(named, {"r3": worse})
     assert (withdrawn.word, withdrawn.named) == ("unexplained", ())
     assert withdrawn.candidates == named.named
-    assert withdrawn.reasons[0].startswith("fluid_convection at table is refuted on r3")
+    assert withdrawn.reasons[0].startswith("with fluid_convection at table, free runs on r3 are worse")
     unnamed = said(WET, {"fluid_convection": 0.5})
     assert refuted(unnamed, {"r3": better}) is unnamed
 
@@ -330,7 +330,7 @@ def test_one_recording_of_another_machine_is_told_and_refutes_nothing() -> None:
     better, worse = improved(2.0, 1.0, 0.5, 1.5), improved(1.0, 1.3, -0.5, -0.1)
     kept = refuted(named, {"r3": better, "r4": better, "r5": worse})
     assert kept.word == "missing physics"
-    assert "holds on the other unseen recordings but not on r5" in kept.reasons[-1]
+    assert "improves the other held-out recordings but not r5" in kept.reasons[-1]
 
 
 def test_an_event_is_no_matter_of_other_recordings() -> None:

@@ -137,7 +137,7 @@ def test_an_effect_that_has_no_place_is_told(old: str, new: str, why: str | None
             "k_rub*speed*", "cooling + k_rub*cooling*"
         )
     told = not_offered(model(), machine.scene(model()), [own(text)])
-    assert told == ([f"rub was not looked for: {why}"] if why else [])
+    assert told == ([f"rub was not searched: {why}"] if why else [])
 
 
 def test_an_input_of_a_role_has_to_be_named() -> None:
@@ -163,7 +163,7 @@ def test_a_time_without_a_middle_is_any_that_the_recordings_show() -> None:
 
 
 MISTAKES = {
-    "k_rub*sped": "effect 'rub': 'sped' means nothing in its formula; known: .*speed",
+    "k_rub*sped": "effect 'rub': 'sped' is not known in its formula; known are .*speed",
     "0.1*speed": "effect 'rub': the amplitude 'k_rub' is not in the formula",
     "k_rub*speed*(": "effect 'rub'",
     "k_rub*__import__('os')": "effect 'rub'",
@@ -216,4 +216,4 @@ def test_a_drive_may_be_known_by_its_speed_alone() -> None:
     scene = replace(scene, channels={**scene.channels, "P_drive": power})
     effect = replace(catalogue()["windage"], word="rub")
     why = "the model has no place of the kind 'driven body' where its channels could act"
-    assert not_offered(machine.model(), scene, [effect]) == [f"rub was not looked for: {why}"]
+    assert not_offered(machine.model(), scene, [effect]) == [f"rub was not searched: {why}"]

@@ -252,9 +252,8 @@ def test_an_error_that_a_person_names_later_is_counted_from_its_first_reading(tm
     """In the campaign file, with --again: as --is says it at once."""
     probes = _probe(-80532), _probe(-3051), _probe(12)
     out, rig = _made(tmp_path, "time,sample,T_room,T_bed,mcu_pos_z", *probes)
-    assert (
-        'predicted: T_bed; no column is taken for an error: if one is, say so, as in --is "mcu_pos_z=' in out
-    )
+    assert "predicted: T_bed; no column was recognised as an error: if one is, say so, as in" in out
+    assert '--is "mcu_pos_z=error,um"' in out
     text = (rig / "campaign.toml").read_text("utf-8")
     text = re.sub(r"mcu_pos_z *= .*", 'mcu_pos_z = { role = "error", unit = "um" }', text)
     (rig / "campaign.toml").write_text(text, "utf-8")

@@ -35,7 +35,9 @@ _GAIN, _TWO_GAIN = 1.3, 1.7  # among several recordings; of two that stand again
 # needs less of a gain
 _FAR, _BACK, _WHOLE = 3.0, 1.15, 0.75
 _AGREES = 3.0  # times the usual misfit, at most, after a repair
-_POOR = 0.5  # of the movement: what others predict no better has causes that nobody recorded, and says nothing
+_POOR = (
+    0.5  # of the movement: what others predict no better has causes that nobody recorded, and says nothing
+)
 _TWO_AGREES = 0.4  # of the movement itself
 _BEGINS = 5.0  # K: by so much more a temperature begins elsewhere than in any other recording
 _FREE_AGREES = 0.3  # of the movement: a drift or an offset of any size fits a little of a poor prediction
