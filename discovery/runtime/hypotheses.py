@@ -24,7 +24,7 @@ from discovery.fitting.covariance import Z95
 from discovery.fitting.problem import Problem
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.runtime.changes import Change, Table, make_table
+from discovery.runtime.changes import Change, Seen, Table, make_table
 from discovery.terms import names, parse
 from discovery.threads import one_thread
 
@@ -38,7 +38,6 @@ OFFSET = (0.5, 2.0)  # K, of the sensor of an input
 LEAST_ODDS = 2.5  # log of the odds against `nothing`, below which nothing has changed
 WORN = 3.0  # log of how much more often a machine wears that has worn before
 RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
-MEMORY_S = 24 * 3600.0  # in which what was read counts less and less: wear goes on meanwhile
 AGES = ("heat load", "rotation speed", "fluid flow", "cooling power", "coolant temperature")
 START_SD = 0.5  # K, um: of states that are known where a recording begins
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
@@ -111,7 +110,7 @@ def compare(exported: Exported, campaign: Campaign, recordings: Sequence[str]) -
     seen = table.seen()
     offered = {"wear": [_wear(exported, width) for width in WEAR]}
     for k, name in enumerate(channels):
-        place = np.array([len(known.parameters) + k])
+        place = np.array([2 * len(known.parameters) + k])
         offered[f"sensor of {name}"] = [Change(place, np.array([[size]])) for size in OFFSET]
     offered["something else"] = [*_exchanges(exported, channels), *_heats(exported.model, table, known.floor)]
     worn = any("of" in entry for entry in exported.changelog)  # revisions are written for wear alone
@@ -120,28 +119,33 @@ def compare(exported: Exported, campaign: Campaign, recordings: Sequence[str]) -
     before |= {"wear": WORN * worn, "something else": -RARE}
     odds = {"nothing": 0.0} | {name: value + before[name] for name, value in evidence.items()}
     verdict, what = _verdict(odds, evidence)
-    wear = _wear(exported, WEAR[1])
-    moved = zip(*table.seen(MEMORY_S).size(wear), strict=True)
-    change = {
-        known.parameters[k]: (float(by), float(sd)) for k, (by, sd) in zip(wear.columns, moved, strict=True)
-    }
+    change = _worn(seen, exported)
     count = int(sum(np.isfinite(s.grid.readings).sum() for s in problem.systems))
     rms = _rms(problem, levels, outputs)
     return Comparison(tuple(recordings), count, verdict, what, odds, rms, change)
 
 
-def _sizes(exported: Exported) -> Array:
-    """(P,) sizes of the fitted parameters."""
+def _sizes(exported: Exported) -> dict[str, float]:
+    """Sizes of the fitted parameters."""
     fitted = exported.document["knowledge"]["parameters"]
-    return np.array([abs(exported.model.parameters[n].value) for n in fitted])
+    return {n: abs(exported.model.parameters[n].value) for n in fitted}
 
 
 def _wear(exported: Exported, width: float) -> Change:
-    """Every parameter that ages, by a share of its own."""
+    """Every parameter that ages, by a share of its own: before the recordings, and bit by bit during them."""
+    sizes = _sizes(exported)
+    at = np.array([k for k, n in enumerate(sizes) if n in ageing(exported)], dtype=np.intp)
+    size = np.array(list(sizes.values()))[at]
+    return Change(np.concatenate([at, len(sizes) + at]), width * np.diag(np.concatenate([size, size])))
+
+
+def _worn(seen: Seen, exported: Exported) -> dict[str, tuple[float, float]]:
+    """Change of each parameter that ages, at the end of the recordings, and its standard deviation."""
     old = ageing(exported)
-    fitted = exported.document["knowledge"]["parameters"]
-    at = np.array([k for k, n in enumerate(fitted) if n in old], dtype=np.intp)
-    return Change(at, width * np.diag(_sizes(exported)[at]))
+    by, covariance = seen.size(_wear(exported, WEAR[1]))
+    both = np.hstack([np.eye(len(old)), np.eye(len(old))])
+    total, variance = both @ by, np.diag(both @ covariance @ both.T)
+    return dict(zip(old, zip(total.tolist(), np.sqrt(variance).tolist(), strict=True), strict=True))
 
 
 def _exchanges(exported: Exported, channels: Sequence[str]) -> list[Change]:
@@ -149,13 +153,10 @@ def _exchanges(exported: Exported, channels: Sequence[str]) -> list[Change]:
     used, old, sizes = _uses(exported), ageing(exported), _sizes(exported)
     found = []
     for channel in channels:
-        at = [
-            k
-            for k, n in enumerate(used)
-            if n not in old and used[n] and all(channel in one for one in used[n])
-        ]
-        if sizes[at].any():
-            found += [Change(np.array(at), width * sizes[at][:, None]) for width in OTHER]
+        group = [n for n in used if n not in old and used[n] and all(channel in one for one in used[n])]
+        if any(sizes[n] for n in group):
+            at = np.array([list(used).index(n) for n in group])
+            found += [Change(at, width * np.array([[sizes[n]] for n in group])) for width in OTHER]
     return found
 
 
@@ -182,8 +183,8 @@ def _verdict(odds: Mapping[str, float], evidence: Mapping[str, float]) -> tuple[
     """The best hypothesis, if it beats `nothing` and its rivals clearly. A sensor needs the evidence of a
     name in a diagnosis.
     """
-    best, second, *_ = sorted(odds, key=lambda name: -odds[name])
-    if best == "nothing" or odds[best] < LEAST_ODDS:
+    best, second, *_ = sorted(evidence, key=lambda name: -odds[name])
+    if odds[best] < LEAST_ODDS:
         return "nothing", ""
     if odds[best] - odds[second] < RIVAL:
         return "undecided", f"{best} or {second}"
