@@ -96,7 +96,7 @@ class Table:
     """Whitened readings (N,) of the fit and of new recordings, with their slopes.
 
     `base` (N, B): what the fit left unknown, in standard deviations; `slopes` (N, K): of what may have
-    changed, parameters at once, parameters bit by bit, offsets of channels, then heat.
+    changed, parameters at once, parameters bit by bit, offsets of channels, what else is asked, then heat.
     """
 
     residual: Array
@@ -112,12 +112,15 @@ class Table:
         return Seen(columns.T @ columns - inside.T @ inside)
 
 
-def make_table(known: Knowledge, problem: Problem, channels: Sequence[str]) -> Table:
+def make_table(
+    known: Knowledge, problem: Problem, channels: Sequence[str], more: Sequence[Sequence[Array]] = ()
+) -> Table:
     """What the readings of a problem and of the fit say, whitened with the noise of the fit.
 
     Args:
         problem: the model at work on new recordings; start values count as unknown.
         channels: inputs whose sensors may have an offset.
+        more: further slopes (R, Y, M) of each recording, one group after another.
 
     Raises:
         UserError: what is known is of another model.
@@ -140,7 +143,12 @@ def make_table(known: Knowledge, problem: Problem, channels: Sequence[str]) -> T
             np.concatenate([sensitivities(run, known.parameters), laws, bounds], axis=2),
             sensitivities(run, (), [starts[i].name for i in mine]),
             np.concatenate(
-                [sensitivities(run, known.parameters, grown=grown), sensitivities(run, channels)], axis=2
+                [
+                    sensitivities(run, known.parameters, grown=grown),
+                    sensitivities(run, channels),
+                    *(group[k] for group in more),
+                ],
+                axis=2,
             ),
             np.concatenate([-np.diff(heat_steps(run, n, edges[k]), axis=2) for n in states], axis=2),
         ]
@@ -160,7 +168,7 @@ def make_table(known: Knowledge, problem: Problem, channels: Sequence[str]) -> T
     )
     count = len(known.rows)
     fitted = np.hstack([known.rows[:, 1:], np.zeros((count, len(starts)))])
-    before = 2 * own + len(channels)
+    before = 2 * own + len(channels) + sum(group[0].shape[2] for group in more)
     return Table(
         np.concatenate([known.rows[:, 0], *(r for r, _, _ in parts)]),
         np.concatenate([fitted, *(j for _, j, _ in parts)]) * spread,

@@ -3,7 +3,8 @@
 All are hypotheses of one comparison (`changes.py`). Under `nothing` the parameters and laws are as uncertain
 as their fit left them. Under `wear` the parameters that can age have changed, under `sensor of X` this sensor
 has an offset. `something else` is heat of unknown cause at one body, as in the diagnosis, or from one body to
-another, or another exchange with one temperature (a fan, a door).
+another, or another exchange with one temperature (a fan, a door). In the running loop, an input that the
+model does not use may act by a path of its own (`unused.py`).
 """
 
 from __future__ import annotations
@@ -25,16 +26,18 @@ from discovery.fitting.problem import Problem
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.runtime.changes import Change, Seen, Table, make_table
+from discovery.runtime.unused import Path, paths
 from discovery.terms import names, parse
 from discovery.threads import one_thread
 
 Array = NDArray[np.float64]
-Verdict = Literal["nothing", "wear", "input sensor", "something else", "undecided"]
+Verdict = Literal["nothing", "wear", "input sensor", "unused input", "something else", "undecided"]
 
 # Chosen on seeds set aside for it and confirmed on others, see benchmarks/runtime.md
 WEAR = (0.05, 0.2)  # relative change of a parameter that ages; both widths count half
 OTHER = (0.1, 0.4)  # relative change of a parameter that cannot age: something else changed
 OFFSET = (0.5, 2.0)  # K, of the sensor of an input
+ACTS = (1.0, 4.0)  # residuals of the fit that an unused input shows
 LEAST_ODDS = 2.5  # log of the odds against `nothing`, below which nothing has changed
 WORN = 3.0  # log of how much more often a machine wears that has worn before
 RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
@@ -48,7 +51,7 @@ class Comparison:
     """What the recordings say. `odds`: log of the probability of the readings under each hypothesis over that
     under `nothing`, prior odds included. `verdict` and `what`: the best one, and the sensor where it is one.
     `rms`: residual of the model at work in units of that of its fit. `change`: of the parameters that age,
-    under wear, with standard deviations.
+    under wear, with standard deviations. `path`: of the unused input, with its parameters.
     """
 
     recordings: tuple[str, ...]
@@ -58,6 +61,7 @@ class Comparison:
     odds: Mapping[str, float]
     rms: float
     change: Mapping[str, tuple[float, float]]
+    path: tuple[Path, Mapping[str, float]] | None = None
 
     def __str__(self) -> str:
         others = ", ".join(f"{name} {value:+.1f}" for name, value in self.odds.items() if name != "nothing")
@@ -90,8 +94,13 @@ def _uses(exported: Exported) -> dict[str, list[frozenset[str]]]:
 
 
 @one_thread
-def compare(exported: Exported, campaign: Campaign, recordings: Sequence[str]) -> Comparison:
+def compare(
+    exported: Exported, campaign: Campaign, recordings: Sequence[str], choose: bool = False
+) -> Comparison:
     """Compare the hypotheses on recordings taken since the last revision.
+
+    Args:
+        choose: a recorded input that the model does not use may act, too.
 
     Raises:
         UserError: a model without knowledge of its parameters, or no reading of any output.
@@ -106,23 +115,29 @@ def compare(exported: Exported, campaign: Campaign, recordings: Sequence[str]) -
         )
     problem = problem_of(exported.model, campaign, recordings, outputs)
     channels = [i.name for i in exported.inputs if i.role in TEMPERATURES]
-    table = make_table(known, problem, channels)
+    found = paths(exported, campaign, recordings, outputs) if choose else []
+    table = make_table(known, problem, channels, [path.columns for path in found])
     seen = table.seen()
     offered = {"wear": [_wear(exported, width) for width in WEAR]}
     for k, name in enumerate(channels):
         place = np.array([2 * len(known.parameters) + k])
         offered[f"sensor of {name}"] = [Change(place, np.array([[size]])) for size in OFFSET]
+    acts = _acting(found, 2 * len(known.parameters) + len(channels), levels)
+    for path in found:
+        offered[f"input {path.channel}"] = [one for p, one in acts if p.channel == path.channel]
     offered["something else"] = [*_exchanges(exported, channels), *_heats(exported.model, table, known.floor)]
     worn = any("of" in entry for entry in exported.changelog)  # revisions are written for wear alone
     evidence = {name: _mean([seen.log_odds(one) for one in ways]) for name, ways in offered.items()}
-    before = {name: -RARE - float(np.log(len(channels))) for name in evidence}
+    before = {f"sensor of {name}": -RARE - float(np.log(len(channels))) for name in channels}
+    before |= {f"input {p.channel}": -RARE - float(np.log(len({q.channel for q in found}))) for p in found}
     before |= {"wear": WORN * worn, "something else": -RARE}
     odds = {"nothing": 0.0} | {name: value + before[name] for name, value in evidence.items()}
     verdict, what = _verdict(odds, evidence)
     change = _worn(seen, exported)
+    chosen = _gains(seen, [one for one in acts if one[0].channel == what])
     count = int(sum(np.isfinite(s.grid.readings).sum() for s in problem.systems))
     rms = _rms(problem, levels, outputs)
-    return Comparison(tuple(recordings), count, verdict, what, odds, rms, change)
+    return Comparison(tuple(recordings), count, verdict, what, odds, rms, change, chosen)
 
 
 def _sizes(exported: Exported) -> dict[str, float]:
@@ -160,6 +175,27 @@ def _exchanges(exported: Exported, channels: Sequence[str]) -> list[Change]:
     return found
 
 
+def _acting(found: Sequence[Path], first: int, levels: Mapping[str, float]) -> list[tuple[Path, Change]]:
+    """The paths of unused inputs, their columns from `first`, with parameters of some sizes: what they show
+    is counted in residuals of the fit.
+    """
+    acts = []
+    for path in found:
+        at = first + np.arange(len(path.into))
+        first += len(path.into)
+        scale = np.array([levels[n] for n in path.into.values()]) / np.maximum(path.size, 1e-300)
+        acts += [(path, Change(at, np.diag(times * scale))) for times in ACTS]
+    return acts
+
+
+def _gains(seen: Seen, acts: Sequence[tuple[Path, Change]]) -> tuple[Path, dict[str, float]] | None:
+    """The most likely of some paths, with the values of its parameters."""
+    if not acts:
+        return None
+    path, change = max(acts, key=lambda one: seen.log_odds(one[1]))
+    return path, dict(zip(path.into, seen.size(change)[0].tolist(), strict=True))
+
+
 def _heats(model: Model, table: Table, floor: Mapping[str, float]) -> list[Change]:
     """Heat of unknown cause at one state, or from one body to another, of any size."""
     bodies = {name for term in model.terms if term.source for name in (term.into, term.source)}
@@ -180,8 +216,8 @@ def _read(campaign: Campaign, recording: str, name: str) -> bool:
 
 
 def _verdict(odds: Mapping[str, float], evidence: Mapping[str, float]) -> tuple[Verdict, str]:
-    """The best hypothesis, if it beats `nothing` and its rivals clearly. A sensor needs the evidence of a
-    name in a diagnosis.
+    """The best hypothesis, if it beats `nothing` and its rivals clearly. A sensor or an input needs the
+    evidence of a name in a diagnosis.
     """
     best, second, *_ = sorted(evidence, key=lambda name: -odds[name])
     if odds[best] < LEAST_ODDS:
@@ -194,6 +230,8 @@ def _verdict(odds: Mapping[str, float], evidence: Mapping[str, float]) -> tuple[
         return "something else", ""
     if evidence[best] < SHORT:
         return "undecided", f"{best} or something else"
+    if best.startswith("input "):
+        return "unused input", best.removeprefix("input ")
     return "input sensor", best.removeprefix("sensor of ")
 
 
@@ -212,10 +250,14 @@ def _rms(problem: Problem, levels: Mapping[str, float], outputs: Sequence[str]) 
 
 
 def begun(exported: Exported, states: Mapping[str, float]) -> Exported:
-    """The model as it starts from states that are known: those it had where the recording begins."""
+    """The model as it starts from states that are known: those it had where the recording begins. Others keep
+    their start.
+    """
     model = exported.model
     started = {
         name: replace(state, start=parse(repr(float(states[name]))), start_sd=START_SD)
+        if name in states
+        else state
         for name, state in model.states.items()
     }
     return replace(exported, model=replace(model, states=started))

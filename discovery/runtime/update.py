@@ -13,6 +13,7 @@ from discovery.export.seal import open_seal
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.runtime.hypotheses import Comparison, begun, compare, model_with
+from discovery.runtime.unused import with_input
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -99,9 +100,9 @@ def revision_of(
     Args:
         begin: states of the model where the recordings begin; default its own start.
     """
-    if found.verdict != "wear":
+    if found.verdict not in ("wear", "unused input"):
         return None
-    document = next_revision(exported, found)
+    document = next_revision(exported, campaign, found)
     again = from_document(*open_seal(render(document), exported.model.name), exported.model.name)
     after = compare(begun(again, begin) if begin is not None else again, campaign, found.recordings).rms
     return (document, after) if after < min(MAY * found.rms, AS_NEW) else None
@@ -114,31 +115,37 @@ def next_name(path: Path) -> Path:
     return path.with_name(f"{stem}.r{revision}{path.suffix}")
 
 
-def next_revision(exported: Exported, found: Comparison) -> dict[str, Any]:
-    """The document of the updated model with its changelog entry; only what wear can change has moved, and
-    ranges, limits and what the fit knew of its parameters stay: the next comparison holds the revision to it.
+def next_revision(exported: Exported, campaign: Campaign, found: Comparison) -> dict[str, Any]:
+    """The document of the updated model with its changelog entry; only what wear can change has moved, or an
+    input has come in. Ranges, limits and what the fit knew of its parameters stay: the next comparison holds
+    the revision to it.
     """
+    if found.verdict == "unused input" and found.path is not None:
+        path, values = found.path
+        moved = f"{path.channel} is an input now, with a lag of {path.lag:g} s: "
+        moved += ", ".join(f"{n} {value:.3g}" for n, value in values.items())
+        return _revised(exported, with_input(exported, campaign, path, values), f"{found}; {moved}")
     document, model = {**exported.document}, model_with(exported.model, found.change)
     entries = []
     for entry in document["parameters"]:
         p = model.parameters[entry["name"]]
         entries.append({**entry, "value": p.value, "low": p.low, "high": p.high})
-    revision = exported.revision + 1
     moved = ", ".join(
         f"{n} {exported.model.parameters[n].value:.4g} -> {model.parameters[n].value:.4g}"
         for n in found.change
     )
+    return _revised(exported, document | {"parameters": entries}, f"{found}; {moved}")
+
+
+def _revised(exported: Exported, document: dict[str, Any], why: str) -> dict[str, Any]:
+    """A document as the next revision, with an entry in its changelog."""
     note = {
-        "revision": revision,
+        "revision": exported.revision + 1,
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "text": f"{found}; {moved}",
+        "text": why,
         "of": exported.seal.sha256,
     }
-    return document | {
-        "revision": revision,
-        "parameters": entries,
-        "changelog": [*document["changelog"], note],
-    }
+    return document | {"revision": note["revision"], "changelog": [*document["changelog"], note]}
 
 
 def _diagnosis(model: Model, campaign: Campaign, recordings: Sequence[str]) -> dict[str, Any]:
