@@ -13,7 +13,7 @@ likelihood; Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,6 +59,11 @@ class Seen:
         solved = np.linalg.solve(factor, pull)
         return float(0.5 * solved @ solved - np.log(np.diag(factor)).sum())
 
+    def log_odds_of(self, columns: Ints, by: Array) -> float:
+        """The same for changes of coefficients by known amounts."""
+        at = 1 + columns
+        return float(self.gram[at, 0] @ by - 0.5 * by @ self.gram[np.ix_(at, at)] @ by)
+
     def size(self, change: Change) -> tuple[Array, Array]:
         """Most likely coefficients (len(columns),) of a change, and their covariance."""
         normal, pull = self._normal(change)
@@ -96,13 +101,15 @@ class Table:
     """Whitened readings (N,) of the fit and of new recordings, with their slopes.
 
     `base` (N, B): what the fit left unknown, in standard deviations; `slopes` (N, K): of what may have
-    changed, parameters at once, parameters bit by bit, offsets of channels, what else is asked, then heat.
+    changed; `at`: their columns by name, of parameters "at once" and "bit by bit", of offsets of channels,
+    and of what else is asked; `heat`: of heat at each state.
     """
 
     residual: Array
     base: Array
     slopes: Array
-    heat: dict[str, Heat]
+    at: Mapping[str, Ints]
+    heat: Mapping[str, Heat]
 
     def seen(self) -> Seen:
         """With what the fit left unknown integrated out."""
@@ -113,18 +120,22 @@ class Table:
 
 
 def make_table(
-    known: Knowledge, problem: Problem, channels: Sequence[str], more: Sequence[Sequence[Array]] = ()
+    known: Knowledge,
+    problem: Problem,
+    channels: Sequence[str],
+    more: Mapping[str, Sequence[Array]] | None = None,
 ) -> Table:
     """What the readings of a problem and of the fit say, whitened with the noise of the fit.
 
     Args:
         problem: the model at work on new recordings; start values count as unknown.
         channels: inputs whose sensors may have an offset.
-        more: further slopes (R, Y, M) of each recording, one group after another.
+        more: by name, further slopes (R, Y, M) of each recording.
 
     Raises:
         UserError: what is known is of another model.
     """
+    more = more or {}
     runs = [problem.run(system, problem.start) for system in problem.systems]
     starts = [u for u in problem.unknowns if u.is_start]
     noise, own = _noise(known, problem.outputs), len(known.parameters)
@@ -146,7 +157,7 @@ def make_table(
                 [
                     sensitivities(run, known.parameters, grown=grown),
                     sensitivities(run, channels),
-                    *(group[k] for group in more),
+                    *(group[k] for group in more.values()),
                 ],
                 axis=2,
             ),
@@ -168,11 +179,15 @@ def make_table(
     )
     count = len(known.rows)
     fitted = np.hstack([known.rows[:, 1:], np.zeros((count, len(starts)))])
-    before = 2 * own + len(channels) + sum(group[0].shape[2] for group in more)
+    counts = {"at once": own, "bit by bit": own} | dict.fromkeys(channels, 1)
+    counts |= {name: group[0].shape[2] for name, group in more.items()}
+    edge = np.cumsum([0, *counts.values()])
+    before = int(edge[-1])
     return Table(
         np.concatenate([known.rows[:, 0], *(r for r, _, _ in parts)]),
         np.concatenate([fitted, *(j for _, j, _ in parts)]) * spread,
         np.concatenate([np.zeros((count, before + first[-1])), *(j for _, _, j in parts)]),
+        {n: np.arange(a, b) for n, a, b in zip(counts, edge[:-1], edge[1:], strict=True)},
         {n: _heat(runs, edges, i, noise.heat_time, before + first, n) for i, n in enumerate(states)},
     )
 

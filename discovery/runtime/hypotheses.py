@@ -4,7 +4,7 @@ All are hypotheses of one comparison (`changes.py`). Under `nothing` the paramet
 as their fit left them. Under `wear` the parameters that can age have changed, under `sensor of X` this sensor
 has an offset. `something else` is heat of unknown cause at one body, as in the diagnosis, or from one body to
 another, or another exchange with one temperature (a fan, a door). In the running loop, an input that the
-model does not use may act by a path of its own (`unused.py`).
+model does not use may act by a path of its own, or one that came in so acts no longer (`unused.py`).
 """
 
 from __future__ import annotations
@@ -26,12 +26,15 @@ from discovery.fitting.problem import Problem
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.runtime.changes import Change, Seen, Table, make_table
-from discovery.runtime.unused import Path, paths
+from discovery.runtime.unused import Path, path_columns, paths, taken_in
 from discovery.terms import names, parse
 from discovery.threads import one_thread
 
 Array = NDArray[np.float64]
-Verdict = Literal["nothing", "wear", "input sensor", "unused input", "something else", "undecided"]
+Ints = NDArray[np.intp]
+Verdict = Literal[
+    "nothing", "wear", "input sensor", "unused input", "idle input", "something else", "undecided"
+]
 
 # Chosen on seeds set aside for it and confirmed on others, see benchmarks/runtime.md
 WEAR = (0.05, 0.2)  # relative change of a parameter that ages; both widths count half
@@ -115,26 +118,31 @@ def compare(
         )
     problem = problem_of(exported.model, campaign, recordings, outputs)
     channels = [i.name for i in exported.inputs if i.role in TEMPERATURES]
-    found = paths(exported, campaign, recordings, outputs) if choose else []
-    table = make_table(known, problem, channels, [path.columns for path in found])
+    ways = {str(p): p for p in paths(exported, campaign, recordings, outputs)} if choose else {}
+    idle = taken_in(exported.model) if choose else {}
+    columns = {name: path.columns for name, path in ways.items()}
+    columns |= {channel: path_columns(problem, gains) for channel, gains in idle.items()}
+    table = make_table(known, problem, channels, columns)
     seen = table.seen()
-    offered = {"wear": [_wear(exported, width) for width in WEAR]}
-    for k, name in enumerate(channels):
-        place = np.array([2 * len(known.parameters) + k])
-        offered[f"sensor of {name}"] = [Change(place, np.array([[size]])) for size in OFFSET]
-    acts = _acting(found, 2 * len(known.parameters) + len(channels), levels)
-    for path in found:
-        offered[f"input {path.channel}"] = [one for p, one in acts if p.channel == path.channel]
-    offered["something else"] = [*_exchanges(exported, channels), *_heats(exported.model, table, known.floor)]
-    worn = any("of" in entry for entry in exported.changelog)  # revisions are written for wear alone
-    evidence = {name: _mean([seen.log_odds(one) for one in ways]) for name, ways in offered.items()}
-    before = {f"sensor of {name}": -RARE - float(np.log(len(channels))) for name in channels}
-    before |= {f"input {p.channel}": -RARE - float(np.log(len({q.channel for q in found}))) for p in found}
-    before |= {"wear": WORN * worn, "something else": -RARE}
-    odds = {"nothing": 0.0} | {name: value + before[name] for name, value in evidence.items()}
+    offered = {"wear": [_wear(exported, table, width) for width in WEAR]}
+    for name in channels:
+        offered[f"sensor of {name}"] = [Change(table.at[name], np.array([[size]])) for size in OFFSET]
+    for name, path in ways.items():
+        offered.setdefault(f"input {path.channel}", []).extend(_acting(path, table.at[name], levels))
+    offered["something else"] = [
+        *_exchanges(exported, table, channels),
+        *_heats(exported.model, table, known.floor),
+    ]
+    evidence = {name: _mean([seen.log_odds(one) for one in alike]) for name, alike in offered.items()}
+    for channel, gains in idle.items():
+        by = np.array([-exported.model.parameters[n].value for n in gains])
+        evidence[f"no input {channel}"] = seen.log_odds_of(table.at[channel], by)
+    odds = {"nothing": 0.0} | {
+        n: value + _before(n, list(evidence), exported) for n, value in evidence.items()
+    }
     verdict, what = _verdict(odds, evidence)
-    change = _worn(seen, exported)
-    chosen = _gains(seen, [one for one in acts if one[0].channel == what])
+    change = _worn(seen, _wear(exported, table, WEAR[1]), ageing(exported))
+    chosen = _chosen(seen, table, [(n, p) for n, p in ways.items() if p.channel == what], levels)
     count = int(sum(np.isfinite(s.grid.readings).sum() for s in problem.systems))
     rms = _rms(problem, levels, outputs)
     return Comparison(tuple(recordings), count, verdict, what, odds, rms, change, chosen)
@@ -146,50 +154,60 @@ def _sizes(exported: Exported) -> dict[str, float]:
     return {n: abs(exported.model.parameters[n].value) for n in fitted}
 
 
-def _wear(exported: Exported, width: float) -> Change:
+def _before(name: str, asked: Sequence[str], exported: Exported) -> float:
+    """Log of the odds of a hypothesis against `nothing` before any reading: that one of the sensors is off is
+    as likely as that one of the other inputs acts, or that something else changed.
+    """
+    if name == "wear":
+        worn = any("of" in entry and entry.get("why", "wear") == "wear" for entry in exported.changelog)
+        return WORN * worn
+    alike = [other for other in asked if other.rpartition(" ")[0] == name.rpartition(" ")[0]]
+    return -RARE - float(np.log(len(alike)))
+
+
+def _wear(exported: Exported, table: Table, width: float) -> Change:
     """Every parameter that ages, by a share of its own: before the recordings, and bit by bit during them."""
-    sizes = _sizes(exported)
-    at = np.array([k for k, n in enumerate(sizes) if n in ageing(exported)], dtype=np.intp)
-    size = np.array(list(sizes.values()))[at]
-    return Change(np.concatenate([at, len(sizes) + at]), width * np.diag(np.concatenate([size, size])))
+    sizes, old = _sizes(exported), ageing(exported)
+    at = [k for k, n in enumerate(sizes) if n in old]
+    size = np.array([sizes[n] for n in sizes if n in old] * 2)
+    return Change(
+        np.concatenate([table.at["at once"][at], table.at["bit by bit"][at]]), width * np.diag(size)
+    )
 
 
-def _worn(seen: Seen, exported: Exported) -> dict[str, tuple[float, float]]:
+def _worn(seen: Seen, wear: Change, old: Sequence[str]) -> dict[str, tuple[float, float]]:
     """Change of each parameter that ages, at the end of the recordings, and its standard deviation."""
-    old = ageing(exported)
-    by, covariance = seen.size(_wear(exported, WEAR[1]))
+    by, covariance = seen.size(wear)
     both = np.hstack([np.eye(len(old)), np.eye(len(old))])
     total, variance = both @ by, np.diag(both @ covariance @ both.T)
     return dict(zip(old, zip(total.tolist(), np.sqrt(variance).tolist(), strict=True), strict=True))
 
 
-def _exchanges(exported: Exported, channels: Sequence[str]) -> list[Change]:
+def _exchanges(exported: Exported, table: Table, channels: Sequence[str]) -> list[Change]:
     """All exchange with one temperature alike, where it does not age: a fan, a door."""
     used, old, sizes = _uses(exported), ageing(exported), _sizes(exported)
     found = []
     for channel in channels:
         group = [n for n in used if n not in old and used[n] and all(channel in one for one in used[n])]
         if any(sizes[n] for n in group):
-            at = np.array([list(used).index(n) for n in group])
+            at = table.at["at once"][[list(used).index(n) for n in group]]
             found += [Change(at, width * np.array([[sizes[n]] for n in group])) for width in OTHER]
     return found
 
 
-def _acting(found: Sequence[Path], first: int, levels: Mapping[str, float]) -> list[tuple[Path, Change]]:
-    """The paths of unused inputs, their columns from `first`, with parameters of some sizes: what they show
-    is counted in residuals of the fit.
+def _acting(path: Path, at: Ints, levels: Mapping[str, float]) -> list[Change]:
+    """The path of an unused input, with parameters of some sizes: what they show is counted in residuals of
+    the fit.
     """
-    acts = []
-    for path in found:
-        at = first + np.arange(len(path.into))
-        first += len(path.into)
-        scale = np.array([levels[n] for n in path.into.values()]) / np.maximum(path.size, 1e-300)
-        acts += [(path, Change(at, np.diag(times * scale))) for times in ACTS]
-    return acts
+    scale = np.array([levels[n] for n in path.into.values()]) / np.maximum(path.size, 1e-300)
+    return [Change(at, np.diag(times * scale)) for times in ACTS]
 
 
-def _gains(seen: Seen, acts: Sequence[tuple[Path, Change]]) -> tuple[Path, dict[str, float]] | None:
+def _chosen(
+    seen: Seen, table: Table, ways: Sequence[tuple[str, Path]], levels: Mapping[str, float]
+) -> tuple[Path, dict[str, float]] | None:
     """The most likely of some paths, with the values of its parameters."""
+    acts = [(path, change) for name, path in ways for change in _acting(path, table.at[name], levels)]
     if not acts:
         return None
     path, change = max(acts, key=lambda one: seen.log_odds(one[1]))
@@ -230,6 +248,8 @@ def _verdict(odds: Mapping[str, float], evidence: Mapping[str, float]) -> tuple[
         return "something else", ""
     if evidence[best] < SHORT:
         return "undecided", f"{best} or something else"
+    if best.startswith("no input "):
+        return "idle input", best.removeprefix("no input ")
     if best.startswith("input "):
         return "unused input", best.removeprefix("input ")
     return "input sensor", best.removeprefix("sensor of ")

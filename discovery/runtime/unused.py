@@ -1,4 +1,5 @@
-"""A recorded input that the model does not use: a path of its own to each error, with a lag.
+"""A recorded input that the model does not use comes in: a path of its own to each error, with a lag. One
+that came in so and no longer helps is left out again.
 
     error += a (s - reference) + b,    tau ds/dt = X - s
 
@@ -9,7 +10,7 @@ thermal error compensation models, CIRP Annals 69, 2020.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,10 +21,11 @@ from discovery.dynamics import sensitivities
 from discovery.export.document import Exported
 from discovery.export.knowledge import problem_of
 from discovery.export.makedocument import described
+from discovery.fitting.problem import Problem
 from discovery.models import Model, Parameter, expanded
 from discovery.models.model import with_settled_memories
 from discovery.recordings import Campaign
-from discovery.terms import parse, text
+from discovery.terms import Apply, Expression, names, parse, text
 
 Array = NDArray[np.float64]
 
@@ -43,6 +45,9 @@ class Path:
     model: Model
     into: Mapping[str, str]
     columns: tuple[Array, ...]
+
+    def __str__(self) -> str:
+        return f"{self.channel} after {self.lag:g} s"
 
     @property
     def size(self) -> Array:
@@ -75,10 +80,14 @@ def paths(
             model, into = _with_path(exported.model, campaign, recordings, name, lag)
             into = {parameter: output for parameter, output in into.items() if output in outputs}
             problem = problem_of(model, campaign, recordings, outputs)
-            runs = [problem.run(system, problem.start) for system in problem.systems]
-            columns = tuple(sensitivities(run, list(into)) for run in runs)
-            found.append(Path(name, lag, model, into, columns))
+            found.append(Path(name, lag, model, into, path_columns(problem, list(into))))
     return found
+
+
+def path_columns(problem: Problem, parameters: Sequence[str]) -> tuple[Array, ...]:
+    """What the readings (R, Y, M) of each recording show more for one of each parameter of a path."""
+    runs = [problem.run(system, problem.start) for system in problem.systems]
+    return tuple(sensitivities(run, parameters) for run in runs)
 
 
 def _with_path(
@@ -106,7 +115,41 @@ def with_input(
     """The document of the model with a path and the values of its parameters; what the fit knows stays."""
     parameters = path.model.with_values(values).parameters
     fixed = {n: replace(p, fixed=p.fixed or n in path.into) for n, p in parameters.items()}
-    model = replace(path.model, parameters=fixed)
+    return _document(exported, campaign, replace(path.model, parameters=fixed))
+
+
+def taken_in(model: Model) -> dict[str, list[str]]:
+    """Inputs that came in by a path, each with the parameters of the path that move outputs."""
+    channels = [n.removesuffix("_lag") for n in model.parameters if n.endswith("_lag")]
+    ends = [*(f"_to_{n}" for n in model.outputs), *(f"_zero_of_{n}" for n in model.outputs)]
+    found = {c: [c + end for end in ends if c + end in model.parameters] for c in channels}
+    return {channel: names for channel, names in found.items() if names}
+
+
+def without_input(exported: Exported, campaign: Campaign, channel: str) -> dict[str, Any]:
+    """The document of the model without the path of an input."""
+    model, gone = exported.model, set(taken_in(exported.model)[channel])
+    outputs = {name: _without(e, gone) for name, e in model.outputs.items()}
+    own = {*gone, f"{channel}_lag", f"{channel}_reference"}
+    terms = tuple(term for term in model.terms if f"{channel}_lag" not in names(term.expression))
+    fed = {term.into for term in model.terms} - {term.into for term in terms}
+    states = {name: state for name, state in model.states.items() if name not in fed}
+    parameters = {name: p for name, p in model.parameters.items() if name not in own}
+    shorter = replace(model, outputs=outputs, terms=terms, states=states, parameters=parameters)
+    return _document(exported, campaign, shorter)
+
+
+def _without(expression: Expression, gone: Collection[str]) -> Expression:
+    """A sum without its last summands that hold some names."""
+    if isinstance(expression, Apply) and expression.function == "+":
+        first, second = expression.arguments
+        first = _without(first, gone)
+        return first if names(second) & set(gone) else Apply("+", (first, second))
+    return expression
+
+
+def _document(exported: Exported, campaign: Campaign, model: Model) -> dict[str, Any]:
+    """The document of a model; an input that was there keeps its ranges, and so does each output."""
     found = described(model, campaign, list(campaign.recordings))
     before = {i["name"]: i for i in exported.document["inputs"]}
     ranges = {o["name"]: o for o in exported.document["outputs"]}

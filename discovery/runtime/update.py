@@ -13,7 +13,7 @@ from discovery.export.seal import open_seal
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.runtime.hypotheses import Comparison, begun, compare, model_with
-from discovery.runtime.unused import with_input
+from discovery.runtime.unused import with_input, without_input
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -100,7 +100,7 @@ def revision_of(
     Args:
         begin: states of the model where the recordings begin; default its own start.
     """
-    if found.verdict not in ("wear", "unused input"):
+    if found.verdict not in ("wear", "unused input", "idle input"):
         return None
     document = next_revision(exported, campaign, found)
     again = from_document(*open_seal(render(document), exported.model.name), exported.model.name)
@@ -117,14 +117,17 @@ def next_name(path: Path) -> Path:
 
 def next_revision(exported: Exported, campaign: Campaign, found: Comparison) -> dict[str, Any]:
     """The document of the updated model with its changelog entry; only what wear can change has moved, or an
-    input has come in. Ranges, limits and what the fit knew of its parameters stay: the next comparison holds
-    the revision to it.
+    input has come in or is left out. Ranges, limits and what the fit knew of its parameters stay: the next
+    comparison holds the revision to it.
     """
     if found.verdict == "unused input" and found.path is not None:
         path, values = found.path
         moved = f"{path.channel} is an input now, with a lag of {path.lag:g} s: "
         moved += ", ".join(f"{n} {value:.3g}" for n, value in values.items())
-        return _revised(exported, with_input(exported, campaign, path, values), f"{found}; {moved}")
+        return _revised(exported, with_input(exported, campaign, path, values), found, moved)
+    if found.verdict == "idle input":
+        document = without_input(exported, campaign, found.what)
+        return _revised(exported, document, found, f"{found.what} is no input any more")
     document, model = {**exported.document}, model_with(exported.model, found.change)
     entries = []
     for entry in document["parameters"]:
@@ -134,15 +137,16 @@ def next_revision(exported: Exported, campaign: Campaign, found: Comparison) -> 
         f"{n} {exported.model.parameters[n].value:.4g} -> {model.parameters[n].value:.4g}"
         for n in found.change
     )
-    return _revised(exported, document | {"parameters": entries}, f"{found}; {moved}")
+    return _revised(exported, document | {"parameters": entries}, found, moved)
 
 
-def _revised(exported: Exported, document: dict[str, Any], why: str) -> dict[str, Any]:
+def _revised(exported: Exported, document: dict[str, Any], found: Comparison, moved: str) -> dict[str, Any]:
     """A document as the next revision, with an entry in its changelog."""
     note = {
         "revision": exported.revision + 1,
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "text": why,
+        "text": f"{found}; {moved}",
+        "why": found.verdict,
         "of": exported.seal.sha256,
     }
     return document | {"revision": note["revision"], "changelog": [*document["changelog"], note]}

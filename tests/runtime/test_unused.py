@@ -78,6 +78,18 @@ def test_an_input_that_acts_comes_in_with_its_gains(exported: Exported, quiet: C
     assert "fan is an input now, with a lag of 3600 s" in new.changelog[-1]["text"]
     again = compare(new, campaign, list(campaign.recordings), choose=True)
     assert again.verdict == "nothing"
+    assert again.odds["no input fan"] < 0.0
+    # the fan is taken off the machine, and its speed is still recorded
+    quiet_again = with_fan(quiet, 0.0)
+    idle = compare(new, quiet_again, list(quiet_again.recordings), choose=True)
+    assert (idle.verdict, idle.what) == ("idle input", "fan")
+    left = revision_of(new, quiet_again, idle)
+    assert left is not None
+    last = from_document(*open_seal(render(left[0]), "last"), "last")
+    assert [i.name for i in last.inputs] == [i.name for i in exported.inputs]
+    assert last.model.outputs == exported.model.outputs
+    assert last.model.states.keys() == exported.model.states.keys()
+    assert last.model.parameters.keys() == exported.model.parameters.keys()
 
 
 def test_an_input_that_does_nothing_stays_out(exported: Exported, quiet: Campaign) -> None:

@@ -161,7 +161,7 @@ def test_odds_are_those_of_the_joint_gaussian() -> None:
 
     rng = np.random.default_rng(3)
     base, slopes, r = rng.normal(size=(40, 6)), rng.normal(size=(40, 5)), rng.normal(size=40)
-    seen = Table(r, base, slopes, {}).seen()
+    seen = Table(r, base, slopes, {}, {}).seen()
     usual = np.eye(40) + base @ base.T
     density = multivariate_normal(np.zeros(40), usual).logpdf(r)
     for at in ([0], [1, 4], [4, 0, 2]):
