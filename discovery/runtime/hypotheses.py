@@ -71,8 +71,7 @@ class Comparison:
         what = f" ({self.what})" if self.what else ""
         return (
             f"{', '.join(self.recordings)}: {self.verdict}{what}; {self.readings} readings, "
-            f"residual {self.rms:.2f} "
-            f"of the fit's; log odds against no change: {others}"
+            f"residual {self.rms:.2f} times that of the fit; log odds against no change: {others}"
         )
 
 

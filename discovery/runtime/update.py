@@ -41,7 +41,7 @@ class Update:
             named = ", ".join(
                 f"{p['effect']} at {'+'.join(p['states'])}" for p in self.diagnosis.get("physics", [])
             )
-            lines.append(f"the diagnosis says: {self.diagnosis['verdict']}{named and ': ' + named}")
+            lines.append(f"diagnosis: {self.diagnosis['verdict']}{named and ': ' + named}")
         if self.path is not None:
             lines.append(
                 f"{self.path}: the next revision, residual {self.after:.2f} of the fit's; "
@@ -58,15 +58,16 @@ def _why(found: Comparison) -> str:
         case "nothing":
             return "these recordings show no change of the machine"
         case "input sensor":
-            return f"the sensor of {found.what} is off, which no parameter may hide; check it"
+            return f"the sensor of {found.what} has an offset; check it. No parameter is changed to hide it"
         case "undecided":
             return f"{found.what}: these recordings do not distinguish them; measure more often, wet and dry"
         case "something else":
             return (
-                "something changed that wear does not; add what the diagnosis names, and fit the model again"
+                "something changed that wear cannot change; add what the diagnosis names to the model, "
+                "and fit it again"
             )
         case _:
-            return "the change would not make it better"
+            return "the revision would not lower the residual"
 
 
 def update_file(
@@ -81,7 +82,7 @@ def update_file(
     found = compare(exported, campaign, recordings)
     revised = revision_of(exported, campaign, found)
     if found.verdict == "wear" and revised is None:
-        found = replace(found, verdict="something else", what="wear leaves too much of it")
+        found = replace(found, verdict="something else", what="wear does not explain all of it")
     if found.verdict == "something else":
         return Update(found, None, None, _diagnosis(exported.model, campaign, recordings))
     if revised is None:

@@ -124,7 +124,7 @@ def test_a_faulty_sensor_is_named_and_nothing_is_signed(machine: Campaign, at_wo
     found = update_file(at_work, campaign, list(campaign.recordings), at_work.with_name("new.json"))
     assert (found.comparison.verdict, found.comparison.what) == ("input sensor", "T_env")
     assert found.path is None
-    assert "the sensor of T_env is off" in found.lines()[-1]
+    assert "the sensor of T_env has an offset" in found.lines()[-1]
 
 
 def test_new_physics_is_handed_to_the_diagnosis_and_nothing_is_signed(
@@ -145,7 +145,7 @@ def test_new_physics_is_handed_to_the_diagnosis_and_nothing_is_signed(
     assert found.comparison.verdict == "something else"
     assert asked == [["d0", "d1", "d2"]]
     assert found.path is None
-    assert "the diagnosis says: missing physics: swarf_heat at table" in found.lines()[-2]
+    assert "diagnosis: missing physics: swarf_heat at table" in found.lines()[-2]
 
 
 def test_a_flooded_gap_is_never_taken_for_a_sensor(machine: Campaign, at_work: Path) -> None:
