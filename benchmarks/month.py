@@ -241,7 +241,6 @@ def live(
         model.write_bytes(render(exported.document))
     kills = iter([*plan.kills, np.inf] if faults else [np.inf])
     next_kill, session, probes, last_probe = next(kills), None, 0, -np.inf
-    names = exported.compiled.inputs
     teacher = learn() if learn is not None else None
 
     def hear(text: str) -> None:
@@ -288,7 +287,9 @@ def live(
                 frozen = next(f for f in plan.faults if f.kind == "frozen")
                 source = int(np.searchsorted(happening.times, frozen.start))
             age = now - float(happening.times[source])
-            readings = {n: Reading(float(happening.inputs[n][source]), inside - age) for n in names}
+            readings = {
+                n: Reading(float(series[source]), inside - age) for n, series in happening.inputs.items()
+            }
             if faults and plan.at("sensor", now):
                 readings["T_fluid"] = Reading(None, inside, False)
             every = 0.5 * HOUR if teacher is not None and teacher.advice else 2 * HOUR

@@ -27,13 +27,22 @@ def main() -> None:
     model = fit_model(read_model(DATA / "thermobalance.toml"), machine, ["fit"]).model
     exported = from_document(*open_seal(render(make_document(model, machine, ["fit"])), "update"), "update")
     gap = (Request("flooded_gap", 60.0, ("b_body_1", "c_body_1")),)
-    cases = {
-        "three unchanged days": days(machine, 3, five_axis()),
-        "losses less by 10 %": days(machine, 3, five_axis(), less_loss(0.9), 24),
-        "losses less by 20 %": days(machine, 3, five_axis(), less_loss(0.8), 24),
-        "room sensor off": warm_room(days(machine, 3, five_axis())),
-        "flooded gap": days(machine, 3, five_axis(), gap),
-    }
+    swarf = (Request("swarf_heat", 200.0, ("table",)),)
+    near = (Request("conduction_path", 60.0, ("b_body_2", "c_body_1")),)
+    far = (Request("conduction_path", 60.0, ("b_body_2", "table")),)
+    cases = {}
+    for count in (8, 24):
+        given = f", {count} readings a day"
+        cases |= {
+            f"three unchanged days{given}": days(machine, 3, five_axis(), (), count),
+            f"losses less by 10 %{given}": days(machine, 3, five_axis(), less_loss(0.9), count),
+            f"losses less by 20 %{given}": days(machine, 3, five_axis(), less_loss(0.8), count),
+            f"room sensor +1.5 K{given}": warm_room(days(machine, 3, five_axis(), (), count)),
+            f"flooded gap 60 W/K{given}": days(machine, 3, five_axis(), gap, count),
+            f"hot swarf{given}": days(machine, 3, five_axis(), swarf, count),
+            f"a path from c_body_1 to b_body_2{given}": days(machine, 3, five_axis(), near, count),
+            f"a path from the table to b_body_2{given}": days(machine, 3, five_axis(), far, count),
+        }
     print("unchanged, validation:", compare(exported, machine, ["validation"]))
     for name, campaign in cases.items():
         print(f"{name}:", compare(exported, campaign, list(campaign.recordings)))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import kernel
+from discovery.dynamics.grid import interleaved
 from discovery.dynamics.prediction import output_matrix, outputs
 from discovery.dynamics.starts import balanced, first_values, memories, rates_at_start, starts_follow
 from discovery.dynamics.system import shifted
@@ -40,6 +41,7 @@ def sensitivities(
     starts: Sequence[str] = (),
     candidates: Sequence[Column] = (),
     count: int | None = None,
+    grown: Array | None = None,
 ) -> Array:
     """dy/d(everything) at the reading instants, (R, Y, M).
 
@@ -51,11 +53,15 @@ def sensitivities(
         starts: names of states whose start value moves.
         candidates: forcing pieces of candidate terms.
         count: number of candidate owners; default the largest owner plus one.
+        grown: (K + 1,) share of its change that each parameter has made at the nodes; default all of it.
     """
     system = trajectory.system
     owners = count if count is not None else max((c.owner for c in candidates), default=-1) + 1
     first = len(parameters) + len(starts)
     moved = _moved_terms(trajectory, parameters) if parameters else []
+    if grown is not None:
+        ends = interleaved(grown[:-1], grown[1:])
+        moved = [replace(piece, series=ends * piece.series) for piece in moved]
     pieces = [*moved, *candidates]
     owner = [piece.owner for piece in moved] + [first + piece.owner for piece in candidates]
     place = {name: i for i, name in enumerate(system.states)}
@@ -65,12 +71,15 @@ def sensitivities(
     series = [np.broadcast_to(piece.series, (2 * steps,)) for piece in pieces]
     stacked = np.array(series).reshape(len(series), steps, 2)
     nodes = system.grid.looked_at
+    begin = _start_slopes(trajectory, parameters, starts, first + owners)
+    if grown is not None:
+        begin[:, : len(parameters)] *= grown[0]
     s = kernel.columns(
         trajectory.which,
         trajectory.e,
         trajectory.w0,
         trajectory.w1,
-        _start_slopes(trajectory, parameters, starts, first + owners),
+        begin,
         np.array(owner, dtype=np.int64),
         into,
         system.scale[into],
@@ -83,7 +92,8 @@ def sensitivities(
     dy: Array = np.einsum("ryn,rnm->rym", output_matrix(trajectory, nodes), s)
     for y, dual in enumerate(outputs(trajectory, frozenset(parameters)) if parameters else []):
         for name, partial in dual.partials.items():
-            dy[:, y, parameters.index(name)] += np.broadcast_to(partial, (len(system.grid.time),))[nodes]
+            whole = np.broadcast_to(partial, (len(system.grid.time),))
+            dy[:, y, parameters.index(name)] += (whole if grown is None else grown * whole)[nodes]
     return system.grid.at_readings(dy)
 
 

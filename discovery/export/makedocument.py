@@ -9,7 +9,7 @@ from typing import Any
 
 from discovery import __version__
 from discovery.errors import UserError
-from discovery.export.compiled import compile_model
+from discovery.export.compiled import compile_model, model_inputs
 from discovery.export.document import FORMAT, VERSION
 from discovery.export.knowledge import knowledge
 from discovery.export.ranges import OutputRange, input_range, output_ranges
@@ -101,10 +101,7 @@ def make_document(
         "revision": revision,
         "step_s": float(step_s),
         "integrator": list(INTEGRATOR),
-        "inputs": [_input(campaign, recordings, name) for name in compiled.inputs],
-        "parameters": [_parameter(name, p) for name, p in model.parameters.items()],
-        "states": [_state(state) for state in model.states.values()],
-        "terms": [_term(term) for term in model.terms],
+        **described(model, campaign, recordings),
         "outputs": [_output(campaign, name, e, limits[name]) for name, e in model.outputs.items()],
         "knowledge": knowledge(model, campaign, recordings).document(),
         "provenance": {
@@ -114,6 +111,18 @@ def make_document(
             **(provenance or {}),
         },
         "changelog": [dict(entry) for entry in changelog],
+    }
+
+
+def described(model: Model, campaign: Campaign, recordings: Sequence[str]) -> dict[str, Any]:
+    """Inputs, with the ranges of some recordings, parameters, states and terms of a model, as a document has
+    them.
+    """
+    return {
+        "inputs": [_input(campaign, recordings, name) for name in model_inputs(model)],
+        "parameters": [_parameter(name, p) for name, p in model.parameters.items()],
+        "states": [_state(state) for state in model.states.values()],
+        "terms": [_term(term) for term in model.terms],
     }
 
 

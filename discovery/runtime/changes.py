@@ -13,7 +13,7 @@ likelihood; Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,12 +59,16 @@ class Seen:
         solved = np.linalg.solve(factor, pull)
         return float(0.5 * solved @ solved - np.log(np.diag(factor)).sum())
 
+    def log_odds_of(self, columns: Ints, by: Array) -> float:
+        """The same for changes of coefficients by known amounts."""
+        at = 1 + columns
+        return float(self.gram[at, 0] @ by - 0.5 * by @ self.gram[np.ix_(at, at)] @ by)
+
     def size(self, change: Change) -> tuple[Array, Array]:
-        """Most likely coefficients (len(columns),) of a change, and their standard deviations."""
+        """Most likely coefficients (len(columns),) of a change, and their covariance."""
         normal, pull = self._normal(change)
         inverse = np.linalg.inv(normal)
-        variance = np.einsum("ck,kl,cl->c", change.root, inverse, change.root)
-        return change.root @ (inverse @ pull), np.sqrt(np.maximum(variance, 0.0))
+        return change.root @ (inverse @ pull), change.root @ inverse @ change.root.T
 
     def _normal(self, change: Change) -> tuple[Array, Array]:
         at = 1 + change.columns
@@ -97,86 +101,94 @@ class Table:
     """Whitened readings (N,) of the fit and of new recordings, with their slopes.
 
     `base` (N, B): what the fit left unknown, in standard deviations; `slopes` (N, K): of what may have
-    changed, parameters, then offsets of channels, then heat. `age` (N,): how long [s] before the end each was
-    read, zero for the fit.
+    changed; `at`: their columns by name, of parameters "at once" and "bit by bit", of offsets of channels,
+    and of what else is asked; `heat`: of heat at each state.
     """
 
     residual: Array
     base: Array
     slopes: Array
-    heat: dict[str, Heat]
-    age: Array
+    at: Mapping[str, Ints]
+    heat: Mapping[str, Heat]
 
-    def seen(self, memory: float = np.inf) -> Seen:
-        """With what the fit left unknown integrated out; what was read counts less with its age over `memory`
-        [s].
-        """
-        fade = np.exp(-self.age / memory)[:, None]
-        columns, base = np.column_stack([self.residual, self.slopes]) * fade, self.base * fade
-        factor = np.linalg.cholesky(base.T @ base + np.eye(base.shape[1]))
-        inside = np.linalg.solve(factor, base.T @ columns)
+    def seen(self) -> Seen:
+        """With what the fit left unknown integrated out."""
+        columns = np.column_stack([self.residual, self.slopes])
+        factor = np.linalg.cholesky(self.base.T @ self.base + np.eye(self.base.shape[1]))
+        inside = np.linalg.solve(factor, self.base.T @ columns)
         return Seen(columns.T @ columns - inside.T @ inside)
 
 
-def make_table(known: Knowledge, problem: Problem, channels: Sequence[str]) -> Table:
+def make_table(
+    known: Knowledge,
+    problem: Problem,
+    channels: Sequence[str],
+    more: Mapping[str, Sequence[Array]] | None = None,
+) -> Table:
     """What the readings of a problem and of the fit say, whitened with the noise of the fit.
 
     Args:
         problem: the model at work on new recordings; start values count as unknown.
         channels: inputs whose sensors may have an offset.
+        more: by name, further slopes (R, Y, M) of each recording.
 
     Raises:
         UserError: what is known is of another model.
     """
+    more = more or {}
     runs = [problem.run(system, problem.start) for system in problem.systems]
     starts = [u for u in problem.unknowns if u.is_start]
-    noise = _noise(known, problem.outputs)
+    noise, own = _noise(known, problem.outputs), len(known.parameters)
     edges = _block_edges(runs, noise)
-    own, shared = len(known.parameters), len(known.parameters) + len(channels)
-    laws, bounds = law_columns(runs[0], known.scales).shape[2], edge_columns(runs[0]).shape[2]
-    form = laws + bounds
     states = [name for name, floor in known.floor.items() if floor > 0]
-    blocks = np.cumsum([0, *((len(e) - 1) * len(states) for e in edges)])
-    width = 1 + shared + form + len(starts) + int(blocks[-1])
-    parts, ages, after = [], [], sum(float(run.system.grid.time[-1]) for run in runs)
+    first = np.cumsum([0, *((len(e) - 1) * len(states) for e in edges)])
+    lasts = [float(run.system.grid.time[-1]) for run in runs]
+    parts = []
     for k, run in enumerate(runs):
         grid = run.system.grid
         mine = [i for i, u in enumerate(starts) if u.recording == grid.recording]
-        heat = [-np.diff(heat_steps(run, state, edges[k]), axis=2) for state in states]
-        data = [
+        grown = (sum(lasts[:k]) + grid.time) / sum(lasts)
+        laws, bounds = law_columns(run, known.scales), edge_columns(run)
+        blocks = [
             problem.residual(run)[:, :, None],
-            sensitivities(run, [*known.parameters, *channels]),
-            law_columns(run, known.scales),
-            edge_columns(run),
+            np.concatenate([sensitivities(run, known.parameters), laws, bounds], axis=2),
             sensitivities(run, (), [starts[i].name for i in mine]),
-            *heat,
+            np.concatenate(
+                [
+                    sensitivities(run, known.parameters, grown=grown),
+                    sensitivities(run, channels),
+                    *(group[k] for group in more.values()),
+                ],
+                axis=2,
+            ),
+            np.concatenate([-np.diff(heat_steps(run, n, edges[k]), axis=2) for n in states], axis=2),
         ]
-        white = make_filter(run).whitened(noise, np.concatenate(data, axis=2))[0]
-        first = 1 + shared + form
-        places = [*range(first), *(first + i for i in mine)]
-        places += range(first + len(starts) + blocks[k], first + len(starts) + blocks[k + 1])
-        parts.append(np.zeros((len(white), width)))
-        parts[-1][:, places] = white
-        rows = np.broadcast_to(grid.time[grid.read][:, None], grid.measured.shape)
-        ages.append(after - rows[grid.measured])
-        after -= float(grid.time[-1])
-    new = np.concatenate(parts)
+        white = make_filter(run).whitened(noise, np.concatenate(blocks, axis=2))[0]
+        ends = np.cumsum([block.shape[2] for block in blocks])[:-1]
+        residual, base, begun, changing, heat = np.split(white, ends, axis=1)
+        began = np.zeros((len(white), len(starts)))
+        began[:, mine] = begun
+        heats = np.zeros((len(white), first[-1]))
+        heats[:, first[k] : first[k + 1]] = heat
+        parts.append((residual[:, 0], np.hstack([base, began]), np.hstack([base[:, :own], changing, heats])))
     spread = np.concatenate(
-        [spreads(known, problem.model, laws, bounds), [u.prior[1] if u.prior else 1.0 for u in starts]]
+        [
+            spreads(known, problem.model, laws.shape[2], bounds.shape[2]),
+            [u.prior[1] if u.prior else 1.0 for u in starts],
+        ]
     )
-    moving = [*range(1, 1 + own), *range(1 + shared, 1 + shared + form + len(starts))]
-    fitted = np.zeros((len(known.rows), len(moving)))
-    fitted[:, : own + form] = known.rows[:, 1:]
-    changing = [*range(1, 1 + shared), *range(1 + shared + form + len(starts), width)]
+    count = len(known.rows)
+    fitted = np.hstack([known.rows[:, 1:], np.zeros((count, len(starts)))])
+    counts = {"at once": own, "bit by bit": own} | dict.fromkeys(channels, 1)
+    counts |= {name: group[0].shape[2] for name, group in more.items()}
+    edge = np.cumsum([0, *counts.values()])
+    before = int(edge[-1])
     return Table(
-        np.concatenate([known.rows[:, 0], new[:, 0]]),
-        np.concatenate([fitted, new[:, moving]]) * spread,
-        np.concatenate([np.zeros((len(fitted), len(changing))), new[:, changing]]),
-        {
-            state: _heat(runs, edges, i, noise.heat_time, shared + blocks, state)
-            for i, state in enumerate(states)
-        },
-        np.concatenate([np.zeros(len(fitted)), *ages]),
+        np.concatenate([known.rows[:, 0], *(r for r, _, _ in parts)]),
+        np.concatenate([fitted, *(j for _, j, _ in parts)]) * spread,
+        np.concatenate([np.zeros((count, before + first[-1])), *(j for _, _, j in parts)]),
+        {n: np.arange(a, b) for n, a, b in zip(counts, edge[:-1], edge[1:], strict=True)},
+        {n: _heat(runs, edges, i, noise.heat_time, before + first, n) for i, n in enumerate(states)},
     )
 
 

@@ -45,8 +45,8 @@ def trusted_model(
         return exported, key
     if not allow_unsigned:
         raise UserError(
-            f"{model}: no key is trusted, so the model is not run; say --trust KEY.pub of the key that "
-            "signed it, or --allow-unsigned to try it where no machine hangs on it"
+            f"{model}: no key is trusted, so the model is not run; give --trust KEY.pub, the key that "
+            "signed it, or --allow-unsigned for a trial without a machine"
         )
     return exported, None
 
@@ -62,16 +62,16 @@ def one_source(
     given = [name for name, value in sources.items() if value is not None]
     if not given:
         raise UsageError(
-            "say where the readings come from: --inputs FILE, --inputs -, --opcua FILE or --opcua-demo"
+            "give the source of the readings: --inputs FILE, --inputs -, --opcua FILE or --opcua-demo"
         )
     if len(given) > 1:
-        raise UsageError(f"{' and '.join(given)}: the readings come from one of them; leave the other out")
+        raise UsageError(f"{' and '.join(given)}: the readings have one source; leave out the other")
     for name, value in (only_opcua if given == ["--inputs"] else {}).items():
         if value is not None:
-            raise UsageError(f"{name} does not go with {given[0]}; leave it out")
+            raise UsageError(f"{name} cannot be used with {given[0]}; leave it out")
     for name, number in shadow.items():
         if number is not None and not 0.0 <= number < math.inf:
-            raise UsageError(f"{name} {number:g} cannot be; give 0 or more")
+            raise UsageError(f"{name} is {number:g}; give 0 or more")
 
 
 def compensate_rows(
@@ -110,7 +110,7 @@ def compensate_rows(
         rows = csv_rows(lines, exported.compiled.inputs, say, dropped, oldest)
         first = next(rows, None)  # inputs that are refused leave no trace in the folder
         if first is None:
-            say("no row with a time came; nothing was done" + (f"; {dropped}" if dropped.counts else ""))
+            say("there was no row with a time; nothing was done" + (f"; {dropped}" if dropped.counts else ""))
             return
         session = Session(
             exported, model=model, folder=folder, trusted=trusted, settings=settings, rule=rule, learn=learn,
@@ -133,7 +133,7 @@ def compensate_rows(
             raise
         if last is None:
             after = f" after the saved state of {instant(session.resumed)}" if session.resumed else ""
-            say(f"no row with a time came{after}; nothing was done")
+            say(f"there was no row with a time{after}; nothing was done")
         session.close(last if last is not None else first[0])
         if dropped.counts:
             say(str(dropped))
@@ -154,7 +154,7 @@ def go_back(folder: Path, say: Say) -> None:
     back = step_back(folder)
     say(
         f"revision {back.revision} of '{back.model.name}' is active again; its offsets "
-        "begin where the last ones were"
+        "start from the present ones"
     )
 
 

@@ -3,7 +3,8 @@
 All are hypotheses of one comparison (`changes.py`). Under `nothing` the parameters and laws are as uncertain
 as their fit left them. Under `wear` the parameters that can age have changed, under `sensor of X` this sensor
 has an offset. `something else` is heat of unknown cause at one body, as in the diagnosis, or from one body to
-another, or another exchange with one temperature (a fan, a door).
+another, or another exchange with one temperature (a fan, a door). In the running loop, an input that the
+model does not use may act by a path of its own, or one that came in so acts no longer (`unused.py`).
 """
 
 from __future__ import annotations
@@ -24,21 +25,25 @@ from discovery.fitting.covariance import Z95
 from discovery.fitting.problem import Problem
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.runtime.changes import Change, Table, make_table
+from discovery.runtime.changes import Change, Seen, Table, make_table
+from discovery.runtime.unused import Path, path_columns, paths, taken_in
 from discovery.terms import names, parse
 from discovery.threads import one_thread
 
 Array = NDArray[np.float64]
-Verdict = Literal["nothing", "wear", "input sensor", "something else", "undecided"]
+Ints = NDArray[np.intp]
+Verdict = Literal[
+    "nothing", "wear", "input sensor", "unused input", "idle input", "something else", "undecided"
+]
 
 # Chosen on seeds set aside for it and confirmed on others, see benchmarks/runtime.md
 WEAR = (0.05, 0.2)  # relative change of a parameter that ages; both widths count half
 OTHER = (0.1, 0.4)  # relative change of a parameter that cannot age: something else changed
 OFFSET = (0.5, 2.0)  # K, of the sensor of an input
+ACTS = (1.0, 4.0)  # residuals of the fit that an unused input shows
 LEAST_ODDS = 2.5  # log of the odds against `nothing`, below which nothing has changed
 WORN = 3.0  # log of how much more often a machine wears that has worn before
 RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
-MEMORY_S = 24 * 3600.0  # in which what was read counts less and less: wear goes on meanwhile
 AGES = ("heat load", "rotation speed", "fluid flow", "cooling power", "coolant temperature")
 START_SD = 0.5  # K, um: of states that are known where a recording begins
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
@@ -49,7 +54,7 @@ class Comparison:
     """What the recordings say. `odds`: log of the probability of the readings under each hypothesis over that
     under `nothing`, prior odds included. `verdict` and `what`: the best one, and the sensor where it is one.
     `rms`: residual of the model at work in units of that of its fit. `change`: of the parameters that age,
-    under wear, with standard deviations.
+    under wear, with standard deviations. `path`: of the unused input, with its parameters.
     """
 
     recordings: tuple[str, ...]
@@ -59,14 +64,14 @@ class Comparison:
     odds: Mapping[str, float]
     rms: float
     change: Mapping[str, tuple[float, float]]
+    path: tuple[Path, Mapping[str, float]] | None = None
 
     def __str__(self) -> str:
         others = ", ".join(f"{name} {value:+.1f}" for name, value in self.odds.items() if name != "nothing")
         what = f" ({self.what})" if self.what else ""
         return (
             f"{', '.join(self.recordings)}: {self.verdict}{what}; {self.readings} readings, "
-            f"residual {self.rms:.2f} "
-            f"of the fit's; log odds against no change: {others}"
+            f"residual {self.rms:.2f} times that of the fit; log odds against no change: {others}"
         )
 
 
@@ -91,8 +96,13 @@ def _uses(exported: Exported) -> dict[str, list[frozenset[str]]]:
 
 
 @one_thread
-def compare(exported: Exported, campaign: Campaign, recordings: Sequence[str]) -> Comparison:
+def compare(
+    exported: Exported, campaign: Campaign, recordings: Sequence[str], choose: bool = False
+) -> Comparison:
     """Compare the hypotheses on recordings taken since the last revision.
+
+    Args:
+        choose: a recorded input that the model does not use may act, too.
 
     Raises:
         UserError: a model without knowledge of its parameters, or no reading of any output.
@@ -107,56 +117,100 @@ def compare(exported: Exported, campaign: Campaign, recordings: Sequence[str]) -
         )
     problem = problem_of(exported.model, campaign, recordings, outputs)
     channels = [i.name for i in exported.inputs if i.role in TEMPERATURES]
-    table = make_table(known, problem, channels)
+    ways = {str(p): p for p in paths(exported, campaign, recordings, outputs)} if choose else {}
+    idle = taken_in(exported.model) if choose else {}
+    columns = {name: path.columns for name, path in ways.items()}
+    columns |= {channel: path_columns(problem, gains) for channel, gains in idle.items()}
+    table = make_table(known, problem, channels, columns)
     seen = table.seen()
-    offered = {"wear": [_wear(exported, width) for width in WEAR]}
-    for k, name in enumerate(channels):
-        place = np.array([len(known.parameters) + k])
-        offered[f"sensor of {name}"] = [Change(place, np.array([[size]])) for size in OFFSET]
-    offered["something else"] = [*_exchanges(exported, channels), *_heats(exported.model, table, known.floor)]
-    worn = any("of" in entry for entry in exported.changelog)  # revisions are written for wear alone
-    evidence = {name: _mean([seen.log_odds(one) for one in ways]) for name, ways in offered.items()}
-    before = {name: -RARE - float(np.log(len(channels))) for name in evidence}
-    before |= {"wear": WORN * worn, "something else": -RARE}
-    odds = {"nothing": 0.0} | {name: value + before[name] for name, value in evidence.items()}
-    verdict, what = _verdict(odds, evidence)
-    wear = _wear(exported, WEAR[1])
-    moved = zip(*table.seen(MEMORY_S).size(wear), strict=True)
-    change = {
-        known.parameters[k]: (float(by), float(sd)) for k, (by, sd) in zip(wear.columns, moved, strict=True)
+    offered = {"wear": [_wear(exported, table, width) for width in WEAR]}
+    for name in channels:
+        offered[f"sensor of {name}"] = [Change(table.at[name], np.array([[size]])) for size in OFFSET]
+    for name, path in ways.items():
+        offered.setdefault(f"input {path.channel}", []).extend(_acting(path, table.at[name], levels))
+    offered["something else"] = [
+        *_exchanges(exported, table, channels),
+        *_heats(exported.model, table, known.floor),
+    ]
+    evidence = {name: _mean([seen.log_odds(one) for one in alike]) for name, alike in offered.items()}
+    for channel, gains in idle.items():
+        by = np.array([-exported.model.parameters[n].value for n in gains])
+        evidence[f"no input {channel}"] = seen.log_odds_of(table.at[channel], by)
+    odds = {"nothing": 0.0} | {
+        n: value + _before(n, list(evidence), exported) for n, value in evidence.items()
     }
+    verdict, what = _verdict(odds, evidence)
+    change = _worn(seen, _wear(exported, table, WEAR[1]), ageing(exported))
+    chosen = _chosen(seen, table, [(n, p) for n, p in ways.items() if p.channel == what], levels)
     count = int(sum(np.isfinite(s.grid.readings).sum() for s in problem.systems))
     rms = _rms(problem, levels, outputs)
-    return Comparison(tuple(recordings), count, verdict, what, odds, rms, change)
+    return Comparison(tuple(recordings), count, verdict, what, odds, rms, change, chosen)
 
 
-def _sizes(exported: Exported) -> Array:
-    """(P,) sizes of the fitted parameters."""
+def _sizes(exported: Exported) -> dict[str, float]:
+    """Sizes of the fitted parameters."""
     fitted = exported.document["knowledge"]["parameters"]
-    return np.array([abs(exported.model.parameters[n].value) for n in fitted])
+    return {n: abs(exported.model.parameters[n].value) for n in fitted}
 
 
-def _wear(exported: Exported, width: float) -> Change:
-    """Every parameter that ages, by a share of its own."""
-    old = ageing(exported)
-    fitted = exported.document["knowledge"]["parameters"]
-    at = np.array([k for k, n in enumerate(fitted) if n in old], dtype=np.intp)
-    return Change(at, width * np.diag(_sizes(exported)[at]))
+def _before(name: str, asked: Sequence[str], exported: Exported) -> float:
+    """Log of the odds of a hypothesis against `nothing` before any reading: that one of the sensors is off is
+    as likely as that one of the other inputs acts, or that something else changed.
+    """
+    if name == "wear":
+        worn = any("of" in entry and entry.get("why", "wear") == "wear" for entry in exported.changelog)
+        return WORN * worn
+    alike = [other for other in asked if other.rpartition(" ")[0] == name.rpartition(" ")[0]]
+    return -RARE - float(np.log(len(alike)))
 
 
-def _exchanges(exported: Exported, channels: Sequence[str]) -> list[Change]:
+def _wear(exported: Exported, table: Table, width: float) -> Change:
+    """Every parameter that ages, by a share of its own: before the recordings, and bit by bit during them."""
+    sizes, old = _sizes(exported), ageing(exported)
+    at = [k for k, n in enumerate(sizes) if n in old]
+    size = np.array([sizes[n] for n in sizes if n in old] * 2)
+    return Change(
+        np.concatenate([table.at["at once"][at], table.at["bit by bit"][at]]), width * np.diag(size)
+    )
+
+
+def _worn(seen: Seen, wear: Change, old: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Change of each parameter that ages, at the end of the recordings, and its standard deviation."""
+    by, covariance = seen.size(wear)
+    both = np.hstack([np.eye(len(old)), np.eye(len(old))])
+    total, variance = both @ by, np.diag(both @ covariance @ both.T)
+    return dict(zip(old, zip(total.tolist(), np.sqrt(variance).tolist(), strict=True), strict=True))
+
+
+def _exchanges(exported: Exported, table: Table, channels: Sequence[str]) -> list[Change]:
     """All exchange with one temperature alike, where it does not age: a fan, a door."""
     used, old, sizes = _uses(exported), ageing(exported), _sizes(exported)
     found = []
     for channel in channels:
-        at = [
-            k
-            for k, n in enumerate(used)
-            if n not in old and used[n] and all(channel in one for one in used[n])
-        ]
-        if sizes[at].any():
-            found += [Change(np.array(at), width * sizes[at][:, None]) for width in OTHER]
+        group = [n for n in used if n not in old and used[n] and all(channel in one for one in used[n])]
+        if any(sizes[n] for n in group):
+            at = table.at["at once"][[list(used).index(n) for n in group]]
+            found += [Change(at, width * np.array([[sizes[n]] for n in group])) for width in OTHER]
     return found
+
+
+def _acting(path: Path, at: Ints, levels: Mapping[str, float]) -> list[Change]:
+    """The path of an unused input, with parameters of some sizes: what they show is counted in residuals of
+    the fit.
+    """
+    scale = np.array([levels[n] for n in path.into.values()]) / np.maximum(path.size, 1e-300)
+    return [Change(at, np.diag(times * scale)) for times in ACTS]
+
+
+def _chosen(
+    seen: Seen, table: Table, ways: Sequence[tuple[str, Path]], levels: Mapping[str, float]
+) -> tuple[Path, dict[str, float]] | None:
+    """The most likely of some paths, with the values of its parameters."""
+    acts = [(path, change) for name, path in ways for change in _acting(path, table.at[name], levels)]
+    if not acts:
+        return None
+    path, change = max(acts, key=lambda one: seen.log_odds(one[1]))
+    return path, dict(zip(path.into, seen.size(change)[0].tolist(), strict=True))
 
 
 def _heats(model: Model, table: Table, floor: Mapping[str, float]) -> list[Change]:
@@ -179,11 +233,11 @@ def _read(campaign: Campaign, recording: str, name: str) -> bool:
 
 
 def _verdict(odds: Mapping[str, float], evidence: Mapping[str, float]) -> tuple[Verdict, str]:
-    """The best hypothesis, if it beats `nothing` and its rivals clearly. A sensor needs the evidence of a
-    name in a diagnosis.
+    """The best hypothesis, if it beats `nothing` and its rivals clearly. A sensor or an input needs the
+    evidence of a name in a diagnosis.
     """
-    best, second, *_ = sorted(odds, key=lambda name: -odds[name])
-    if best == "nothing" or odds[best] < LEAST_ODDS:
+    best, second, *_ = sorted(evidence, key=lambda name: -odds[name])
+    if odds[best] < LEAST_ODDS:
         return "nothing", ""
     if odds[best] - odds[second] < RIVAL:
         return "undecided", f"{best} or {second}"
@@ -193,6 +247,10 @@ def _verdict(odds: Mapping[str, float], evidence: Mapping[str, float]) -> tuple[
         return "something else", ""
     if evidence[best] < SHORT:
         return "undecided", f"{best} or something else"
+    if best.startswith("no input "):
+        return "idle input", best.removeprefix("no input ")
+    if best.startswith("input "):
+        return "unused input", best.removeprefix("input ")
     return "input sensor", best.removeprefix("sensor of ")
 
 
@@ -211,10 +269,14 @@ def _rms(problem: Problem, levels: Mapping[str, float], outputs: Sequence[str]) 
 
 
 def begun(exported: Exported, states: Mapping[str, float]) -> Exported:
-    """The model as it starts from states that are known: those it had where the recording begins."""
+    """The model as it starts from states that are known: those it had where the recording begins. Others keep
+    their start.
+    """
     model = exported.model
     started = {
         name: replace(state, start=parse(repr(float(states[name]))), start_sd=START_SD)
+        if name in states
+        else state
         for name, state in model.states.items()
     }
     return replace(exported, model=replace(model, states=started))

@@ -36,7 +36,7 @@ ROW_S = 300.0  # between two rows of the recording that an update learns from
 ACTION = 1.6  # rms of the last errors left, in units of the residual of the fit: measure
 RECENT = 32  # errors that the action limit looks at
 FILE = "learning.json"
-KEPT = ("times", "inputs", "errors", "marks", "left", "counted", "new", "compared", "advice")
+KEPT = ("times", "inputs", "others", "errors", "marks", "left", "counted", "new", "compared", "advice")
 LEAST = 6  # new errors of at least one output before hypotheses are compared
 EVERY_S = 6 * 3600.0  # between two comparisons where the action limit is kept ...
 SOON_S = 4 * 3600.0  # ... and where it is not
@@ -56,6 +56,7 @@ class Learner:
     advice: str = ""
     times: list[float] = field(default_factory=list)
     inputs: list[list[float]] = field(default_factory=list)
+    others: list[dict[str, float]] = field(default_factory=list)  # readings that the model does not use
     errors: list[dict[str, float]] = field(default_factory=list)
     marks: list[tuple[int, dict[str, float]]] = field(default_factory=list)  # row, states of the model there
     left: list[float] = field(default_factory=list)  # errors left, in units of the residual of the fit
@@ -70,7 +71,7 @@ class Learner:
         """Forget everything: another model is at work."""
         known = compensator.exported.document.get("knowledge", {})
         self.levels = {n: r for n, r in known.get("residual", {}).items() if r is not None}
-        for rows in (self.times, self.inputs, self.errors, self.marks, self.left):
+        for rows in (self.times, self.inputs, self.others, self.errors, self.marks, self.left):
             rows.clear()
         self.new, self.advice = 0, ""
 
@@ -91,6 +92,7 @@ class Learner:
                 return False
             self.times.append(now)
             self.inputs.append(compensator.inputs.tolist())
+            self.others.append(_others(compensator, readings))
             self.merged = 1
             self.errors.append(found)
             self._forget(now)
@@ -144,7 +146,7 @@ class Learner:
         if now - self.times[0] <= LONGEST_S or len(self.marks) < 3:
             return
         first = self.marks[len(self.marks) // 2][0]
-        for rows in (self.times, self.inputs, self.errors):
+        for rows in (self.times, self.inputs, self.others, self.errors):
             del rows[:first]
         self.marks = [(row - first, states) for row, states in self.marks if row >= first]
 
@@ -163,6 +165,9 @@ class Learner:
             for o in exported.outputs
             if o.role == "error"
         }
+        for name in sorted(set().union(*self.others)):
+            values[name] = np.array([row.get(name, math.nan) for row in self.others])
+            channels[name] = Channel(name, "other input", "1", None, "linear")
         return Campaign("running", channels, {"running": Recording("running", time, values)}, Path("running"))
 
     def save(self, compensator: Compensator, folder: Path, now: float) -> None:
@@ -186,7 +191,8 @@ class Learner:
             return
 
     def compare(self, compensator: Compensator, now: float) -> tuple[Comparison, bytes | None]:
-        """The hypotheses on what was seen, and the signed next revision where it is wear.
+        """The hypotheses on what was seen, and the signed next revision where it is wear or an input that the
+        model did not use.
 
         Raises:
             UserError: a model without knowledge of its parameters.
@@ -194,9 +200,17 @@ class Learner:
         self.compared, self.new = now, 0
         campaign = self.campaign(compensator)
         exported = begun(compensator.exported, self.marks[0][1])
-        found = compare(exported, campaign, ["running"])
+        found = compare(exported, campaign, ["running"], choose=True)
         revised = revision_of(compensator.exported, campaign, found, begin=self.marks[0][1])
         return found, None if revised is None else render(revised[0], self.key)
+
+
+def _others(compensator: Compensator, readings: Mapping[str, Reading]) -> dict[str, float]:
+    """Good readings of what the model does not use: any of them may be an input of the next revision."""
+    known = {i.name for i in compensator.exported.inputs} | set(compensator.names)
+    known |= {f"{name}_applied" for name in compensator.names}
+    found = {n: number(r.value) for n, r in readings.items() if n not in known and r.good}
+    return {n: value for n, value in found.items() if math.isfinite(value)}
 
 
 def _between(word: str) -> Literal["linear", "held"]:

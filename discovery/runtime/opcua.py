@@ -157,7 +157,7 @@ def _tell_jump(clock: Clock, session: Session) -> None:
         session.tell(
             clock.now(),
             "clock",
-            f"the wall clock was set by {moved:+.0f} s; the compensation goes on with its own time",
+            f"the wall clock was set by {moved:+.0f} s; the compensation continues with its own time",
         )
 
 
@@ -174,7 +174,7 @@ def _word(error: Exception) -> str:
 
 
 async def _lost(link: Link, session: Session, what: str) -> None:
-    session.tell(link.clock.now(), "connection lost", f"{what}; it is tried again every {RETRY_S:g} s")
+    session.tell(link.clock.now(), "connection lost", f"{what}; next attempt every {RETRY_S:g} s")
     await link.close()
 
 
@@ -198,7 +198,7 @@ async def _first_connection(link: Link, seconds: float | None, asked: Asked, say
             await link.connect()
         except UnreachableError as error:
             if not told:
-                say(f"{error}; it is tried again every {RETRY_S:g} s")
+                say(f"{error}; next attempt every {RETRY_S:g} s")
             told = True
             await _until(time.monotonic() + RETRY_S, asked)
         else:

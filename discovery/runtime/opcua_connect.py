@@ -102,7 +102,7 @@ async def _check_own(form: ConnectionForm, path: Path) -> None:
         raise UserError(
             f"application_uri '{form.application_uri}' is not the one in {path} "
             f"({', '.join(found) or 'none'}), "
-            "and servers refuse that; make them equal"
+            "and servers refuse this; make them equal"
         )
 
 
@@ -119,7 +119,7 @@ async def _check_server(form: ConnectionForm, named: Path) -> None:
         other = load_der_x509_certificate(shown[0]) if shown else None
         print_of_other = other.fingerprint(hashes.SHA1()).hex() if other is not None else "none"
         raise UserError(
-            f"{form.url}: the server shows another certificate (SHA-1 {print_of_other}) than {named} (SHA-1 "
+            f"{form.url}: the certificate of the server (SHA-1 {print_of_other}) is not {named} (SHA-1 "
             f"{certificate.fingerprint(hashes.SHA1()).hex()}); if the machine has a new one, compare its "
             "fingerprint at the machine and fetch it with `discovery opcua certificate`"
         )

@@ -83,7 +83,7 @@ class Link:
                 kind = ua.VariantType((await node.read_data_type_as_variant_type()).value)
             except Exception:
                 raise UserError(
-                    f"{form.url}: there is no variable {node_id} for '{name}'; mend the connection file "
+                    f"{form.url}: there is no variable {node_id} for '{name}'; correct the connection file "
                     "(`discovery opcua browse` lists the nodes)"
                 ) from None
             if kind.name not in kinds:

@@ -35,7 +35,7 @@ def make_certificate(folder: Path, name: str, uri: str = CLIENT_URI) -> tuple[Pa
     certificate, key_file = folder / f"{name}.der", folder / f"{name}.pem"
     for path in (certificate, key_file):
         if path.exists():
-            raise UserError(f"{path}: is there already; remove it, or give another --name")
+            raise UserError(f"{path}: this file exists; remove it, or give another --name")
     key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
     host, now = socket.gethostname(), datetime.datetime.now(datetime.UTC)
@@ -107,7 +107,7 @@ async def _below(client: Any, ua: Any, node: Any, way: str, depth: int, done: se
         children = await node.get_references(ua.ObjectIds.HierarchicalReferences, ua.BrowseDirection.Forward)
     except Exception:
         raise UserError(
-            f"there is no node {node.nodeid.to_string()} that can be browsed; begin with i=85, the "
+            f"there is no node {node.nodeid.to_string()} that can be browsed; start with i=85, the "
             f"Objects folder"
         ) from None
     for child in children:

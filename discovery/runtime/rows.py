@@ -63,7 +63,7 @@ def csv_rows(
         without = f"the inputs have no column {', '.join(missing)}, which the model needs"
         if len(missing) == len(needed):
             raise UserError(f"{without}; name a file with its inputs")
-        say(f"{without}; without a reading of each no offset is given out")
+        say(f"{without}; without them there is no offset")
     dropped = dropped if dropped is not None else Dropped()
     found = _in_order(_parsed(source, header, separator, dropped), dropped, say)
     return _in_seconds(found, oldest_s)
@@ -96,7 +96,7 @@ def _parsed(
             if line == 2:
                 raise UserError(
                     f"line 2 of the inputs has {len(cells)} cells, the header {len(header)} names; are its "
-                    "numbers written with decimal commas? Separate the cells by semicolons then"
+                    "numbers written with decimal commas? Then separate the cells by semicolons"
                 )
             dropped.add("with more cells than the header", line)
             continue
@@ -174,7 +174,10 @@ def _in_order(rows: Iterator[tuple[int, Row]], dropped: Dropped, say: Callable[[
             spacing = sorted(usual)[len(usual) // 2] if usual else 0.0
             back = last + spacing - (waiting[0][1][0] + shift)
             shift += back
-            say(f"the clock of the inputs went back by {back:.0f} s in line {waiting[0][0]}; it is followed")
+            say(
+                f"the clock of the inputs went back by {back:.0f} s in line {waiting[0][0]}; "
+                "the new time is used"
+            )
         yield from [accept(one) for _, one in waiting]
         waiting.clear()
     if waiting and waiting[0][1][0] + shift > last and len(waiting) > 1:  # the end of a recording after a gap

@@ -110,12 +110,12 @@ class Session:
         if found is not None:
             self.resumed, self.resume_at = found.time, found.output
             gap = f", {now - found.time:.0f} s ago" if now is not None else ""
-            self.tell(found.time, "restart", f"goes on from the state of {instant(found.time)}{gap}")
+            self.tell(found.time, "restart", f"continues from the state of {instant(found.time)}{gap}")
         elif before is not None and now is not None:
             self.tell(
                 now,
                 "saved state refused",
-                f"it is of {instant(before.time)}, which has not come yet; the model starts anew",
+                f"its time, {instant(before.time)}, is in the future; the model starts without it",
                 "set the clock of this computer",
             )
         if found is None:
@@ -184,11 +184,11 @@ class Session:
         """Tell the first of several failures to write, and when it is over."""
         if error is not None and what not in self.failing:
             self.failing.add(what)
-            remedy = "make room on the disk; what is not written yet is kept in memory"
-            self.tell(now, f"{what} failing", f"{text} ({error}); the compensation goes on", remedy)
+            remedy = "free disk space; lines that are not written yet are kept in memory"
+            self.tell(now, f"{what} failing", f"{text} ({error}); the compensation continues", remedy)
         elif error is None and what in self.failing and not self._pending(what):
             self.failing.discard(what)
-            self.tell(now, f"{what} written again", "the disk takes it again, nothing is missing")
+            self.tell(now, f"{what} written again", "writing works again, nothing is missing")
 
     def _pending(self, what: str) -> bool:
         return what == "output" and self.output is not None and bool(self.output.pending)
@@ -225,11 +225,11 @@ class Session:
         if self.compensator.origin is None:
             absent = [g.spec.name for g in self.compensator.guards if g.held is None]
             raise UserError(
-                f"no offset was given out: no good reading of {', '.join(absent) or 'the inputs'} ever came; "
-                "give a reading of each input of the model"
+                f"there was no offset: {', '.join(absent) or 'the inputs'} never had a good reading; "
+                "each input of the model needs one"
             )
         if self.output is not None and (self.output.pending or self.output.lost):
-            raise UserError(f"{self.output.path}: the last offsets are not written; make room on the disk")
+            raise UserError(f"{self.output.path}: the last offsets are not written; free disk space")
         if self.found is not None and self.found.state in (State.FAULT, State.FROZEN):
             raise UserError(f"the compensation ended in {self.found.state.name}; its last event says why")
 
@@ -240,9 +240,9 @@ class Session:
         if self.folder is not None:
             learn.save(self.compensator, self.folder, now)
         if learn.advice and not advised:
-            self.tell(now, "action limit", "the errors left are beyond the action limit", learn.advice)
+            self.tell(now, "action limit", "the residual errors exceed the action limit", learn.advice)
         elif advised and not learn.advice:
-            self.tell(now, "action limit kept", "the errors left are within the action limit again")
+            self.tell(now, "action limit kept", "the residual errors are within the action limit again")
         if not due or self.shadow is not None or self.folder is None:
             return
         try:
@@ -255,7 +255,7 @@ class Session:
             return
         remedy = {
             "input sensor": f"check the sensor of {found.what}",
-            "something else": "record, and let `discovery diagnose` name what changed",
+            "something else": "record the machine and run `discovery diagnose`, which can name the change",
             "undecided": "measure more often, wet and dry",
         }.get(found.verdict, "")
         self.tell(now, f"learning: {found.verdict}", str(found), remedy)
@@ -313,16 +313,16 @@ class Session:
             self.tell(
                 now,
                 "state failing",
-                f"{self.folder}: the state cannot be saved ({error}); the compensation goes on, but "
+                f"{self.folder}: the state cannot be saved ({error}); the compensation continues, but "
                 f"a restart "
-                "would begin from an older state",
-                "make room, or give it another folder with --state",
+                "would start from an older state",
+                "free disk space, or name another folder with --state",
             )
         if error is not None:
             self.failing.add("state")
         elif "state" in self.failing:
             self.failing.discard("state")
-            self.tell(now, "state saved again", "the disk takes it again")
+            self.tell(now, "state saved again", "writing works again")
 
 
 def header(compensator: Compensator) -> str:

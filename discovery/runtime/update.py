@@ -13,6 +13,7 @@ from discovery.export.seal import open_seal
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.runtime.hypotheses import Comparison, begun, compare, model_with
+from discovery.runtime.unused import with_input, without_input
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -40,7 +41,7 @@ class Update:
             named = ", ".join(
                 f"{p['effect']} at {'+'.join(p['states'])}" for p in self.diagnosis.get("physics", [])
             )
-            lines.append(f"the diagnosis says: {self.diagnosis['verdict']}{named and ': ' + named}")
+            lines.append(f"diagnosis: {self.diagnosis['verdict']}{named and ': ' + named}")
         if self.path is not None:
             lines.append(
                 f"{self.path}: the next revision, residual {self.after:.2f} of the fit's; "
@@ -57,15 +58,16 @@ def _why(found: Comparison) -> str:
         case "nothing":
             return "these recordings show no change of the machine"
         case "input sensor":
-            return f"the sensor of {found.what} is off, which no parameter may hide; check it"
+            return f"the sensor of {found.what} has an offset; check it. No parameter is changed to hide it"
         case "undecided":
             return f"{found.what}: these recordings do not distinguish them; measure more often, wet and dry"
         case "something else":
             return (
-                "something changed that wear does not; add what the diagnosis names, and fit the model again"
+                "something changed that wear cannot change; add what the diagnosis names to the model, "
+                "and fit it again"
             )
         case _:
-            return "the change would not make it better"
+            return "the revision would not lower the residual"
 
 
 def update_file(
@@ -80,7 +82,7 @@ def update_file(
     found = compare(exported, campaign, recordings)
     revised = revision_of(exported, campaign, found)
     if found.verdict == "wear" and revised is None:
-        found = replace(found, verdict="something else", what="wear leaves too much of it")
+        found = replace(found, verdict="something else", what="wear does not explain all of it")
     if found.verdict == "something else":
         return Update(found, None, None, _diagnosis(exported.model, campaign, recordings))
     if revised is None:
@@ -99,9 +101,9 @@ def revision_of(
     Args:
         begin: states of the model where the recordings begin; default its own start.
     """
-    if found.verdict != "wear":
+    if found.verdict not in ("wear", "unused input", "idle input"):
         return None
-    document = next_revision(exported, found)
+    document = next_revision(exported, campaign, found)
     again = from_document(*open_seal(render(document), exported.model.name), exported.model.name)
     after = compare(begun(again, begin) if begin is not None else again, campaign, found.recordings).rms
     return (document, after) if after < min(MAY * found.rms, AS_NEW) else None
@@ -114,31 +116,41 @@ def next_name(path: Path) -> Path:
     return path.with_name(f"{stem}.r{revision}{path.suffix}")
 
 
-def next_revision(exported: Exported, found: Comparison) -> dict[str, Any]:
-    """The document of the updated model with its changelog entry; only what wear can change has moved, and
-    ranges, limits and what the fit knew of its parameters stay: the next comparison holds the revision to it.
+def next_revision(exported: Exported, campaign: Campaign, found: Comparison) -> dict[str, Any]:
+    """The document of the updated model with its changelog entry; only what wear can change has moved, or an
+    input has come in or is left out. Ranges, limits and what the fit knew of its parameters stay: the next
+    comparison holds the revision to it.
     """
+    if found.verdict == "unused input" and found.path is not None:
+        path, values = found.path
+        moved = f"{path.channel} is an input now, with a lag of {path.lag:g} s: "
+        moved += ", ".join(f"{n} {value:.3g}" for n, value in values.items())
+        return _revised(exported, with_input(exported, campaign, path, values), found, moved)
+    if found.verdict == "idle input":
+        document = without_input(exported, campaign, found.what)
+        return _revised(exported, document, found, f"{found.what} is no input any more")
     document, model = {**exported.document}, model_with(exported.model, found.change)
     entries = []
     for entry in document["parameters"]:
         p = model.parameters[entry["name"]]
         entries.append({**entry, "value": p.value, "low": p.low, "high": p.high})
-    revision = exported.revision + 1
     moved = ", ".join(
         f"{n} {exported.model.parameters[n].value:.4g} -> {model.parameters[n].value:.4g}"
         for n in found.change
     )
+    return _revised(exported, document | {"parameters": entries}, found, moved)
+
+
+def _revised(exported: Exported, document: dict[str, Any], found: Comparison, moved: str) -> dict[str, Any]:
+    """A document as the next revision, with an entry in its changelog."""
     note = {
-        "revision": revision,
+        "revision": exported.revision + 1,
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "text": f"{found}; {moved}",
+        "why": found.verdict,
         "of": exported.seal.sha256,
     }
-    return document | {
-        "revision": revision,
-        "parameters": entries,
-        "changelog": [*document["changelog"], note],
-    }
+    return document | {"revision": note["revision"], "changelog": [*document["changelog"], note]}
 
 
 def _diagnosis(model: Model, campaign: Campaign, recordings: Sequence[str]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from discovery.cli import app
 from discovery.errors import UserError
 from discovery.export import export_model
 from discovery.export.identifiers import comment, identifiers
+from discovery.export.st.proof import compiled
 from discovery.export.st.reader import read_structured_text
 from discovery.models import Model, State
 from discovery.models.modelfile import write_model
@@ -35,8 +36,27 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         *("C double", "C float", "FMI 2.0", "FMI 3.0", "structured text LREAL", "structured text REAL")
     }
     assert all(found is not None and found <= limit for found, limit in limits.values())
-    assert any("structured text compiler" in str(proof) for proof in done.proofs)
     return place
+
+
+@pytest.mark.parametrize(
+    ("status", "said"), [(0, "compiled with iec2c"), (1, "iec2c refuses"), (None, "not compiled")]
+)
+def test_structured_text_is_compiled_where_a_compiler_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: int | None, said: str
+) -> None:
+    """A stand-in that reads the file as a compiler would; real ones: `tests/export/outside`."""
+    if status is not None:
+        (tmp_path / "iec2c").write_text(
+            f"#!/bin/sh\n/usr/bin/test -s model.st || exit 2\necho line 7\nexit {status}\n"
+        )
+        (tmp_path / "iec2c").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    if status:
+        with pytest.raises(UserError, match=f"{said} the structured text: line 7"):
+            compiled("PROGRAM x END_PROGRAM")
+    else:
+        assert said in compiled("PROGRAM x END_PROGRAM")
 
 
 def test_the_c_files_stand_alone(folder: Path, tmp_path: Path) -> None:

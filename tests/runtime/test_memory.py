@@ -262,7 +262,7 @@ def test_a_stop_is_safe_and_goes_on(model_file: Path, day: Path, tmp_path: Path)
         command, input=lines[0] + "".join(lines[300:]), text=True, capture_output=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert "goes on from the state of" in done.stderr
+    assert "continues from the state of" in done.stderr
     assert "events; ended" in done.stderr
     times = [float(row.split(",")[0]) for row in out.read_text().splitlines()[1:]]
     assert times == sorted(times)

@@ -106,7 +106,7 @@ def test_a_server_that_is_not_the_one_named_is_refused(
     place: Path, form: ConnectionForm, exported: Exported
 ) -> None:
     said = refused(form, place, exported, {"server_certificate": "impostor.der"})
-    assert "the server shows another certificate (SHA-1 " in said
+    assert "the certificate of the server (SHA-1 " in said
     assert "impostor.der" in said
 
 
@@ -303,7 +303,7 @@ def test_nodes_can_be_browsed_and_a_certificate_fetched(
     assert "read, write" in own
     assert (tmp_path / "server.der").read_bytes() == (place / "server.der").read_bytes()
     assert len(fingerprint) == 40
-    with pytest.raises(UserError, match="is there already"):
+    with pytest.raises(UserError, match="this file exists"):
         make_certificate(place, "client")
 
 
@@ -329,5 +329,5 @@ def test_a_server_that_is_not_there_yet_is_waited_for(
 
     assert asyncio.run(work())
     assert len(said) == 2
-    assert "it is tried again every" in said[0]
+    assert "next attempt every" in said[0]
     assert said[1].startswith("connected to")

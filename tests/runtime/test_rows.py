@@ -38,7 +38,7 @@ def test_a_clock_that_is_set_back_is_followed() -> None:
     times, dropped, said = read(stamps)
     assert times == MINUTES
     assert not dropped.counts
-    assert said == ["the clock of the inputs went back by 86400 s in line 702; it is followed"]
+    assert said == ["the clock of the inputs went back by 86400 s in line 702; the new time is used"]
 
 
 def test_rows_out_of_order_and_twice_are_left_out_and_counted() -> None:

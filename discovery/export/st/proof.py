@@ -35,8 +35,8 @@ def prove_st(exported: Exported, reference: Reference, spelling: Spelling = st_t
     proofs = []
     for precision, kind in KINDS.items():
         text = spelling(exported, precision)
-        compiled = _compiled(text) if spelling is st_text else "not compiled: only TIA Portal does"
-        note = f"read by discovery, first {min(STEPS, len(reference.u))} steps; {compiled}"
+        made = compiled(text) if spelling is st_text else "not compiled: only TIA Portal does"
+        note = f"read by discovery, first {min(STEPS, len(reference.u))} steps; {made}"
         name = "structured text" if spelling is st_text else "SCL"
         deviation = _replay(exported, reference, text, kind)
         proofs.append(within(Proof(f"{name} {kind}", deviation, LIMITS[precision], note)))
@@ -63,7 +63,12 @@ def _replay(exported: Exported, reference: Reference, text: str, kind: str) -> f
 COMPILERS = {"iec2c": ["-T", ".", "model.st"], "strucpp": ["model.st", "-o", "model.cpp"]}
 
 
-def _compiled(text: str) -> str:
+def compiled(text: str) -> str:
+    """Which compilers took a structured text, in words; not compiled where none is installed.
+
+    Raises:
+        UserError: a compiler that refuses the text.
+    """
     found = [name for name in COMPILERS if shutil.which(name) is not None]
     for compiler in found:
         with tempfile.TemporaryDirectory() as name:
