@@ -27,7 +27,7 @@ _LEAST = 8  # intervals of a trajectory that is not divided
 _FIRST = 3  # steps of Newton that may become longer
 _SHRINKS = 0.5  # factor by which later ones have to become shorter, else half of them is taken
 _AWAY = 3  # steps of Newton that lead away from a trajectory that old linearisations have come close to ...
-_NEAR = 1e-5  # ... by steps as short as this: it is the solution, as well as can be known at the kink of a law
+_NEAR = 1e-5  # ... by steps as short as this: the solution, as well as the kink of a law lets it be known
 
 
 @dataclass(frozen=True)
