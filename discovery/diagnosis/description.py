@@ -1,7 +1,8 @@
 """A formula that describes missing heat if no effect of the catalogue fits. It is a description, not a cause.
 
-SINDy in the filtered form: a library of powers, products, thresholds, saturations and lags of the inputs and
-of the body's own temperature, each seen through the model, chosen one after the other by evidence.
+SINDy in the filtered form. The library has powers, products, thresholds, saturations and lags of the inputs
+and of the temperature of the body, each filtered through the model. Evidence chooses one term after the
+other.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The probability of an answer: the bagged posterior over all models that the search tried.
 
-A posterior of approximate models is too sure of itself: a little more data, other priors or one recording
-less and another model wins. So it is averaged over resampled blocks of time and over wider and narrower
-priors (Huggins & Miller, Bayesian Analysis 18, 2023). The models stay where they were fitted; everything else
-is algebra on their normal equations.
+The posterior of approximate models is too narrow: with a little more data, other priors or one recording
+less, another model is the most likely one. Therefore it is averaged over resampled blocks of time and over
+wider and narrower priors (Huggins & Miller, Bayesian Analysis 18, 2023). The models are not fitted again; the
+rest is algebra on their normal equations.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The proof: free runs of the fitted baseline and of the repaired model, as in every table.
 
-Both models are fitted as any model of an experiment is, and start as it does; what a fit allowed for in the
-diagnosis (process noise, starts) helps neither. Single wrong readings are set aside.
+Both models are fitted and started like any model of an experiment, without the process noise and the starts
+of the diagnosis. Single wrong readings are set aside.
 """
 
 from __future__ import annotations

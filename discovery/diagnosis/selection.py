@@ -1,8 +1,7 @@
 """Search for the most likely set of effects, one refit at a time.
 
-Effects are added while they add to the posterior; then each one is questioned: is it needed, and would
-another one stand better in its place? Everything that is refitted on the way is kept: these models share the
-posterior.
+Effects are added as long as the posterior grows. Then each effect is removed, and replaced by each rival, as
+a test. All refitted models are kept and take part in the posterior.
 """
 
 from __future__ import annotations

@@ -5,9 +5,8 @@
 
 Evidence is integrated over the values of a table {value: weight}.
 
-`python -m benchmarks.thresholds` shows what each one does on cases of several families of machines. What is
-here are priors (what is believed before the recordings are read), the resolution of integrals, and the
-probabilities from which something is said. A rule that is neither does not exist.
+`python -m benchmarks.thresholds` shows the effect of each number on cases of several families of machines.
+The numbers are priors, resolutions of integrals, and limits of probability. There are no other rules.
 """
 
 from __future__ import annotations

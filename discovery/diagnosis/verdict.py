@@ -1,7 +1,7 @@
 """The verdict: the named effects, their probability, their rivals, or that the cause is unknown.
 
-An effect is named where its probability says so, where it also predicts recordings that a fit has not seen,
-and where no veto of physics stands against it. Unseen recordings may withdraw a name, never add one.
+An effect is named if it is probable enough, if it improves the prediction of recordings that the fit has not
+seen, and if no law of physics forbids it. Held-out recordings may withdraw a name, but never add one.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """The search for events: when an unknown heat acts, and when a sensor jumps.
 
-Steps at many instants are seen through the model at once; a window is the difference of two of them, so all
-windows of a recording are scored from one Gram matrix. Every instant is as likely as any other before the
-recordings are read; a claim keeps, as the weight of its best instants, what share of all of them the readings
-leave.
+Steps at many instants are filtered through the model at once. A window is the difference of two steps, so one
+Gram matrix scores all windows of a recording. All instants are equally likely in the prior. The weight of the
+best instants is the share of all instants that the readings do not exclude.
 """
 
 from __future__ import annotations

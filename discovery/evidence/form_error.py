@@ -2,11 +2,11 @@
 
     q_k (1 + sum_m e_km psi_m),   e_km ~ N(0, share^2)
 
-for each flow of the model, and likewise for what each output shows. psi_m are the inputs, the body and the
-recording, each less its mean and over its spread, scaled so that a flow is off by the share in all. And the
-bodies of a lumped model have no sharp edges: a share of each flow enters a neighbour of the body that it is
-drawn at. Both shares are unknown, together on a ladder from an exact model to a coarse one. The part of form
-error that wanders with time is process noise (`process_noise.py`); this one does not average out over a long
+for each flow of the model, and in the same way for each output. psi_m are the inputs, the body and the
+recording, each minus its mean and divided by its spread, scaled so that the total error of a flow is the
+share. The bodies of a lumped model also have no sharp edges: a share of each flow enters a neighbour of its
+body. Both shares are unknown and grow together from an exact model to a coarse one. The part of the form
+error that changes with time is process noise (`process_noise.py`). This part does not average out over a long
 recording (Kennedy & O'Hagan, J. R. Stat. Soc. B 63, 2001).
 """
 

@@ -1,11 +1,11 @@
 """Inputs that may be logged late: with fast bodies and frequent readings, a switch some seconds before its
 stamp looks like missing heat.
 
-A logger that holds what it sampled, or smooths it, is late by up to about one of its intervals. That is an
-unknown of each recording, like the offset of an input known only within a spread. Where the fastest body
-takes many intervals to answer, or readings come too rarely to follow it, nothing is asked.
+A logger that holds or smooths its samples is late by up to about one of its intervals. This shift is an
+unknown of each recording, like the offset of an input with a spread. It is left out if the fastest body needs
+many intervals to respond, or if readings are too rare to follow it.
 
-That each switch is late by another time is noise (`everyday.JITTER`).
+A shift that differs from switch to switch is noise (`process_noise.py`).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A latent force: smooth heat of unknown cause at one body, and its curve over time.
 
 The heat is piecewise constant over blocks with a first-order covariance of unknown size; its curve follows in
-closed form. It asks for no catalogue: it says where something is missing, when, and how much any explanation
+closed form. It needs no catalogue: it shows where and when something is missing, and how much any explanation
 can gain (Alvarez, Luengo & Lawrence, Latent force models, AISTATS 2009).
 """
 

@@ -2,9 +2,9 @@
 
     s_i(t)^2 = (level floor_i)^2 + (share flow_i(t))^2
 
-No body is free of heat that nobody records, of an unknown level; and a lumped model errs the more the more
-heat flows through a body, by a share that is small for a model that is nearly exact and large for a coarse
-one. Evidence is integrated over a few of each, and over slow sensor noise.
+Every body has some unrecorded heat, of an unknown level. The error of a lumped model also grows with the heat
+flow through a body, by a share that is small for a nearly exact model and large for a coarse one. Evidence is
+integrated over a few values of each, and over slow sensor noise.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A fit under a noise model: whitened residual and sensitivities, stored as normal equations of each block.
 
-Everything that is asked afterwards (evidence with all unknowns integrated out, what a refit would absorb of a
-signature, the posterior on resampled blocks) is algebra on these small matrices:
+All later results (evidence with all unknowns integrated out, the part of a signature that a refit would
+absorb, the posterior on resampled blocks) are algebra on these small matrices:
 
     log p(y) = -log det L - 1/2 (r'r - b' H^-1 b) - 1/2 log det H + priors,   H = J'J + priors, b = J'r
 

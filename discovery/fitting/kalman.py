@@ -7,9 +7,9 @@ model around a trajectory,
 
 so a Kalman filter whitens residuals and sensitivity columns alike in one pass (Sarkka & Solin, Applied
 Stochastic Differential Equations, 2019, ch. 10) and gives the likelihood of the variances. `w` is held
-between readings: its time constant is hours, readings come in minutes. Its size s(t) follows what flows
-through the body (`Noise`): a time-varying gain, no further state. An input that switches a little before
-or after its stamp leaves an impulse at the bodies, each time another one.
+between readings, because its time constant is hours and readings come in minutes. Its size s(t) follows the
+flow through the body (`Noise`): a time-varying gain without a further state. An input that switches a little
+before or after its stamp gives an impulse at the bodies, each time a different one.
 """
 
 from __future__ import annotations

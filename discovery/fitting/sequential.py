@@ -2,7 +2,7 @@
 
 "First, the model for environmental influences is developed ... With these derived parameters the machine tool
 is compensated against environmental influences and the next input is investigated" (Mayr et al., section 4).
-So each step fits eq. (7) to what the influences known before leave of the readings.
+So each step fits eq. (7) to the residual of the influences identified before.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Gauss-Newton on the normal equations with Marquardt's damping (Nocedal & Wright, Numerical Optimization, 2006,
 ch. 10) and bounds by an active set: unknowns are few and readings many, so each step is one p x p system, and
-a trial step that is refused costs a free run and no sensitivities.
+a rejected trial step costs one free run, without sensitivities.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The lead of one model over another on held-out recordings, with a 95 % interval.
 
-The rms of both models is compared in blocks of each recording, and the blocks are drawn anew many times
-(block bootstrap; Kuensch, Annals of Statistics 17, 1989). Neighbouring residuals are correlated, so single
-readings would give too narrow an interval.
+The rms of both models is compared in blocks of each recording, and the blocks are resampled many times (block
+bootstrap; Kuensch, Annals of Statistics 17, 1989). Neighbouring residuals are correlated, so single readings
+would give too narrow an interval.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """The published method for a discrepancy: differentiate the residual, regress it on a library, threshold.
 
-Kaheman et al. (arXiv:1909.08574, 2019). Kept to compare with: the workbench takes no derivative of a reading.
+Kaheman et al. (arXiv:1909.08574, 2019). It serves for comparison: the workbench takes no derivative of a
+reading.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Normal equations of a linear regression, added up block by block.
 
-Everything after the one pass over the readings works on these small matrices, so that paths, folds and block
-bootstraps cost the same whatever the length of the recordings:
+After one pass over the readings, everything works on these small matrices. Paths, folds and block bootstraps
+cost the same for recordings of any length:
 
     cost(theta) = square - 2 vector' theta + theta' matrix theta = |target - columns theta|^2.
 """

@@ -1,11 +1,11 @@
 """Feature libraries for `pysindy.SINDy`: inputs through first-order lags, and terms through a model's own
 dynamics.
 
-Both take the readings themselves as left-hand side, so that nothing is differentiated:
+The left-hand side of both is the readings themselves, so nothing is differentiated:
 
     library = FilteredInputs(["time", "P0", "P1"])
     model = SINDy(optimizer=SparseSearch(library), feature_library=library)
-    model.fit([X_a, X_b], t=1, x_dot=[Y_a, Y_b])        # rows of X: time [s], P0, P1; NaN in Y: not read then
+    model.fit([X_a, X_b], t=1, x_dot=[Y_a, Y_b])        # rows of X: time [s], P0, P1; NaN in Y: no reading
     model.print(lhs=["E_Y"])                            # E_Y = 0.020 lag(P0, 3600)
 """
 

@@ -2,8 +2,8 @@
 
     tau_j ds_j/dt = sum_k g_jk phi_k(u) - s_j          y = sum_j s_j + sum_k g_k phi_k(u) + offset
 
-Eq. (8) generalised: there every input has one mass of its own, in eq. (9) all inputs share one. An input
-may act without a mass, or be added up without bound, as charge is.
+This generalises eq. (8), where every input has its own mass, and eq. (9), where all inputs share one. An
+input may also act without a mass, or be integrated without limit, such as a current (charge).
 """
 
 from __future__ import annotations

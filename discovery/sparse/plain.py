@@ -4,9 +4,9 @@
     d/dt x = Theta(x, u) Xi
 
 The plain form differentiates the readings (smoothed finite differences), the weak form integrates against
-test functions (`WeakPDELibrary`). Form, degree and threshold are those that predict left-out recordings
-best in free runs (quarters of a single one). It stands in experiments to be compared with, so its numbers
-are those of PySINDy: nothing is fitted afterwards.
+test functions (`WeakPDELibrary`). Form, degree and threshold are those that predict left-out recordings best
+in free runs (quarters of a single one). It serves for comparison, so its coefficients are those of PySINDy:
+nothing is fitted afterwards.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Rates: a baseline model and candidate terms in the rates of its states, every coefficient a parameter.
 
-The whole library is one model, in which a term that has left has the coefficient zero. Its fit by output
-error gives the sensitivity column of every coefficient (the term filtered through the model's own dynamics),
-and the normal equations of these columns rank all subsets at once: `residual = S_params d_theta +
-S_candidates theta` needs no derivative of a reading and works with states that nobody measures.
+The whole library is one model, in which a removed term has the coefficient zero. Its fit by output error
+gives the sensitivity column of every coefficient (the term filtered through the model's own dynamics), and
+the normal equations of these columns rank all subsets at once: `residual = S_params d_theta + S_candidates
+theta` needs no derivative of a reading and works with states that are not measured.
 """
 
 from __future__ import annotations

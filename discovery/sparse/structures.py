@@ -6,7 +6,7 @@ empties into it.
     circuit upstream   y' = flow(h) - flow(y),  h' = terms in the inputs - flow(h)  a tank above a tank, a
     body behind a body
 
-What leaves the body upstream enters the output: that fixes the scale in which the hidden state counts.
+The flow out of the upstream body enters the output. This fixes the scale of the hidden state.
 """
 
 from __future__ import annotations
