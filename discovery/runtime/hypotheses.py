@@ -42,7 +42,7 @@ OTHER = (0.1, 0.4)  # relative change of a parameter that cannot age: something 
 OFFSET = (0.5, 2.0)  # K, of the sensor of an input
 ACTS = (1.0, 4.0)  # residuals of the fit that an unused input shows
 LEAST_ODDS = 2.5  # log of the odds against `nothing`, below which nothing has changed
-WORN = 3.0  # log of how much more often a machine wears that has worn before
+MEMORY_S = 24 * 3600.0  # in which a residual counts less and less: wear goes on meanwhile
 RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
 AGES = ("heat load", "rotation speed", "fluid flow", "cooling power", "coolant temperature")
 START_SD = 0.5  # K, um: of states that are known where a recording begins
@@ -53,8 +53,9 @@ TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature
 class Comparison:
     """What the recordings say. `odds`: log of the probability of the readings under each hypothesis over that
     under `nothing`, prior odds included. `verdict` and `what`: the best one, and the sensor where it is one.
-    `rms`: residual of the model at work in units of that of its fit. `change`: of the parameters that age,
-    under wear, with standard deviations. `path`: of the unused input, with its parameters.
+    `rms`: residual of the model at work in units of that of its fit; `lately`: the same, as of now.
+    `change`: of the parameters that age, under wear, with standard deviations. `path`: of the unused input,
+    with its parameters.
     """
 
     recordings: tuple[str, ...]
@@ -63,6 +64,7 @@ class Comparison:
     what: str
     odds: Mapping[str, float]
     rms: float
+    lately: float
     change: Mapping[str, tuple[float, float]]
     path: tuple[Path, Mapping[str, float]] | None = None
 
@@ -136,15 +138,21 @@ def compare(
     for channel, gains in idle.items():
         by = np.array([-exported.model.parameters[n].value for n in gains])
         evidence[f"no input {channel}"] = seen.log_odds_of(table.at[channel], by)
-    odds = {"nothing": 0.0} | {
-        n: value + _before(n, list(evidence), exported) for n, value in evidence.items()
-    }
+    odds = {"nothing": 0.0} | {n: value + _before(n, list(evidence)) for n, value in evidence.items()}
     verdict, what = _verdict(odds, evidence)
-    change = _worn(seen, _wear(exported, table, WEAR[1]), ageing(exported))
+    change = _worn(seen, offered["wear"], ageing(exported))
     chosen = _chosen(seen, table, [(n, p) for n, p in ways.items() if p.channel == what], levels)
     count = int(sum(np.isfinite(s.grid.readings).sum() for s in problem.systems))
-    rms = _rms(problem, levels, outputs)
-    return Comparison(tuple(recordings), count, verdict, what, odds, rms, change, chosen)
+    rms, lately = (_rms(problem, levels, outputs, memory) for memory in (np.inf, MEMORY_S))
+    return Comparison(tuple(recordings), count, verdict, what, odds, rms, lately, change, chosen)
+
+
+def residual_lately(exported: Exported, campaign: Campaign, recordings: Sequence[str]) -> float:
+    """Residual of a model on recordings, as of now, in units of that of its fit."""
+    residual = exported.document["knowledge"]["residual"]
+    levels = {n: r for n, r in residual.items() if r is not None}
+    outputs = [n for n in levels if any(_read(campaign, r, n) for r in recordings)]
+    return _rms(problem_of(exported.model, campaign, recordings, outputs), levels, outputs, MEMORY_S)
 
 
 def _sizes(exported: Exported) -> dict[str, float]:
@@ -153,13 +161,12 @@ def _sizes(exported: Exported) -> dict[str, float]:
     return {n: abs(exported.model.parameters[n].value) for n in fitted}
 
 
-def _before(name: str, asked: Sequence[str], exported: Exported) -> float:
+def _before(name: str, asked: Sequence[str]) -> float:
     """Log of the odds of a hypothesis against `nothing` before any reading: that one of the sensors is off is
     as likely as that one of the other inputs acts, or that something else changed.
     """
     if name == "wear":
-        worn = any("of" in entry and entry.get("why", "wear") == "wear" for entry in exported.changelog)
-        return WORN * worn
+        return 0.0
     alike = [other for other in asked if other.rpartition(" ")[0] == name.rpartition(" ")[0]]
     return -RARE - float(np.log(len(alike)))
 
@@ -174,9 +181,11 @@ def _wear(exported: Exported, table: Table, width: float) -> Change:
     )
 
 
-def _worn(seen: Seen, wear: Change, old: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Change of each parameter that ages, at the end of the recordings, and its standard deviation."""
-    by, covariance = seen.size(wear)
+def _worn(seen: Seen, wear: Sequence[Change], old: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Change of each parameter that ages, at the end of the recordings, and its standard deviation, under the
+    most likely width of wear: little evidence moves parameters little.
+    """
+    by, covariance = seen.size(max(wear, key=seen.log_odds))
     both = np.hstack([np.eye(len(old)), np.eye(len(old))])
     total, variance = both @ by, np.diag(both @ covariance @ both.T)
     return dict(zip(old, zip(total.tolist(), np.sqrt(variance).tolist(), strict=True), strict=True))
@@ -260,12 +269,21 @@ def _mean(logs: Sequence[float]) -> float:
     return float(top + np.log(np.mean(np.exp(np.array(logs) - top))))
 
 
-def _rms(problem: Problem, levels: Mapping[str, float], outputs: Sequence[str]) -> float:
-    """Residual of the model at work, start values settled, in units of that of its fit."""
+def _rms(problem: Problem, levels: Mapping[str, float], outputs: Sequence[str], memory: float) -> float:
+    """Residual of the model at work, start values settled, in units of that of its fit; a reading counts less
+    with its age over `memory` [s].
+    """
     scale = np.array([levels[n] for n in outputs])
-    residuals = [problem.residual(run) for run in settle_starts(problem)[1]]
-    found = np.concatenate([(r / scale)[np.isfinite(r)] for r in residuals])
-    return float(np.sqrt(np.mean(found**2)))
+    after = sum(float(system.grid.time[-1]) for system in problem.systems)
+    total, weight = 0.0, 0.0
+    for run in settle_starts(problem)[1]:
+        grid = run.system.grid
+        squares = (problem.residual(run) / scale) ** 2
+        share = np.exp((grid.time[grid.read] - after) / memory)
+        total += float(np.nansum(squares * share[:, None]))
+        weight += float(np.sum(np.isfinite(squares) * share[:, None]))
+        after -= float(grid.time[-1])
+    return float(np.sqrt(total / weight))
 
 
 def begun(exported: Exported, states: Mapping[str, float]) -> Exported:

@@ -12,7 +12,7 @@ from discovery.export.document import Exported, from_document, read_document, re
 from discovery.export.seal import open_seal
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.runtime.hypotheses import Comparison, begun, compare, model_with
+from discovery.runtime.hypotheses import Comparison, begun, compare, model_with, residual_lately
 from discovery.runtime.unused import with_input, without_input
 
 if TYPE_CHECKING:
@@ -105,8 +105,9 @@ def revision_of(
         return None
     document = next_revision(exported, campaign, found)
     again = from_document(*open_seal(render(document), exported.model.name), exported.model.name)
-    after = compare(begun(again, begin) if begin is not None else again, campaign, found.recordings).rms
-    return (document, after) if after < min(MAY * found.rms, AS_NEW) else None
+    started = begun(again, begin) if begin is not None else again
+    after = residual_lately(started, campaign, found.recordings)
+    return (document, after) if after < min(MAY * found.lately, AS_NEW) else None
 
 
 def next_name(path: Path) -> Path:
@@ -147,7 +148,6 @@ def _revised(exported: Exported, document: dict[str, Any], found: Comparison, mo
         "revision": exported.revision + 1,
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "text": f"{found}; {moved}",
-        "why": found.verdict,
         "of": exported.seal.sha256,
     }
     return document | {"revision": note["revision"], "changelog": [*document["changelog"], note]}

@@ -111,6 +111,18 @@ def test_parameters_and_starts(name: str, campaign: Campaign) -> None:
         assert _alike(found[:, len(free) + k], (up - down) / 2e-3)
 
 
+@pytest.mark.parametrize("flow", ["(k + d*time/21600)*(T - a)", "k*(T - a)"])
+def test_a_parameter_that_changes_bit_by_bit(flow: str, campaign: Campaign) -> None:
+    """As one in front of the share of time that has passed, in a flow and in an output."""
+    where, wanted = ("2*a + b", "k") if "d" in flow else ("(c + d*time/21600)*a", "c")
+    model = two_bodies(flow, where, k=5.0, d=0.0, **({} if wanted == "k" else {"c": 2.0}))
+    system = make_system(model, make_grid(campaign, "r", model.inputs, ["y"]))
+    at = simulate(system, model.values(), start_values(system, model.values()))
+    grown = sensitivities(at, [wanted], grown=system.grid.time / 21600.0)
+    assert _alike(grown[:, 0, 0], sensitivities(at, ["d"])[:, 0, 0])
+    assert not _alike(grown[:, 0, 0], sensitivities(at, [wanted])[:, 0, 0])
+
+
 def _alike(found: Array, expected: Array) -> bool:
     """Within 1 % of the largest."""
     return bool(np.max(np.abs(found - expected)) < 0.01 * np.max(np.abs(expected)) + 1e-9)

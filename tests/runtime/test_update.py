@@ -212,5 +212,5 @@ def test_what_readings_do_not_distinguish_is_not_signed() -> None:
     assert _verdict({**odds, "wear": 5.0}, evidence) == ("input sensor", "T")
     weak = _verdict({**odds, "wear": -1.0, "sensor of T": 6.0}, {**evidence, "sensor of T": 9.0})
     assert weak == ("undecided", "sensor of T or something else")
-    said = Comparison(("a",), 9, "undecided", "wear or sensor of T", odds, 1.4, {})
+    said = Comparison(("a",), 9, "undecided", "wear or sensor of T", odds, 1.4, 1.4, {})
     assert "measure more often, wet and dry" in Update(said, None, None, None).lines()[-1]
