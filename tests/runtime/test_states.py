@@ -447,9 +447,9 @@ def test_the_command_says_what_is_missing(model_file: Path, tmp_path: Path) -> N
         ([str(tmp_path / "none.json"), *inputs], "there is no such file", 1),
         ([model, "--back", "--state", str(tmp_path)], "--back is not possible", 1),
         ([model, *inputs, "--trust", str(tmp_path / "no.pub")], "there is no such key", 1),
-        ([model, "--allow-unsigned"], "say where the readings come from", 2),
+        ([model, "--allow-unsigned"], "give the source of the readings: --inputs FILE", 2),
         ([model, "--back"], "--back needs --state", 2),
-        ([model, *inputs, "--opcua-demo"], "--inputs and --opcua-demo: the readings come from one", 2),
+        ([model, *inputs, "--opcua-demo"], "--inputs and --opcua-demo: the readings have one source", 2),
         ([model, *inputs, "--seconds", "5"], "--seconds cannot be used with --inputs", 2),
         ([model, *inputs, "--learn", "key.pem"], "--learn needs --state", 2),
         ([model, *inputs, "--shadow-hours", "-1"], "--shadow-hours -1 cannot be", 2),
@@ -465,7 +465,10 @@ def test_a_column_that_is_not_there_is_told(model_file: Path) -> None:
     command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", "-"]
     some = CliRunner().invoke(app, command, input="time,T_env,speed\n0,20,0\n")
     assert some.exit_code == 1
-    assert "there was no offset: P_drive never had a good reading" in some.stderr
+    assert (
+        "there was no offset: P_drive, T_cool, T_fluid, h_nozzle, pump never had a good reading"
+        in some.stderr
+    )
     assert "the inputs have no column P_drive, T_cool, T_fluid" in some.stderr
     none = CliRunner().invoke(app, command, input="time,a\n0,20\n")
     assert none.exit_code == 1
