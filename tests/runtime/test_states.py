@@ -452,8 +452,8 @@ def test_the_command_says_what_is_missing(model_file: Path, tmp_path: Path) -> N
         ([model, *inputs, "--opcua-demo"], "--inputs and --opcua-demo: the readings have one source", 2),
         ([model, *inputs, "--seconds", "5"], "--seconds cannot be used with --inputs", 2),
         ([model, *inputs, "--learn", "key.pem"], "--learn needs --state", 2),
-        ([model, *inputs, "--shadow-hours", "-1"], "--shadow-hours -1 cannot be", 2),
-        ([model, *inputs, "--shadow-um", "nan"], "--shadow-um nan cannot be", 2),
+        ([model, *inputs, "--shadow-hours", "-1"], "--shadow-hours is -1; give 0 or more", 2),
+        ([model, *inputs, "--shadow-um", "nan"], "--shadow-um is nan; give 0 or more", 2),
     ):
         done = runner.invoke(app, ["compensate", *words])
         assert done.exit_code == status
