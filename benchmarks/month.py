@@ -89,7 +89,7 @@ class Plan:
 
 
 def month(days: int, seed: int) -> Plan:
-    """The plan of the issue, its days in proportion where there are fewer than thirty."""
+    """What happens in thirty days; in fewer days, in proportion."""
     scale = days / 30.0
 
     def fault(kind: str, day: float, hours: float) -> Fault:
