@@ -52,7 +52,7 @@ def test_a_slope_is_known_as_well_as_regression_says() -> None:
 
 
 def test_a_start_that_nobody_knows_costs_certainty() -> None:
-    """3 um beside the line are where the body began: with a free intercept only the spread of u informs."""
+    """An offset of 3 um is where the body began. With a free intercept, only the spread of u informs."""
     found = known({"E": 3.0 + NOISE}, {"E": "k*u + zero"}, start_sd=100.0)
     assert found.residual["E"] == pytest.approx(np.std(NOISE), rel=1e-3)
     about = found.rows[:, 1] @ found.rows[:, 1]
