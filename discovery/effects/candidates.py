@@ -14,7 +14,18 @@ from discovery.effects.places import TEMPERATURES, Spot, spots
 from discovery.models import Model
 from discovery.models.units import differences, same_dimension
 from discovery.recordings import Channel
-from discovery.terms import Apply, Expression, Name, Number, Term, delays_at, names, parse, substitute
+from discovery.terms import (
+    Apply,
+    Expression,
+    Name,
+    Number,
+    Term,
+    delays_at,
+    names,
+    parse,
+    rewrite,
+    substitute,
+)
 
 
 @dataclass(frozen=True)
@@ -325,9 +336,10 @@ def _units(h: Hypothesis, model: Model, channels: Mapping[str, Channel]) -> dict
 
 def _flow_unit(h: Hypothesis, channels: Mapping[str, Channel]) -> str:
     """What the unit of an effect that is in proportion to a flow carries, as "/(l/min)"; nothing where a flow
-    has no unit.
+    has no unit, or where its sign alone counts.
     """
-    if "flow" not in names(parse(h.effect.formula, f"effect {h.effect.word}")):
+    formula = parse(h.effect.formula, f"effect {h.effect.word}")
+    if "flow" not in names(rewrite(formula, lambda f: Number(1.0) if f.function == "sign" else None)):
         return ""
     used = {name for term in h.terms for name in names(term.expression)} & set(channels)
     return next((f"/({u})" for n in sorted(used) if same_dimension(u := channels[n].unit, "l/min")), "")

@@ -2,7 +2,7 @@
 
 from discovery.terms.delays import delays_at
 from discovery.terms.dual import Dual, Program, compiled, evaluate
-from discovery.terms.expression import Apply, Expression, Name, Number, degree, names, substitute
+from discovery.terms.expression import Apply, Expression, Name, Number, degree, names, rewrite, substitute
 from discovery.terms.parsing import parse
 from discovery.terms.printing import text
 from discovery.terms.term import Term
@@ -21,6 +21,7 @@ __all__ = [
     "evaluate",
     "names",
     "parse",
+    "rewrite",
     "substitute",
     "text",
 ]

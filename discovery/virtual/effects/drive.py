@@ -164,6 +164,7 @@ DRIVE = (
         _driven_by_speed,
         _preload_reach,
         _preload,
+        ("friction_speed",),  # by far the most of it: size n/top / k, also of a cold bearing
     ),
     Effect(
         "copper_resistance", "1", "q = size P 0.00393 (T - T_env)", _driven_by_power, number(1.0), _copper

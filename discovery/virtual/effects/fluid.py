@@ -129,6 +129,7 @@ def _gap(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
     laws = [Law("gap", Form.LINK, a, b, size * share, leaves=b, film=(name, 0.15)) for a, b, share in pairs]
     level = [
         heat("gap fills", name, 1.0 / fill, m.words.pump),
+        Law("gap is full", Form.LINK, name, size=1.0 / fill, gate=m.words.pump),  # the rest flows past it
         Law("gap leaks", Form.LINK, name, size=1.0 / leak),
     ]
     return m.plus([*laws, *level], {name: LEVEL})
