@@ -173,7 +173,7 @@ def make_context(
     """
     inputs = _inputs(campaign, recordings, outputs)
     whole = {r: make_grid(campaign, r, inputs, outputs, coarse=NODES, most=2 * NODES) for r in recordings}
-    belief = thresholds.BELIEF if physical else None
+    belief = thresholds.BELIEF if physical and not model.guessed else None
     stated = {name: campaign.channels[name].noise for name in outputs}
 
     def fitted(grids: Mapping[str, Grid], begin: Fit | None = None) -> Fit:

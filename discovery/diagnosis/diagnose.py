@@ -138,7 +138,8 @@ def diagnose(
         held_out: recordings for the proof; nothing else uses them.
         outputs: measured channels; default all that model and campaign share.
         effects: further effects; one with the same word replaces that of the catalogue.
-        physical: whether an engineer chose the start values of the model (not a program).
+        physical: whether an engineer chose the start values of the model (not a program); those of a model
+            file that says `guessed = true` are not believed in any case.
         fitted: the fit of the model, if there is one already.
         tell: is called with a few words when a step begins.
 

@@ -42,6 +42,7 @@ def first_model(
     lines = [
         "# The simplest model that could work. Improve it. Each output has its own equation.",
         f'name = "{count}"',
+        "guessed = true   # delete this line once the start values are what you know of the machine",
         "",
         "[parameters]",
         *(line for block in blocks for line in block.parameters),

@@ -83,6 +83,11 @@ class ModelForm(Strict):
 
     name: str = ""
     time_unit: Literal["s", "min", "h", "d"] = "s"
+    guessed: bool = Field(
+        False,
+        description="true: the start values are guesses, and a diagnosis does not believe them (written by "
+        "`discovery new`)",
+    )
     parameters: dict[str, ParameterForm] = Field(default_factory=dict)
     states: dict[str, StateForm]
     terms: list[TermForm] = Field(default_factory=list)
@@ -125,7 +130,8 @@ def read_model(path: Path) -> Model:
     for name, formula in form.outputs.items():
         outputs[name] = parse(formula, place := at("outputs", name))
         check_memory(outputs[name], parameters, states, place)
-    return Model(form.name or Path(path).stem, parameters, states, tuple(terms), outputs, form.time_unit)
+    name = form.name or Path(path).stem
+    return Model(name, parameters, states, tuple(terms), outputs, form.time_unit, form.guessed)
 
 
 def _check_names(form: ModelForm, at: Callable[..., str]) -> None:
@@ -215,6 +221,7 @@ def model_document(model: Model) -> dict[str, Any]:
     return {
         "name": model.name,
         "time_unit": model.time_unit,
+        **({"guessed": True} if model.guessed else {}),
         "parameters": {name: _parameter_entry(p) for name, p in model.parameters.items()},
         "states": {name: _state_entry(state) for name, state in model.states.items()},
         "terms": [_term_entry(name, term) for name, term in told_apart],
