@@ -4,10 +4,12 @@
 
 for each flow of the model, and in the same way for each output. psi_m are the inputs, the body and the
 recording, each minus its mean and divided by its spread, scaled so that the total error of a flow is the
-share. The bodies of a lumped model also have no sharp edges: a share of each flow enters a neighbour of its
-body. Both shares are unknown and grow together from an exact model to a coarse one. The part of the form
-error that changes with time is process noise (`process_noise.py`). This part does not average out over a long
-recording (Kennedy & O'Hagan, J. R. Stat. Soc. B 63, 2001).
+share. The bodies of a lumped model also have no sharp edges, and are not equally warm everywhere: a share of
+each flow enters a neighbour of its body, and the place that an output sees answers to the flow before the
+whole body does, by a third of its Biot number (a plate that is heated on one side; Incropera, DeWitt, ch. 5:
+a body is one mass up to a Biot number of 0.1). The shares are unknown and grow together from an exact model
+to a coarse one. The part of the form error that changes with time is process noise (`process_noise.py`). This
+part does not average out over a long recording (Kennedy & O'Hagan, J. R. Stat. Soc. B 63, 2001).
 """
 
 from __future__ import annotations
@@ -18,20 +20,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, predict, sensitivities
+from discovery.dynamics.prediction import output_matrix
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.signatures import signatures
 from discovery.fitting import Fit
-from discovery.terms import Term, evaluate
+from discovery.terms import Apply, Number, Term, evaluate, names
 
 Array = NDArray[np.float64]
 
-LAWS, EDGES = 36, 16  # directions in the readings in which form errors of laws and edges are kept
+LAWS, PLACES = 36, 36  # directions in the readings in which form errors of laws and of places are kept
+DEPTH = 1 / 3  # of its Biot number: share of its rise by which a plate is warmer where it is heated
+INNER = (0.05, 0.2)  # of the time constant of a body: how fast the place that an output sees may answer
 
 
 def model_form(fit: Fit, white: Array) -> tuple[list[Array], int]:
     """By recording, what the readings (R, Y, M) show more for form errors of the whole model of a share of
     one: the directions, each as likely as any other (unit normal), that hold nearly all of what the
-    parameters of the fit do not absorb. The number of those that are laws; the rest are edges.
+    parameters of the fit do not absorb. The number of those that are laws; the rest are places.
 
     Args:
         white: (Y,) reading noise, in which directions are compared.
@@ -41,7 +46,7 @@ def model_form(fit: Fit, white: Array) -> tuple[list[Array], int]:
     basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0]
     kept = [
         _directions(columns, _stacked(runs, columns, white), basis, most)
-        for columns, most in ((_laws(runs), LAWS), ([edge_columns(run) for run in runs], EDGES))
+        for columns, most in ((_laws(runs), LAWS), ([place_columns(run) for run in runs], PLACES))
     ]
     return [np.concatenate(pair, axis=2) for pair in zip(*kept, strict=True)], kept[0][0].shape[2]
 
@@ -69,6 +74,58 @@ def law_columns(
         owners += len(points)
     flows = sensitivities(run, (), (), pieces, count=owners)
     return np.concatenate([flows, _levers(run, scales, index, count)], axis=2)
+
+
+def place_columns(run: Trajectory) -> Array:
+    """What the readings show more (R, Y, M) where a flow does not act in a whole body: it enters a neighbour,
+    or the place that an output sees answers first.
+    """
+    return np.concatenate([edge_columns(run), inner_columns(run)], axis=2)
+
+
+def inner_columns(run: Trajectory) -> Array:
+    """What the readings show more (R, Y, M) where the place that an output sees answers to each flow before
+    its body does: by a third of the rise that the flow makes in the body (a Biot number of one), within a
+    part of the time constant of the body.
+    """
+    system = run.system
+    grid, nodes = system.grid, system.grid.looked_at
+    levers = output_matrix(run, nodes)
+    first = np.minimum(2 * nodes, 2 * len(grid.step) - 1)
+    losses = -np.median(np.diagonal(run.a, axis1=1, axis2=2), axis=0)  # 1 / time constant
+    slow = np.maximum(losses, 1.0 / float(grid.time[-1] - grid.time[0]))
+    found = [np.zeros((len(nodes), len(grid.outputs), 0))]
+    for term in _flows(run):
+        for name, sign in ((term.into, 1.0), (term.source, -1.0)):
+            if name is None:
+                continue
+            i = system.states.index(name)
+            for part in INNER:
+                lagged = Apply("lag", (term.expression, Number(part / slow[i])))
+                series = np.asarray(evaluate(lagged, run.at_ends(), memory=system.ends).value, dtype=float)
+                rise = (
+                    sign * DEPTH * system.scale[i] / slow[i] * np.broadcast_to(series, (2 * len(grid.step),))
+                )
+                seen = levers[:, :, i] * rise[first, None]
+                found += [_only(seen, y) for y in _outputs_of(run, name)]
+    return grid.at_readings(np.concatenate(found, axis=2))
+
+
+def _outputs_of(run: Trajectory, state: str) -> list[int]:
+    """Indices of the outputs that show a state."""
+    shown = run.system.model.outputs
+    return [
+        y
+        for y, name in enumerate(run.system.grid.outputs)
+        if name == state or (name in shown and state in names(shown[name]))
+    ]
+
+
+def _only(seen: Array, y: int) -> Array:
+    """One output of several, (R, Y) as (R, Y, 1)."""
+    out = np.zeros((*seen.shape, 1))
+    out[:, y, 0] = seen[:, y]
+    return out
 
 
 def edge_columns(run: Trajectory) -> Array:

@@ -64,7 +64,7 @@ class Prior:
     levels: Mapping[float, float]  # of the heat that nobody records, each with its weight
     shares: Mapping[float, float]  # of what flows through a body, off from hour to hour
     slow: Mapping[float, float]  # slow noise, shares of the reading noise
-    forms: Mapping[tuple[float, float], float]  # by which laws are off, and flows beyond the edge of a body
+    forms: Mapping[tuple[float, float], float]  # laws are off; flows act beyond a body
 
 
 def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float = 0.0) -> dict[str, float]:

@@ -34,7 +34,7 @@ class Noise:
     slow_time: float = SLOW_TIME
     heat_time: float = HEAT_TIME
     form: float = 0.0  # share by which a law of the model is off at an operating point, whenever it is there
-    edge: float = 0.0  # share of a flow that enters a neighbour of the body that it is drawn at
+    edge: float = 0.0  # share of a flow that enters a neighbour of its body, or shows before all of its body
     jitter: float = 0.0  # of single switches of inputs that may be logged late, as a share of `Grid.unsure`
 
     @property

@@ -1,0 +1,58 @@
+"""Form errors of places: an output sees a place of a body, which answers before the whole body does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from discovery.dynamics import Trajectory, make_grid, make_system, predict, simulate
+from discovery.evidence.form_error import INNER, inner_columns, place_columns
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
+
+Array = NDArray[np.float64]
+
+C, HA, POWER, ON = 50e3, 10.0, 200.0, 7200.0  # J/K, W/K, W, s
+TIME = np.arange(0.0, 57601.0, 60.0)
+
+
+@pytest.fixture(scope="module")
+def run() -> Trajectory:
+    """One body that a step of power warms, seen with 3 um/K."""
+    channels = {
+        "y": Channel("y", "error", "um", None, "linear"),
+        "u": Channel("u", "heat load", "W", None, "held"),
+    }
+    values = {"y": np.zeros(len(TIME)), "u": np.where(TIME >= ON, POWER, 0.0)}
+    state = State("T", "degC", C, parse("20"), 0.0, 1 / C)
+    terms = (Term("load", "T", parse("u")), Term("air", "T", parse("hA*(20 - T)")))
+    model = Model("one", {"hA": Parameter(HA)}, {"T": state}, terms, {"y": parse("3*(T - 20)")})
+    campaign = Campaign("c", channels, {"r": Recording("r", TIME, values)})
+    return simulate(make_system(model, make_grid(campaign, "r", ["u"], ("y",))), model.values())
+
+
+def test_a_place_rises_as_much_as_its_body_in_a_part_of_its_time(run: Trajectory) -> None:
+    """Closed form: 3 um/K times a third of P/hA, with a part of the time constant C/hA."""
+    found = inner_columns(run)[:, 0, : len(INNER)]
+    since = np.maximum(TIME - ON, 0.0)
+    for column, part in zip(found.T, INNER, strict=True):
+        assert column == pytest.approx(POWER / HA * (1 - np.exp(-since * HA / (part * C))), abs=1e-6)
+
+
+def test_places_explain_what_lumping_a_bar_of_two_cells_leaves(run: Trajectory) -> None:
+    """The front cell is heated and seen; the model has one body of both. It has no neighbour, so no edge."""
+
+    def rates(t: float, x: Array) -> Array:
+        link = 40.0 * (x[1] - x[0])
+        heat = POWER if t >= ON else 0.0
+        return np.array([(heat + link - HA / 2 * x[0]) / (C / 2), (-link - HA / 2 * x[1]) / (C / 2)])
+
+    bar = solve_ivp(rates, (0.0, TIME[-1]), [0.0, 0.0], t_eval=TIME, max_step=60.0, rtol=1e-8).y
+    left = 3 * bar[0] - predict(run)[:, 0]
+    columns = place_columns(run)[:, 0]
+    rest = left - columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
+    assert np.std(left) > 1.0
+    assert np.std(rest) < 0.1 * np.std(left)
