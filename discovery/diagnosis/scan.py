@@ -9,13 +9,14 @@ from math import inf
 import numpy as np
 
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.scored import Scored, score
+from discovery.diagnosis.scored import Scored, is_usual, settled
 from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score, Without, scan
 from discovery.evidence.events import place_events
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.signatures import signatures
+from discovery.fitting import Noise
 
 
 @dataclass(frozen=True)
@@ -85,4 +86,15 @@ def attempt(
     if h.effect.amplitude.fixed is None:
         low = 0.0 if h.effect.amplitude.sign > 0 else -h.effect.amplitude.most
         sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
-    return score(context, (*others, h), current.noise, current.fit, sizes, goal)
+    chosen = (*others, h)
+    tries = [settled(context, chosen, noise, current.fit, sizes, goal) for noise in _noises(context, current)]
+    found = [one for one in tries if one is not None]
+    return max(found, key=lambda one: one.evidence, default=None)
+
+
+def _noises(context: Context, current: Scored) -> list[Noise]:
+    """Noises to refit under: the most likely one, and the usual one where that is larger than usual, because
+    much process noise explains any path of a model and holds a fit where it is.
+    """
+    coarse = not is_usual(current.settings[current.best])
+    return [current.noise, context.usual] if coarse else [current.noise]

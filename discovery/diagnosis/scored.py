@@ -26,6 +26,8 @@ from discovery.models import Model
 Array = NDArray[np.float64]
 
 ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
+ROUNDS = 3  # of refits under a noise that is more likely
+MOVED = 1.0  # log-likelihood that calls for another one
 KEPT = 4  # noise settings of a model, the most likely ones
 
 
@@ -89,6 +91,15 @@ class Scored:
         """Probability that the error is larger than usual for a lumped model, over the settings tried."""
         coarse = np.array([not is_usual(s) for s in self.settings])
         return float(np.exp(self.levels - log_sum_exp(self.levels)) @ coarse)
+
+    @property
+    def ahead(self) -> float:
+        """Log-likelihood by which the optimum under the most likely noise lies above the fit, to first order.
+
+        A fit knows no form errors, so none take part.
+        """
+        _, step, covariance = self.grams[self.best].without(self.seen.spread).solved()
+        return 0.5 * float(step @ np.linalg.solve(covariance, step)) if len(step) else 0.0
 
     @property
     def off(self) -> float:
@@ -228,6 +239,28 @@ def score(
     except RunsAwayError:
         return None
     return scored(context, chosen, fit)
+
+
+def settled(
+    context: Context,
+    chosen: Sequence[Hypothesis],
+    noise: Noise,
+    start: Fit | None = None,
+    sizes: Mapping[str, float] | None = None,
+    goal: float = inf,
+) -> Scored | None:
+    """As `score`, and refitted under the noise that is most likely then, until nothing moves any more: what
+    process noise takes for granted far from the machine, a model with less of it may explain.
+    """
+    one = score(context, chosen, noise, start, sizes, goal)
+    for _ in range(ROUNDS):
+        if one is None or one.fit.ended_early or one.evidence == -inf or one.ahead < MOVED:
+            break
+        other = score(context, chosen, one.noise, one.fit)
+        if other is None or other.evidence <= one.evidence:
+            break
+        one = other
+    return one
 
 
 def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:

@@ -12,7 +12,7 @@ from math import inf
 
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.scan import Scan, attempt, scan_model
-from discovery.diagnosis.scored import Scored, light, score, scored
+from discovery.diagnosis.scored import Scored, light, score, scored, settled
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score
 from discovery.fitting import Noise
@@ -67,9 +67,9 @@ class Search:
     def run(self) -> Search:
         """Search from the most likely model that was tried, or from the baseline."""
         if not self.tried:
-            rough = score(self.context, (), self.context.usual)
-            assert rough is not None  # the context has fitted it
-            self.keep(score(self.context, (), rough.noise, rough.fit) or rough)
+            first = settled(self.context, (), self.context.usual)
+            assert first is not None  # the context has fitted it
+            self.keep(first)
         current = self.best
         while True:
             start = current.keys

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.crossvalidation import left_out
 from discovery.diagnosis.scan import scan_model
-from discovery.diagnosis.scored import is_usual, with_force
+from discovery.diagnosis.scored import MOVED, is_usual, score, settled, with_force
 from tests.diagnosis.parts import bare, claim_of, dry, scored_of, wetted
 
 
@@ -110,3 +110,17 @@ def test_what_is_there_predicts_recordings_that_are_left_out() -> None:
     assert proofs[event.key] is None  # other recordings say nothing of it
     alone = replace(dry(), recordings=("r1",))
     assert left_out(alone, wetted(), [h]) == {h.key: None}
+
+
+def test_a_fit_settles_under_the_noise_that_it_makes_likely() -> None:
+    """Fitted under the noise of the model that lacks the fluid, the whole model stands beside its optimum."""
+    coarse = max(dry().settings, key=lambda s: (s.noise.share, s.level)).noise
+    chosen = (claim_of(dry(), "fluid_convection", "table"),)
+    first, last = score(dry(), chosen, coarse), settled(dry(), chosen, coarse)
+    assert first is not None
+    assert last is not None
+    assert first.ahead > MOVED
+    assert last.ahead < 0.01 * MOVED
+    assert last.evidence > first.evidence + 1.0
+    size = {name: p.value for name, p in last.fit.model.parameters.items()}
+    assert size["hF_table"] == pytest.approx(30.0, rel=0.05)
