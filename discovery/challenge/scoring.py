@@ -5,6 +5,10 @@ log evidence +0.7/sqrt(number of rivals, the answer included); no mismatch where
 that the key accepts +1, else `unexplained` 0; a missed effect 0; a false alarm, a wrong name, physics taken
 for the measuring chain or the reverse -2. Several effects: the share found, -1 for each that is not there. A
 place counts if at most one state too many is listed.
+
+A machine also has laws that its baseline lacks although nobody concealed them; the key lists them under
+`also_true`. To name one is no mistake: +1 if nothing is concealed, 0 if the concealed effect is not named,
+and no deduction next to the concealed effect.
 """
 
 from __future__ import annotations
@@ -23,8 +27,9 @@ NEAR = 3.0  # log evidence within which an alternative belongs to the answer
 PENALTY = -2.0
 SHOWN = frozenset({"joint_hysteresis"})  # stated at an output, though it sits at a body
 
-RIGHT, ELSEWHERE, IN_SET, MISSED, UNNAMED = (
+RIGHT, OF_MACHINE, ELSEWHERE, IN_SET, MISSED, UNNAMED = (
     "right",
+    "true of the machine",
     "right effect, wrong place",
     "truth in the set",
     "missed",
@@ -55,9 +60,12 @@ def judge(key: Key, answer: Answer | None) -> Judgement:
     """
     if answer is None:
         return Judgement(PENALTY, FAILED)
-    verdict, found = answer["verdict"], answer.get("physics") or []
+    verdict, named = answer["verdict"], answer.get("physics") or []
+    found = [f for f in named if not of_machine(key, f)]
     if verdict in key.get("accepts", ()):
         return Judgement(1.0, RIGHT)
+    if named and not found:
+        return Judgement(0.0 if key["effect"] else 1.0, OF_MACHINE)
     if key["effect"] is None:
         return Judgement(1.0, RIGHT) if verdict == "no mismatch" else Judgement(PENALTY, FALSE_ALARM)
     if verdict == "no mismatch":
@@ -93,6 +101,13 @@ def names(key: Key) -> set[str]:
 def places(key: Key) -> set[str]:
     """States or output at which the effect acts; none where it acts everywhere."""
     return {*key["states"], *([key["output"]] if "output" in key else [])}
+
+
+def of_machine(key: Key, named: Answer) -> bool:
+    """Whether a named effect acts at the machine in silence, and is not one of those that are concealed."""
+    if any(named["effect"] in names(truth) for truth in truths(key)):
+        return False
+    return any(named["effect"] in names(own) and at_place(own, named) for own in key.get("also_true", ()))
 
 
 def _touches(found: Answer, key: Key) -> bool:

@@ -13,6 +13,8 @@ from discovery.challenge.intervals import Share, share
 from discovery.challenge.overlap import overlap
 from discovery.challenge.scoring import (
     ELSEWHERE,
+    FAILED,
+    FALSE_ALARM,
     RIGHT,
     WRONG,
     WRONG_KIND,
@@ -23,6 +25,7 @@ from discovery.challenge.scoring import (
     in_stated_set,
     judge,
     names,
+    of_machine,
     places,
     stands,
     truths,
@@ -51,6 +54,11 @@ class Scored:
     def named(self) -> list[Answer]:
         """Effects that the answer names."""
         return list(self.answer.get("physics") or []) if self.answer else []
+
+    @property
+    def alarms(self) -> bool:
+        """A false alarm, or no answer, where nothing is concealed."""
+        return self.judgement.word in (FALSE_ALARM, FAILED)
 
     @property
     def large(self) -> bool:
@@ -138,8 +146,8 @@ def tally(scored: Sequence[Scored]) -> Tally:
         words=Counter(s.judgement.word for s in scored),
         confusion=_counts(pair for s in scored for pair in _confused(s)),
         power=_power([s for s in scored if s.key["kind"] in ("one", "input") and "rms_over_noise" in s.key]),
-        false_alarms=share([s.verdict != "no mismatch" for s in quiet]),
-        false_alarms_coloured=share([s.verdict != "no mismatch" for s in quiet if s.key.get("coloured")]),
+        false_alarms=share([s.alarms for s in quiet]),
+        false_alarms_coloured=share([s.alarms for s in quiet if s.key.get("coloured")]),
         outside_named=share([s.judgement.word in (WRONG, WRONG_KIND) for s in outside]),
         large_named=share([s.verdict in NAMING for s in large]),
         large_right=share([s.judgement.word == RIGHT for s in large_told]),
@@ -206,7 +214,7 @@ def _first_body(s: Scored) -> str | None:
 
 def _has_extra(s: Scored) -> bool:
     true = set().union(*(names(t) for t in truths(s.key)))
-    return any(f["effect"] not in true for f in s.named)
+    return any(f["effect"] not in true and not of_machine(s.key, f) for f in s.named)
 
 
 def _confused(s: Scored) -> list[tuple[str, str]]:
@@ -243,7 +251,7 @@ def _power(scored: Sequence[Scored]) -> list[Bin]:
 def _confidences(scored: Sequence[Scored]) -> list[tuple[float, bool]]:
     """Probability and truth of every effect that was named: effect and place have to be right."""
     return [
-        (float(f["probability"]), any(stands(t, f) for t in truths(s.key)))
+        (float(f["probability"]), any(stands(t, f) for t in truths(s.key)) or of_machine(s.key, f))
         for s in scored
         for f in s.named
         if f.get("probability") is not None

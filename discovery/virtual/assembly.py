@@ -1,7 +1,8 @@
 """A machine built part by part, together with the model that an engineer would write of it.
 
 What an engineer knows (a joint, the air, a recorded power) enters the plant cell by cell and the baseline as
-one term of a body. What he leaves out, `nature`, enters the plant alone.
+one term of a body. What he leaves out, `nature`, enters the plant alone. A law of the plant that the baseline
+lacks, or has in another form, is noted where it is built: `lacks`.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ import numpy as np
 
 from discovery.models import Model, Parameter, State
 from discovery.terms import Term, parse
-from discovery.virtual.machine import T_REF, Channel, Machine, Pace, Words
+from discovery.virtual.machine import T_REF, Channel, Lack, Machine, Pace, Words
 from discovery.virtual.materials import Bar, Share, facing
-from discovery.virtual.network import Array, Form, Gate, Inputs, Law, Network, Switch, heat, link
+from discovery.virtual.network import Array, Form, Gate, Inputs, Law, Network, Switch, heat, linear, link
 from discovery.virtual.signals import Draw
+
+ONE = 1000.0  # times the conductance inside a body: it has one temperature
 
 
 class Assembly:
@@ -49,6 +52,7 @@ class Assembly:
         self.airs: dict[str, float] = {}
         self.wet: dict[str, float] = {}
         self.driven: dict[str, str] = {}
+        self.unknown: list[Lack] = []
 
     def about(self, value: float, spread: float = 0.15) -> float:
         """A dimension drawn around its usual value; `spread` is the standard deviation of its logarithm."""
@@ -65,6 +69,13 @@ class Assembly:
             link(f"inside {bar.name}", a, b, bar.conductance * bar.cells)
             for a, b in zip(bar.nodes, bar.nodes[1:], strict=False)
         ]
+        if bar.cells > 1:  # heat diffuses through it: its inside is a mass behind its surface
+            self.lacks(
+                "second_thermal_mass",
+                (bar.name,),
+                f"inside {bar.name}",
+                believed=lambda law: replace(law, size=ONE * law.size),
+            )
         begin = parse(start or self.default_air)
         capacity = float(f"{bar.capacity:.4g}")
         self.states[bar.name] = State(bar.name, capacity=capacity, start=begin, scale=1.0 / capacity)
@@ -106,6 +117,8 @@ class Assembly:
             size = coefficient * share / 5.0**exponent
             form, shape = (Form.POWER, (exponent,)) if exponent else (Form.LINK, ())
             self.laws.append(Law(f"air {body}", form, node, around, size, shape=shape, leaves=around))
+        if exponent:
+            self.lacks("natural_convection", (body,), f"air {body}", believed=linear)
         self.airs[body] = coefficient
         self.believe(
             f"air around {body}",
@@ -137,6 +150,11 @@ class Assembly:
         self.laws += [heat(name, node, part, power) for node, part in self.span(body, *at)]
         self.driven[body] = speed
         typical = float(power({speed: np.array([1000.0])})[0])
+
+        def palmgren(u: Inputs) -> Array:
+            return np.asarray(typical * (u[speed] / 1000.0) ** (5.0 / 3.0))
+
+        self.lacks("friction_speed", (body,), name, believed=lambda law: replace(law, gate=palmgren))
         self.believe(f"friction of {body}", body, f"P_{body}*({speed}/1000)**1.667",
                      {f"P_{body}": (typical, "W")})  # fmt: skip
 
@@ -150,6 +168,13 @@ class Assembly:
                 Law(f"fluid {body}", Form.LINK, node, words.fluid, conductance * share, words.pump,
                     leaves=words.fluid, film=covered)
             )  # fmt: skip
+        if film:  # the surface is wetted by the film, not in proportion to the flow
+            self.lacks(
+                "fluid_convection_flow",
+                (body,),
+                f"fluid {body}",
+                believed=lambda law: replace(law, film=None),
+            )
         self.wet[body] = conductance
         self.believe(f"fluid on {body}", body,
                      f"hF_{body}*{words.pump}*({words.fluid_channel} - {body})",
@@ -211,6 +236,12 @@ class Assembly:
         self.nodes |= nodes or {}
         self.switches |= switches or {}
 
+    def lacks(
+        self, effect: str, states: tuple[str, ...], *laws: str, believed: Callable[[Law], Law | None]
+    ) -> None:
+        """The baseline lacks these laws of the plant, or has them as `believed`."""
+        self.unknown.append(Lack(effect, states, laws, believed))
+
     def machine(
         self,
         title: str,
@@ -228,5 +259,6 @@ class Assembly:
         return Machine(
             title, Network(self.nodes, tuple(self.laws), self.switches), self.bodies, self.levers,
             self.offsets, (*channels, *self.outputs), baseline, self.nominal, cycle, words, pace,
-            joints=self.joints, air=self.airs, wet=self.wet, driven=self.driven, **facts,
+            joints=self.joints, air=self.airs, wet=self.wet, driven=self.driven,
+            lacks=tuple(self.unknown), **facts,
         )  # fmt: skip

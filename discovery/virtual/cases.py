@@ -99,6 +99,11 @@ def _facts(world: World) -> Key:
         "coloured": world.coloured,
         "noise": world.sigma.round(4).tolist(),
         "lumping_over_noise": round(world.lumping, 3),
+        "also_true": [
+            {"effect": lack.effect, "states": list(lack.states), "rms_over_noise": round(rms, 3)}
+            | ({"also": list(also)} if (also := EFFECTS[lack.effect].also) else {})
+            for lack, rms in world.lacks()
+        ],
     }
 
 

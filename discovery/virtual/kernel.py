@@ -11,15 +11,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from discovery.virtual.network import Form
+from discovery.virtual.network import KELVIN, STEFAN_BOLTZMANN, Form
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SMALLEST = 1000.0  # parts of a step, at most
 GAMMA = 1.0 - 1.0 / np.sqrt(2.0)
-STEFAN_BOLTZMANN = 5.670374e-8
-KELVIN = 273.15
 RPM = 2.0 * np.pi / 60.0  # rad/s per rpm
 
 # The columns of the integer table of laws.

@@ -66,6 +66,16 @@ class Spare:
 
 
 @dataclass(frozen=True)
+class Lack:
+    """A law that nature has at a machine in silence, and that its baseline lacks or has in another form."""
+
+    effect: str
+    states: tuple[str, ...]
+    laws: tuple[str, ...]  # names of the laws of the plant
+    believed: Callable[[Law], Law | None]  # each of them in the form of the baseline; None: not at all
+
+
+@dataclass(frozen=True)
 class Words:
     """Names that inputs and nodes have on this machine; empty: it has none."""
 
@@ -114,6 +124,7 @@ class Machine:
     shown: tuple[
         Callable[[Array, float], Array], ...
     ] = ()  # what joints and sensors do to the outputs (n, Y)
+    lacks: tuple[Lack, ...] = ()  # what the baseline lacks even in silence
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -146,6 +157,11 @@ class Machine:
         changed = self.network.changed(
             lambda law: replace(law, size=factor * law.size) if law.name.startswith(laws) else law
         )
+        return replace(self, network=changed)
+
+    def as_believed(self, lack: Lack) -> Machine:
+        """This machine with one law in the form that the baseline has."""
+        changed = self.network.changed(lambda law: lack.believed(law) if law.name in lack.laws else law)
         return replace(self, network=changed)
 
     def mean(self, run: Run, body: str) -> Array:

@@ -23,6 +23,9 @@ Inputs = Mapping[str, Array]
 Gate = str | Callable[[Inputs], Array]
 """Factor of a law: the name of an input, or a function of the inputs that gives (n,) or a number."""
 
+STEFAN_BOLTZMANN = 5.670374e-8
+KELVIN = 273.15
+
 ZERO = "0"
 """The name of a boundary that is always zero."""
 
@@ -122,6 +125,12 @@ def stream(name: str, into: str, source: str, size: float, gate: Gate | None = N
 def natural(name: str, into: str, source: str, size: float, exponent: float) -> Law:
     """Natural convection, `size` [W/K at 1 K] |dT|^exponent dT: 1/4 laminar, 1/3 turbulent."""
     return Law(name, Form.POWER, into, source, size, shape=(exponent,), leaves=source)
+
+
+def linear(law: Law) -> Law:
+    """A law of convection or radiation as a conductance: its slope at a difference of 5 K, or at 22 degC."""
+    size = 5.0 ** law.shape[0] if law.form == Form.POWER else 4.0 * STEFAN_BOLTZMANN * (22.0 + KELVIN) ** 3
+    return replace(law, form=Form.LINK, size=size * law.size, shape=())
 
 
 def gate_values(gate: Gate | None, inputs: Inputs, n: int) -> Array:

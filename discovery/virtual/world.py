@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discovery.virtual.log import Chain, Columns, observe, reading_instants
-from discovery.virtual.machine import Machine
+from discovery.virtual.machine import Lack, Machine
 from discovery.virtual.network import Array, Inputs, heat
 from discovery.virtual.refit import Refit, refit
 from discovery.virtual.signals import HOUR, Draw, noise
@@ -21,6 +21,7 @@ LUMPING = (
     0.6,
 )  # rms over noise that a baseline leaves of its machine without effect; the noise is set by it
 TRIES = 8
+TOLD = 3.0  # log evidence within which readings do not tell two models apart
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,14 @@ class World:
     def size(self, machine: Machine) -> float:
         """Rms over noise that the first step of a refit leaves of a change."""
         return float(np.sqrt(np.mean(self.fitted.left(self.change(machine)) ** 2)))
+
+    def lacks(self) -> list[tuple[Lack, float]]:
+        """Laws that the baseline lacks in silence, each with the rms over noise that a refit leaves of it.
+
+        Only those that the readings can tell: N readings hold at most N rms^2/2 of log evidence about a law.
+        """
+        sizes = [(lack, self.size(self.machine.as_believed(lack))) for lack in self.machine.lacks]
+        return [(lack, rms) for lack, rms in sizes if len(self.fitted.residual) * rms**2 / 2.0 > TOLD]
 
     def visible(self, logs: dict[str, Columns]) -> float:
         """Rms over noise by which the residual of a full refit differs with an effect and without it."""

@@ -19,6 +19,12 @@ from discovery.challenge.tally import by_family, score_all, tally
 GAP = {"effect": "flooded_gap", "states": ["c_body_1", "b_corpus"]}
 OFFSET = {"effect": "sensor_offset", "states": [], "output": "E_Z0T"}
 QUIET: dict[str, Any] = {"effect": None, "states": []}
+OWN = {
+    "also_true": [
+        {"effect": "natural_convection", "states": ["table"], "also": ["radiation"]},
+        {"effect": "flooded_gap", "states": ["side"]},
+    ]
+}
 TWO = {
     "effect": "two",
     "states": [],
@@ -91,6 +97,30 @@ UNKNOWN = {"verdict": "unexplained", "physics": [], "alternatives": []}
         (TWO, said(named("friction_speed", "c_body_2")), 0.5, scoring.PARTLY),
         (TWO, said(named("friction_speed", "table")), 0.0, scoring.ELSEWHERE),
         (TWO, said(named("friction_speed", "c_body_2"), named("radiation", "side")), -0.5, scoring.WRONG),
+        (QUIET | OWN, said(named("natural_convection", "table")), 1.0, scoring.OF_MACHINE),
+        (QUIET | OWN, said(named("radiation", "table")), 1.0, scoring.OF_MACHINE),
+        (QUIET | OWN, said(named("natural_convection", "side")), -2.0, scoring.FALSE_ALARM),
+        (QUIET | OWN, UNKNOWN, -2.0, scoring.FALSE_ALARM),
+        (
+            QUIET | OWN,
+            said(named("natural_convection", "table"), named("wear", "table")),
+            -2.0,
+            scoring.FALSE_ALARM,
+        ),
+        (GAP | OWN, said(named("natural_convection", "table")), 0.0, scoring.OF_MACHINE),  # the gap is missed
+        (GAP | OWN, said(named("flooded_gap", "side")), 0.5, scoring.ELSEWHERE),
+        (
+            GAP | OWN,
+            said(named("radiation", "table"), named("flooded_gap", "b_corpus")),
+            1.0,
+            scoring.RIGHT,
+        ),
+        (
+            TWO | OWN,
+            said(named("friction_speed", "c_body_2"), named("radiation", "table")),
+            0.5,
+            scoring.PARTLY,
+        ),
     ],
 )
 def test_rules(key: dict[str, Any], answer: dict[str, Any] | None, points: float, word: str) -> None:

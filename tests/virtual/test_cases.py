@@ -24,6 +24,7 @@ from discovery.virtual import faults
 from discovery.virtual.cases import FAULTS, KINDS, Case, Plan, draw_plans, make_case
 from discovery.virtual.effects import EFFECTS, Shapes
 from discovery.virtual.families import FAMILIES
+from discovery.virtual.network import Form
 from discovery.virtual.world import FIT, World, draw_world
 
 SEED = {"two": 1}  # the cheapest of a few; of all others, 7
@@ -134,6 +135,19 @@ def test_visible_is_what_a_nonlinear_refit_leaves(world: World) -> None:
     hit = (np.isfinite(clean["b"]["E_Z"]) & (clean["b"]["time"] >= at)).sum()
     raw = 5.0 * np.sqrt(hit / rows)
     assert 0.5 * raw < world.visible(faulty) <= 1.001 * raw
+
+
+def test_a_key_lists_what_nature_has_and_the_baseline_has_not(world: World) -> None:
+    """Free convection of the housing, by the size that a refit of the baseline leaves of it."""
+    own = {(e["effect"], *e["states"]): e for e in case_of("one").key["also_true"]}
+    assert ("natural_convection", "base") in own
+    assert ("friction_speed", "front") not in own  # by Palmgren in the plant and in the baseline
+    assert all(e["rms_over_noise"] < 1.0 for e in own.values())  # the noise was drawn so that it hides them
+    found = {(lack.effect, *lack.states): rms for lack, rms in world.lacks()}
+    linear = next(lack for lack in world.machine.lacks if lack.laws == ("air base",))
+    plain = world.machine.as_believed(linear)
+    assert all(law.form == Form.LINK for law in plain.network.laws if law.name == "air base")
+    assert found["natural_convection", "base"] == world.size(plain)
 
 
 def test_noise_is_what_the_key_says(world: World) -> None:

@@ -1,6 +1,7 @@
 """What every family promises, and what every effect does to every machine that can have it."""
 
 from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,27 @@ def test_an_effect_acts_and_nothing_else_changes(family: str, number: int) -> No
         if effect.word not in ("fluid_delay", "fluid_sump", "joint_hysteresis", "cooling_hysteresis"):
             assert np.abs(weak.read(run(weak, u)) - plain).max() < 0.02, at
         assert m.baseline is acting.baseline
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_key_knows_all_that_a_baseline_lacks(family: str) -> None:
+    """With all laws as the baseline believes them, a refit leaves next to nothing."""
+    m = FAMILIES[family](np.random.default_rng(3))
+    m = replace(
+        m,
+        pace=replace(m.pace, hours=m.pace.hours / 3, before_h=2.0),
+        channels=tuple(replace(c, sd=0.0) if c.series else c for c in m.channels),
+    )
+    believed = reduce(lambda machine, lack: machine.as_believed(lack), m.lacks, m)
+    u = draw_inputs(np.random.default_rng(8), m, 0, 0.0)
+    at = reading_instants(np.random.default_rng(0), m.pace, (m.pace.read_s[0], m.pace.read_s[0]))
+    left = []
+    for plant in (m, believed):
+        log = observe(plant, run(plant, u), first_step(m), at, np.random.default_rng(0), None)
+        left.append(refit(plant, {"a": log}, sigma_of(m, m.pace.noise[0])).rms)
+    assert left[1] < 0.1 < left[0]  # of the least noise
+    assert {s for lack in m.lacks for s in lack.states} <= set(m.bodies)
+    assert {lack.effect for lack in m.lacks} <= set(EFFECTS)
 
 
 def test_every_effect_has_a_machine() -> None:

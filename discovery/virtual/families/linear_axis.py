@@ -7,6 +7,7 @@ stretch of the screw that is travelled: each cell by the share of the stroke tha
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
@@ -52,11 +53,22 @@ def linear_axis(rng: Draw, refine: int = 1) -> Machine:
         n = np.abs(u["speed"]) / 1000.0
         return np.asarray(nut * (0.35 * n + 0.65 * n ** (5.0 / 3.0)))
 
-    for k, node in enumerate(cells):
-        share = on_cell(k, len(cells), length)
+    def usual(u: Inputs) -> Array:
+        return np.asarray(nut * (np.abs(u["speed"]) / 1000.0) ** 1.4)
+
+    strokes = {node: on_cell(k, len(cells), length) for k, node in enumerate(cells)}
+    for node, share in strokes.items():
         a.nature(Law("loss nut", Form.HEAT, node, size=0.5, gate=times(rubbing, share)))
         a.nature(Law("nut on screw", Form.LINK, node, "nut", grip, share, leaves="nut"))
     a.nature(heat("loss nut", "nut", 0.5, rubbing))
+    a.lacks(
+        "friction_speed",
+        ("nut", *SECTIONS),
+        "loss nut",
+        believed=lambda law: replace(
+            law, gate=times(usual, strokes[law.into]) if law.into in strokes else usual
+        ),
+    )
     a.driven["nut"] = "speed"
     a.believe("friction of the nut", "nut", "P_nut*(speed/1000)**1.4", {"P_nut": (0.5 * nut, "W")})
     for k, name in enumerate(SECTIONS):
@@ -80,6 +92,14 @@ def linear_axis(rng: Draw, refine: int = 1) -> Machine:
         natural("motor air", "motor", "T_env", 1.5, 0.25),
         heat("motor", "motor", motor, "P_servo"),
         nodes={"motor": about(4e3)},
+    )
+    a.lacks(
+        "second_thermal_mass",
+        ("bearing",),
+        *("motor", "motor flange", "motor air"),
+        believed=lambda law: (
+            replace(law, into="bearing", size=0.6 * motor) if law.form == Form.HEAT else None
+        ),
     )
     a.driven["bearing"] = "speed"
     a.believe(

@@ -62,6 +62,8 @@ def measuring_machine(rng: Draw, refine: int = 1) -> Machine:
         switches={"conditioner": Switch("ceiling", 21.3, 0.3)},
     )
 
+    a.lacks("radiation", ("granite_top",), "shine", believed=lambda _: None)
+
     tilt = 6.0 / (thick / 2)
     a.error("E_X", "um", {"beam": 7.4 * span * 0.6, "granite_top": -6.0 * span * 0.5}, uneven=0.1)
     a.error("E_Z", "um", {"legs": 7.4 * leg, "ram": -23.5 * 0.15, "granite_top": 0.3}, uneven=0.1)

@@ -12,7 +12,7 @@ from discovery.virtual import physics
 from discovery.virtual.assembly import Assembly
 from discovery.virtual.machine import Machine, Pace, Spare, Words, felt, logged
 from discovery.virtual.materials import CAST_IRON, Bar
-from discovery.virtual.network import LEVEL, Array, Form, Inputs, Law, heat, link
+from discovery.virtual.network import LEVEL, Array, Form, Inputs, Law, heat, linear, link
 from discovery.virtual.signals import Draw, lagged, levels, room, shifts, switched
 
 PACE = Pace(hours=96.0, step_s=30.0, log_s=60.0, before_h=60.0, noise=(0.3, 1.6), heat_w=4.0)
@@ -132,6 +132,7 @@ def _tall_air(a: Assembly, name: str, coefficient: float) -> None:
                     shape=(0.25,),
                 )
             )
+    a.lacks("natural_convection", (name,), f"air {name}", believed=linear)
     a.believe(
         f"air around {name}",
         name,

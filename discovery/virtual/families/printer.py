@@ -9,7 +9,7 @@ from __future__ import annotations
 from discovery.virtual.assembly import Assembly
 from discovery.virtual.machine import Channel, Machine, Pace, Spare, Words, felt, logged
 from discovery.virtual.materials import ALUMINIUM, STEEL, Bar, Material
-from discovery.virtual.network import Form, Inputs, Law, Switch
+from discovery.virtual.network import Form, Inputs, Law, Switch, linear
 from discovery.virtual.signals import Draw, levels, room
 
 PACE = Pace(
@@ -73,6 +73,7 @@ def printer(rng: Draw, refine: int = 1) -> Machine:
         ],
         switches={"thermostat": Switch("bed", target, rng.uniform(0.5, 1.5), heats=True)},
     )
+    a.lacks("radiation", ("gantry", "bed"), "shine", believed=linear)
     a.believe("bed heater", "bed", "k_bed*P_bed", {"k_bed": (1.0, "1")})
     a.believe(
         "shine of the bed", "gantry", "G_shine*(bed - gantry)", {"G_shine": (6.5 * shine, "W/K")}, "bed"
