@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -78,16 +78,25 @@ def _in_play(context: Context, current: Scored) -> list[Setting]:
 
 
 def attempt(
-    context: Context, current: Scored, others: Sequence[Hypothesis], claim: Score, goal: float = inf
+    context: Context,
+    current: Scored,
+    others: Sequence[Hypothesis],
+    claim: Score,
+    goal: Callable[[Noise], float] = lambda _: inf,
 ) -> Scored | None:
-    """Refit with a further candidate, starting from the sizes of the scan; `goal` as in `fit_model`."""
+    """Refit with a further candidate, starting from the sizes of the scan.
+
+    Args:
+        goal: as in `fit_model`, under a noise.
+    """
     h = claim.hypothesis
     sizes: dict[str, float] = {}
     if h.effect.amplitude.fixed is None:
         low = 0.0 if h.effect.amplitude.sign > 0 else -h.effect.amplitude.most
         sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
     chosen = (*others, h)
-    tries = [settled(context, chosen, noise, current.fit, sizes, goal) for noise in _noises(context, current)]
+    noises = _noises(context, current)
+    tries = [settled(context, chosen, noise, current.fit, sizes, goal(noise)) for noise in noises]
     found = [one for one in tries if one is not None]
     return max(found, key=lambda one: one.evidence, default=None)
 

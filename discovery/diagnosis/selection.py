@@ -147,10 +147,9 @@ class Search:
         keys = [frozenset((*own, claim.hypothesis.key)) for claim in pool]
         known = {*self.tried, *self.lost}
         fresh = {k: claim for k, claim in zip(keys, pool, strict=True) if k not in known}
-        goal = self._goal(start.noise) if fresh else inf
 
         def tried(claim: Score) -> Scored | None:
-            one = attempt(self.context, start, others, claim, goal)
+            one = attempt(self.context, start, others, claim, self._goal)
             return one if one is not None and one.evidence > -inf else None  # the evidence is found here
 
         found = dict(zip(fresh, side_by_side(tried, list(fresh.values())), strict=True))
