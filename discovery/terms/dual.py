@@ -350,11 +350,11 @@ def _played(memory: Memory | None, inner: Value, width: Value) -> Any:
 
 
 def _followed(played: Any, partial: Value) -> Any:
-    value, follows, contact = played
+    value, follows, _ = played
     if follows is None:
         return partial
-    full = np.broadcast_to(np.asarray(partial, dtype=float), np.shape(value))
-    return full[follows] * (contact != 0)
+    # before any contact it rests where it began, and moves with that
+    return np.broadcast_to(np.asarray(partial, dtype=float), np.shape(value))[follows]
 
 
 def _first(several: Any) -> Any:

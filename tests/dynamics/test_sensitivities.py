@@ -157,6 +157,18 @@ def test_the_width_of_a_play_behind_a_body(campaign: Campaign) -> None:
     )
 
 
+def test_a_play_begins_where_its_body_does(campaign: Campaign) -> None:
+    """Else the first reading, which zeroes a free run, would say nothing of the start of a body in its seat."""
+    model = two_bodies("0*a", "play(a, w)", w=0.4)
+    system = make_system(model, make_grid(campaign, "r", model.inputs, ["y"]))
+    values = model.values()
+    found = sensitivities(simulate(system, values, start_values(system, values)), (), ["a"])[:, 0, 0]
+    up, down = (run(system, values, start_values(system, values, {"a": by})) for by in (1e-3, -1e-3))
+    slope = (up - down) / 2e-3
+    assert slope[0] == pytest.approx(1.0)
+    assert found[0] == pytest.approx(1.0)
+
+
 def test_what_leaves_one_body_enters_the_other(campaign: Campaign) -> None:
     """Without losses the heat in both bodies is the heat that came in, exactly."""
     model = two_bodies("0*a", "40e3*(a - 22) + 90e3*(b - 22)", hA=0.0)
