@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 
 FORMER = 2  # recordings as which the spread of starts that was believed before counts
 MOST = 2.0  # of what is expected, the most that an input is logged late
+FARTHEST = 1e6  # times its start that a parameter may go: no recording shows more, and the arithmetic fails
 
 
 class Prior(NamedTuple):
@@ -267,7 +268,10 @@ def _parameter(
     is_log = bool(prior and prior.is_log)
     low = max(p.min, 1e-12) if is_log else p.min
     known = (prior.mean, prior.sd) if prior else p.prior
-    return Unknown(name, recording, False, p.at(recording or ""), low, p.max, known, is_log, belief)
+    start = p.at(recording or "")
+    reach = FARTHEST * abs(start) or np.inf
+    low, high = max(low, -reach), min(p.max, reach)
+    return Unknown(name, recording, False, start, low, high, known, is_log, belief)
 
 
 def _start_spread(state: State) -> tuple[float, Literal["given", "read", "fitted"]]:

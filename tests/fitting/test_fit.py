@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 
 from discovery.fitting import fit_model, make_problem, predict_recording
 from discovery.fitting.covariance import covariance_of
+from discovery.fitting.problem import FARTHEST
 from discovery.fitting.solve import Solution, solve
 from discovery.fitting.starts import warm_start
 from discovery.models import Model, Parameter, State
@@ -166,6 +167,19 @@ def test_a_fit_that_will_not_come_near_its_goal_ends_early(monkeypatch: pytest.M
 def test_bounds_hold() -> None:
     fitted = fit_model(model(g=Parameter(0.005, "1", 0.0, 0.01)), campaign(recording(0)), ["r0"]).model
     assert fitted.parameters["g"].value == pytest.approx(0.01, abs=1e-6)
+
+
+def test_no_parameter_runs_away_for_ever() -> None:
+    """Readings that follow their input at once would send a rate to infinity, and arithmetic with it."""
+    base = recording(0)
+    rng = np.random.default_rng(3)
+    at_once = {**base.values, "y": 0.02 * base.values["u"] + 0.5 * rng.standard_normal(200)}
+    starts = model(a=Parameter(1.0, "1/h", 0.0), g=Parameter(0.02), k=Parameter(0.0, fixed=True))
+    problem = make_problem(starts, campaign(replace(base, values=at_once)), ["r0"])
+    limits = dict(zip((u.name for u in problem.unknowns), zip(*problem.bounds, strict=True), strict=True))
+    assert limits["a"] == (0.0, FARTHEST)
+    assert limits["g"] == pytest.approx((-0.02 * FARTHEST, 0.02 * FARTHEST))
+    assert fit_model(starts, campaign(replace(base, values=at_once)), ["r0"]).model.parameters["a"].value > 10
 
 
 def test_a_fixed_parameter_stays() -> None:
