@@ -87,7 +87,8 @@ def said(s: Scored) -> str:
     """An answer in words."""
     return (
         " and ".join(
-            f"{f['effect']}@{'+'.join(f['states'])} ({f.get('probability') or 0:.2f})" for f in s.named
+            f"{f['effect']}@{'+'.join(f['states'])}" + (f" ({p:.2f})" if (p := f.get("probability")) else "")
+            for f in s.named
         )
         or s.verdict
     )

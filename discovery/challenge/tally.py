@@ -56,6 +56,11 @@ class Scored:
         return list(self.answer.get("physics") or []) if self.answer else []
 
     @property
+    def states_bodies(self) -> bool:
+        """Whether the answer states bodies at all; a method that failed should have."""
+        return self.answer is None or "location" in self.answer
+
+    @property
     def alarms(self) -> bool:
         """A false alarm, or no answer, where nothing is concealed."""
         return self.judgement.word in (FALSE_ALARM, FAILED)
@@ -139,6 +144,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
         if at_place(t, f) and (c := covered(t, f)) is not None
     ]
     said = [p for p, _ in confidences]
+    everywhere = [_gap(s) or 0.0 for s in inside if s.key["kind"] != "measuring"]
     return Tally(
         scored=scored,
         points=mean(s.judgement.points for s in scored) if scored else 0.0,
@@ -162,7 +168,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
             [
                 _first_body(s) in places(s.key)
                 for s in scored
-                if s.key["kind"] in ("one", "input", "outside") and s.key["states"]
+                if s.key["kind"] in ("one", "input", "outside") and s.key["states"] and s.states_bodies
             ]
         ),
         reliability=reliability,
@@ -174,7 +180,7 @@ def tally(scored: Sequence[Scored]) -> Tally:
         explained=median(g for s, g in gaps if s.verdict in NAMING)
         if any(s.verdict in NAMING for s, _ in gaps)
         else None,
-        explained_all=median([_gap(s) or 0.0 for s in inside if s.key["kind"] != "measuring"] or [0.0]),
+        explained_all=median(everywhere) if gaps and everywhere else None,
         seconds=median(seconds) if seconds else None,
         seconds_most=max(seconds, default=None),
         processor=median(processor) if processor else None,

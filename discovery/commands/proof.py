@@ -34,13 +34,21 @@ def challenge(
     write: Annotated[
         Path | None, typer.Option(help="Write cases and keys.json into this folder, and stop.")
     ] = None,
+    score: Annotated[
+        Path | None,
+        typer.Option(
+            help="Score the answers in this folder (case_01.json, ...) to the cases of --cases-from."
+        ),
+    ] = None,
 ) -> None:
     """Conceal effects in many simulated cases, seal the answers, solve the cases and score the diagnosis.
 
-    --write only writes cases for practice, with their keys. It solves nothing.
+    --write only writes cases for practice, with their keys. It solves nothing. --score judges the answers of
+    your own method to them: files in the form of diagnosis.json, case_01.json or case_01/diagnosis.json.
 
     \b
     discovery challenge --family headstock --cases 40 --seed 7 --write practice/headstock
+    discovery challenge --cases-from practice/headstock --score my_answers
     discovery challenge --family portal --family printer --cases 60
 
     Run the same command again to continue after a stop. Writes report.html, results.json and challenge.md
@@ -48,11 +56,19 @@ def challenge(
     """
     from discovery.challenge.run import challenge as run_challenge
     from discovery.challenge.run import family_list, practice
+    from discovery.errors import UsageError
     from discovery.progress import shown
 
     use_jobs(jobs)
     if family and "help" in family:
         typer.echo(family_list())
+        return
+    if score is not None:
+        from discovery.challenge.answers import score_answers
+
+        if cases_from is None:
+            raise UsageError("--score needs the cases: name their folder with --cases-from.")
+        typer.echo("\n".join(score_answers(cases_from, score)))
         return
     with shown() as progress:
         if write is not None:
