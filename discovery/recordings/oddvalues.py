@@ -52,6 +52,8 @@ _USUAL = 6.0  # times the steps that one in ten exceeds
 _AGREE = 0.3  # of that distance: what the neighbours differ by
 # so far away that nothing but a fault explains it: such a reading is left out on loading
 _IMPOSSIBLE = {"degC": 30.0, "um": 100.0, "um/m": 100.0}
+_ROW = 3  # such readings in a row
+_TRACE = 3.0  # times the usual steps, or those next to it: a response leaves more behind
 _SOME = 3  # readings that are none: no slip any more
 _MANY, _MANY_SHARE = 5, 0.01  # so many lone readings, or such a share of all, pull at a fit
 _ZERO = 15.0  # median steps that a reading falls to be exactly zero
@@ -96,13 +98,16 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         "zeros",
         weight=4.0,
     )
-    lone = np.setdiff1d(lone_readings(read), [*words, *zeros, *told])
-    left_out = np.intersect1d(lone, impossible_readings(channel, read)).size
+    impossible = impossible_readings(channel, read)
+    lone = np.setdiff1d(np.union1d(lone_readings(read), impossible), [*words, *zeros, *told]).astype(np.intp)
+    left_out = np.intersect1d(lone, impossible).size
     if left_out or lone.size >= max(_MANY, _MANY_SHARE * read.size):
-        first = int(lone[0])
+        first = last = int(lone[0])
+        while last + 1 in lone:
+            last += 1
         what = (
-            f"'{channel.name}' is {read[first]:g} {channel.unit} in one reading between "
-            f"{read[first - 1]:g} and {read[first + 1]:g}"
+            f"'{channel.name}' is {read[first]:g} {channel.unit} in {_count(last - first + 1)} between "
+            f"{read[first - 1]:g} and {read[last + 1]:g}"
         )
         do = "it is left out" if left_out else "leave the cell empty if the sensor failed there"
         line = int(lines[known[first]])
@@ -126,27 +131,61 @@ def odd_readings(channel: Channel, read: Array) -> Lines:
 
 
 def impossible_readings(channel: Channel, read: Array) -> Lines:
-    """Rows of readings (R,) that stand alone so far from their neighbours that only a fault explains them."""
+    """Rows of readings (R,), up to three in a row, so far from the others that only a fault explains them.
+
+    No machine goes so far and comes back between two readings without a trace: the reading after them goes on
+    where the one before them was.
+    """
     least = _IMPOSSIBLE.get(channel.unit)
     if channel.role not in _SENSORS or least is None or read.size < FEW:
         return np.zeros(0, dtype=np.intp)
-    return lone_readings(read, least)
+    steps = np.diff(read)
+    sizes, far = np.abs(steps), _far(steps, least)
+    usual = float(np.percentile(sizes, 90))
+    rows: set[int] = set()
+    for k in np.flatnonzero(sizes[:-1] > far).tolist():  # from the last right reading to the first wrong one
+        if abs(read[k] - np.median(read[max(0, k - 2 * _ROW) : k + 3 * _ROW])) > far:
+            continue  # the wrong one is this one
+        for last in range(k + 1, min(k + _ROW, read.size - 2) + 1):
+            around = sizes[[max(k - 1, 0), min(last + 1, sizes.size - 1)]]
+            moves = max(usual, float(around[around < far].max(initial=0.0)))
+            away = np.abs(read[k + 1 : last + 1] - read[k])
+            if away.min() > far and abs(read[last + 1] - read[k]) <= _TRACE * moves:
+                rows |= set(range(k + 1, last + 1))
+    return np.array(sorted(rows), dtype=np.intp)
 
 
-def lone_readings(read: Array, least: float = 0.0) -> Lines:
+def lone_readings(read: Array) -> Lines:
     """Rows of single readings (R,) far from both neighbours, which agree."""
     steps = np.diff(read)
-    if steps.size < 3 or not steps.any():
+    far = _far(steps)
+    if not np.isfinite(far):
         return np.zeros(0, dtype=np.intp)
     sizes = np.abs(steps)
-    usual = 1.4826 * float(np.median(sizes))
-    far = max(_LONE * usual, _USUAL * float(np.percentile(sizes, 90)), least)
-    if usual == 0.0 and far == 0.0:
-        return np.zeros(0, dtype=np.intp)
     away = np.minimum(sizes[:-1], sizes[1:])
     turns = np.sign(steps[:-1]) != np.sign(steps[1:])
     agree = np.abs(read[2:] - read[:-2]) < _AGREE * away
     return np.flatnonzero((away > far) & turns & agree) + 1
+
+
+def _far(steps: Array, least: float = 0.0) -> float:
+    """A step (R - 1,) beyond which a reading is far from the one before it; infinite where nothing moves."""
+    if steps.size < 3 or not steps.any():
+        return np.inf
+    sizes = np.abs(steps)
+    return (
+        max(_LONE * 1.4826 * float(np.median(sizes)), _USUAL * float(np.percentile(sizes, 90)), least)
+        or np.inf
+    )
+
+
+def _count(readings: int) -> str:
+    """How many readings, in words.
+
+    >>> _count(1), _count(2)
+    ('one reading', '2 readings in a row')
+    """
+    return "one reading" if readings == 1 else f"{readings} readings in a row"
 
 
 def _logger_words(read: Array) -> Lines:

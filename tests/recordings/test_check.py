@@ -300,7 +300,6 @@ def test_slow_quantised_and_switched_signals_are_no_frozen_sensors(write: Write)
     "cells",
     [
         [20.0] * 30 + [55.0] * 30,  # a step stays
-        [20.0] * 30 + [55.0, 55.0] + [20.0] * 30,  # two readings agree
         [20.0] * 30 + [59.0] + [25.0] * 30,  # an overshoot: the neighbours differ
         [20.0 + 35.0 * (k % 2) for k in range(60)],  # a signal that is so
         [20.0] * 30 + [32.0] + [20.0] * 30,  # a door
@@ -308,7 +307,16 @@ def test_slow_quantised_and_switched_signals_are_no_frozen_sensors(write: Write)
 )
 def test_what_moves_is_no_lone_wrong_reading(write: Write, cells: list[float]) -> None:
     told = found(write(with_column(1, [f"{cell}" for cell in cells])))
-    assert not any("in one reading" in line for line in told)
+    assert not any("in one reading" in line or "in a row" in line for line in told)
+
+
+def test_wrong_readings_in_a_row_are_left_out_and_said(write: Write) -> None:
+    path = write(with_column(1, [f"{cell}" for cell in [20.0] * 30 + [55.0, 55.5] + [20.0] * 30]))
+    [told] = found(path)
+    assert "line 32: 'T_env' is 55 degC in 2 readings in a row between 20 and 20" in told
+    assert told.endswith("left out")
+    air = next(iter(load_campaign(path).recordings.values())).values["T_env"]
+    assert np.flatnonzero(np.isnan(air)).tolist() == [30, 31]
 
 
 mutations = st.lists(
