@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Mapping
 
 from discovery.firsthour.vocabulary import fold, words_of
-from discovery.recordings.units import parse_unit
+from discovery.recordings.units import multiple, parse_unit
 
 # spelled as here once folded (small letters, signs of degrees alike) -> as pint knows it
 _SPELLED = {
@@ -133,7 +133,17 @@ def unit_in(header: str) -> tuple[str, str] | None:
         meant = form is _WITH_UNIT[0] or _is_symbol(name, unit)
         if _is_unit(unit, meant) and (meant or _belongs(name, unit)):
             return name, unit
+        if meant and _is_range(name, unit):
+            return name, unit
     return None
+
+
+def _is_range(name: str, unit: str) -> bool:
+    """Whether a whole number with a unit belongs to what a name says: AI1 [10 V], but not T_air (2 m)."""
+    found = multiple(unit)
+    has = dimension_of(known_unit(found[1]) or "") if found else {}
+    says = {quantity for word in words_of(name) for quantity, odds in word.says.items() if odds > 1.5}
+    return bool(has) and (not says or bool(has.keys() & says))
 
 
 def _is_symbol(name: str, unit: str) -> bool:
@@ -172,9 +182,26 @@ def is_dated(name: str) -> bool:
     return bool(_DATE.search(fold(name)))
 
 
+def steps_in(written: str) -> tuple[float, str] | None:
+    """Factor and unit of what counts in steps of a unit; None for a unit itself, and for what may be a range.
+
+    A whole number without a sign may be the range of an input, or a height: AI1 [10 V], T_air (2 m).
+
+    >>> steps_in("2.5 um"), steps_in("x10 mV"), steps_in("1/10 °C"), steps_in("10 V"), steps_in("2 m")
+    ((2.5, 'um'), (10.0, 'mV'), (0.1, '°C'), None, None)
+    """
+    found = multiple(written)
+    if found is None or not (known_unit(found[1]) or time_unit(found[1]) or _is_unit(found[1], True)):
+        return None
+    signed = re.search("[x×*·]", written.removesuffix(found[1]))
+    return found if signed or found[0] != round(found[0]) else None
+
+
 def _is_unit(written: str, bracketed: bool) -> bool:
-    """Whether a text is a unit; in brackets it may be one that pint knows, or is meant to be one."""
+    """Whether a text is a unit; in brackets it may also be steps of one, or one that pint knows."""
     written = written.strip()
+    if bracketed and steps_in(written):
+        return True
     if known_unit(written) or time_unit(written):
         return bracketed or _folded(written) not in ("1", "-", "m", "n", "h", "d")
     if not bracketed:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,12 @@ from discovery.errors import UserError
 from discovery.firsthour.cells import comma_is_decimal, holds_word, is_number, read_numbers
 from discovery.firsthour.clocks import is_clock
 from discovery.firsthour.longform import find_long, widen
-from discovery.firsthour.measures import unit_in
+from discovery.firsthour.measures import steps_in, unit_in
 from discovery.firsthour.sheets import Sheet, read_sheets
 from discovery.firsthour.stamps import Clock, find_clock, spread_evenly
 from discovery.firsthour.vocabulary import words_of
 from discovery.naming import is_taken, is_word
+from discovery.recordings.units import multiple
 
 Array = NDArray[np.float64]
 
@@ -141,6 +143,8 @@ def _table(sheet: Sheet) -> OwnTable:
         notes += [*said, *more]
     if not columns:
         raise UserError(f"{sheet.path}: there is no column of numbers except time")
+    columns, steps = _whole_units(columns)
+    notes += steps
     return OwnTable(
         sheet.path,
         np.round(time, 6),
@@ -153,6 +157,27 @@ def _table(sheet: Sheet) -> OwnTable:
         sheet.above,
         sheet.name,
     )
+
+
+def _whole_units(columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
+    """Columns that count in steps of a unit, in that unit: 2.5 um, x10 mV, 1/10 °C. 10 V may be a range."""
+    found, notes = list(columns), []
+    for k, column in enumerate(columns):
+        if (written := multiple(column.unit)) is None:
+            continue
+        factor, unit = written
+        if steps_in(column.unit):
+            found[k] = replace(column, unit=unit, values=factor * column.values)
+            notes.append(
+                f"column '{column.header}' counts in steps of {column.unit}: multiplied by {factor:g}"
+            )
+        elif factor != 1.0:
+            found[k] = replace(column, unit=unit)
+            notes.append(
+                f"column '{column.header}': {column.unit} is taken as its range (?); if it counts in such "
+                f'steps, say --is "{column.header}=x{column.unit}"'
+            )
+    return found, notes
 
 
 def _spread(clock: Clock) -> tuple[Array, list[str]]:

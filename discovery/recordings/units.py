@@ -4,6 +4,7 @@ Canonical: degC, rpm, W, mm, um, um/m, l/min, 1. A heat load or cooling power wi
 percent) and an "other input" keep the unit they have.
 """
 
+import math
 import re
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,6 +21,10 @@ _COMMON = frozenset({"1", "percent", "degC", "K", "W", "rpm", "mm", "um", "um/m"
 # long as it takes.
 _POWER = r"(\*\*|\^)\s?-?\d(\.\d{1,6})?(?!\s*(\*\*|\^|[\d.]))"
 _SPELLING = re.compile(rf"1?([^\W\d]|[/*() %°·²³⁻¹]|{_POWER}|(?<=[/(])1(?![\d.]))*")
+# a factor: 2.5, 1e-3, 1/10, with or without a sign of multiplication on either side; then a unit
+_MULTIPLE = re.compile(
+    r"[x×*·]?\s*(\d{1,12}(?:[.,]\d{1,12})?(?:[eE][-+]?\d{1,3})?|1/1\d{1,12}|10\^[-+]?\d{1,2})\s*[x×*·]?\s*((?!\d)[\w°%].{0,99})"
+)
 _LONGEST = 100  # letters; the coefficient of a product of several inputs has a long one
 _MISTAKEN = {"C": "degC", "c": "degC", "F": "degF", "u/min": "rpm", "U/min": "rpm", "µ": "um", "l/m": "l/min"}
 
@@ -39,15 +44,20 @@ class Conversion:
 
 @lru_cache(maxsize=256)
 def conversion(unit: str, role: str) -> Conversion:
-    """How values in `unit` become the canonical unit of `role`.
+    """How values in `unit`, a unit or a multiple of one, become the canonical unit of `role`.
 
     Raises UnitError: unknown to pint, or of a dimension that the role does not have.
 
     >>> conversion("kW", "heat load")
     Conversion(unit='W', factor=1000.0, offset=0.0)
+    >>> conversion("2.5 um", "error")
+    Conversion(unit='um', factor=2.5, offset=0.0)
     >>> conversion("1/min", "rotation speed")
     Conversion(unit='rpm', factor=1.0, offset=0.0)
     """
+    if (steps := multiple(unit)) is not None:
+        one = conversion(steps[1], role)
+        return Conversion(one.unit, steps[0] * one.factor, one.offset)
     facts = ROLES[role]
     if unit in facts.units or (unit in _COMMON and not facts.units):
         return Conversion(unit)
@@ -69,6 +79,20 @@ def conversion(unit: str, role: str) -> Conversion:
             return Conversion(unit)
         problem = f"the unit '{unit}' cannot be that of a channel of role '{role}'"
         raise UnitError(f"{problem}; {_allowed(unit, role)}") from None
+
+
+def multiple(unit: str) -> tuple[float, str] | None:
+    """Factor and unit of a multiple of a unit, as counters step and loggers scale; None for anything else.
+
+    >>> multiple("2.5 um"), multiple("x10 mV"), multiple("1/10 degC"), multiple("0,1 °C"), multiple("1/min")
+    ((2.5, 'um'), (10.0, 'mV'), (0.1, 'degC'), (0.1, '°C'), None)
+    """
+    found = _MULTIPLE.fullmatch(unit.strip())
+    if found is None or len(unit) > _LONGEST:
+        return None
+    over, _, under = found[1].replace(",", ".").replace("10^", "1e").partition("/")
+    factor = float(over) / float(under or 1.0)
+    return (factor, found[2]) if 0.0 < factor < math.inf else None
 
 
 def _affine(given: "pint.Unit", canonical: str) -> Conversion:
