@@ -71,7 +71,10 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
     limits = ROLES[channel.role].ranges.get(channel.unit)
     told = np.zeros(0, dtype=np.intp)  # what lies outside its range has a finding already
     if limits is not None:
-        told = np.flatnonzero((read < limits.usual[0]) | (read > limits.usual[1]))
+        never = (read < limits.possible[0]) | (read > limits.possible[1])
+        unusual = (read < limits.usual[0]) | (read > limits.usual[1])
+        left_out = np.isin(np.arange(read.size), impossible_readings(channel, read))
+        told = np.flatnonzero(never | (unusual & ~left_out))
     words = np.setdiff1d(words, told)
     yield from _told(
         file,
@@ -98,10 +101,10 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         "zeros",
         weight=4.0,
     )
-    impossible = impossible_readings(channel, read)
-    lone = np.setdiff1d(np.union1d(lone_readings(read), impossible), [*words, *zeros, *told]).astype(np.intp)
-    left_out = np.intersect1d(lone, impossible).size
-    if left_out or lone.size >= max(_MANY, _MANY_SHARE * read.size):
+    away = impossible_readings(channel, read)
+    lone = np.setdiff1d(np.union1d(lone_readings(read), away), [*words, *zeros, *told]).astype(np.intp)
+    dropped = np.intersect1d(lone, away).size
+    if dropped or lone.size >= max(_MANY, _MANY_SHARE * read.size):
         first = last = int(lone[0])
         while last + 1 in lone:
             last += 1
@@ -109,7 +112,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
             f"'{channel.name}' is {read[first]:g} {channel.unit} in {_count(last - first + 1)} between "
             f"{read[first - 1]:g} and {read[last + 1]:g}"
         )
-        do = "it is left out" if left_out else "leave the cell empty if the sensor failed there"
+        do = "it is left out" if dropped else "leave the cell empty if the sensor failed there"
         line = int(lines[known[first]])
         yield Finding("warning", file, line, what + more(lone.size), do, "outlier", channel.name, 2.0)
     if not channel.measured:  # the air may jump: a door

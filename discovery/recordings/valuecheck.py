@@ -8,6 +8,7 @@ import numpy as np
 from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Array, Lines
 from discovery.recordings.finding import Finding, more
+from discovery.recordings.oddvalues import impossible_readings
 from discovery.recordings.roles import ROLES
 
 FEW = 20  # readings: fewer carry no model
@@ -23,7 +24,10 @@ _SENSORS = ("ambient temperature", "fluid temperature", "coolant temperature", "
 
 
 def range_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
-    """Values that the role cannot have (errors) or seldom has (warnings). `column` (T,): canonical unit."""
+    """Values that the role cannot have (errors) or seldom has (warnings). `column` (T,): canonical unit.
+
+    Of what is left out on loading, only what the role cannot have.
+    """
     limits = ROLES[channel.role].ranges.get(channel.unit)
     if limits is None:
         return
@@ -33,7 +37,9 @@ def range_findings(file: Path, lines: Lines, channel: Channel, column: Array) ->
     if impossible.size:
         what = f"'{channel.name}' is {column[impossible[0]]:g}{unit}, no {channel.role} can be that"
         yield Finding("error", file, int(lines[impossible[0]]), what + more(impossible.size), do)
-    unusual = np.setdiff1d(_outside(column, limits.usual), impossible)
+    known = np.flatnonzero(np.isfinite(column))
+    left_out = known[impossible_readings(channel, column[known])]
+    unusual = np.setdiff1d(_outside(column, limits.usual), [*impossible, *left_out]).astype(np.intp)
     if unusual.size:
         what = (
             f"'{channel.name}' is {column[unusual[0]]:g}{unit}, unusual for a channel of role {channel.role}"

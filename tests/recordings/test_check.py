@@ -60,7 +60,10 @@ def test_nothing_is_wrong(write: Write) -> None:
         (with_line(9, "420,2O,0,"), "error: fit.csv, line 9: 'T_env' is '2O', not a number; write a number"),
         (with_line(9, '420,"20,5",0,'), "error: fit.csv, line 9: 'T_env' is '20,5' with a decimal comma"),
         (with_line(9, "420,20,5,0,"), "error: fit.csv, line 9: 5 cells under 4 columns; look for a decimal"),
-        (with_line(9, "420,200,0,"), "warning: fit.csv, line 9: 'T_env' is 200 degC, unusual for"),
+        (
+            with_line(9, "420,200,0,"),
+            "warning: fit.csv, line 9: 'T_env' is 200 degC in one reading between 20.6 and 20.1",
+        ),
         (with_line(9, "420,-300,0,"), "error: fit.csv, line 9: 'T_env' is -300 degC, no ambient temperature"),
         (with_line(9, "420,20,9e9,"), "error: fit.csv, line 9: 'speed' is 9e+09 rpm, no rotation speed can"),
         (rows(2), "error: fit.csv: only 2 rows; too short for any model"),

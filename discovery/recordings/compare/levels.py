@@ -216,7 +216,7 @@ def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iter
                 odd = odd and (siblings > 1 or _stays_apart(one, c.name, recordings))
             else:
                 odd = siblings >= 5 and abs(here) > _ALONE and agree[f"{one.name}|{c.name}"] < _AGREE
-            if odd:
+            if odd and not (here > 0 and _was_hot(one, c.name, here, recordings)):
                 read = one.known(c.name)[1]
                 side = "above" if here > 0 else "below"
                 what = (
@@ -225,6 +225,19 @@ def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iter
                     f"temperatures, which agree"
                 )
                 yield _finding(one, c, 0, what, "look at the sensor, its unit and its contact", "start", 2.0)
+
+
+def _was_hot(one: Seen, name: str, above: float, recordings: Sequence[Seen]) -> bool:
+    """Whether a recording began while a body was hot, by what it does then: it cools, or a controller holds
+    it where other recordings hold it, too. A sensor with an offset does neither.
+    """
+    read = one.known(name)[1]
+    start = float(np.median(read[:5]))
+    if start - np.percentile(read, 2) > above / 2:
+        return True
+    others = [float(np.median(r.known(name)[1])) for r in recordings if r is not one and name in r.values]
+    held = np.ptp(np.percentile(read, [5, 95])) < _START
+    return bool(held and others and min(abs(start - level) for level in others) < _START)
 
 
 def _stays_apart(one: Seen, name: str, recordings: Sequence[Seen]) -> bool:

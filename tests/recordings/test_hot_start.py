@@ -1,0 +1,42 @@
+"""A body that is hot when a recording begins is no fault of its sensor: it cools, or it is held."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from discovery.recordings.campaign import Channel
+from discovery.recordings.compare.levels import _starts
+from discovery.recordings.compare.seen import Seen
+
+Array = NDArray[np.float64]
+TIME = np.linspace(0.0, 3600.0, 240)
+HELD = 100.0 + 0.3 * np.sin(TIME / 7.0)
+NAMES = ("bed", "frame", "chamber", "nozzle")
+CHANNELS = [Channel(name, "temperature", "degC", None, "linear") for name in NAMES]
+
+
+def seen(name: str, nozzle: Array) -> Seen:
+    slow = {n: 22.0 + k + 8.0 * TIME / 3600.0 for k, n in enumerate(NAMES[:-1])}
+    return Seen(name, Path(f"{name}.csv"), TIME, {**slow, "nozzle": nozzle}, np.arange(len(TIME)))
+
+
+def warmed() -> Array:
+    """From the room to 100 degC, where its controller holds it."""
+    return np.asarray(np.minimum(HELD, 22.0 + TIME / 10.0))
+
+
+@pytest.mark.parametrize(
+    ("nozzle", "sound"),
+    [
+        (HELD, True),  # held from the first reading on, as elsewhere later
+        (22.0 + 78.0 * np.exp(-TIME / 900.0), True),  # it cools
+        (HELD - 30.0, False),  # held where no other recording has it
+        (47.0 + 20.0 * TIME / 3600.0, False),  # a sensor that is off by 25 K warms with the machine
+    ],
+)
+def test_a_hot_start(nozzle: Array, sound: bool) -> None:
+    recordings = [seen("monday", warmed()), seen("tuesday", warmed()), seen("friday", nozzle)]
+    found = list(_starts(recordings, CHANNELS))
+    assert ([f.channel for f in found] == []) is sound
