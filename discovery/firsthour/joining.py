@@ -49,7 +49,7 @@ class Shift:
 def join_all(firsts: Sequence[OwnTable], seconds: Sequence[OwnTable]) -> list[OwnTable]:
     """Each table of the first logger with that of the second.
 
-    A pair that does not show how its clocks are shifted takes what the others show: the loggers are the same.
+    The clocks are the same in all pairs with dates. If their shifts agree, all pairs take the mean.
 
     Raises:
         UserError: two tables do not overlap, or one has no partner.
@@ -61,10 +61,10 @@ def join_all(firsts: Sequence[OwnTable], seconds: Sequence[OwnTable]) -> list[Ow
         )
     pairs = [(a, b, *_offset(a, b)) for a, b in zip(firsts, seconds, strict=True)]
     shifts = [estimate_shift(a, replace(b, time=b.time + offset)) for a, b, offset, _ in pairs]
-    dated = all(a.first and b.first for a, b, *_ in pairs)  # else each pair began anew
+    dated = len(pairs) > 1 and all(a.first and b.first for a, b, *_ in pairs)  # else each pair began anew
     common = _common(shifts) if dated else None
     return [
-        _joined(a, b, offset, how, common if common and not shift.known else shift)
+        _joined(a, b, offset, how, common or shift)
         for (a, b, offset, how), shift in zip(pairs, shifts, strict=True)
     ]
 

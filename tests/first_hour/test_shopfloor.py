@@ -61,4 +61,5 @@ def test_loggers_share_their_shift(tmp_path: Path) -> None:
     assert all("ahead" in one and "corrected" in one for one in notes)
     shifts = [float(one.split("ahead by ")[1].split(" s")[0]) for one in notes]
     assert shifts == pytest.approx([95.0] * 3, abs=10.0)
+    assert len(set(shifts)) == 1  # two clocks have one shift
     assert "as in the other pairs" in notes[2]  # a single step does not show it
