@@ -55,12 +55,15 @@ _SAID = {"Y": "year", "M": "month", "D": "day"}
 
 @dataclass(frozen=True)
 class Instants:
-    """`seconds` (N,) since the first; `first`: ISO 8601; `about`: how they were read; `sure`."""
+    """`seconds` (N,) since the first; `first`: ISO 8601; `about`: how they were read; `sure`; `zoned`: they
+    name their time zone.
+    """
 
     seconds: Array
     first: str
     about: str
     sure: bool = True
+    zoned: bool = False
 
 
 def read_instants(cells: Sequence[str]) -> Instants | None:
@@ -83,13 +86,25 @@ def read_instants(cells: Sequence[str]) -> Instants | None:
     forward = [one for one in found if (np.diff(one[1]) >= 0).all()] or found
     if not forward:
         return None
+    zoned = bool((one := _INSTANT.fullmatch(cells[0][:_LONGEST])) and one["zone"])
     order, best, first = min(forward, key=lambda one: unevenness(one[1]))
     others = [one for one in forward if not np.array_equal(one[1], best)]
     if not others or not (np.diff(best) >= 0).all():
-        return Instants(best, first.isoformat(), "instants")
+        return Instants(best, first.isoformat(), "instants", zoned=zoned)
     other = min(others, key=lambda one: unevenness(one[1]))[0]
     about = f"instants (? dates read as {_order(order)}, the most even; {_order(other)} runs forward too)"
-    return Instants(best, first.isoformat(), about, sure=False)
+    return Instants(best, first.isoformat(), about, sure=False, zoned=zoned)
+
+
+def summer_time_begins(before: datetime, after: datetime) -> bool:
+    """Whether clocks on a wall skip an hour between two instants of one night, in Europe or North America.
+
+    >>> summer_time_begins(datetime(2026, 3, 29, 1, 59), datetime(2026, 3, 29, 3, 0))
+    True
+    """
+    sunday = before.weekday() == 6 and before.month == 3 and (before.day > 24 or 8 <= before.day <= 14)
+    hours = (before.replace(hour=hour, minute=0, second=0, microsecond=0) for hour in (1, 2, 3))
+    return sunday and any(before < hour and after >= hour + timedelta(hours=1) for hour in hours)
 
 
 def read_times_of_day(cells: Sequence[str]) -> Array | None:

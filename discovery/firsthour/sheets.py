@@ -146,7 +146,7 @@ def _plain(cell: str) -> bool:
     """Whether a cell is a number without blanks inside, a stamp, a switch or nothing."""
     if is_number(cell):
         return not re.search(r"\d\s+\d", cell)
-    return is_stamp(cell) or is_switch(cell) or is_empty(cell)
+    return (is_stamp(cell) and not re.search(r"[;\t|]", cell)) or is_switch(cell) or is_empty(cell)
 
 
 def _split(line: str, mark: str) -> list[str]:
@@ -176,6 +176,7 @@ def _sheet(
         )
     check_shape(path, rows, width)
     header = (*head[at][1], *[""] * width)[:width]
+    header = tuple(word or group for word, group in zip(header, groups, strict=True))  # a merged cell
     above = (*remarks, *("  ".join(filter(None, cells)) for _, cells in head[:at]))
     said = (
         *notes,
@@ -200,6 +201,11 @@ def _sheet(
         head[at][0],
         mark,
     )
+
+
+def _is_remark(cells: Sequence[str]) -> bool:
+    """Whether a row below the readings is a remark or a sum: it begins with a word, not with a stamp."""
+    return not is_data(cells) and holds_word(cells[0]) and not is_stamp(cells[0])
 
 
 def _width(head: Sequence[Row], middle: Sequence[Row]) -> tuple[int, int]:
@@ -237,7 +243,7 @@ def _body(
         if len(cells) == spare and (spare < width or not cells[-1]):
             cells = cells[:width] if spare > width else [*cells, ""]
         last = len(lines) - index <= _TRAILER and index > first + FEWEST
-        if len(cells) != width or (last and not is_data(cells) and holds_word(cells[0])):
+        if len(cells) != width or (last and _is_remark(cells)):
             cut_off = index == len(lines) - 1 and len(cells) < width
             if cells[:width] == header[:width]:
                 again += 1

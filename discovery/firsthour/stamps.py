@@ -9,13 +9,20 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.firsthour.cells import is_empty, is_number, is_stamp, read_numbers
-from discovery.firsthour.instants import is_date, is_time_of_day, read_instants, read_times_of_day
+from discovery.firsthour.instants import (
+    is_date,
+    is_time_of_day,
+    read_instants,
+    read_times_of_day,
+    summer_time_begins,
+)
 from discovery.firsthour.measures import CLOCKS, TIME_UNITS, is_dated, time_unit
 from discovery.firsthour.sheets import Sheet
 from discovery.firsthour.vocabulary import fold
@@ -38,7 +45,8 @@ class Clock:
     """`columns`: where the stamps stand; `seconds` (N,) since the first row; `about`: how they were read.
 
     `order`: the rows as they follow each other in time, None: as in the file. `first`: ISO 8601 of the first
-    row, or "". `counted`: nothing says the unit of its numbers, they are not converted.
+    row, or "". `counted`: nothing says the unit of its numbers, they are not converted. `wall`: dates without
+    a time zone, as of a clock on a wall.
     """
 
     columns: tuple[int, ...]
@@ -48,6 +56,7 @@ class Clock:
     order: NDArray[np.intp] | None = None
     first: str = ""
     counted: bool = False
+    wall: bool = False
 
 
 def find_clock(
@@ -71,6 +80,9 @@ def find_clock(
         about = f"{one.about}, from column '{names[one.columns[0]]}'"
         about += "" if sure else ", since none is called time"
         seconds, order, notes = _forward(one.seconds, series)
+        if one.wall and order is None:
+            seconds, said = _summer(seconds, one.first)
+            notes = [*notes, *said]
         steps = np.diff(seconds)
         if np.isfinite(seconds).all() and (steps >= 0).all() and np.sum(steps > 0) >= _FEWEST:
             if (steps == 0).any() and not sure:
@@ -133,10 +145,11 @@ def _stamped(
             milliseconds = read_numbers(sheet.cells(fine), None).values / 1e3
             whole = found.seconds + milliseconds - milliseconds[0]
             if (np.diff(whole) >= 0).all():
-                yield Clock((*columns, fine), whole, f"{found.about} and milliseconds", first=found.first)
-        yield Clock(columns, found.seconds, found.about, first=found.first)
+                about = f"{found.about} and milliseconds"
+                yield Clock((*columns, fine), whole, about, first=found.first, wall=not found.zoned)
+        yield Clock(columns, found.seconds, found.about, first=found.first, wall=not found.zoned)
     if (seconds := read_times_of_day(cells)) is not None:
-        yield Clock((at,), seconds, "time of day")
+        yield Clock((at,), seconds, "as time of day")
 
 
 def _are_milliseconds(sheet: Sheet, column: int, name: str, unit: str) -> bool:
@@ -221,11 +234,36 @@ def _forward(
     return seconds, None, []
 
 
+def _summer(seconds: Array, first: str) -> tuple[Array, list[str]]:
+    """The time without the hour that a clock on a wall skips where summer time begins.
+
+    Args:
+        first: ISO 8601 of the first row.
+    """
+    steps = np.diff(seconds)
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    begin = datetime.fromisoformat(first)
+    for row in np.flatnonzero(np.abs(steps - _HOUR - usual) <= max(usual, 1.0)).tolist():
+        before, after = (begin + timedelta(seconds=float(seconds[k])) for k in (row, row + 1))
+        if summer_time_begins(before, after):
+            moved = seconds.copy()
+            moved[row + 1 :] -= _HOUR
+            return moved, [
+                "the clock was put forward by an hour (start of summer time): the hour was taken out"
+            ]
+    return seconds, []
+
+
 def spread_evenly(seconds: Array) -> Array:
-    """Rows of one stamp, evenly up to the next stamp: a clock of whole seconds, a faster logger."""
+    """Rows of one stamp, evenly up to the next stamp: a clock of whole seconds, a faster logger.
+
+    None is moved further than stamps usually are apart: a pause stays empty.
+    """
     starts = np.flatnonzero(np.concatenate(([True], np.diff(seconds) > 0)))
     if len(starts) == len(seconds):
         return seconds
-    last = float(seconds[starts[-1]] + (seconds[starts[-1]] - seconds[starts[-2]]))
-    places, stamps = np.append(starts, len(seconds)), np.append(seconds[starts], last)
-    return np.asarray(np.interp(np.arange(len(seconds)), places, stamps), dtype=np.float64)
+    gaps = np.diff(seconds[starts])
+    widths = np.minimum(np.append(gaps, gaps[-1]), np.median(gaps))
+    rows = np.diff(np.append(starts, len(seconds)))
+    within = np.arange(len(seconds)) - np.repeat(starts, rows)
+    return np.asarray(seconds + within * np.repeat(widths / rows, rows), dtype=np.float64)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.errors import UserError
-from discovery.firsthour.cells import comma_is_decimal, holds_word, is_number, read_numbers
+from discovery.firsthour.cells import comma_is_decimal, is_number, is_stamp, read_numbers
 from discovery.firsthour.clocks import is_clock
 from discovery.firsthour.longform import find_long, widen
 from discovery.firsthour.measures import steps_in, unit_in
@@ -201,7 +201,7 @@ def _columns(
             continue
         cells = sheet.cells(index)
         read = read_numbers(cells, comma)
-        if read.wrong is not None and all(map(holds_word, set(filter(None, cells)))):
+        if read.wrong is not None and not any(is_number(cell) or is_stamp(cell) for cell in set(cells)):
             few = list(dict.fromkeys(filter(None, cells)))
             do = f" ({', '.join(few)}); write numbers for them if they matter" if 1 < len(few) <= 6 else ""
             notes.append(f"column '{header}' holds words: left out{do}")

@@ -1,0 +1,72 @@
+"""Files as outsiders bring them: what was read wrongly once."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from discovery.firsthour.stamps import spread_evenly
+from discovery.firsthour.table import read_own
+
+
+def write(path: Path, *lines: str) -> Path:
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    return path
+
+
+def test_a_logger_that_writes_tag_and_value_on_change(tmp_path: Path) -> None:
+    """A blank in the stamp is no mark between cells, and the last rows are readings."""
+    lines = ["Time;Tag;Value;Quality"]
+    for k in range(120):
+        at = f"2026-03-27 06:{k // 60:02d}:{k % 60:02d}.000"
+        lines += [f"{at};Spindle.Speed;{1000 + 7 * (k % 9)};Good", f"{at};Head.Temp;{20 + 0.01 * k:.2f};Good"]
+    table = read_own(write(tmp_path / "change.csv", *lines))
+    assert [c.name for c in table.columns] == ["Spindle_Speed", "Head_Temp"]
+    assert len(table.time) == 120
+    assert table.columns[1].values[-1] == pytest.approx(21.19)
+    assert not any("left out" in note for note in table.notes)
+
+
+def test_a_column_of_states_is_left_out_though_one_of_them_is_a_switch(tmp_path: Path) -> None:
+    rows = [f"{k};{('AUTO', 'JOG', 'STOP')[k // 5 % 3]};{k % 7}" for k in range(60)]
+    table = read_own(write(tmp_path / "plc.csv", "t/s;Mode;T1 [°C]", *rows))
+    assert [c.name for c in table.columns] == ["T1"]
+    assert "column 'Mode' holds words: left out (AUTO, JOG, STOP)" in table.notes[0]
+
+
+SPRING, OTHER = datetime(2026, 3, 28, 22, 0), datetime(2026, 3, 27, 22, 0)
+
+
+@pytest.mark.parametrize(
+    ("begin", "zone", "hours"),
+    [(SPRING, "", 8.0), (SPRING, "+01:00", 9.0), (OTHER, "", 9.0)],
+    ids=["summer time begins", "with a time zone", "a pause in another night"],
+)
+def test_the_hour_that_clocks_skip_in_spring(
+    tmp_path: Path, begin: datetime, zone: str, hours: float
+) -> None:
+    """From 2 to 3 at night no row: on the night of the change no time passed, else the logger paused."""
+    lines = ["Zeitstempel;T1 [°C]"]
+    for k in range(481):
+        at = begin + timedelta(minutes=k)
+        at += timedelta(hours=at.hour in range(2, 12))
+        lines.append(f"{at:%Y-%m-%dT%H:%M:%S}{zone};{20 + k % 7}")
+    table = read_own(write(tmp_path / "night.csv", *lines))
+    assert table.time[-1] == hours * 3600.0
+    assert any("start of summer time" in note for note in table.notes) is (hours == 8.0)
+
+
+def test_rows_of_one_stamp_are_not_spread_over_a_pause() -> None:
+    """Two rows in each minute, then a pause of an hour."""
+    stamps = np.array([0.0, 0.0, 60.0, 60.0, 3660.0, 3660.0, 3720.0, 3720.0])
+    assert spread_evenly(stamps).tolist() == [0.0, 30.0, 60.0, 90.0, 3660.0, 3690.0, 3720.0, 3750.0]
+
+
+def test_a_merged_cell_over_two_lines_names_its_column(tmp_path: Path) -> None:
+    rows = [f"2026-03-02 08:00:{k:02d};{k % 3};{20 + k % 7}" for k in range(60)]
+    table = read_own(write(tmp_path / "merged.csv", "Zeit;Antrieb;Lager", ";Drehzahl;T1", ";1/min;°C", *rows))
+    assert table.clock == "Zeit"
+    assert "none is called time" not in table.about_time
