@@ -7,7 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.firsthour.measures import CLOCKS, TIME_UNITS, time_unit
+from discovery.firsthour.measures import CLOCKS, TIME_UNITS, is_unit, time_unit
 from discovery.firsthour.vocabulary import fold
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ def tells_time(name: str, unit: str, values: Array, seconds: Array, role: str) -
     whose slope is that of no clock, is none.
     """
     known = np.isfinite(values)
-    if (unit and time_unit(unit) is None) or np.sum(known) < _FEWEST:
+    if (is_unit(unit) and time_unit(unit) is None) or np.sum(known) < _FEWEST:
         return False
     values, seconds = values[known] - values[known][0], seconds[known] - seconds[known][0]
     steps = np.diff(values)
@@ -69,7 +69,7 @@ def tells_time(name: str, unit: str, values: Array, seconds: Array, role: str) -
     if not (steps > 0).all() or np.abs(values - slope * seconds).max() > _EXACT * np.median(steps):
         return False
     counts = any(abs(slope * one - 1) < 1e-3 for one in TIME_UNITS.values()) or (steps == 1).all()
-    return bool(unit or counts or role == "other input" or CLOCKS.search(fold(name)))
+    return bool(time_unit(unit) or counts or role == "other input" or CLOCKS.search(fold(name)))
 
 
 def counts_up(name: str) -> bool:

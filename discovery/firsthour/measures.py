@@ -59,6 +59,7 @@ _SPELLED = {
     "1": "- 1 – — [-] -/- bool boolean 0/1 0|1 1/0 on/off off/on ein/aus aus/ein sí/no si/no oui/non",
 }
 _KNOWN = {word: unit for unit, words in _SPELLED.items() for word in words.split()}
+_KNOWN |= {"Nm": "N*m", "NM": "N*m"}  # in small letters a length
 TIME_UNITS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 _TIMES = {
     "ns": "ns nsec nanoseconds nanosekunden",
@@ -91,10 +92,10 @@ def _folded(written: str) -> str:
 def known_unit(written: str) -> str | None:
     """The unit of a list that a text spells, or None.
 
-    >>> known_unit("℃"), known_unit("U/min"), known_unit("min⁻¹"), known_unit("quux")
-    ('degC', 'rpm', 'rpm', None)
+    >>> known_unit("℃"), known_unit("U/min"), known_unit("[Nm]"), known_unit("nm"), known_unit("quux")
+    ('degC', 'rpm', 'N*m', 'nm', None)
     """
-    return _KNOWN.get(_folded(written))
+    return _KNOWN.get(written.strip("[]() ")) or _KNOWN.get(_folded(written))
 
 
 def time_unit(written: str) -> str | None:
@@ -114,6 +115,19 @@ def unit_of(written: str) -> tuple[str, str | None]:
         r"(?<=[a-zA-Z])(?=[2-4](?!\w))", "**", written.strip().replace("º", "°").replace("˚", "°")
     )
     return spelled, known_unit(written)
+
+
+def is_unit(written: str) -> bool:
+    """Whether a text is a unit, of the list or one that pint knows.
+
+    >>> is_unit("°C"), is_unit("ohm"), is_unit("Unit"), is_unit("")
+    (True, True, False, False)
+    """
+    spelled, known = unit_of(written)
+    try:
+        return known is not None or bool(parse_unit(spelled))
+    except ValueError:
+        return False
 
 
 def unit_in(header: str) -> tuple[str, str] | None:

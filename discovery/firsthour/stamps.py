@@ -74,7 +74,9 @@ def find_clock(
     named = [k for k, name in enumerate(names) if CLOCKS.search(fold(name))]
     named.sort(key=lambda k: (not CLOCKS.match(fold(names[k])), k))
     backwards = None
-    order_of_columns = [*named, *(k for k in range(len(names)) if k not in named)]
+    others = [k for k in range(len(names)) if k not in named]
+    others.sort(key=lambda k: not _holds_stamps(sheet, k))  # before numbers of rows
+    order_of_columns = [*named, *others]
     for one in _candidates(sheet, order_of_columns, names, units):
         sure = one.columns[0] in named
         about = f"{one.about}, from column '{names[one.columns[0]]}'"
@@ -98,6 +100,11 @@ def find_clock(
         f"{sheet.path}: no column of time was found; call one 'time' (seconds, or instants as "
         "2026-03-01T08:00:00), or add one if the file has none"
     )
+
+
+def _holds_stamps(sheet: Sheet, column: int) -> bool:
+    head = sheet.columns[column].slice(0, 5).to_pylist()
+    return all(is_stamp(cell) and not is_number(cell) for cell in head)
 
 
 def _candidates(

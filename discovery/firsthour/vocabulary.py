@@ -237,6 +237,9 @@ _FORMS: tuple[tuple[str, Mapping[str, float], str], ...] = (
 )
 
 
+_SYMBOL = re.compile(r"(?<![^\W_])T([a-z]{3,})")
+
+
 @dataclass(frozen=True)
 class Word:
     """One word that a name holds: `said` as the name spells it, `gloss` in English, and what it says."""
@@ -249,10 +252,11 @@ class Word:
 def fold(text: str) -> str:
     """Small letters without accents, words apart by one blank: "Kühlwasser_Temp.1" is "kuehlwasser temp 1".
 
-    >>> fold("DutyCycle_1"), fold("温度（℃）"), fold("Größe")
-    ('duty cycle 1', '温度 °c', 'groesse')
+    >>> fold("DutyCycle_1"), fold("温度（℃）"), fold("Größe"), fold("Troom"), fold("Tank")
+    ('duty cycle 1', '温度 °c', 'groesse', 't room', 'tank')
     """
     text = unicodedata.normalize("NFKC", text.replace("℃", "°C").replace("℉", "°F"))
+    text = _SYMBOL.sub(lambda found: f"T {found[1]}" if found[1] in _words() else found[0], text)
     text = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", text).lower()
     for letter, pair in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("ß", "ss"), ("ł", "l")):
         text = text.replace(letter, pair)
@@ -273,6 +277,12 @@ def words_of(name: str) -> list[Word]:
             found.append((start, Word(folded[start:end], gloss, says)))
             free[start:end] = [False] * (end - start)
     return [word for _, word in sorted(found, key=lambda one: one[0])]
+
+
+@lru_cache(maxsize=1)
+def _words() -> frozenset[str]:
+    """Words that may stand behind the symbol of a temperature: Troom, Tbearing."""
+    return frozenset(word.lstrip("~") for _, _, words in _ROWS for word in words.split())
 
 
 @lru_cache(maxsize=1024)

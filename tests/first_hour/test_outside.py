@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from discovery.firsthour.guess import guess
+from discovery.firsthour.recorded import recorded
 from discovery.firsthour.stamps import spread_evenly
-from discovery.firsthour.table import read_own
+from discovery.firsthour.table import Column, read_own
 
 
 def write(path: Path, *lines: str) -> Path:
@@ -70,3 +72,25 @@ def test_a_merged_cell_over_two_lines_names_its_column(tmp_path: Path) -> None:
     table = read_own(write(tmp_path / "merged.csv", "Zeit;Antrieb;Lager", ";Drehzahl;T1", ";1/min;°C", *rows))
     assert table.clock == "Zeit"
     assert "none is called time" not in table.about_time
+
+
+def test_stamps_are_the_time_and_not_the_numbers_of_the_rows(tmp_path: Path) -> None:
+    rows = [f"{k},2026-03-27T06:{k:02d}:00.000000000,{20 + k % 7}" for k in range(60)]
+    table = read_own(write(tmp_path / "pandas.csv", ",ts,t_head", *rows))
+    assert table.time[-1] == 59 * 60.0
+    assert [c.name for c in table.columns] == ["t_head"]
+
+
+def test_a_torque_is_no_length_and_a_symbol_before_a_word_is_read() -> None:
+    torque, room = (Column(h, n, u, np.linspace(20.0, 22.0, 50)) for h, n, u in
+                    (("M [Nm]", "M", "Nm"), ("Troom [C]", "Troom", "C")))  # fmt: skip
+    assert (guess(torque).role, guess(torque).unit) == ("other input", "N*m")
+    assert guess(room).role == "ambient temperature"
+
+
+def test_each_channel_may_bring_its_own_clock(tmp_path: Path) -> None:
+    """As oscilloscopes of controllers write them: the second clock is no input, whatever stands over it."""
+    rows = [f"{50 * k};{20 + k % 7};{50 * k};{k % 3}" for k in range(60)]
+    scope = write(tmp_path / "scope.csv", "Name;T1;Name;E_z", "Unit;°C;Unit;µm", *rows)
+    found = recorded([read_own(scope)])
+    assert [c.name for c in found.seen] == ["T1", "E_z"]
