@@ -12,7 +12,9 @@ from discovery.firsthour.guess import Guess
 from discovery.firsthour.recorded import Recorded
 from discovery.firsthour.table import Array, OwnTable
 from discovery.recordings.campaignfile import CampaignForm
+from discovery.recordings.oddvalues import far_step
 
+_AFTER = 7  # readings that a first one is compared with
 _FAR = 3.0  # times the span: no thermal error starts so far from zero
 
 Zeros = dict[str, dict[str, float]]  # by recording and error: what its readings are counted from
@@ -89,7 +91,7 @@ def _zeros(read: Mapping[str, Mapping[str, Array]], files: Mapping[str, Hashable
         for error in shifted:
             known = _known(errors.get(error, np.empty(0)))
             if known.size:
-                first.setdefault((files[name], error), float(known[0]))
+                first.setdefault((files[name], error), _first(known))
             if (files[name], error) in first:
                 zeros[name][error] = first[files[name], error]
     return zeros
@@ -102,7 +104,8 @@ def _notes(zeros: Zeros) -> list[str]:
             notes.setdefault(
                 error,
                 f"'{error}' starts at {first:g} in {name}, far from zero compared with how much it moves: in "
-                "each file it is counted from its first reading",
+                "each file it is counted from its first reading. What the machine had moved before is "
+                "unknown: begin all recordings cold, or keep one zero",
             )
     return list(notes.values())
 
@@ -110,6 +113,12 @@ def _notes(zeros: Zeros) -> list[str]:
 def _far(values: Array) -> bool:
     known = _known(values)
     return bool(known.size and abs(known[0]) > _FAR * np.ptp(known) > 0.0)
+
+
+def _first(known: Array) -> float:
+    """The first of the readings (N,) that those after it do not contradict."""
+    near = np.abs(known - np.median(known[:_AFTER])) <= far_step(np.diff(known))
+    return float(known[np.argmax(near)])
 
 
 def _known(values: Array) -> Array:

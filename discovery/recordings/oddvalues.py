@@ -143,7 +143,7 @@ def impossible_readings(channel: Channel, read: Array) -> Lines:
     if channel.role not in _SENSORS or least is None or read.size < FEW:
         return np.zeros(0, dtype=np.intp)
     steps = np.diff(read)
-    sizes, far = np.abs(steps), _far(steps, least)
+    sizes, far = np.abs(steps), far_step(steps, least)
     usual = float(np.percentile(sizes, 90))
     rows: set[int] = set()
     for k in np.flatnonzero(sizes[:-1] > far).tolist():  # from the last right reading to the first wrong one
@@ -161,7 +161,7 @@ def impossible_readings(channel: Channel, read: Array) -> Lines:
 def lone_readings(read: Array) -> Lines:
     """Rows of single readings (R,) far from both neighbours, which agree."""
     steps = np.diff(read)
-    far = _far(steps)
+    far = far_step(steps)
     if not np.isfinite(far):
         return np.zeros(0, dtype=np.intp)
     sizes = np.abs(steps)
@@ -171,7 +171,7 @@ def lone_readings(read: Array) -> Lines:
     return np.flatnonzero((away > far) & turns & agree) + 1
 
 
-def _far(steps: Array, least: float = 0.0) -> float:
+def far_step(steps: Array, least: float = 0.0) -> float:
     """A step (R - 1,) beyond which a reading is far from the one before it; infinite where nothing moves."""
     if steps.size < 3 or not steps.any():
         return np.inf

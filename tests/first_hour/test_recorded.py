@@ -248,6 +248,12 @@ def test_an_error_far_from_zero_is_counted_from_its_first_reading(tmp_path: Path
         assert _read(rig, recording, "dZ") == [-k / 2 for k in range(60)]
 
 
+def test_a_wrong_first_reading_is_no_zero(tmp_path: Path) -> None:
+    wrong: Row = lambda k: _probe(-80532 + 4300 * (k < 2))(k)  # noqa: E731
+    _, rig = _made(tmp_path, "time,sample,T_room,T_bed,dZ_um", wrong, _probe(-3051))
+    assert _read(rig, "run0", "dZ")[2:] == [-k / 2 for k in range(58)]
+
+
 def test_an_error_that_a_person_names_later_is_counted_from_its_first_reading(tmp_path: Path) -> None:
     """In the campaign file, with --again: as --is says it at once."""
     probes = _probe(-80532), _probe(-3051), _probe(12)
