@@ -79,7 +79,7 @@ CLOCKS = re.compile(
     r"(time|zeit|stamp)\b|zeit\b|時刻|時間|日時|日付|経過|时间|日期|시간|время|дата"
 )
 _DATE = re.compile(r"\b(date|datum|data|fecha|dato|dia|tag|jour|giorno)\b|дата|日付|日期")
-DEGREES = ("degC", "degF", "K")
+DEGREES = ("degC", "degF", "K", "0.1 degC", "0.01 degC")  # controllers count in parts of a degree
 # symbols of quantities in formulas, by the unit of one letter behind them: F_N, U_V, x_m
 _SYMBOLS = {"N": "f", "V": "u e", "A": "i", "W": "p q", "C": "t", "K": "t", "F": "t", "m": "x y z s h l"}
 

@@ -67,10 +67,10 @@ def sensors_as_inputs(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
 
 
 def _alike(column: Column, columns: Sequence[Column]) -> list[Column]:
-    """Columns of one unit whose names differ in a number or an axis alone, this one among them."""
+    """Columns of one unit whose names, and what explains them, differ in a number or an axis alone."""
 
-    def kind(one: Column) -> tuple[str, str]:
-        return _ONE_OF_SEVERAL.sub("#", fold(one.header)), one.unit
+    def kind(one: Column) -> tuple[str, ...]:
+        return (*(_ONE_OF_SEVERAL.sub("#", fold(words)) for words in (one.header, one.about)), one.unit)
 
     return [other for other in columns if kind(other) == kind(column)]
 

@@ -9,6 +9,14 @@ from discovery.firsthour.shapes import Shape
 
 _ROOM, _ROOM_SD = 22.0, 6.0  # degC at which a machine starts
 _AIR_SD = 8.0
+# log odds of a unit of temperature, and what makes degC of it; kelvin fits no other values
+_DEGREES = {
+    "degC": (0.0, 1.0, 0.0),
+    "degF": (-2.2, 5 / 9, -160 / 9),
+    "K": (-0.5, 1.0, -273.15),
+    "0.1 degC": (-0.5, 0.1, 0.0),
+    "0.01 degC": (-1.5, 0.01, 0.0),
+}
 _ELSEWHERE = 0.01  # density per K of a machine that starts hot or cold
 _USUAL_TRAVEL = (math.log(40.0), math.log(5.0))  # um of a thermal error: median, spread of the logarithm
 _USUAL_HEAT = (math.log(800.0), math.log(6.0))  # W of a heat load at its most
@@ -16,16 +24,15 @@ _USUAL_SPEED = (math.log(3000.0), math.log(5.0))  # rpm at its most
 
 
 def temperature_odds(forms: Sequence[Shape], *, air: bool = False) -> dict[str, float]:
-    """Log odds of the units of temperatures that share one. `air`: the air around a machine is never hot."""
-    odds = {"degC": 0.0, "degF": -2.2, "K": -0.5}  # kelvin fits no other values
+    """Log odds of the units of temperatures that share one. `air`: the air around a machine is never hot.
+
+    Whole numbers may count in parts of a degree, as controllers do.
+    """
+    odds = {unit: prior for unit, (prior, _, _) in _DEGREES.items()}
     for form in forms:
-        for unit, (factor, offset) in {
-            "degC": (1.0, 0.0),
-            "degF": (5 / 9, -160 / 9),
-            "K": (1.0, -273.15),
-        }.items():
+        for unit, (_, factor, offset) in _DEGREES.items():
             first, low, high = (factor * v + offset for v in (form.first, form.low, form.high))
-            if low < -60.0 or high > 1500.0:
+            if low < -60.0 or high > 1500.0 or (factor <= 0.1 and not form.whole):
                 odds[unit] -= 12.0
                 continue
             near = math.exp(-0.5 * ((first - _ROOM) / (_AIR_SD if air else _ROOM_SD)) ** 2) / (

@@ -12,6 +12,7 @@ from discovery.firsthour.guess import guess
 from discovery.firsthour.recorded import recorded
 from discovery.firsthour.stamps import spread_evenly
 from discovery.firsthour.table import Column, read_own
+from discovery.firsthour.tableguess import guess_all
 
 
 def write(path: Path, *lines: str) -> Path:
@@ -94,3 +95,35 @@ def test_each_channel_may_bring_its_own_clock(tmp_path: Path) -> None:
     scope = write(tmp_path / "scope.csv", "Name;T1;Name;E_z", "Unit;°C;Unit;µm", *rows)
     found = recorded([read_own(scope)])
     assert [c.name for c in found.seen] == ["T1", "E_z"]
+
+
+@pytest.mark.parametrize(
+    ("room", "head", "unit"),
+    [
+        ((2158, 2237), (2200, 3454), "0.01 degC"),
+        ((215, 224), (220, 345), "0.1 degC"),
+        ((294, 297), (295, 330), "K"),
+        ((20, 24), (22, 61), "degC"),
+        ((70, 75), (72, 110), "degF"),
+    ],
+)
+def test_whole_numbers_may_be_parts_of_a_degree(
+    room: tuple[int, int], head: tuple[int, int], unit: str
+) -> None:
+    columns = [
+        Column(name, name, "", np.round(np.linspace(*ends, 400)))
+        for name, ends in (("temp_amb", room), ("temp_head", head))
+    ]
+    assert {one.unit for one in guess_all(columns).values()} == {unit}
+
+
+def test_a_list_above_the_table_says_which_channel_is_the_room() -> None:
+    """CH1 to CH3 are alike in their names alone."""
+    slow = np.linspace(21.0, 30.0, 400)
+    places = {"CH1": "Spindle front", "CH2": "Room", "CH3": "Column"}
+    found = guess_all([Column(name, name, "degC", slow, about) for name, about in places.items()])
+    assert {name: one.role for name, one in found.items()} == {
+        "CH1": "temperature",
+        "CH2": "ambient temperature",
+        "CH3": "temperature",
+    }
