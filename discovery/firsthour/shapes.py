@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+HELD = 0.5  # share of readings that repeat the one before: what is set, not measured
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -32,6 +34,17 @@ class Shape:
     @property
     def slow(self) -> bool:
         return self.span > 0 and self.jump < 0.15 and self.few > 6
+
+
+def is_set(values: Array) -> bool:
+    """Whether somebody sets a channel (N,), as a target: most readings repeat the one before, and it jumps.
+
+    >>> is_set(np.repeat([0.0, 105.0, 60.0], 20)), is_set(np.linspace(20.0, 30.0, 60).round())
+    (True, False)
+    """
+    known = values[np.isfinite(values)]
+    form = shape(known)
+    return form is not None and not form.slow and bool(np.mean(np.diff(known) == 0) > HELD)
 
 
 def shape(values: Array) -> Shape | None:

@@ -22,7 +22,7 @@ from discovery.firsthour.guess import (
 )
 from discovery.firsthour.measures import DEGREES
 from discovery.firsthour.odds import likely, probabilities
-from discovery.firsthour.shapes import shape
+from discovery.firsthour.shapes import HELD, shape
 from discovery.firsthour.table import Column
 from discovery.firsthour.unitodds import temperature_odds
 from discovery.firsthour.vocabulary import CELL, fold, words_of
@@ -32,7 +32,6 @@ from discovery.recordings.valuecheck import below_zero
 Array = NDArray[np.float64]
 Hints = Mapping[str, Sequence[tuple[str, Mapping[str, float]]]]
 
-_HELD = 0.5  # share of readings that repeat the one before: what is set, not measured
 _ONE_OF_SEVERAL = re.compile(r"\d+|(?<![^\W\d_])(d ?)?[xyz](?![^\W\d_])")
 _BRACKETS = re.compile(r"[\[(（][^\])）]*[\])）]")
 _PUSHES = ("torque", "current", "signal", "flow", "power", "speed")
@@ -174,7 +173,7 @@ def _held(values: Array) -> bool | None:
     known = values[np.isfinite(values)]
     if not known.size or known.min() == known.max():
         return None
-    return bool(np.mean(np.diff(known) == 0) > _HELD)
+    return bool(np.mean(np.diff(known) == 0) > HELD)
 
 
 def _air(column: Column) -> tuple[float, int]:

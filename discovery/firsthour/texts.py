@@ -13,6 +13,7 @@ from discovery.firsthour.guess import Guess
 from discovery.firsthour.measures import DEGREES
 from discovery.firsthour.recorded import Recorded
 from discovery.firsthour.room import ROOM, Room
+from discovery.firsthour.shapes import is_set
 from discovery.firsthour.table import OwnTable
 
 _CONSTANTS = {"speed": "rotation speed", "flow": "fluid flow", "power": "heat load"}
@@ -43,11 +44,12 @@ def campaign_text(
     """
     channels: dict[str, dict[str, object]] = {}
     headers = {column.name: column.header for column in found.seen}
+    steps = {column.name for column in found.seen if is_set(column.values)}
     for name, one in guesses.items():
         entry: dict[str, object] = {"role": one.role, "unit": one.unit}
         if one.corrects:
             entry["corrects"] = one.corrects
-        if one.role == "other input" and one.unit in DEGREES:
+        if one.role == "other input" and one.unit in DEGREES and name not in steps:
             entry["between"] = "linear"
         if question := doubt(one):
             entry["guessed"] = question

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from discovery.firsthour.guess import guess
+from discovery.firsthour.new import new
 from discovery.firsthour.recorded import recorded
 from discovery.firsthour.stamps import spread_evenly
 from discovery.firsthour.table import Column, read_own
 from discovery.firsthour.tableguess import guess_all
+from discovery.recordings import load_campaign
+from discovery.recordings.check import check_campaign
 
 
 def write(path: Path, *lines: str) -> Path:
@@ -127,3 +130,17 @@ def test_a_list_above_the_table_says_which_channel_is_the_room() -> None:
         "CH2": "ambient temperature",
         "CH3": "temperature",
     }
+
+
+def test_a_target_is_held_between_its_stamps_and_is_no_sensor_that_fell(tmp_path: Path) -> None:
+    target, slow = np.repeat([105.0, 105.0, 0.0], 100), np.linspace(22.0, 28.0, 300).round(1)
+    rows = [
+        f"{20 * k},{a:g},{b:g},{3 * b - 60 + k % 2:g}"
+        for k, (a, b) in enumerate(zip(target, slow, strict=True))
+    ]
+    files = [write(tmp_path / f"run{n}.csv", "time,bed_target,T_frame,dZ_um", *rows) for n in range(3)]
+    for run in files[1:]:  # on to the end
+        run.write_text(run.read_text("utf-8").replace(",0,", ",105,"), "utf-8")
+    new(tmp_path / "rig", files, statements=["bed_target=other input,degC"], quick=True)
+    assert load_campaign(tmp_path / "rig" / "campaign.toml").channels["bed_target"].between == "held"
+    assert not [f for f in check_campaign(tmp_path / "rig") if f.channel == "bed_target"]

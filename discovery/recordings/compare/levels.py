@@ -42,7 +42,7 @@ def level_findings(recordings: Sequence[Seen], channels: Mapping[str, Channel]) 
         yield from _scale(having, channel)
         yield from _resolution(having, channel)
         yield from _full_range(having, channel)
-        if channel.unit == "degC":
+        if channel.unit == "degC" and channel.between == "linear":  # what is held is set, not measured
             yield from _climbs(having, channel)
     yield from _starts(recordings, [c for c in channels.values() if c.unit == "degC"])
     inputs = [c for c in channels.values() if c.is_input]
