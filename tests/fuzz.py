@@ -35,6 +35,7 @@ WORDS = (
     *(b"[", b"]]", b"{", b"}", b"=", b"#", b"[[terms]]", b"name = ", b"time", b"1" * 400, b"9" * 30),
     *(b"0x1", b"2026-02-30", b"24:61:61", b"\xff\xfe", b"\xef\xbb\xbf", b"\x82\xb5", b"degF", b"T_env**9999"),
     *(b"exp(exp(exp(T)))", b"../../etc/passwd", b"1_000", b"true", b"null", b"1.2.3", b"-999", b"3.4e38"),
+    *(b"2.5 um", b"[x10 mV]", b"1/10 degC", b"1e999 um", b"10^99 W", b"2026-03-29 01:59:30", b"Nm"),
 )
 
 
