@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -81,3 +83,9 @@ def write_small(folder: Path) -> None:
     (folder / "campaign.toml").write_text(CAMPAIGN)
     (folder / "model.toml").write_text(MODEL)
     (folder / "experiment.toml").write_text(EXPERIMENT)
+
+
+def results_of(out: Path) -> dict[str, Any]:
+    """What a run has written into `out`."""
+    content: dict[str, Any] = json.loads((out / "results.json").read_text())
+    return content

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -234,3 +235,11 @@ def diagnosed(hours: float) -> dict[str, Any]:
         },
         "reasons": ["flooded gap adds 300 of log evidence"],
     }
+
+
+def data_of(page: str) -> dict[str, Any]:
+    """The data that a page draws its charts from."""
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)
+    assert found
+    data: dict[str, Any] = json.loads(found[1])
+    return data

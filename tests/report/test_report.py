@@ -8,34 +8,19 @@ import re
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from discovery.challenge import scoring
-from discovery.diagnosis.thresholds import RIVAL
 from discovery.errors import UserError
-from discovery.models import Parameter
-from discovery.report import equations, write_comparison, write_figures, write_report
+from discovery.report import write_comparison, write_figures, write_report
 from discovery.report.chart import thinned
 from discovery.report.compare import load_runs
-from discovery.report.mismatch import NEAR, section, sizes
 from discovery.report.page import render
 from discovery.report.ranking import ranked, ratio
 from discovery.report.run import load_run
 from discovery.report.series import autocorrelation
 from tests.report import sample
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return Path(sample.write_sample(tmp_path_factory.mktemp("runs") / "cutting fluid"))
-
-
-@pytest.fixture(scope="module")
-def page(folder: Path) -> str:
-    return write_report(folder).read_text("utf-8")
 
 
 class _Page(HTMLParser):
@@ -76,13 +61,6 @@ def _read(page: str) -> _Page:
     return reader
 
 
-def _data(page: str) -> dict[str, Any]:
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)
-    assert found
-    data: dict[str, Any] = json.loads(found[1])
-    return data
-
-
 def test_it_is_whole_and_loads_nothing(page: str) -> None:
     reader = _read(page)
     assert reader.wrong == []
@@ -96,7 +74,7 @@ def test_it_is_whole_and_loads_nothing(page: str) -> None:
 
 
 def test_every_error_of_every_recording_is_drawn(page: str) -> None:
-    keys = {chart["key"] for chart in _data(page)["charts"]}
+    keys = {chart["key"] for chart in sample.data_of(page)["charts"]}
     wanted = {f"{recording}-{output}" for recording in ("fit", "validation") for output in sample.OUTPUTS}
     assert wanted <= keys
     assert set(_read(page).charts) == keys
@@ -184,7 +162,7 @@ def test_a_simulated_machine_is_said_first_and_inputs_are_drawn(tmp_path: Path) 
     (folder / "inputs.json").write_text(json.dumps(inputs))
     page = write_report(folder).read_text("utf-8")
     assert re.search(r'class="eyebrow">Simulated machine · ', page)
-    (chart,) = (one for one in _data(page)["charts"] if one["key"] == "validation-inputs")
+    (chart,) = (one for one in sample.data_of(page)["charts"] if one["key"] == "validation-inputs")
     assert chart["panels"][0]["label"] == "pump [-]"
     assert chart["panels"][0]["series"][0]["y"] == [0, 0, 1, 1, 1]  # a step, not a ramp
     (folder / "inputs.json").write_text('{"validation": {"pump": [1]}}')
@@ -206,7 +184,7 @@ def test_models_that_are_not_drawn_are_named(folder: Path, page: str) -> None:
     more = dataclasses.replace(
         run, results={**run.results, "models": {**models, **copies}}, predictions=predictions
     )
-    drawn = {one["name"] for one in _data(render(more))["charts"][0]["panels"][0]["series"]}
+    drawn = {one["name"] for one in sample.data_of(render(more))["charts"][0]["panels"][0]["series"]}
     (named,) = re.findall(r"Not drawn, since [^:]*: ([^.]*)\.", render(more))
     assert len(set(copies) - drawn) == 1
     assert {named} == set(copies) - drawn
@@ -228,55 +206,6 @@ def test_a_recording_that_was_fitted_decides_nothing(folder: Path) -> None:
     assert ratio(run, "discovered", "reduced") == before
 
 
-def test_the_missing_physics_is_named_with_size_and_certainty(page: str) -> None:
-    assert "flooded gap at c_body_1 and b_corpus (98 % sure)" in page
-    assert "G_gap = 38.3 W/K (95 %: 35.1 to 41.6)" in page
-    assert "less than 1 in 1000" in page
-    assert "pump &gt; 0.5 and speed &gt; 750 rpm." in page
-    shades = [chart["shades"] for chart in _data(page)["charts"] if chart["key"] == "fit-E_Y0C"]
-    assert shades == [[[4, 10, "mismatch at b_corpus, 81 W"]]]
-
-
-def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path) -> None:
-    folder = sample.write_sample(tmp_path / "run")
-    path = folder / "diagnosis.json"
-    diagnosis = json.loads(path.read_text())
-    diagnosis["physics"].append(
-        {**diagnosis["physics"][0], "effect": "clock_shift", "states": [], "recording": "fit"}
-    )
-    held = {"rms_before": 1.6, "rms_after": 25.0, "noise_floor": 0.4, "gain_low": -27.0, "gain_high": -19.0}
-    diagnosis["improvement"] = {
-        "fit": {},
-        "held_out": {"left": held},
-        "explained": -1.0,
-        "contradicted_by": ["left"],
-    }
-    path.write_text(json.dumps(diagnosis))
-    page = write_report(folder).read_text("utf-8")
-    assert "clock shift in fit (98 % sure); but the held-out “left” contradicts the repair." in page
-    assert "Do not use the repaired model" in page
-    assert "The repair removes" not in page
-    held |= {"rms_after": 1.59, "gain_low": -0.1, "gain_high": 0.2}
-    diagnosis["improvement"] = {"fit": {}, "held_out": {"left": held}, "explained": -0.002}
-    path.write_text(json.dumps(diagnosis))
-    page = write_report(folder).read_text("utf-8")
-    assert "contradict" not in page
-    assert "The repair removes none of this mismatch" in page
-    assert "(improvement, 95 %: −0.1 to 0.2; may be chance)" in page
-
-
-def test_an_output_that_the_repair_makes_worse_is_named(tmp_path: Path) -> None:
-    folder = sample.write_sample(tmp_path / "run")
-    results = json.loads((folder / "results.json").read_text())
-    before = results["models"]["thermobalance"]["recordings"]
-    after = json.loads(json.dumps(before))
-    after["validation"]["E_Y0C"]["rms"] = 2 * before["validation"]["E_Y0C"]["rms"]
-    results["models"]["repaired"] = {"kind": "repaired", "recordings": after}
-    (folder / "results.json").write_text(json.dumps(results))
-    page = write_report(folder).read_text("utf-8")
-    assert re.search(r"After the repair, the rms is larger for E_Y0C on validation \(\S+ → \S+ µm\)\.", page)
-
-
 def test_a_narrow_screen_lists_the_network(page: str) -> None:
     listed = re.search(r'<dl class="bodies listed">(.*?)</dl>', page, re.S)
     assert listed
@@ -284,65 +213,6 @@ def test_a_narrow_screen_lists_the_network(page: str) -> None:
     assert [name for name, _ in bodies] == ["table", "c_body_1", "b_corpus"]
     assert '<span class="added">b_corpus</span>' in dict(bodies)["c_body_1"]
     assert "<span>T_fluid</span>" in dict(bodies)["table"]
-
-
-@pytest.mark.parametrize(("unit", "said"), [("um", "µm"), ("times the reading noise",) * 2])
-def test_the_proof_says_what_its_figures_are(tmp_path: Path, unit: str, said: str) -> None:
-    folder = sample.write_sample(tmp_path / "run")
-    diagnosis = json.loads((folder / "diagnosis.json").read_text())
-    diagnosis["improvement"]["unit"] = unit
-    (folder / "diagnosis.json").write_text(json.dumps(diagnosis))
-    page = write_report(folder).read_text("utf-8")
-    assert f"0.6 → 0.5 {said} on validation" in page
-    assert f"each weighted by its noise [{said}]" in page
-
-
-def test_what_came_closest_has_its_recording_and_hours_and_stands_once(tmp_path: Path) -> None:
-    heat = {"effect": "unmeasured_heat", "states": ["head"], "share_that_a_refit_leaves": 0.6}
-    considered = [
-        {**heat, "recording": "mon", "instants_s": [36000, 50400], "log_evidence": 60.0},
-        {**heat, "recording": "fri", "instants_s": [600, 1800], "log_evidence": 50.0},
-        {"effect": "film_drag", "states": ["head"], "log_evidence": 20.0, "share_that_a_refit_leaves": 0.02},
-        {"effect": "film_drag", "states": ["head"], "log_evidence": 10.0, "share_that_a_refit_leaves": 0.02},
-    ]
-    document = {**sample.diagnosed(24.0), "verdict": "unexplained", "physics": [], "considered": considered}
-    (tmp_path / "diagnosis.json").write_text(json.dumps(document))
-    found = section(load_run(tmp_path))
-    assert found
-    (table,) = (t for t in found["tables"] if t.title == "Closest effects of the catalogue")
-    assert [row.cells for row in table.rows] == [
-        ("unmeasured heat", "head in mon (10 to 14 h)", "60", "60 %"),
-        ("unmeasured heat", "head in fri (10 to 30 min)", "50", "60 %"),
-        ("film drag", "head", "20", "2 %"),
-    ]
-
-
-def test_a_jump_that_may_be_none_is_not_told() -> None:
-    known = {
-        "zero_T": {"value": -0.01, "low": -0.03, "high": 0.01, "unit": "K", "output": "T"},
-        "zero_dZ": {"value": 2.1, "low": 2.0, "high": 2.2, "unit": "um", "output": "dZ"},
-        "t_zero": {"value": 60.0, "low": 50.0, "high": 70.0, "unit": "s"},
-    }
-    told = sizes({"states": ["T", "dZ"], "moved": ["dZ"], "parameters": known})
-    assert told == ["zero_dZ = 2.1 µm (95 %: 2 to 2.2)", "t_zero = 60 s (95 %: 50 to 70)"]
-
-
-def test_a_size_says_at_which_speed_it_is_one() -> None:
-    size = {"value": 0.686, "low": 0.487, "high": 0.905, "unit": "W", "at": "1000 rpm"}
-    assert sizes({"parameters": {"P_f": size}}) == ["P_f = 0.686 W at 1000 rpm (95 %: 0.487 to 0.905)"]
-
-
-def test_a_given_number_of_each_recording_is_printed_for_each() -> None:
-    window = Parameter(0.0, "s", fixed=True, per_recording=True, values={"monday": 8.7})
-    assert (
-        equations.value("t_on", window).value,
-        equations.value("k", Parameter(2.0, fixed=True)).value,
-    ) == (
-        "monday: 8.7",
-        "2",
-    )
-    found = dataclasses.replace(window, fixed=False, intervals={"monday": (8.1, 9.3)})
-    assert equations.value("t_on", found).value == "monday: 8.7 (8.1 to 9.3)"
 
 
 def test_names_of_a_user_stay_text(page: str) -> None:
@@ -362,15 +232,6 @@ def test_without_diagnosis_and_discovered_model_those_parts_do_not_show(tmp_path
     assert "discovery" not in ids
     assert {"answer", "predictions", "comparison", "network", "reproduce"} <= set(ids)
     assert "The given model “thermobalance” predicts best" in page
-
-
-def test_a_diagnosis_alone_makes_a_report(tmp_path: Path) -> None:
-    (tmp_path / "diagnosis.json").write_text(json.dumps(sample.diagnosed(24.0)))
-    page = write_report(tmp_path).read_text("utf-8")
-    assert (
-        "<h1>Physics is missing in “thermobalance”: flooded gap at c_body_1 and b_corpus (98 % sure).</h1>"
-        in page
-    )
 
 
 def test_a_folder_without_results_is_told(tmp_path: Path) -> None:
@@ -423,7 +284,3 @@ def test_autocorrelation_is_that_of_statsmodels() -> None:
 
     values = np.cumsum(np.random.default_rng(1).standard_normal(300))
     np.testing.assert_allclose(autocorrelation(values, 12), acf(values, nlags=12, fft=False)[1:], rtol=1e-10)
-
-
-def test_report_and_engine_mean_the_same_by_a_rival_that_cannot_be_excluded() -> None:
-    assert {NEAR, scoring.NEAR} == {RIVAL}

@@ -1,151 +1,22 @@
-"""States of the runtime, input guards in their order, and the rows that feed it."""
+"""States of the runtime, its status word, and how it gets over faults, gaps and a change of model."""
 
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from discovery.cli import app
-from discovery.errors import UserError
-from discovery.export.compiled import compile_model
-from discovery.export.document import Exported, Input, Output
-from discovery.export.ranges import InputRange, OutputRange
-from discovery.export.seal import Seal
+from discovery.export.document import Exported, Input
+from discovery.export.ranges import InputRange
 from discovery.export.stepper import Stepper
-from discovery.models import Model, State
 from discovery.runtime.compensator import Compensator, Settings
 from discovery.runtime.compensator import State as Mode
 from discovery.runtime.events import Event
 from discovery.runtime.fastforward import fast_forward
-from discovery.runtime.guards import Fault, InputGuard, Reading
-from discovery.runtime.rows import csv_rows, ticks
-from discovery.terms import Term, parse
-
-TEMPERATURE = Input(
-    "T", "ambient temperature", "degC", "linear", InputRange(20, 24, -30, 60, 0.5, 0.001, 300.0, 8.0, 3600.0)
-)
-POWER = Input("P", "heat load", "W", "held", InputRange(0, 800, 0, 2000, None, None, 300.0))
-
-
-def small(rate: str = "P/1000 - y/600", inputs: tuple[Input, ...] = (POWER,)) -> Exported:
-    """One error that follows a power, at most 100 um and 1 um/s."""
-    model = Model(
-        "small",
-        {},
-        {"y": State("y", "um", None, parse(0.0), 0.0, 1.0)},
-        (Term("t", "y", parse(rate)),),
-        {"E": parse("y")},
-    )
-    outputs = (Output("E", "error", "um", OutputRange(100.0, 1.0)),)
-    return Exported(
-        model, compile_model(model, 1.0), inputs, outputs, 1, {}, (), {}, Seal("0" * 64, None, None)
-    )
-
-
-def test_the_checks_come_in_order() -> None:
-    def fault(reading: Reading | None, now: float = 1000.0) -> Fault:
-        guard = InputGuard(TEMPERATURE)
-        guard.check(Reading(22.0, 990.0), 990.0)
-        found = guard.check(reading, now)
-        assert found is not None
-        assert found.value == (22.0 if found.fault & ~Fault.UNTRAINED else reading.value if reading else None)
-        return found.fault
-
-    assert fault(Reading(22.3, 1000.0)) is Fault.NONE
-    assert fault(None) is Fault.NOT_FINITE
-    assert fault(Reading(math.nan, 0.0, False)) is Fault.NOT_FINITE
-    assert fault(Reading(99.0, 0.0, False)) is Fault.QUALITY
-    assert fault(Reading(99.0, 0.0)) is Fault.AGE
-    assert fault(Reading(99.0, 1000.0)) is Fault.IMPLAUSIBLE
-    assert fault(Reading(30.0, 1000.0)) is Fault.JUMP
-
-
-def minutes_until_taken(
-    spec: Input, before: float, values: list[float], together: bool = False
-) -> int | None:
-    """Minutes until the first of `values`, one a minute, is taken."""
-    guard = InputGuard(spec)
-    for k in range(10):
-        guard.check(Reading(before + 0.01 * (k % 2), 60.0 * k), 60.0 * k)
-    for k, value in enumerate(values):
-        now = 60.0 * (10 + k)
-        found = guard.check(Reading(value, now), now, together)
-        assert found is not None
-        if found.value == value:
-            return k
-        assert found.fault & Fault.JUMP
-    return None
-
-
-@pytest.mark.parametrize(
-    ("step", "together", "minutes"),
-    [
-        (2.5, False, 5),  # a hall door
-        (-2.0, False, 5),
-        (2.5, True, 1),  # another sensor steps the same way
-        (15.0, False, 240),  # no room does that within a minute: hours, but not for good
-        (15.0, True, 240),
-    ],
-)
-def test_a_step_is_held_back_until_it_has_stayed(step: float, together: bool, minutes: int) -> None:
-    noise = 0.02 * np.sin(np.arange(300.0))
-    assert minutes_until_taken(TEMPERATURE, 22.0, list(22.0 + step + noise), together) == minutes
-
-
-def test_a_loose_contact_is_never_taken() -> None:
-    flicker = [22.0 + 3.0 + 2.0 * (k % 2) for k in range(600)]
-    assert minutes_until_taken(TEMPERATURE, 22.0, flicker) is None
-
-
-def test_a_value_that_comes_back_is_taken_at_once() -> None:
-    guard = InputGuard(TEMPERATURE)
-    for k, value in enumerate([22.0, 25.0, 25.0, 22.1, 25.0]):
-        found = guard.check(Reading(value, 60.0 * k), 60.0 * k)
-    assert found is not None
-    assert (found.value, found.fault) == (22.1, Fault.JUMP)
-    assert guard.stayed == 0.0
-
-
-def test_a_held_input_waits_outside_of_its_training_alone() -> None:
-    """Inside it may switch at will; one minute at 20 kW is no heat; a new regime is taken after 5 min."""
-    wide = replace(POWER, range=replace(POWER.range, plausible_high=50e3))
-    for inside in (0.0, 800.0, 1200.0):
-        assert minutes_until_taken(wide, 300.0, [inside]) == 0
-    assert minutes_until_taken(wide, 300.0, [20e3] * 3 + [300.0]) == 3
-    assert minutes_until_taken(wide, 300.0, [2000.0] * 10) == 4
-    cycles = [2000.0 + k if k % 4 < 2 else 300.0 for k in range(40)]  # heavy cuts of 2 min
-    guard, taken = InputGuard(wide), []
-    for k, value in enumerate(cycles):
-        found = guard.check(Reading(value, 60.0 * k), 60.0 * k)
-        taken.append(found is not None and found.value == value)
-    assert all(taken[20:])
-
-
-def test_a_value_that_stands_still_is_stale() -> None:
-    """Fresh stamps, the same number to the last digit: the sensor of the training never did that for 1 h."""
-    guard = InputGuard(TEMPERATURE)
-    faults = []
-    for k in range(70):
-        found = guard.check(Reading(22.123, 60.0 * k), 60.0 * k)
-        assert found is not None
-        faults.append(found.fault)
-    assert faults == [Fault.NONE] * 61 + [Fault.AGE] * 9
-    found = guard.check(Reading(22.124, 4200.0), 4200.0)
-    assert found is not None
-    assert found.fault is Fault.NONE
-
-
-def test_the_gain_fades_beyond_the_trained_range() -> None:
-    guard = InputGuard(TEMPERATURE)
-    assert [guard.gain(v) for v in (20.0, 24.0, 26.0, 34.0, 10.0, 40.0)] == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
-    assert 0.0 < guard.gain(29.0) < 1.0
-
+from discovery.runtime.guards import Fault, Reading
+from tests.runtime.small import POWER, TEMPERATURE, small
 
 WIDE = replace(POWER, range=replace(POWER.range, high=2000.0))
 
@@ -273,38 +144,6 @@ def test_before_any_good_value_nothing_is_given_out() -> None:
     assert compensator.state.name == Mode.OFF.name
 
 
-def test_the_gain_falls_straight_from_half_a_span_to_two() -> None:
-    """A span is that of the training, of a temperature at least 5 K, of anything else at least its size."""
-    speed = Input("n", "rotation speed", "rpm", "held", InputRange(990, 1000, 0, 9000, None, None, 300.0))
-    for spec, values in (
-        (TEMPERATURE, (26.5, 29.0, 15.0)),
-        (POWER, (1200, 1600, -800)),
-        (speed, (1500, 2000)),
-    ):
-        expected = [1.0, 2 / 3, 2 / 3][: len(values)]
-        assert [InputGuard(spec).gain(v) for v in values] == pytest.approx(expected)
-
-
-def test_the_input_furthest_from_its_training_decides_on_the_gain() -> None:
-    found = []
-    for temperature in (22.0, 29.0):
-        compensator = Compensator(small("P/1000 - y/600 + 0*T", (POWER, TEMPERATURE)))
-        for t in map(float, range(60)):
-            tick = compensator.tick({"P": Reading(100.0, t), "T": Reading(temperature, t)}, t)
-        found.append(tick.offsets["E"])
-    assert found[0] < -5.0
-    assert found[1] == pytest.approx(2 / 3 * found[0])
-    assert tick.faults == {"P": Fault.NONE, "T": Fault.UNTRAINED}
-
-
-@pytest.mark.parametrize(("gap", "fault"), [(500.0, Fault.JUMP), (700.0, Fault.NONE)])
-def test_after_a_gap_a_value_is_not_compared_with_one_from_before(gap: float, fault: Fault) -> None:
-    """1.9 K in 500 s is more than 0.5 K and 0.001 K/s; what was 700 s ago says nothing."""
-    compensator = Compensator(small("0*T", (TEMPERATURE,)), Settings(catch_up_s=600.0))
-    compensator.tick({"T": Reading(22.0, 0.0)}, 0.0)
-    assert compensator.tick({"T": Reading(23.9, gap)}, gap).faults["T"] is fault
-
-
 def bits(
     compensator: Compensator, now: float, value: object = 100.0, **options: bool
 ) -> tuple[int, set[int]]:
@@ -381,135 +220,3 @@ def test_trouble_lasts_as_long_as_it_is_said() -> None:
 
     assert modes(None, 40) == ["DEGRADED"] * 30 + ["FAULT"] * 10
     assert modes(1600.0, 50) == ["FROZEN"] * 41 + ["FAULT"] * 9
-
-
-def test_rows_are_read_whatever_stands_in_them() -> None:
-    lines = [
-        "time,P,T\n",
-        "0,1,2\n",
-        "x,1,1\n",
-        "10,,abc\n",
-        "5,9,9\n",
-        '20,"3\n',
-        "30,4\n",
-        "1e300,5,5\n",
-        "40,6,7,8\n",
-        "\n",
-    ]
-    rows = list(csv_rows(lines))
-    assert [time for time, _ in rows][:2] == [0.0, 10.0]
-    assert max(time for time, _ in rows) <= 40.0
-    assert math.isnan(rows[1][1]["T"].value)  # type: ignore[arg-type]
-    assert "P" not in rows[1][1]
-    with pytest.raises(UserError, match="no column 'time'"):
-        list(csv_rows(["a,b\n", "1,2\n"]))
-
-
-def test_ticks_use_what_was_known_by_then() -> None:
-    rows = [
-        (0.0, {"P": Reading(1.0, 0.0)}),
-        (25.0, {"P": Reading(2.0, 25.0)}),
-        (30.0, {"P": Reading(3.0, 30.0)}),
-    ]
-    found = [(now, newest["P"].value) for now, newest in ((n, dict(a)) for n, a in ticks(rows, 10.0))]
-    assert found == [(0.0, 1.0), (10.0, 1.0), (20.0, 1.0), (30.0, 3.0)]
-    assert [now for now, _ in ticks(rows, 10.0, after=10.0)] == [20.0, 30.0]
-    far = [*rows, (1e5, {"P": Reading(4.0, 1e5)})]
-    assert [now for now, _ in ticks(far, 10.0)] == [0.0, 10.0, 20.0, 30.0, 1e5]  # the machine was off
-
-
-@pytest.mark.parametrize("zone", ["UTC", "Europe/Berlin", "America/New_York"])
-def test_instants_do_not_depend_on_the_clock_of_the_computer(
-    monkeypatch: pytest.MonkeyPatch, zone: str
-) -> None:
-    """The hours of both changes of summer time, every half hour: none is lost, and naive means UTC."""
-    monkeypatch.setenv("TZ", zone)
-    time.tzset()
-    try:
-        for day, first in (("2026-03-29", 1774746000.0), ("2026-10-25", 1792890000.0)):
-            stamps = [f"{day}T{h:02d}:{m:02d}:00" for h in range(1, 4) for m in (0, 30)]
-            rows = list(csv_rows(["time,P", *(f"{stamp},1" for stamp in stamps)]))
-            assert [t for t, _ in rows] == [first + 1800.0 * k for k in range(6)]
-        [(zoned, _)] = csv_rows(["time,P", "2026-03-29T03:00:00+02:00,1"])
-        assert zoned == 1774746000.0
-    finally:
-        monkeypatch.undo()
-        time.tzset()
-
-
-def test_the_command_says_what_is_missing(model_file: Path, tmp_path: Path) -> None:
-    runner = CliRunner()
-    model, inputs = str(model_file), ["--inputs", "-"]
-    for words, sentence, status in (
-        ([model, *inputs], "no key is trusted", 1),
-        ([model, "--allow-unsigned", "--inputs", "none.csv"], "there is no such file", 1),
-        ([model, "--allow-unsigned", "--inputs", str(tmp_path)], "this is a folder", 1),
-        ([str(tmp_path / "none.json"), *inputs], "there is no such file", 1),
-        ([model, "--back", "--state", str(tmp_path)], "--back is not possible", 1),
-        ([model, *inputs, "--trust", str(tmp_path / "no.pub")], "there is no such key", 1),
-        ([model, "--allow-unsigned"], "give the source of the readings: --inputs FILE", 2),
-        ([model, "--back"], "--back needs --state", 2),
-        ([model, *inputs, "--opcua-demo"], "--inputs and --opcua-demo: the readings have one source", 2),
-        ([model, *inputs, "--seconds", "5"], "--seconds cannot be used with --inputs", 2),
-        ([model, *inputs, "--learn", "key.pem"], "--learn needs --state", 2),
-        ([model, *inputs, "--shadow-hours", "-1"], "--shadow-hours is -1; give 0 or more", 2),
-        ([model, *inputs, "--shadow-um", "nan"], "--shadow-um is nan; give 0 or more", 2),
-    ):
-        done = runner.invoke(app, ["compensate", *words])
-        assert done.exit_code == status
-        assert sentence in done.output
-
-
-def test_a_column_that_is_not_there_is_told(model_file: Path) -> None:
-    """A file of something else had been run, with exit status 0 and a table of zeros."""
-    command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", "-"]
-    some = CliRunner().invoke(app, command, input="time,T_env,speed\n0,20,0\n")
-    assert some.exit_code == 1
-    assert (
-        "there was no offset: P_drive, T_cool, T_fluid, h_nozzle, pump never had a good reading"
-        in some.stderr
-    )
-    assert "the inputs have no column P_drive, T_cool, T_fluid" in some.stderr
-    none = CliRunner().invoke(app, command, input="time,a\n0,20\n")
-    assert none.exit_code == 1
-    assert "name a file with its inputs" in none.stderr
-    assert none.stdout == ""
-
-
-@pytest.mark.parametrize(
-    ("text", "status"), [("t;T_env\n0;20\n", 1), ("time,a\n0,20\n", 1), ("time,T_env\n", 0)]
-)
-def test_inputs_that_are_refused_leave_no_state(
-    model_file: Path, tmp_path: Path, text: str, status: int
-) -> None:
-    memory = tmp_path / "mem"
-    command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", "-", "--state", str(memory)]
-    assert CliRunner().invoke(app, command, input=text).exit_code == status
-    assert not memory.exists()
-    assert CliRunner().invoke(app, command, input="time,T_env\n0,20\n").exit_code == 1
-    assert (memory / "active.json").exists()
-
-
-def test_the_output_may_not_be_what_is_read(model_file: Path, tmp_path: Path) -> None:
-    inputs = tmp_path / "in.csv"
-    inputs.write_text("time,T_env\n0,20\n")
-    for used in (inputs, model_file):
-        before = used.read_bytes()
-        command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", str(inputs)]
-        done = CliRunner().invoke(app, [*command, "--out", str(used)])
-        assert (done.exit_code, "--out names the same file" in done.output) == (1, True)
-        assert used.read_bytes() == before
-
-
-def test_inputs_that_cannot_be_read_leave_an_older_output(model_file: Path, tmp_path: Path) -> None:
-    inputs, out = tmp_path / "in.csv", tmp_path / "offsets.csv"
-    inputs.write_text("t;T_env\n0;20\n")
-    command = ["compensate", str(model_file), "--allow-unsigned", "--inputs", str(inputs), "--out", str(out)]
-    assert CliRunner().invoke(app, command).exit_code == 1
-    assert not out.exists()
-    out.write_text("what was there")
-    assert CliRunner().invoke(app, command).exit_code == 1
-    assert out.read_text() == "what was there"
-    inputs.write_text("time,T_env\n0,20\n")
-    assert CliRunner().invoke(app, command).exit_code == 1  # no offset: the others are missing
-    assert out.read_text().startswith("time,state,status")
