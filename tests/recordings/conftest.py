@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from discovery.recordings.check import check_campaign
+
 CAMPAIGN = """name = "test"
 
 [channels]
@@ -43,3 +45,22 @@ def write(tmp_path: Path) -> Write:
         return path
 
     return write
+
+
+def found(path: Path) -> list[str]:
+    """Findings without the folder, as they are printed."""
+    return [str(finding).replace(f"{path.parent}/", "") for finding in check_campaign(path)]
+
+
+def with_line(number: int, text: str) -> list[str]:
+    lines = rows()
+    lines[number - 1] = text
+    return lines
+
+
+def with_column(place: int, cells: list[str]) -> list[str]:
+    """The good recording with the cells of one column replaced, from the second line on."""
+    lines = [line.split(",") for line in rows(len(cells))]
+    for line, cell in zip(lines[1:], cells, strict=True):
+        line[place] = cell
+    return [",".join(line) for line in lines]

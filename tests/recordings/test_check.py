@@ -3,7 +3,6 @@
 import gzip
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -13,28 +12,9 @@ from discovery.cli import app
 from discovery.errors import UserError
 from discovery.recordings import load_campaign
 from discovery.recordings.check import check_campaign, summary
-from tests.recordings.conftest import CAMPAIGN, Write, rows
+from tests.recordings.conftest import CAMPAIGN, Write, found, rows, with_column, with_line
 
 ROOT = Path(__file__).parents[2]
-
-
-def found(path: Path) -> list[str]:
-    """Findings without the folder, as they are printed."""
-    return [str(finding).replace(f"{path.parent}/", "") for finding in check_campaign(path)]
-
-
-def with_line(number: int, text: str) -> list[str]:
-    lines = rows()
-    lines[number - 1] = text
-    return lines
-
-
-def with_column(place: int, cells: list[str]) -> list[str]:
-    """The good recording with the cells of one column replaced, from the second line on."""
-    lines = [line.split(",") for line in rows(len(cells))]
-    for line, cell in zip(lines[1:], cells, strict=True):
-        line[place] = cell
-    return [",".join(line) for line in lines]
 
 
 def test_nothing_is_wrong(write: Write) -> None:
@@ -290,36 +270,6 @@ def test_exit_status_and_closing_line(write: Write) -> None:
 @pytest.mark.parametrize("folder", ["tclab"])
 def test_the_recordings_that_come_along_are_good(folder: str) -> None:
     assert check_campaign(ROOT / "datasets" / folder) == []
-
-
-def test_slow_quantised_and_switched_signals_are_no_frozen_sensors(write: Write) -> None:
-    random = np.random.default_rng(1)
-    slow = 22 + np.cumsum(random.normal(0, 0.02, 600))
-    cells = [f"{value:.1f}" for value in slow]  # a sensor of 0.1 degC that changes every few readings
-    assert found(write(with_column(1, cells))) == []
-
-
-@pytest.mark.parametrize(
-    "cells",
-    [
-        [20.0] * 30 + [55.0] * 30,  # a step stays
-        [20.0] * 30 + [59.0] + [25.0] * 30,  # an overshoot: the neighbours differ
-        [20.0 + 35.0 * (k % 2) for k in range(60)],  # a signal that is so
-        [20.0] * 30 + [32.0] + [20.0] * 30,  # a door
-    ],
-)
-def test_what_moves_is_no_lone_wrong_reading(write: Write, cells: list[float]) -> None:
-    told = found(write(with_column(1, [f"{cell}" for cell in cells])))
-    assert not any("in one reading" in line or "in a row" in line for line in told)
-
-
-def test_wrong_readings_in_a_row_are_left_out_and_said(write: Write) -> None:
-    path = write(with_column(1, [f"{cell}" for cell in [20.0] * 30 + [55.0, 55.5] + [20.0] * 30]))
-    [told] = found(path)
-    assert "line 32: 'T_env' is 55 degC in 2 readings in a row between 20 and 20" in told
-    assert told.endswith("left out")
-    air = next(iter(load_campaign(path).recordings.values())).values["T_env"]
-    assert np.flatnonzero(np.isnan(air)).tolist() == [30, 31]
 
 
 mutations = st.lists(

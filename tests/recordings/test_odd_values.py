@@ -1,0 +1,71 @@
+"""Readings that only a fault explains, up to three in a row, and what is none."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from discovery.recordings import load_campaign
+from discovery.recordings.campaign import Channel
+from discovery.recordings.oddvalues import impossible_readings
+from tests.recordings.conftest import Write, found, with_column
+
+PROBE = Channel("z", "error", "um", None, "linear")
+
+
+def slow(seed: int = 1) -> NDArray[np.float64]:
+    rng = np.random.default_rng(seed)
+    return np.asarray(-150.0 * (1.0 - np.exp(-np.arange(200) / 60.0)) + rng.normal(0.0, 2.0, 200))
+
+
+@pytest.mark.parametrize("rows", [[70], [70, 71], [70, 71, 72], [40, 41, 90, 120, 121, 122]])
+def test_left_out(rows: list[int]) -> None:
+    read = slow()
+    read[rows] += 4300.0
+    assert impossible_readings(PROBE, read).tolist() == rows
+
+
+def test_sound_readings_between_wrong_ones_stay() -> None:
+    read = slow()
+    read[[70, 71, 74, 75]] += 4300.0
+    assert impossible_readings(PROBE, read).tolist() == [70, 71, 74, 75]
+
+
+def test_what_lasts_or_fades_is_no_fault() -> None:
+    lasts = slow()
+    lasts[70:74] += 4300.0  # four readings: the probe was moved, or the machine
+    assert impossible_readings(PROBE, lasts).size == 0
+    heated = 25.0 + np.random.default_rng(2).normal(0.0, 0.05, 200)
+    heated[70:73] += [180.0, 195.0, 200.0]
+    heated[73:] += 200.0 * np.exp(-np.arange(1, 128) / 1.5)  # a nozzle: hot for three readings, then it cools
+    sensor = Channel("nozzle", "temperature", "degC", None, "linear")
+    assert impossible_readings(sensor, heated).size == 0
+
+
+def test_slow_quantised_and_switched_signals_are_no_frozen_sensors(write: Write) -> None:
+    random = np.random.default_rng(1)
+    slow = 22 + np.cumsum(random.normal(0, 0.02, 600))
+    cells = [f"{value:.1f}" for value in slow]  # a sensor of 0.1 degC that changes every few readings
+    assert found(write(with_column(1, cells))) == []
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        [20.0] * 30 + [55.0] * 30,  # a step stays
+        [20.0] * 30 + [59.0] + [25.0] * 30,  # an overshoot: the neighbours differ
+        [20.0 + 35.0 * (k % 2) for k in range(60)],  # a signal that is so
+        [20.0] * 30 + [32.0] + [20.0] * 30,  # a door
+    ],
+)
+def test_what_moves_is_no_lone_wrong_reading(write: Write, cells: list[float]) -> None:
+    told = found(write(with_column(1, [f"{cell}" for cell in cells])))
+    assert not any("in one reading" in line or "in a row" in line for line in told)
+
+
+def test_wrong_readings_in_a_row_are_left_out_and_said(write: Write) -> None:
+    path = write(with_column(1, [f"{cell}" for cell in [20.0] * 30 + [55.0, 55.5] + [20.0] * 30]))
+    [told] = found(path)
+    assert "line 32: 'T_env' is 55 degC in 2 readings in a row between 20 and 20" in told
+    assert told.endswith("left out")
+    air = next(iter(load_campaign(path).recordings.values())).values["T_env"]
+    assert np.flatnonzero(np.isnan(air)).tolist() == [30, 31]
