@@ -225,7 +225,7 @@ def read_numbers(cells: Sequence[str], comma: bool | None) -> Numbers:
 
 
 def _value(cell: str, comma: bool | None, units: dict[str, int]) -> float | None:
-    """One cell: NaN where nothing was measured, None where it is no number."""
+    """Return one cell as a number. NaN: nothing was measured. None: the cell is no number."""
     if _NUMBER.fullmatch(cell) and not (comma and _THOUSANDS.fullmatch(cell)):
         return _finite(cell)
     folded = unicodedata.normalize("NFKC", cell).strip().replace("−", "-").casefold()

@@ -107,7 +107,9 @@ def as_good(one: Score, best: Score) -> bool:
 
 
 def _left_out(experiment: Experiment, name: str, entry: ModelEntry, fold: Fold) -> tuple[Array, Array]:
-    """Sums of squares left over, and without a model, on what a fit did not see: each (outputs,)."""
+    """Return two sums of squares for each output over the parts that a fit did not see: of the model, and
+    without a model.
+    """
     whole, outputs = experiment.campaign, experiment.outputs_of(entry)
     kept = [r for r in experiment.fit if r not in fold.recordings]
     seen = {
@@ -171,7 +173,9 @@ def _inside(time: Array, fold: Fold, recording: str) -> NDArray[np.bool_]:
 
 
 def _points(experiment: Experiment) -> int:
-    """Instants of a recording: more where the outputs move quickly."""
+    """Return the instants of a recording at which models are compared. There are more where the outputs
+    move quickly.
+    """
     campaign, fit = experiment.fitting, experiment.fit
     scale = min(time_scale(campaign, fit, [y]) for y in experiment.outputs)
     longest = max(float(campaign.recordings[r].time[-1]) for r in fit)

@@ -82,7 +82,7 @@ def counts_up(name: str) -> bool:
 
 
 def _says_time(words: str) -> bool:
-    """Whether a name is that of a clock; a t alone may be a temperature."""
+    """Return whether a name is that of a clock. A t alone may be a temperature."""
     return bool(CLOCKS.search(re.sub(r"\bt\b", "", words)))
 
 
@@ -119,7 +119,7 @@ def bookkeeping(name: str, unit: str, values: Array, seconds: Array, role: str) 
 
 
 def _starts_anew(steps: Array, seconds: Array) -> bool:
-    """Whether a column rises with the slope of a clock but for where it falls back."""
+    """Return whether a column rises as a clock does, except for the places where it starts again."""
     slopes = steps[steps > 0] / seconds[steps > 0]
     return len(slopes) >= _MOSTLY * len(steps) and any(
         np.mean(np.abs(slopes * one - 1) < _EXACT) >= _MOSTLY for one in TIME_UNITS.values()

@@ -72,7 +72,7 @@ def _without_mark(data: bytes) -> str:
 
 
 def _likely(data: bytes, encoding: str) -> float:
-    """How much the text looks like words when it is read so."""
+    """Return how much the text looks like words if it is read in this encoding."""
     try:
         text = data.decode(encoding)
     except UnicodeDecodeError:

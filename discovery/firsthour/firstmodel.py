@@ -161,7 +161,9 @@ def usual_inputs(guesses: Mapping[str, Guess], room: str | None, *, thermal: boo
 
 
 def _belonging(output: str, loads: Sequence[str], outputs: Sequence[str]) -> list[str]:
-    """Loads that warm an output: the one of its number where all are numbered, else all."""
+    """Return the loads that warm an output. If all are numbered, it is the load with the same number, else
+    all loads.
+    """
     number = {name: (re.findall(r"\d+", name) or [""])[-1] for name in [*loads, *outputs]}
     numbers = [number[load] for load in loads]
     paired = (

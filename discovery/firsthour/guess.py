@@ -69,7 +69,7 @@ def evidence_of(column: Column, hints: Sequence[tuple[str, Mapping[str, float]]]
 
 
 def _unit_read(column: Column) -> str | None:
-    """The unit of the header where it is one."""
+    """Return the unit in the header, if it is one."""
     spelled, named = unit_of(column.unit)
     return named or (spelled if spelled and _known(spelled, OTHER) else None)
 
@@ -113,7 +113,7 @@ def _stated(guesses: Mapping[str, Guess]) -> list[str]:
 
 
 def _with_unit(one: Guess, unit: str, listed: bool, written: str) -> Guess:
-    """A role that can have the unit of the header: the likeliest that does."""
+    """Return the guess with the likeliest role that can have the unit of the header."""
     for role, chance in ((one.role, one.chance), *one.rivals, (OTHER, one.chance)):
         if _known(unit, role):
             said = "" if listed and unit == written else f"; the header says {written}"

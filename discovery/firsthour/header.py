@@ -66,14 +66,14 @@ def _fitted(cells: list[str], width: int) -> list[str] | None:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Whether a row names units: most of its cells are such, or a "-"."""
+    """Return whether a row holds units: most of its cells are units or a "-"."""
     known = [cell for cell in cells if cell]
     named = [known_unit(cell) or time_unit(cell) or unit_in(f"x [{cell.strip('[]()')}]") for cell in known]
     return sum(map(bool, named)) >= max(1, len(known) / 2)
 
 
 def _spread_out(cells: Sequence[str]) -> list[str]:
-    """A word over a group of columns stands over the first of them alone."""
+    """Repeat a word over a group of columns. The file has it only over the first of them."""
     found: list[str] = []
     for cell in cells:
         found.append(cell or (found[-1] if found else ""))
@@ -89,7 +89,7 @@ def explained(name: str, above: Sequence[Row]) -> str:
 
 
 def _compare(path: Path, above: Sequence[Row], width: int) -> None:
-    """Raise a UserError where the line above the rows is a header with more or fewer names than they have."""
+    """Raise a UserError if the line above the rows is a header with too many or too few names."""
     line, names = above[-1] if above else (0, [])
     if len(names) > 1 and all(holds_word(name) for name in names):
         raise UserError(

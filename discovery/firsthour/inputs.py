@@ -85,7 +85,7 @@ def _scaled(columns: Array) -> Array:
 
 
 def _unexplained(blocks: list[dict[str, Array]], targets: list[Array], names: Sequence[str]) -> float:
-    """Mean over the outputs of the share of variance that the responses leave."""
+    """Return the share of variance that the responses do not explain, as the mean over the outputs."""
     shares = []
     for block, y in zip(blocks, targets, strict=True):
         F = np.column_stack([block[name] for name in names])

@@ -170,7 +170,9 @@ def _parts(cell: str) -> _Parts | None:
 
 
 def _instant(parts: _Parts, order: str) -> datetime:
-    """Raises ValueError where the date is none in this order."""
+    """Return the instant of a date in this order of day, month and year. Raises ValueError if the date does
+    not exist.
+    """
     date, seconds, away = parts
     found = {}
     for letter, text in zip(order, date, strict=True):
@@ -195,7 +197,7 @@ def _instant(parts: _Parts, order: str) -> datetime:
 
 
 def _hour(hour: str, half: str | None) -> int:
-    """An hour of 24."""
+    """Return the hour on a clock of 24 hours."""
     if not half:
         return int(hour)
     late = half[0] in "pP" or half in ("午後", "下午")

@@ -85,7 +85,7 @@ def _common(shifts: Sequence[Shift]) -> Shift | None:
 
 
 def _joined(first: OwnTable, second: OwnTable, offset: float, how: str, shift: Shift) -> OwnTable:
-    """One table of both at the stamps of either; an empty cell where a logger has no reading."""
+    """Return one table with the stamps of both. A cell is empty if its logger has no reading then."""
     moved = second.time + offset + (shift.seconds if shift.seen else 0.0)
     if moved[-1] < first.time[0] or moved[0] > first.time[-1]:
         raise UserError(
@@ -189,7 +189,9 @@ def _rates(stamps: Array, values: Array, grid: Array, width: float) -> Array:
 def _cost(
     stamps: Array, drivers: list[Column], grid: Array, shift: float, targets: list[Array], length: float
 ) -> float:
-    """Sum over the answers of the log of the share of their rates that the shifted drivers leave."""
+    """Return how badly the shifted drivers explain the rates of the answers: the log of the remaining
+    share, summed over the answers.
+    """
     step = grid[1] - grid[0]
     features = [np.ones(len(grid))]
     start = grid[0] - _MOST * length
@@ -210,7 +212,9 @@ def _cost(
 
 
 def _filtered(values: Array, step: float, lag: float) -> Array:
-    """What a change of the input does to the rate of a first-order answer: a high pass of its lag."""
+    """Return what a change of the input does to the rate of a first-order answer: the input through a high
+    pass.
+    """
     if lag == 0.0:
         return values
     from scipy.signal import lfilter

@@ -102,7 +102,7 @@ def _is_name(cell: str) -> bool:
 
 
 def _alternate(cells: Sequence[str]) -> bool:
-    """Whether few values alternate: those of a state stay for a while."""
+    """Return whether a few values alternate from row to row. A state of a machine would stay for a while."""
     count = len(set(cells[: _MOST * 20]))
     if not 2 <= count <= _MOST or not 2 <= len(set(cells)) <= min(_MOST, len(cells) / _TURNS):
         return False
@@ -110,7 +110,7 @@ def _alternate(cells: Sequence[str]) -> bool:
 
 
 def _stacked(cells: Sequence[str], known: Mapping[int, Sequence[str]], at: int) -> bool:
-    """Whether each word stands in one block of rows, and stamps begin anew with each block."""
+    """Return whether each word fills one block of rows, and the stamps start again with each block."""
     if not 2 <= len(set(cells[:20_000])) <= _MOST and len(set(cells)) != len(
         set(cells[-20_000:]) | {cells[0]}
     ):
@@ -131,7 +131,9 @@ def _numbered(name: str, cells: Sequence[str]) -> bool:
 
 
 def _moves(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Whether a column holds numbers that differ for one name and are neither a counter nor a clock."""
+    """Return whether a column holds readings: its numbers differ for one name, and it is no counter and no
+    clock.
+    """
     numbers = [cell for cell in cells if is_number(cell)]
     if len(numbers) < len(cells) / 2 or any(is_stamp(c) for c in cells[:20] if not is_empty(c)):
         return False

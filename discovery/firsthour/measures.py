@@ -161,7 +161,7 @@ def _is_range(name: str, unit: str) -> bool:
 
 
 def _is_symbol(name: str, unit: str) -> bool:
-    """Whether a name ends with the letter that formulas have for what has the unit: F_N, U_V."""
+    """Return whether a name ends with the symbol that formulas use for this unit: F_N, U_V."""
     return fold(name).split()[-1:] in [[letter] for letter in _SYMBOLS.get(unit, "").split()]
 
 

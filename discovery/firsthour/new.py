@@ -108,7 +108,7 @@ def new(
 def _check_request(
     folder: Path, sources: Sequence[Path], joins: Sequence[Path], *, there: bool, again: bool
 ) -> None:
-    """Refuse what cannot be done: see the errors of `new`."""
+    """Refuse a request that cannot be fulfilled. Raises the errors that `new` lists."""
     if there and not again:
         raise UserError(
             f"{folder}: campaign.toml is there already; use --again to make model and experiment again "
@@ -156,7 +156,7 @@ def _planned_again(folder: Path, progress: Progress, *, quick: bool) -> list[str
 
 
 def _written(folder: Path) -> dict[str, dict[str, object]]:
-    """Channels of the campaign that is there, without those that were guessed and never confirmed."""
+    """Return the channels of the existing campaign, without guesses that nobody has confirmed."""
     form = read_toml(folder / "campaign.toml", CampaignForm)
     return {
         name: one.model_dump(exclude_defaults=True)
@@ -166,7 +166,9 @@ def _written(folder: Path) -> dict[str, dict[str, object]]:
 
 
 def _outputs(found: Recorded, guesses: Mapping[str, Guess]) -> list[str]:
-    """The errors and other outputs, else the temperatures; without those that never move, if any moves."""
+    """Return the errors and other outputs, or the temperatures if there are none. Outputs that never move
+    are left out, if another one moves.
+    """
     stated = [column for column in found.seen if guesses[column.name].role in ("error", "other output")]
     known = stated or [column for column in found.seen if guesses[column.name].role == "temperature"]
     return [column.name for column in known if not never_moves(column)] or [column.name for column in known]
@@ -216,7 +218,7 @@ def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Gue
 
 
 def _predicted(outputs: Sequence[str], found: Recorded, guesses: Mapping[str, Guess]) -> str:
-    """Which columns the models predict; how to name an error where none was recognised."""
+    """Say which columns the models predict. If no error was recognised, also say how to name one."""
     line = f"predicted: {', '.join(outputs)}"
     if any(guesses[name].role in ("error", "other output") for name in outputs):
         return line

@@ -170,7 +170,7 @@ def _unchosen(
     lines: Mapping[str, str],
     files: Mapping[str, str],
 ) -> Plan:
-    """The simple model and a discovered one, not compared."""
+    """Return the simple model and a discovered one, without a comparison."""
     simple = "first_order" if files else next(iter(lines))
     references = [name for name in REFERENCES if name in lines]
     chosen = dict.fromkeys((simple, "discovered", *references))

@@ -207,7 +207,7 @@ def _counted(
 
 
 def _common(runs: Sequence[OwnTable]) -> tuple[set[str], list[str]]:
-    """Names that all have, and what is said of the others."""
+    """Return the names that all recordings have, and a note about the others."""
     first = {column.name for column in runs[0].columns}
     for table in runs[1:]:
         here = {column.name for column in table.columns}
@@ -252,7 +252,7 @@ def _says_nothing(
 
 
 def _named(column: Column) -> str:
-    """The role that name and unit say, whatever the values are."""
+    """Return the role that name and unit state, without a look at the values."""
     return guess(replace(column, values=np.zeros(0))).role
 
 

@@ -65,7 +65,9 @@ def unknown_room(
 
 
 def _cold_start(run: OwnTable, guesses: Mapping[str, Guess]) -> float | None:
-    """Mean of the first temperatures [degC] where two or more agree as in a machine that stood overnight."""
+    """Return the mean of the first temperatures [degC] if they agree, as after a night at rest. None: they
+    differ, or there is only one.
+    """
     firsts = []
     for column in run.columns:
         one = guesses.get(column.name)

@@ -126,7 +126,9 @@ class _Lines:
 
 
 def _mark(lines: Sequence[str]) -> str:
-    """What separates the cells: with it most lines have as many cells, and most of these can be read."""
+    """Return the mark between the cells. With the right one, most lines have the same number of cells, and
+    most cells can be read.
+    """
     sample = [*lines[len(lines) // 2 :][:_TAIL], *lines[-_TAIL:]]
 
     def score(mark: str) -> tuple[float, int]:
@@ -143,7 +145,7 @@ def _mark(lines: Sequence[str]) -> str:
 
 @lru_cache(maxsize=4096)
 def _plain(cell: str) -> bool:
-    """Whether a cell is a number without blanks inside, a stamp, a switch or nothing."""
+    """Return whether a cell is a number without blanks, a stamp, a switch or empty."""
     if is_number(cell):
         return not re.search(r"\d\s+\d", cell)
     return (is_stamp(cell) and not re.search(r"[;\t|]", cell)) or is_switch(cell) or is_empty(cell)

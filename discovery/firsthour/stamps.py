@@ -135,7 +135,9 @@ def _candidates(
 def _stamped(
     sheet: Sheet, at: int, cells: list[str], names: Sequence[str], units: Sequence[str]
 ) -> Iterator[Clock]:
-    """A column of stamps; a column of dates with the one of the time of day; a column of milliseconds."""
+    """Yield clocks from a column of stamps, from a date with a time of day, and with a column of
+    milliseconds.
+    """
     fine = next(
         (k for k, name in enumerate(names) if k != at and _are_milliseconds(sheet, k, name, units[k])), None
     )

@@ -75,7 +75,9 @@ def _alike(column: Column, columns: Sequence[Column]) -> list[Column]:
 
 
 def _one_scale(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
-    """Temperatures without a unit share one: that of those that name theirs, else the likeliest for all."""
+    """Give all temperatures without a unit the same one: the unit of those that have one, else the
+    likeliest.
+    """
     found = dict(guesses)
     heat = [c for c in columns if guesses[c.name].role in TEMPERATURES]
     named = {guesses[c.name].unit for c in heat if c.unit}
@@ -157,7 +159,7 @@ def _is_heat(one: Guess) -> bool:
 
 
 def _cell(guesses: Mapping[str, Guess], holds: Mapping[str, bool | None]) -> dict[str, Guess]:
-    """A current that is set, a voltage that is not, and no error: the voltage is what is measured."""
+    """If a current is set, a voltage is not, and there is no error, then the voltage is measured."""
     found = dict(guesses)
     currents = [n for n, one in guesses.items() if one.unit in CURRENTS and holds.get(n)]
     voltages = [n for n, one in guesses.items() if one.unit in VOLTAGES and holds.get(n) is False]
@@ -169,7 +171,7 @@ def _cell(guesses: Mapping[str, Guess], holds: Mapping[str, bool | None]) -> dic
 
 
 def _held(values: Array) -> bool | None:
-    """Whether most readings repeat the one before them; None where nothing moves."""
+    """Return whether most readings repeat the one before. None: the column never moves."""
     known = values[np.isfinite(values)]
     if not known.size or known.min() == known.max():
         return None
@@ -177,7 +179,7 @@ def _held(values: Array) -> bool | None:
 
 
 def _air(column: Column) -> tuple[float, int]:
-    """How clearly a column is the air around a machine, the clearest is the least."""
+    """Return how clearly a column is the air around the machine. The smallest value is the clearest."""
     words = words_of(column.header)
     says = max((word.says.get("air", 0.0) for word in words), default=0.0)
     more = sum("air" not in word.says and word.gloss != "temp" for word in words)
@@ -215,7 +217,7 @@ def _one_room(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[s
 
 
 def _the_fluid(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
-    """Where a flow is recorded and no temperature of a fluid, the one coolant is that fluid.
+    """If a flow is recorded, but no fluid temperature, then the only coolant is that fluid.
 
     Apart, the two would never meet: no convection to the fluid could be offered.
     """
@@ -250,7 +252,7 @@ def _corrections(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dic
 
 
 def _signed(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
-    """Heat loads with readings below zero: a discharge, a brake, or heat that is taken away."""
+    """Mark heat loads with readings below zero: a discharge, a brake, or cooling."""
     found = dict(guesses)
     for column in columns:
         one, known = guesses[column.name], column.values[np.isfinite(column.values)]

@@ -74,7 +74,7 @@ def _excel(path: Path) -> dict[str, list[tuple[int, list[str]]]]:
 
 
 def _trimmed(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
-    """Rows of one width, without columns that are empty on the left and right."""
+    """Return rows of equal width, without empty columns on the left and right."""
     width = max((len(row) for _, row in rows), default=0)
     rows = [(k, row + [""] * (width - len(row))) for k, row in rows]
     used = [any(row[c] for _, row in rows) for c in range(width)]
@@ -85,7 +85,7 @@ def _trimmed(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
 
 
 def _word(value: Any) -> str:
-    """A cell of a spreadsheet as a text table would spell it."""
+    """Return a cell of a spreadsheet as a text table would write it."""
     if value is None:
         return ""
     if isinstance(value, bool):

@@ -45,7 +45,9 @@ def block_means(time: Array, values: Array, first: Ints, counts: Array | None = 
 
 @njit(cache=True, nogil=True)
 def _means(time, values, weights, first, within):  # type: ignore[no-untyped-def]
-    """Sums of differences from the first reading: what stays constant is so to the last bit."""
+    """Return the means of blocks, as sums of differences from the first reading: a constant stays exactly
+    constant.
+    """
     blocks = first.shape[0] - 1
     counts, square = np.zeros(blocks), np.zeros(blocks)
     stamp, mean = np.full(blocks, np.nan), np.full(blocks, np.nan)

@@ -100,7 +100,7 @@ def _decode(data: bytes, troubles: _Troubles) -> str:
 
 
 def _rows(text: str, troubles: _Troubles) -> Iterator[tuple[int, list[str]]]:
-    """The lines that hold something, cut into cells, with their numbers."""
+    """Yield the lines that are not empty, as cells, with their numbers."""
     lines = io.StringIO(text)
     first = next((line for line in lines if line.strip()), "")
     lines.seek(0)
@@ -169,7 +169,7 @@ def _stamp(text: str, line: int, instants: bool, troubles: _Troubles) -> float |
 
 
 def _number(text: str, name: str, line: int, troubles: _Troubles) -> float:
-    """A cell as a number; NaN where it is empty or none."""
+    """Return a cell as a number. NaN: the cell is empty or no number."""
     if text in EMPTY_CELLS:
         return math.nan
     try:

@@ -88,7 +88,9 @@ def summary(findings: Sequence[Finding], misfits: Sequence[str] = ()) -> str:
 
 
 def _form(path: Path, text: str, data: dict[str, Any]) -> tuple[CampaignForm | None, list[Finding]]:
-    """The campaign without its faulty channels and recordings, and the faults; None when little is left."""
+    """Return the campaign without its faulty channels and recordings, and the faults. None: too little
+    remains.
+    """
     try:
         return CampaignForm.model_validate(data), []
     except ValidationError as error:
@@ -101,7 +103,7 @@ def _form(path: Path, text: str, data: dict[str, Any]) -> tuple[CampaignForm | N
 
 
 def _without(data: dict[str, Any], keys: list[Key]) -> dict[str, Any]:
-    """`data` without the keys, cut off at the second word: a whole channel, a whole recording."""
+    """Return `data` without these keys. A key removes the whole channel or the whole recording."""
     kept = {key: dict(value) if isinstance(value, dict) else value for key, value in data.items()}
     for key in keys:
         table = kept if len(key) == 1 else kept.get(str(key[0])) if key else None
@@ -155,7 +157,9 @@ def _recording_findings(
 
 
 def _plausible(channel: Channel, values: Array) -> Array:
-    """Values without those that have a finding of their own: a comparison of recordings is not about them."""
+    """Return the values without those that have a finding of their own. They would disturb the comparison
+    of recordings.
+    """
     known = np.flatnonzero(np.isfinite(values))
     wrong = known[odd_readings(channel, values[known])]
     found = np.where(np.isfinite(values), values, np.nan)

@@ -128,14 +128,14 @@ class Reduction:
         self.kept = {n: _Mean(*map(np.append, old[n], one)) for n, one in new.items()}
 
     def _filled(self, name: str, column: Array) -> Array:
-        """A column with its last value wherever it was not written."""
+        """Return a column in which the last value fills the empty cells."""
         known = np.concatenate([[self.last.get(name, np.nan)], column])
         index = np.maximum.accumulate(np.where(np.isfinite(known), np.arange(len(known)), 0))
         self.last[name] = float(known[index[-1]])
         return np.asarray(known[index][1:])
 
     def _halve(self) -> None:
-        """Two blocks become one."""
+        """Join two blocks into one."""
         self.every *= 2
         self.begin = self.begin[::2]
         self.kept = {n: _Mean(*_paired(one, n in self.held)) for n, one in self.kept.items()}
@@ -165,7 +165,7 @@ class Reduction:
 
 
 def _paired(one: _Mean, held: bool) -> Iterator[Array]:
-    """Means of two blocks each; a last one that is alone stays so."""
+    """Return the means of two blocks each. A last single block stays as it is."""
     odd = len(one.mean) % 2
     counts, stamp, mean = (np.append(a, [0.0, np.nan, np.nan][k]) if odd else a for k, a in enumerate(one))
     n, m = counts[::2], counts[1::2]

@@ -192,7 +192,7 @@ def _count(readings: int) -> str:
 
 
 def _logger_words(read: Array) -> Lines:
-    """Rows that hold a known word for nothing, far from all other readings."""
+    """Return the rows with a code that loggers write for a missing value, far from all other readings."""
     found = [np.flatnonzero(np.abs(read) > _LARGEST)]
     for word in _WORDS:
         rows = np.flatnonzero(read == word)
@@ -227,7 +227,9 @@ def _zeros(channel: Channel, read: Array) -> Lines:
 
 
 def _steps(read: Array, wrong: Lines) -> Iterator[int]:
-    """Rows after which readings jump and stay: a step far larger than all steps around it."""
+    """Yield the rows after which the readings jump and stay: the step is far larger than all steps around
+    it.
+    """
     kept = np.delete(np.arange(read.size), wrong.astype(np.intp))
     steps = np.abs(np.diff(read[kept]))
     usual = 1.4826 * float(np.median(steps)) if steps.size else 0.0

@@ -249,7 +249,7 @@ def _instant(stamp: datetime | str | None) -> datetime:
 
 
 def _floats(column: Any) -> Array:
-    """Numbers as floats, (T,); null and NaN both mean not measured.
+    """Return numbers as floats, (T,). Null and NaN both mean: not measured.
 
     Read from Arrow's own buffers: its conversions to numpy would import pandas.
     """

@@ -98,7 +98,9 @@ def _sixtieths(values: Array, unit: str) -> float:
 
 
 def _answer(series: Array, clock: Array) -> float | None:
-    """How long a column needs for a third of its range, on the clock; None where it jumps or stands still."""
+    """Return how long a column takes for a third of its range, on this clock. None: it jumps, or it does
+    not move.
+    """
     known = np.flatnonzero(np.isfinite(series))
     if known.size < 20:
         return None

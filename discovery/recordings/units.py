@@ -108,7 +108,7 @@ def _affine(given: "pint.Unit", canonical: str) -> Conversion:
 
 
 def _per_revolution(given: "pint.Unit") -> "pint.Unit":
-    """1/min and Hz of a rotation count revolutions, where pint would count radians."""
+    """Return the unit of a rotation: 1/min and Hz count revolutions, pint would count radians."""
     angles = ("radian", "degree", "revolution", "turn", "grade")
     turns = any(angle in str(name) for name in given._units for angle in angles)
     return given if turns else given * _registry().Unit("revolution")

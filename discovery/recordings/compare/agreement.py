@@ -88,7 +88,7 @@ def disagreements(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -
 
 
 def _best_repair(known: CrossPrediction) -> Disagreement | None:
-    """The repair with the largest gain, or None where every recording agrees or none helps."""
+    """Return the repair with the largest gain. None: all recordings agree, or no repair helps."""
     found = [pair for one in known.recordings.values() for pair in _repairs(known, one)]
     return max(found, key=lambda pair: pair[0])[1] if found else None
 
@@ -131,7 +131,7 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
 
 
 def _begins_elsewhere(known: CrossPrediction, one: Seen, repair: Repair) -> bool:
-    """Whether a temperature begins as it does in another recording, but not once its unit is changed.
+    """Return whether a temperature begins as in another recording, and would not after the change of unit.
 
     Its unit is right then, because machines begin at about the temperature of the room.
     """
@@ -222,7 +222,7 @@ def _lateness(known: CrossPrediction, one: Seen, group: Sequence[str], predicted
 def _after(
     known: CrossPrediction, predicted: Prediction, repair: Repair, outputs: Sequence[str]
 ) -> dict[str, float]:
-    """Misfit of some outputs of a repaired recording; none of an output with too few readings."""
+    """Return the misfit of some outputs after a repair. An output with too few readings has no misfit."""
     made = repair.made
     again = known.repaired(predicted, made, repair.channels, outputs)
     found = {}

@@ -168,7 +168,7 @@ class CrossPrediction:
         }
 
     def _theta(self, y: str, without: set[str]) -> Array | None:
-        """Coefficients of an output, from all recordings but some."""
+        """Return the coefficients of an output, fitted to all recordings except some."""
         known = [gram for (name, of), gram in self.grams.items() if of == y and name not in without]
         if not known:
             return None
@@ -195,7 +195,7 @@ class CrossPrediction:
         )
 
     def _changed(self, responses: Responses, made: Seen, changed: set[str]) -> Responses:
-        """Responses with those of some inputs made anew."""
+        """Return the responses, with those of some inputs computed again."""
         fresh = {
             n: input_on_grid(made.time, made.values[n], responses.grid, self.channels[n].between)
             for n in changed
@@ -230,7 +230,7 @@ class CrossPrediction:
 
 
 def _std(values: Array) -> float:
-    """Standard deviation; numpy's own takes five times as long for a few hundred values."""
+    """Return the standard deviation. For a few hundred values, numpy takes five times as long."""
     middle = values.sum() / values.size
     return float(np.sqrt(max(float(values @ values) / values.size - middle**2, 0.0)))
 
@@ -255,7 +255,7 @@ def _with_products(even: Mapping[str, Array], channels: Mapping[str, Channel]) -
 
 
 def _at(grid: Array, columns: Array, at: Array) -> NDArray[np.float64]:
-    """Columns on a grid (G, K) at other instants (R, K), straight between."""
+    """Return columns on a grid (G, K) at other instants (R, K), by straight lines."""
     place = np.clip(np.searchsorted(grid, at) - 1, 0, len(grid) - 2)
     share = ((at - grid[place]) / (grid[place + 1] - grid[place]))[:, None]
     return np.asarray((1 - share) * columns[place] + share * columns[place + 1])

@@ -89,7 +89,7 @@ def share_noise(a: Array, b: Array) -> bool:
 
 
 def _second(readings: Array) -> Array:
-    """Second differences without what is no noise: jumps are cut to a few standard deviations."""
+    """Return second differences of the noise: jumps are cut to a few standard deviations."""
     second = np.diff(readings, 2)
     scale = 1.4826 * float(np.median(np.abs(second - np.median(second))))
     if scale <= 0 or np.mean(np.abs(second) > _TAIL * scale) > _JUMPS:
@@ -104,7 +104,7 @@ def _alike(a: Array, b: Array) -> bool:
 
 
 def _overlap(a: Array, b: Array) -> bool:
-    """Whether one series hangs together with the other at any shift."""
+    """Return whether one series is correlated with the other at any shift."""
     if a.size < _FEWEST or b.size < _FEWEST:
         return False
     from scipy.signal import correlate, correlation_lags

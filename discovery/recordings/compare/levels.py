@@ -71,7 +71,9 @@ def _noise(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
 
 
 def _scale(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
-    """A noise that changes by orders of magnitude within a recording: another unit from there on."""
+    """Find a noise that changes by orders of magnitude within a recording: from there on the unit is
+    another.
+    """
     if not channel.measured and channel.between != "linear":
         return
     for one in recordings:
@@ -183,7 +185,7 @@ def _fastest(time: Array, read: Array) -> tuple[float, int]:
 
 
 def _starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iterator[Finding]:
-    """Temperatures that agree at a cold start, but for one that agrees elsewhere."""
+    """Find a temperature that differs from the others at a cold start, and does not in other recordings."""
     away: dict[tuple[str, str], float] = {}
     agree: dict[str, float] = {}
     for one in recordings:
@@ -251,7 +253,7 @@ def _stays_apart(one: Seen, name: str, recordings: Sequence[Seen]) -> bool:
 
 
 def _exchanged(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Finding]:
-    """Two inputs that stand at each other's level, or whose relation fits when they are exchanged."""
+    """Find two inputs that have the level of each other, or a relation that fits only after an exchange."""
     for k, a in enumerate(inputs):
         for b in inputs[k + 1 :]:
             if (a.unit == "degC") != (b.unit == "degC"):
@@ -308,7 +310,7 @@ def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Fi
 
 
 def _occurs(values: Array, elsewhere: Array) -> NDArray[np.bool_]:
-    """Of each of `values` (N,), whether the readings `elsewhere` (M,) were held near it for a while."""
+    """Return for each of `values` (N,) whether the readings `elsewhere` (M,) stayed near it for a while."""
     ordered = np.sort(elsewhere)
     width = _NEAR * float(np.ptp(ordered))
     near = np.searchsorted(ordered, values + width, "right") - np.searchsorted(
@@ -318,7 +320,7 @@ def _occurs(values: Array, elsewhere: Array) -> NDArray[np.bool_]:
 
 
 def _goes_on(pair: Array) -> float:
-    """How much one channel moves while the other keeps its most frequent value."""
+    """Return how much one channel moves while the other has its most frequent value."""
     values, counts = np.unique(pair[1], return_counts=True)
     still = pair[1] == values[np.argmax(counts)]
     return float(np.std(pair[0][still])) / (float(np.std(pair[0])) or 1.0)
@@ -330,7 +332,9 @@ def _related(others: Sequence[Array]) -> bool:
 
 
 def _together(one: Seen, a: str, b: str) -> Array | None:
-    """Values of two channels where both are known, (2, N); None where one does not move or is a switch."""
+    """Return the values of two channels where both are known, (2, N). None: one is a switch or does not
+    move.
+    """
     if a not in one.values or b not in one.values or {a, b} & one.constant:
         return None
     pair = np.array([one.values[a], one.values[b]])
