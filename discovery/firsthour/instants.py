@@ -41,8 +41,12 @@ _INSTANT = re.compile(
     rf"(?:\s*(?:\([^\W\d]{{1,3}}\))?[ tT_,\-]*(?P<early>午前|午後|上午|下午)?\s*{_TIME})?",
     re.IGNORECASE,
 )
+_CTIME = re.compile(
+    r"(?:[^\W\d]{2,4} )?([^\W\d]{3,9} +\d{1,2}) ([\d:.]+) (\d{4})"
+)  # Fri Mar 27 20:00:00 2026
 _COMPACT = re.compile(r"(\d{4})(\d{2})(\d{2})[ T_-]?(\d{2})(\d{2})(\d{2}(?:[.,]\d+)?)?")
 _OF_DAY = re.compile(
+    r"(?:(?P<d>\d{1,3})\s*(?:days?|d|Tage?)[ ,]*)?"
     r"(?P<early>午前|午後|上午|下午)?\s*(?P<h>\d{1,4})\s*[:時时h]\s*(?P<m>\d{1,2})(?:\s*[:分]\s*(?P<s>\d{1,2}(?:[.,]\d+)?))?\s*秒?"
     r"\s*(?P<half>[ap]\.?\s?m\.?)?",
     re.IGNORECASE,
@@ -119,7 +123,8 @@ def read_times_of_day(cells: Sequence[str]) -> Array | None:
         return None
     seconds = np.array(
         [
-            _hour(p["h"], p["half"] or p["early"]) * 3600.0
+            int(p["d"] or 0) * DAY
+            + _hour(p["h"], p["half"] or p["early"]) * 3600.0
             + int(p["m"]) * 60.0
             + float((p["s"] or "0").replace(",", "."))
             for p in parts
@@ -130,10 +135,28 @@ def read_times_of_day(cells: Sequence[str]) -> Array | None:
     return np.asarray(seconds + DAY * days - seconds[0], dtype=np.float64)
 
 
+def of_two_parts(cells: Sequence[str]) -> bool:
+    """Whether times have two parts and begin at zero: 0:00, 0:30 are minutes and seconds, or hours and
+    minutes since the start.
+    """
+    return (
+        all(re.fullmatch(r"\d{1,4}:\d{2}", cell) for cell in cells) and float(cells[0].replace(":", "")) == 0
+    )
+
+
 def is_date(cell: str) -> bool:
     """Whether a cell is a date without a time of day."""
     found = _INSTANT.fullmatch(cell)
     return bool(found and found["h"] is None)
+
+
+def is_instant(cell: str) -> bool:
+    """Whether a cell is a date, with or without a time of day.
+
+    >>> is_instant("27.03.2026 20.00.00"), is_instant("20260327T200000"), is_instant("12.5"), is_instant("T1")
+    (True, True, False, False)
+    """
+    return _parts(cell) is not None
 
 
 def is_time_of_day(cell: str) -> bool:
@@ -155,7 +178,8 @@ def _parts(cell: str) -> _Parts | None:
     if found := _COMPACT.fullmatch(cell):
         seconds = int(found[4]) * 3600 + int(found[5]) * 60 + float((found[6] or "0").replace(",", "."))
         return (found[1], found[2], found[3]), seconds, 0.0
-    found = _INSTANT.fullmatch(cell) if len(cell) <= _LONGEST else None
+    cell = _CTIME.sub(r"\1 \3 \2", cell) if len(cell) <= _LONGEST else ""
+    found = _INSTANT.fullmatch(cell)
     if not found or (" " in cell[found.start("a") : found.end("b")] and not _NAMED.search(cell)):
         return None
     seconds = 0.0

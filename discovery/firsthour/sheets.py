@@ -20,6 +20,7 @@ from discovery.errors import UserError
 from discovery.firsthour.cells import holds_word, is_empty, is_number, is_stamp, is_switch
 from discovery.firsthour.encodings import decode
 from discovery.firsthour.header import Row, explained, find_header, is_data
+from discovery.firsthour.instants import is_time_of_day
 from discovery.firsthour.workbooks import is_workbook, read_workbook
 from discovery.limits import check_shape, read_table
 from discovery.recordings.columns import Lines
@@ -148,7 +149,12 @@ def _plain(cell: str) -> bool:
     """Return whether a cell is a number without blanks, a stamp, a switch or empty."""
     if is_number(cell):
         return not re.search(r"\d\s+\d", cell)
-    return (is_stamp(cell) and not re.search(r"[;\t|]", cell)) or is_switch(cell) or is_empty(cell)
+    return (
+        (is_stamp(cell) and not re.search(r"[;\t|]", cell))
+        or is_time_of_day(cell)
+        or is_switch(cell)
+        or is_empty(cell)
+    )
 
 
 def _split(line: str, mark: str) -> list[str]:

@@ -18,7 +18,9 @@ from discovery.errors import UserError
 from discovery.firsthour.cells import is_empty, is_number, is_stamp, read_numbers
 from discovery.firsthour.instants import (
     is_date,
+    is_instant,
     is_time_of_day,
+    of_two_parts,
     read_instants,
     read_times_of_day,
     summer_time_begins,
@@ -26,6 +28,7 @@ from discovery.firsthour.instants import (
 from discovery.firsthour.measures import CLOCKS, TIME_UNITS, is_dated, time_unit
 from discovery.firsthour.sheets import Sheet
 from discovery.firsthour.vocabulary import fold
+from discovery.recordings.timeunit import time_odds
 
 Array = NDArray[np.float64]
 
@@ -34,6 +37,10 @@ _EPOCH = (6e8, 4.2e9)  # s since 1970: 1989 to 2103
 _YEAR = 366.0  # d
 _SERIAL = (30000.0, 80000.0)  # days since 1900, as spreadsheets count: 1982 to 2119
 _HOUR = 3600.0
+_STOPWATCHES = {
+    "minutes and seconds": r"m{1,2}:s{1,2}|min:s(ec)?",
+    "hours and minutes": r"h{1,2}:m{1,2}|h:min",
+}
 _INTERVAL = re.compile(
     r"(?:interval|abtast|sampling|sample|rate|takt|scan|cycle|周期|間隔|间隔)\D{0,20}?(\d+(?:[.,]\d+)?)\s*([^\W\d]{1,12})",
     re.IGNORECASE,
@@ -115,17 +122,13 @@ def _candidates(
         if not head:
             continue
         cells = sheet.cells(at)
-        if is_stamp(head[0]) and not is_number(head[0].replace(" ", "")):
+        dated = is_instant(head[0]) and not head[0].isdecimal()
+        if dated or (is_stamp(head[0]) and not is_number(head[0].replace(" ", ""))):
             yield from _stamped(sheet, at, cells, names, units)
             continue
         if not is_number(head[0]):
-            found = (
-                read_instants(cells)
-                if re.match(r"[^\W\d]", head[0]) and any(map(str.isdigit, head[0]))
-                else None
-            )
-            if found:
-                yield Clock((at,), found.seconds, found.about, first=found.first)
+            if is_time_of_day(head[0]) and (seconds := read_times_of_day(cells)) is not None:
+                yield Clock((at,), seconds, "as time since the start")
             continue
         read = read_numbers(cells, None)
         if read.wrong is None and np.isfinite(read.values).all():
@@ -158,7 +161,25 @@ def _stamped(
                 yield Clock((*columns, fine), whole, about, first=found.first, wall=not found.zoned)
         yield Clock(columns, found.seconds, found.about, first=found.first, wall=not found.zoned)
     if (seconds := read_times_of_day(cells)) is not None:
-        yield Clock((at,), seconds, "as time of day")
+        if of_two_parts(cells):
+            yield _of_two_parts(at, seconds, f"{sheet.header[at]} {units[at]}")
+        else:
+            yield Clock((at,), seconds, "as time of day")
+
+
+def _of_two_parts(at: int, seconds: Array, header: str) -> Clock:
+    """A stopwatch: hours and minutes, or minutes and seconds, as its header says or as recordings last.
+
+    Args:
+        seconds: (N,) read as hours and minutes.
+    """
+    forms = _STOPWATCHES.items()
+    said = next((words for words, form in forms if re.search(rf"\b({form})\b", header.lower())), "")
+    odds = time_odds(seconds / _HOUR, [])
+    short = said == "minutes and seconds" or (not said and odds["min"] > odds["h"])
+    about = "minutes and seconds" if short else "hours and minutes"
+    doubt = "" if said else " (? the header does not say; write mm:ss or hh:mm under its name)"
+    return Clock((at,), seconds / 60.0 if short else seconds, f"as {about}{doubt}")
 
 
 def _are_milliseconds(sheet: Sheet, column: int, name: str, unit: str) -> bool:

@@ -144,3 +144,46 @@ def test_a_target_is_held_between_its_stamps_and_is_no_sensor_that_fell(tmp_path
     new(tmp_path / "rig", files, statements=["bed_target=other input,degC"], quick=True)
     assert load_campaign(tmp_path / "rig" / "campaign.toml").channels["bed_target"].between == "held"
     assert not [f for f in check_campaign(tmp_path / "rig") if f.channel == "bed_target"]
+
+
+START = datetime(2026, 3, 27, 20, 0)
+STAMPS = {
+    "%Y%m%dT%H%M%S": "compact",
+    "%a %b %d %H:%M:%S %Y": "as C writes them",
+    "%d.%m.%Y %H.%M.%S": "dots",
+    "%Y-%m-%d %H:%M:%S,250": "a comma before the milliseconds",
+}
+
+
+@pytest.mark.parametrize("form", STAMPS, ids=list(STAMPS.values()))
+def test_dates_of_many_forms(tmp_path: Path, form: str) -> None:
+    rows = [f"{START + timedelta(seconds=30 * k):{form}};{20 + k % 7}" for k in range(700)]
+    table = read_own(write(tmp_path / "log.csv", "Zeit;T1 [°C]", *rows))
+    assert (np.diff(table.time) == 30.0).all()
+
+
+@pytest.mark.parametrize(
+    ("head", "step", "form", "seconds"),
+    [
+        ("Time", 30, "{m}:{s:02d}", 30.0),  # 350 h would be the other
+        ("Time [mm:ss]", 30, "{m}:{s:02d}", 30.0),
+        ("Time [h:mm]", 30, "{m}:{s:02d}", 1800.0),
+        ("Time", 30, "{days} days {h:02d}:{min:02d}:{s:02d}", 30.0),
+        ("Time", 30, "{days}d {h:02d}:{min:02d}:{s:02d}", 30.0),
+    ],
+)
+def test_times_since_the_start(tmp_path: Path, head: str, step: int, form: str, seconds: float) -> None:
+    rows = []
+    for k in range(700):
+        at = step * k
+        parts = {
+            "m": at // 60,
+            "s": at % 60,
+            "min": at % 3600 // 60,
+            "h": at % 86400 // 3600,
+            "days": at // 86400,
+        }
+        rows.append(f"{form.format(**parts)},{20 + k % 7}")
+    table = read_own(write(tmp_path / "log.csv", f"{head},T1 [°C]", *rows))
+    assert (np.diff(table.time) == seconds).all()
+    assert ("?" in table.about_time) is (head == "Time" and "days" not in form and "d " not in form)
