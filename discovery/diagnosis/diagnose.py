@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from discovery.diagnosis.document import DiagnosisDocument
+    from discovery.diagnosis.form import DiagnosisDocument
 
 ANOTHER_NOISE = 0.05  # relative change of a channel's reading noise that calls for another search
 

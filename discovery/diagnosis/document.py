@@ -1,4 +1,4 @@
-"""diagnosis.json: its schema, and what a diagnosis writes there."""
+"""What a diagnosis writes into diagnosis.json."""
 
 from __future__ import annotations
 
@@ -6,8 +6,25 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
-from pydantic import Field
 
+from discovery.diagnosis.form import (
+    Against,
+    Alternative,
+    Claim,
+    Considered,
+    DescriptionDocument,
+    Detection,
+    DiagnosisDocument,
+    Gain,
+    ImprovementDocument,
+    LocationDocument,
+    MissingHeat,
+    Number,
+    Physics,
+    Size,
+    Window,
+    WrongReading,
+)
 from discovery.diagnosis.proof import Improvement, unit_of
 from discovery.diagnosis.thresholds import RIVALS_SHOWN
 from discovery.diagnosis.verdict import FAULT, UNEXPLAINED, Named
@@ -15,7 +32,6 @@ from discovery.diagnosis.when import instants
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.latent_force import alike, heat_over_time
-from discovery.schema import Strict
 from discovery.terms import text
 
 if TYPE_CHECKING:
@@ -24,177 +40,11 @@ if TYPE_CHECKING:
 CONSIDERED = 12  # claims on what the baseline leaves that are listed
 WRONG_READINGS = 12  # single wrong readings that are named
 
-Number = float | None
-
-
-class Size(Strict):
-    """A parameter of an effect that was found."""
-
-    value: Number
-    low: Number = Field(description="95 % interval")
-    high: Number
-    unit: str
-    at: str | None = Field(None, description="speed that it is a size at")
-    output: str | None = Field(None, description="output that it is a size of, where each has its own")
-
 
 class _Claimed(TypedDict):
     effect: str
     states: list[str]
     recording: str | None
-
-
-class Claim(Strict):
-    """An effect at a place."""
-
-    effect: str
-    states: list[str] = Field(description="states it enters; for a measurement fault the output or input")
-    recording: str | None = Field(None, description="the one in which it acts, or begins to act")
-
-
-class Physics(Claim):
-    """An effect that the repaired model adds."""
-
-    title: str
-    moved: list[str] | None = Field(None, description="outputs that it moves beyond the interval of each")
-    probability: float
-    expression: str
-    expressions: list[str] | None = Field(None, description="all, where it has several")
-    parameters: dict[str, Size]
-    source: str
-    confused_with: list[str]
-
-
-class Alternative(Claim):
-    """Another answer to one part of the question."""
-
-    log_evidence_below_best: float
-    instead_of: str
-
-
-class Considered(Claim):
-    """A candidate effect of the first scan, scored on the residual of the baseline."""
-
-    channels: list[str] = Field(default_factory=list, description="inputs that it follows")
-    instants_s: list[float] | None = None
-    log_evidence: Number
-    log_odds: Number = Field(description="with the prior odds of its place")
-    score: Number = Field(description="standard deviations")
-    share_that_a_refit_leaves: Number
-
-
-class Detection(Strict):
-    """Residual of the baseline, and the noise that it is compared with."""
-
-    p_value: Number = Field(description="probability that nothing is missing")
-    log_evidence: Number = Field(description="log posterior odds of the answer over the baseline")
-    latent_force_log_evidence: Number
-    noise: dict[str, Number]
-    slow_noise: dict[str, Number]
-    process_noise: dict[str, Number] = Field(description="floor at each state, W or a rate")
-    form_error: float = Field(description="process noise as a share of what flows")
-    residual_rms: dict[str, Number]
-
-
-class Window(Strict):
-    """A span in which heat is missing."""
-
-    recording: str
-    start_s: Number
-    end_s: Number
-    state: str
-    heat_W: Number  # noqa: N815 - the unit is part of the name
-
-
-class LocationDocument(Strict):
-    """Where and when."""
-
-    outputs: dict[str, float]
-    states: dict[str, float]
-    alike: list[list[str]] = Field(description="states at which missing heat looks the same in the readings")
-    windows: list[Window]
-    regime: str | None
-    unmodelled_heat_W: dict[str, Number]  # noqa: N815
-
-
-class Gain(Strict):
-    """rms of free runs before and after the repair, in `unit` of the improvement."""
-
-    rms_before: Number
-    rms_after: Number
-    noise_floor: Number
-    gain_low: Number = None
-    gain_high: Number = None
-    outputs: dict[str, tuple[Number, Number]] = Field(
-        default_factory=dict, description="rms of each output before and after, in its unit"
-    )
-    runs_away: bool | None = None
-
-
-class ImprovementDocument(Strict):
-    """The proof."""
-
-    unit: str
-    fit: Gain
-    held_out: dict[str, Gain]
-    contradicted_by: list[str]
-    explained: Number
-
-
-class WrongReading(Strict):
-    """A single reading that was set aside."""
-
-    output: str
-    recording: str
-    time_s: Number
-    size: Number
-
-
-class Against(Strict):
-    """Missing heat against one input or state."""
-
-    value: list[Number]
-    heat: list[Number]
-    error: list[Number]
-
-
-class MissingHeat(Strict):
-    """The latent force at the most likely state."""
-
-    state: str
-    over_time: dict[str, dict[str, list[float]]]
-    against: dict[str, Against]
-    named: bool
-
-
-class DescriptionDocument(Strict):
-    """A formula that follows heat of unknown cause."""
-
-    state: str
-    formula: str
-    log_evidence: Number
-    note: str = "describes the missing heat; it is not its cause"
-
-
-class DiagnosisDocument(Strict):
-    """The content of diagnosis.json."""
-
-    model: str
-    verdict: str
-    reasons: list[str]
-    about: str
-    detection: Detection
-    location: LocationDocument
-    physics: list[Physics]
-    alternatives: list[Alternative]
-    considered: list[Considered]
-    closest: list[Claim]
-    improvement: ImprovementDocument
-    set_aside: list[WrongReading]
-    missing_heat: MissingHeat | None
-    description: DescriptionDocument | None
-    next_experiment: str
-    seconds: float
 
 
 def document(d: Diagnosis) -> DiagnosisDocument:

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from discovery.diagnosis.document import DiagnosisDocument
+    from discovery.diagnosis.form import DiagnosisDocument
 
 COLUMNS = ["effect", "places", "probability", "parameter", "value", "low", "high", "unit"]
 

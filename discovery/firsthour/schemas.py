@@ -19,7 +19,7 @@ def schema(file: str) -> str:
     """
     from pydantic import BaseModel
 
-    from discovery.diagnosis.document import DiagnosisDocument
+    from discovery.diagnosis.form import DiagnosisDocument
     from discovery.experiment.document import ResultsDocument
     from discovery.experiment.form import ExperimentForm
     from discovery.models.modelfile import ModelForm
