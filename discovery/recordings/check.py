@@ -17,7 +17,7 @@ from discovery.recordings.compare import Seen, compare
 from discovery.recordings.correction import pair_corrections
 from discovery.recordings.correctioncheck import correction_findings
 from discovery.recordings.finding import Finding
-from discovery.recordings.inputcheck import input_findings
+from discovery.recordings.inputcheck import input_findings, written_on_change
 from discovery.recordings.oddvalues import odd_findings, odd_readings
 from discovery.recordings.reading import read_columns
 from discovery.recordings.twins import fingerprint
@@ -138,7 +138,8 @@ def _recording_findings(
         what = f"{count} lone values of '{name}' are far from all around them"
         findings.append(Finding("warning", file, None, what, "they are not used; look at the sensor"))
     findings.extend(_header_findings(file, columns, form, recording))
-    findings.extend(clock_findings(file, columns))
+    pauses = written_on_change(list(columns.values.values()))
+    findings.extend(clock_findings(file, columns, pauses=pauses))
     channels = {
         name: make_channel(name, one, conversions[name])
         for name, one in form.channels.items()
@@ -146,6 +147,7 @@ def _recording_findings(
     }
     values = channel_values(columns, recording, form.channels, conversions)
     findings.extend(_content_findings(file, columns, channels, recording, values))
+    findings.extend(input_findings(file, columns, channels, values, pauses=pauses))
     findings.extend(correction_findings(file, columns, values, pairs))
     print_of = fingerprint(columns.time, [v for c, v in values.items() if channels[c].measured])
     whole = None
@@ -202,4 +204,3 @@ def _content_findings(
             yield from odd_findings(file, columns.lines, channels[name], column)
             if channels[name].measured:
                 yield from few_findings(file, channels[name], column)
-    yield from input_findings(file, columns, channels, values)

@@ -13,9 +13,9 @@ _LONG = 60 * 86400.0  # s: no thermal recording in one piece; 8 h in millisecond
 _SHORT = 1.0  # s: no thermal recording either; 12 h in days are 0.5
 
 
-def clock_findings(file: Path, columns: Columns) -> list[Finding]:
+def clock_findings(file: Path, columns: Columns, *, pauses: bool = False) -> list[Finding]:
     """Stamps that run backwards or come twice (errors), too few rows (an error), jumps, and stamps that are
-    hardly seconds (warnings).
+    hardly seconds (warnings). `pauses`: the logger pauses while nothing changes, so jumps are none.
     """
     steps = np.diff(columns.time)
     findings = []
@@ -32,7 +32,7 @@ def clock_findings(file: Path, columns: Columns) -> list[Finding]:
         findings.append(Finding("error", file, int(columns.lines[twice[0] + 1]), what, do))
     forward = steps[steps > 0]
     usual = float(np.median(forward)) if forward.size else 0.0
-    if (jumps := np.flatnonzero(steps > _JUMP * usual)).size and usual > 0:
+    if (jumps := np.flatnonzero(steps > _JUMP * usual)).size and usual > 0 and not pauses:
         what = f"time jumps by {steps[jumps[0]]:g} s where steps are {usual:g} s{more(jumps.size)}"
         do = "nothing is known of the gap: split the recording there if the machine did not stand still"
         findings.append(Finding("warning", file, int(columns.lines[jumps[0] + 1]), what, do))

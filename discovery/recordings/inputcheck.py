@@ -1,6 +1,6 @@
 """Inputs: are they known where they are needed."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,13 +11,25 @@ from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Array, Columns
 from discovery.recordings.finding import Finding, more
 
+_MOSTLY_EMPTY = 0.7  # share of rows with a value
+_SPARSE = 3  # columns
+_FEWEST = 30  # values that have not repeated
 _GAP = 20.0  # a stretch of so many usual steps without a value is a gap
 
 
 def input_findings(
-    file: Path, columns: Columns, channels: Mapping[str, Channel], values: Mapping[str, Array]
+    file: Path,
+    columns: Columns,
+    channels: Mapping[str, Channel],
+    values: Mapping[str, Array],
+    *,
+    pauses: bool,
 ) -> Iterator[Finding]:
-    """Inputs without any value (an error) or with long empty stretches, and readings in those (warnings)."""
+    """Inputs without any value (an error) or with long empty stretches, and readings in those (warnings).
+
+    Args:
+        pauses: the logger writes only what has changed, so empty stretches are none.
+    """
     uncovered = {}
     for name, column in values.items():
         if not channels[name].is_input:
@@ -27,12 +39,25 @@ def input_findings(
             do = f"measure it, or say set = {{ {name} = ... }} in the campaign file"
             yield Finding("error", file, None, f"the input '{name}' has no value at all", do)
             continue
-        gaps = long_gaps(columns.time, known)
+        gaps = [] if pauses else long_gaps(columns.time, known)
         yield from _told(file, columns, channels[name], gaps)
         uncovered[name] = inside(gaps, columns.time.size) & ~known
     for name, column in values.items():
         if channels[name].measured:
             yield from _alone(file, columns, name, np.isfinite(column), uncovered)
+
+
+def written_on_change(columns: Collection[Array]) -> bool:
+    """Whether a logger wrote a value only when it had changed: then an empty cell means unchanged.
+
+    That is so if most columns (each (T,)) are empty in many rows, each in other ones, and no value repeats
+    the one before it.
+    """
+    known = [np.isfinite(column) for column in columns]
+    sparse = [one for one in known if 1 < one.sum() < _MOSTLY_EMPTY * one.size]
+    apart = len({one.tobytes() for one in sparse}) == len(sparse) >= _SPARSE
+    moves = all((np.diff(column[one]) != 0).all() for column, one in zip(columns, known, strict=True))
+    return bool(apart and moves and len(sparse) > len(columns) / 2 and sum(map(np.sum, sparse)) >= _FEWEST)
 
 
 def long_gaps(time: Array, known: NDArray[np.bool_]) -> list[tuple[int, int]]:
