@@ -170,7 +170,7 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
 
 
 def _run(context: Context, model: Model, inputs: Mapping[str, Array], length: float) -> Trajectory:
-    """A model under a pattern of inputs, started where the first recording was."""
+    """Return a run of a model under a pattern of inputs. It starts as the first recording did."""
     time = np.linspace(0.0, length, STEPS + 1)
     samples = {
         n: Samples(time, v, context.campaign.channels[n].between == "linear") for n, v in inputs.items()

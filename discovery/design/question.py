@@ -91,7 +91,7 @@ def _called(shown: Sequence[Hypothesis]) -> str:
 
 
 def _without(best: Scored) -> Model:
-    """The model with its effects switched off and everything else unchanged."""
+    """Return the model with its effects switched off and everything else unchanged."""
     return best.fit.model.with_values({name: 0.0 for h in best.hypotheses for name in h.amplitudes})
 
 

@@ -89,7 +89,7 @@ class Experiment:
         return moving or usual or [c.name for c in channels]
 
     def _moves(self, name: str) -> bool:
-        """Whether a channel says something in the recordings to fit; the ambient temperature always does."""
+        """Return whether a channel moves in the recordings to fit. The ambient temperature always counts."""
         if self.campaign.channels[name].role == _INPUT_ROLES[0]:
             return True
         pieces = [self.campaign.recordings[r].values.get(name, np.empty(0)) for r in self.fit]
@@ -144,7 +144,7 @@ def load_experiment(path: str | os.PathLike[str]) -> Experiment:
 
 
 def _recordings(path: Path, form: ExperimentForm) -> list[str]:
-    """The recordings to load. Raises UserError where the campaign does not have one of them."""
+    """Return the recordings to load. Raises UserError if the campaign does not have one of them."""
     known = list(read_toml(campaign_path(path.parent / form.campaign), CampaignForm).recordings)
     named: dict[str, tuple[str, ...]] = dict.fromkeys(form.fit, ("fit",))
     named |= dict.fromkeys(form.held_out, ("held_out",))
@@ -165,7 +165,7 @@ def _of_role(campaign: Campaign, role: str) -> list[str]:
 
 
 def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collection[str]) -> None:
-    """What a schema cannot say: names that must exist elsewhere. Raises UserError."""
+    """Check what a schema cannot: names that must exist elsewhere. Raises UserError."""
     channels = list(campaign.channels)
     measured = [name for name in channels if campaign.channels[name].measured]
     both = [name for name in form.fit if name in form.held_out]

@@ -107,7 +107,7 @@ class RegressionEntry(Strict):
 
 
 def _said(entry: Any) -> Any:
-    """What a model is: a file of its own, or a kind that is built."""
+    """Say what a model is: a file, or a kind that is built."""
     if not isinstance(entry, Mapping):
         return entry
     if "kind" in entry and (kind := str(entry["kind"])) not in ("file", *_BUILT):

@@ -61,7 +61,7 @@ def _fitting(report: Mapping[str, Any]) -> Callable[..., Fit]:
 
 
 def _refit(fit: Fit, report: Mapping[str, Any]) -> Refit:
-    """How a discovered model is fitted to what a fold leaves."""
+    """Return how a discovered model is fitted to the recordings that a fold leaves."""
 
     def refit(campaign: Campaign, recordings: Sequence[str]) -> Fit:
         outputs = fit.problem.outputs

@@ -94,7 +94,7 @@ def run(
 def _looked_at(
     path: Path, progress: Progress, tell: Progress, *, force: bool
 ) -> tuple[Experiment, list[Finding]]:
-    """An experiment, and what is wrong with its recordings, which is said before anything is fitted."""
+    """Return an experiment and the findings in its recordings. They are printed before any fit."""
     progress("reading the recordings")
     experiment = load_experiment(path)
     progress("comparing the recordings with each other")
@@ -110,7 +110,7 @@ _DIAGNOSIS = 4.0  # how long it takes, relative to a model that is only fitted
 
 
 def _weight(entry: ModelEntry) -> float:
-    """How long a model takes, relative to one that is only fitted."""
+    """Return how long a model takes, relative to a model that is only fitted."""
     return 3.0 if isinstance(entry, SparseOptions) else 1.0
 
 
@@ -230,7 +230,7 @@ def diagnose(
 
 
 def _written(found: Diagnosis | None) -> dict[str, Any] | None:
-    """A diagnosis as its file holds it; what does not apply is left out."""
+    """Return a diagnosis as its file holds it, without parts that do not apply."""
     return found.document().model_dump(exclude_unset=True) if found else None
 
 

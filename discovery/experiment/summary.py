@@ -77,7 +77,9 @@ def comparison(runs: Sequence[Run]) -> Iterator[str]:
 
 
 def _rms(run: Run, results: Mapping[str, Mapping[str, Any]], recordings: Sequence[str]) -> Iterator[str]:
-    """A table for each recording; of many, the table of all held-out ones that the report shows."""
+    """Return a table for each recording. If there are many, return one table of all held-out recordings, as
+    in the report.
+    """
     if len(recordings) <= _MOST_RECORDINGS:
         tables = [rms_table(results, recording) for recording in recordings]
     else:

@@ -205,7 +205,7 @@ def _net(build: Builder, scale: int, entering: list[int], leaving: list[int]) ->
 def _with_memory(
     model: Model, build: Builder, known: Mapping[str, Node], inputs: tuple[str, ...], step_s: float
 ) -> tuple[dict[Apply, Delay], list[Apply]]:
-    """Delays and plays of a model, each once; inner plays before outer ones."""
+    """Return the delays and plays of a model, each one time, inner plays before outer ones."""
     delays: dict[Apply, Delay] = {}
     plays: dict[Apply, None] = {}
 

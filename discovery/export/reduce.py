@@ -187,7 +187,7 @@ def _projected(model: Model, mean: Array, right: Array, left: Array) -> Model:
 
 
 def _sum(offset: float, pieces: Sequence[tuple[float, Expression]]) -> Expression:
-    """offset + sum of gain times expression; equal expressions are one."""
+    """Return offset + sum of gain times expression. Equal expressions are joined."""
     gains: dict[Expression, float] = {}
     for gain, expression in pieces:
         gains[expression] = gains.get(expression, 0.0) + gain

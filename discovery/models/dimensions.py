@@ -88,7 +88,7 @@ def _entering(model: Model, state: State) -> tuple[Dimension, str]:
 
 
 def _clock(model: Model, state: State) -> str:
-    """The time unit of a state's rates; a hidden one may have a clock of its own."""
+    """Return the time unit of the rates of a state. A hidden state may have its own."""
     own = (unit for unit, seconds in TIME_UNITS.items() if math.isclose(state.scale * seconds, 1.0))
     return next(own, model.time_unit)
 
@@ -223,7 +223,7 @@ def _combine(a: Dimension, b: Dimension, sign: float) -> Dimension:
 def _remedy(
     model: Model, expression: Expression, dimensions: Mapping[str, Dimension], wanted: Dimension
 ) -> str:
-    """The unit that would fit, where a term is one parameter times something."""
+    """Return the unit that would fit, if a term is one parameter times something."""
     factors = _factors(expression)
     mine = [f.id for f, sign in factors if isinstance(f, Name) and f.id in model.parameters and sign > 0]
     if len(mine) != 1:
@@ -239,7 +239,7 @@ def _remedy(
 
 
 def _factors(expression: Expression, sign: float = 1.0) -> list[tuple[Expression, float]]:
-    """What is multiplied (1) and divided by (-1)."""
+    """Return the factors of a product (1) and of its denominator (-1)."""
     match expression:
         case Apply(function="*" | "/" as how, arguments=(a, b)):
             return [*_factors(a, sign), *_factors(b, sign if how == "*" else -sign)]

@@ -34,7 +34,7 @@ def equations(model: Model) -> list[str]:
 
 
 def _printed(parameter: Parameter) -> Expression:
-    """A value and its unit as one name; the minus sign stands outside, where the grammar places it."""
+    """Return a value and its unit as one name. The minus sign stands before it, as the grammar needs it."""
     unit = "" if parameter.unit in ("1", "") else f" [{parameter.unit}]"
     name = Name(f"{abs(parameter.value):.4g}{unit}")
     return Apply("neg", (name,)) if parameter.value < 0 else name
@@ -45,7 +45,7 @@ def _write(expression: Expression) -> str:
 
 
 def _sum(parts: Sequence[tuple[float, Expression]], values: dict[str, Expression]) -> str:
-    """A sum with plain signs: what starts with a minus or leaves the state is subtracted."""
+    """Return a sum with plain signs. A term that starts with a minus or leaves the state is subtracted."""
     line = ""
     for sign, expression in parts:
         tree = substitute(expression, values)

@@ -238,7 +238,7 @@ def _addends(expression: Expression) -> list[Expression]:
 
 
 def _short(apply: Apply) -> Expression | None:
-    """Without what cancels."""
+    """Return an expression in a shorter form, without zeros and terms that cancel. None: it has none."""
     match apply:
         case Apply("-", (a, b)) if a == b:
             return Number(0.0)

@@ -140,7 +140,7 @@ def _says(case: Case, unseen: tuple[str, ...]) -> Iterator[str]:
 
 
 def _charts(m: Material, experiment: Experiment, models: Mapping[str, Fitted]) -> tuple[Chart, ...]:
-    """Readings minus models on the last recording, an unseen one where there is any."""
+    """Return readings minus models on the last recording, a held-out one if there is any."""
     recording = (*experiment.fit, *experiment.held_out)[-1]
     charts = []
     for error in experiment.outputs:

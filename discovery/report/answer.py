@@ -120,7 +120,7 @@ def _percent_less(lead: Lead) -> str:
 
 
 def _interval(lead: Lead) -> str:
-    """The interval of a lead behind a caption; nothing where there is none."""
+    """Return the interval of a lead behind a caption. Without an interval, return nothing."""
     if lead.low == lead.high:
         return ""
     low, high = (f"{100 * (end - 1) + 0.0:.0f}".replace("-0", "0") for end in (lead.low, lead.high))
@@ -128,7 +128,7 @@ def _interval(lead: Lead) -> str:
 
 
 def _removed(run: Run, best: str) -> tuple[list[str], list[tuple[str, str]]]:
-    """How much of the thermal error is gone; the error without compensation is the reading itself."""
+    """Say how much of the thermal error is gone. Without compensation, the error is the reading itself."""
     share = removed(run, best)
     if not math.isfinite(share):
         return [], []
@@ -236,7 +236,7 @@ def _effect(one: Mapping[str, Any]) -> str:
 
 
 def _grouped(found: Sequence[Mapping[str, Any]]) -> str:
-    """Effects with their places and probabilities; one effect at several places is named once."""
+    """Return the effects with their places and probabilities. One effect at several places appears once."""
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for one in found:
         alike = (words(str(one.get("effect"))), percent(one.get("probability")))

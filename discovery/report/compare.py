@@ -169,7 +169,9 @@ def merged(runs: Sequence[Run], folder: Path, chosen: Sequence[int] | None = Non
 
 
 def _recordings(run: Run) -> list[str]:
-    """Recordings of the fit and held-out ones; not those that only some of its models are fitted to."""
+    """Return the recordings of the fit and the held-out ones, without those to which only some models are
+    fitted.
+    """
     scored = {
         name for entry in run.results.get("models", {}).values() for name in entry.get("recordings", {})
     }

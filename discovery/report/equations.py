@@ -61,7 +61,7 @@ def equations(model: Model) -> list[str]:
 
 
 def _read(name: str, model: Model, signs: Mapping[str, str]) -> str:
-    """The symbol of an output; one that bears the name of a state is what its sensor shows of it."""
+    """Return the symbol of an output. An output with the name of a state is the reading of that state."""
     body = signs.get(name) or mathml.symbol(name)
     return f"<msup><mrow>{body}</mrow><mtext>read</mtext></msup>" if name in model.states else body
 
@@ -95,7 +95,7 @@ def _summands(tree: Expression, signs: Mapping[str, str]) -> list[tuple[str, str
 
 
 def _equation(left: str, parts: list[tuple[str, str, int]]) -> str:
-    """An equation whose right side is broken between summands where it would become too long."""
+    """Return an equation. Its right side is broken between summands if it is too long."""
     lines: list[str] = [""]
     room = _LINE
     for index, (sign, body, length) in enumerate(parts):

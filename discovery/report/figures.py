@@ -175,7 +175,7 @@ def _across(figure: Any, ax: Axes) -> Any:
 
 
 def _legend(figure: Any, handles: Mapping[str, Any]) -> float:
-    """A legend at the top with as many columns as the width holds; its height in inches."""
+    """Draw a legend at the top with as many columns as fit. Return its height in inches."""
     for columns in range(min(3, len(handles)), 0, -1):
         legend = figure.legend(
             handles.values(), handles.keys(), loc="upper center", ncols=columns, columnspacing=1.2

@@ -95,7 +95,9 @@ def _log_ratio(squares: Array) -> Array:
 
 @cache
 def _drawn(number: int) -> Array:
-    """How often each block of a pair is drawn, (draws, blocks); independent draws for each pair."""
+    """Return how often each block of a pair is drawn, (draws, blocks). The draws of each pair are
+    independent.
+    """
     rng = np.random.default_rng(0)
     for _ in range(number + 1):
         picks = rng.integers(0, _BLOCKS, (_DRAWS, _BLOCKS))
@@ -103,7 +105,9 @@ def _drawn(number: int) -> Array:
 
 
 def _without(run: Run, readings: Array, output: str) -> Array:
-    """What is left without a model: errors themselves, temperatures from the first reading on."""
+    """Return what remains without a model: the errors themselves, and temperatures relative to their first
+    reading.
+    """
     known = readings[np.isfinite(readings)]
     first = known[0] if known.size and run.unit(output) in ("°C", "K", "°F", "degC") else 0.0
     return np.asarray(readings - first)

@@ -97,7 +97,7 @@ def _speed(size: Mapping[str, Any]) -> str:
 
 
 def _place(one: Mapping[str, Any]) -> str:
-    """Bodies, recording and hours of an effect; a shifted clock has a recording alone."""
+    """Return bodies, recording and hours of an effect. A shifted clock only has a recording."""
     places = listed(one.get("moved") or one.get("states") or [])
     parts = [places, f"in {one['recording']}" if one.get("recording") else "", _hours(one)]
     return " ".join(part for part in parts if part) or "all inputs"
@@ -229,7 +229,7 @@ def _rivals(d: Mapping[str, Any]) -> Printed:
 
 
 def _considered(d: Mapping[str, Any]) -> Printed:
-    """What scored highest in the search; only where nothing was named, since else the rivals say more."""
+    """Return the highest scores of the search if nothing was named. Else the rivals say more."""
     if d.get("physics") or d.get("verdict") == "no mismatch":
         return Printed("", (), ())
     best: dict[tuple[str, str], Mapping[str, Any]] = {}

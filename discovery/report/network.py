@@ -104,7 +104,7 @@ def drawing(model: Model, heat: Mapping[str, float], unit: str = "W") -> str:
 
 
 def _layout(bodies: list[str], inputs: list[str], links: list[Edge]) -> dict[str, tuple[float, float]]:
-    """Bodies on an inner ellipse, linked ones beside each other; inputs outside of what they act on."""
+    """Place the bodies on an inner ellipse, linked ones next to each other, and the inputs around them."""
     order = _chain(bodies, links)
     centre = (WIDTH / 2, HEIGHT / 2)
     place: dict[str, tuple[float, float]] = {}

@@ -90,7 +90,7 @@ def differences(chosen: Mapping[str, str], other: Mapping[str, str]) -> list[str
 
 
 def _changed(before: str, after: str) -> str:
-    """What a list of names became; of a long one, what was added and what was left out.
+    """Say how a list of names has changed. Of a long list, say only what was added and removed.
 
     >>> _changed("a, b", "a"), _changed("a, b, c, d, e", "a, b, c, d, x"), _changed("a", "b, c, d, e, f")
     ('a, b → a', 'with x, without e', '1 → 5 others')

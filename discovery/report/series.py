@@ -42,7 +42,7 @@ def prediction_charts(run: Run, models: Sequence[str]) -> list[Chart]:
 
 
 def _input_charts(run: Run, recording: str) -> list[Chart]:
-    """The inputs of a recording, a panel for each unit; at most one chart."""
+    """Return at most one chart of the inputs of a recording, with a panel for each unit."""
     inputs, time = run.inputs.get(recording, {}), run.predictions[recording].time
     if not inputs or not len(time):
         return []
@@ -138,7 +138,7 @@ def residual_charts(run: Run, model: str, recording: str) -> list[Chart]:
 
 
 def _left_over(run: Run, model: str, recording: str) -> Iterator[tuple[str, Array]]:
-    """What a model leaves of each output that has readings enough to say something about it."""
+    """Return the residual of a model for each output that has enough readings."""
     data = run.predictions[recording]
     for output in data.readings:
         if output in data.models.get(model, {}):

@@ -264,7 +264,9 @@ class Compensator:
             self.state = State.DEGRADED if replaced or recovering else settled
 
     def _fail(self, now: float, *, part_done: bool) -> None:
-        """The model gave no number: hold, then ramp out; in FAULT it starts anew in the end."""
+        """Hold the output and ramp it out, because the model gave no number. In FAULT the model starts
+        again in the end.
+        """
         if self.state is State.FAULT:
             if now - self.since > self.settings.freeze_limit_s:  # its state may be what fails
                 self.origin, self.since = None, now

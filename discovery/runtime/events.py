@@ -108,7 +108,7 @@ def state_event(
 
 
 def _calm(change: Change) -> str:
-    """Why the state changes where nothing is wrong."""
+    """Return why the state changes although nothing is wrong."""
     if change.before in TROUBLE:
         return "the inputs are good again"
     if change.switched_on:

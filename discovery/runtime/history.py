@@ -99,7 +99,7 @@ class History:
         return None
 
     def _set_aside(self) -> None:
-        """A damaged history is put aside and begun anew."""
+        """Put a damaged history aside and begin a new one."""
         self.base.close()
         self.base = None
         self.path.replace(self.path.with_suffix(".damaged"))

@@ -120,7 +120,7 @@ class Learner:
                 row[k] += (float(compensator.inputs[k]) - row[k]) / self.merged
 
     def _interrupt(self, compensator: Compensator, now: float) -> None:
-        """The model has not settled, or has failed: after more than GAP_S of it the recording begins anew."""
+        """Begin a new recording if the model has not settled, or has failed, for more than GAP_S."""
         if self.times and now - self.times[-1] > GAP_S:
             self.begin(compensator)
 
@@ -206,7 +206,9 @@ class Learner:
 
 
 def _others(compensator: Compensator, readings: Mapping[str, Reading]) -> dict[str, float]:
-    """Good readings of what the model does not use: any of them may be an input of the next revision."""
+    """Return good readings of columns that the model does not use. Each may be an input of the next
+    revision.
+    """
     known = {i.name for i in compensator.exported.inputs} | set(compensator.names)
     known |= {f"{name}_applied" for name in compensator.names}
     found = {n: number(r.value) for n, r in readings.items() if n not in known and r.good}

@@ -111,7 +111,9 @@ async def _variable(
 
 
 def _signal(spec: Input, index: int, time: float) -> float:
-    """A held input switches every few minutes, a temperature wanders; both within the trained range."""
+    """Return an input within its trained range: a held input switches every few minutes, a temperature
+    drifts.
+    """
     low, high = spec.range.low, spec.range.high
     if spec.between == "held":
         level = (0.0, 1.0, 0.5, 1.0, 0.25)[int(time / 120.0 + index) % 5]

@@ -80,7 +80,7 @@ class Output:
         return None
 
     def _follow(self) -> None:
-        """Go on in a new file where the old one was moved away (log rotation)."""
+        """Continue in a new file if the old one was moved away (log rotation)."""
         assert self.file is not None
         assert self.path is not None
         try:

@@ -231,7 +231,9 @@ def ticks(
 
 
 def _time(cell: str) -> float:
-    """Seconds; an instant without a zone is taken as UTC, so that no clock of a computer comes into it."""
+    """Return seconds. An instant without a zone counts as UTC, so the time zone of the computer has no
+    influence.
+    """
     try:
         return float(cell)
     except ValueError:

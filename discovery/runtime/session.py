@@ -263,7 +263,7 @@ class Session:
             self._offer(revised, now)
 
     def _offer(self, data: bytes, now: float) -> None:
-        """A new revision runs in the shadow; measured errors must confirm it."""
+        """Let a new revision run in the shadow. Measured errors must confirm it."""
         assert self.folder is not None
         candidate = offer(self.folder, data)
         rule = Rule(hours=self.rule.hours, most_um=None)
@@ -303,7 +303,7 @@ class Session:
             self.lock.close()
 
     def _hear(self, now: float) -> None:
-        """What became of the last save; only the first of several failures is reported."""
+        """Read the result of the last save. Of several failures, only the first is reported."""
         if self.saving is None:
             return
         with suppress(BaseException):

@@ -58,7 +58,7 @@ class Shadow:
                 self.residuals.setdefault(name, []).append((error - old[name], error - new[name]))
 
     def _new_error(self, name: str, readings: Mapping[str, Reading], now: float) -> float:
-        """The uncompensated error, if it is a good reading newer than the last one counted; NaN if not.
+        """Return the uncompensated error if it is a good reading and newer than the last one, else NaN.
 
         A source may show one reading for many ticks, from before the shadow run as well.
         """
@@ -89,7 +89,9 @@ class Shadow:
         return self.difference <= self.rule.most_um, text
 
     def _rms(self, which: int) -> float:
-        """Of the residuals about their mean: where a measurement is zeroed is not the model's affair."""
+        """Return the rms of the residuals about their mean. The zero of a measurement does not concern the
+        model.
+        """
         total, count = 0.0, 0
         for pairs in self.residuals.values():
             values = [pair[which] for pair in pairs]

@@ -149,7 +149,7 @@ def _without(expression: Expression, gone: Collection[str]) -> Expression:
 
 
 def _document(exported: Exported, campaign: Campaign, model: Model) -> dict[str, Any]:
-    """The document of a model; an input that was there keeps its ranges, and so does each output."""
+    """Return the document of a model. Known inputs and all outputs keep their ranges."""
     found = described(model, campaign, list(campaign.recordings))
     before = {i["name"]: i for i in exported.document["inputs"]}
     ranges = {o["name"]: o for o in exported.document["outputs"]}

@@ -27,7 +27,7 @@ def delays_at(channels: Collection[str], expression: Expression) -> Expression:
 
 
 def _before(expression: Expression, seconds: Expression, channels: Collection[str]) -> Expression:
-    """What an expression, its own delays at channels, was some seconds ago."""
+    """Return an expression as it was some seconds ago. Its own delays are at channels."""
     match expression:
         case Name(id="time"):
             return Apply("-", (expression, seconds))

@@ -131,7 +131,7 @@ def _convert(node: ast.AST, source: str, where: str, counter: list[int], depth: 
 
 
 def _check_call(name: str, args: list[ast.expr], source: str, where: str) -> None:
-    """Refuse a call with too few or too many arguments, and a delay of what is no channel."""
+    """Refuse a call with too few or too many arguments, and a delay of anything but a channel."""
     fewest, most = FUNCTIONS[name]
     if not fewest <= len(args) <= most:
         raise UserError(

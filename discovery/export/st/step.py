@@ -71,7 +71,7 @@ def _settled(c: Compiled) -> list[str]:
 
 
 def _fails(places: Sequence[str], kind: str) -> list[str]:
-    """The call fails where a number is not finite, or as good as."""
+    """Write the checks that mark a call as failed if a number is not finite, or too large."""
     return [f"IF NOT (ABS({place}) < {kind}#1.0e30) THEN failed := TRUE; END_IF;" for place in places]
 
 
