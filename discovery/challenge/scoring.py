@@ -104,10 +104,15 @@ def places(key: Key) -> set[str]:
 
 
 def of_machine(key: Key, named: Answer) -> bool:
-    """Whether a named effect acts at the machine in silence, and is not one of those that are concealed."""
+    """Whether a named effect acts at the machine in silence, and is not one of those that are concealed.
+
+    It may be named at several bodies at once. At most one of them may be a body where it does not act.
+    """
     if any(named["effect"] in names(truth) for truth in truths(key)):
         return False
-    return any(named["effect"] in names(own) and at_place(own, named) for own in key.get("also_true", ()))
+    own = [places(one) for one in key.get("also_true", ()) if named["effect"] in names(one)]
+    there, said = set().union(*own), set(named.get("states", ()))
+    return bool(said & there) and len(said - there) <= 1
 
 
 def _touches(found: Answer, key: Key) -> bool:

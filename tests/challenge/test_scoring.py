@@ -22,6 +22,7 @@ QUIET: dict[str, Any] = {"effect": None, "states": []}
 OWN = {
     "also_true": [
         {"effect": "natural_convection", "states": ["table"], "also": ["radiation"]},
+        {"effect": "natural_convection", "states": ["bed"], "also": ["radiation"]},
         {"effect": "flooded_gap", "states": ["side"]},
     ]
 }
@@ -99,6 +100,13 @@ UNKNOWN = {"verdict": "unexplained", "physics": [], "alternatives": []}
         (TWO, said(named("friction_speed", "c_body_2"), named("radiation", "side")), -0.5, scoring.WRONG),
         (QUIET | OWN, said(named("natural_convection", "table")), 1.0, scoring.OF_MACHINE),
         (QUIET | OWN, said(named("radiation", "table")), 1.0, scoring.OF_MACHINE),
+        (
+            QUIET | OWN,
+            said(named("radiation", "table", "bed", "side")),
+            1.0,
+            scoring.OF_MACHINE,
+        ),  # one too many
+        (QUIET | OWN, said(named("radiation", "table", "side", "x")), -2.0, scoring.FALSE_ALARM),
         (QUIET | OWN, said(named("natural_convection", "side")), -2.0, scoring.FALSE_ALARM),
         (QUIET | OWN, UNKNOWN, -2.0, scoring.FALSE_ALARM),
         (
