@@ -14,7 +14,9 @@ from typer.testing import CliRunner
 
 from discovery.cli import app
 from discovery.experiment import load_experiment
+from discovery.experiment.ending import Ending
 from discovery.experiment.modelfits import fit_of
+from discovery.report.lead import Lead
 from tests.small import write_small
 
 EXPERIMENT = """
@@ -51,6 +53,43 @@ def test_a_run_ends_in_five_lines(folder: Path) -> None:
     assert lines[0].startswith("winner: one_body predicts best on 1 held-out recording: rms")
     assert "than that of regression" in lines[1]
     assert lines[3] == "doubts: none; the recordings are sound"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "share", "said"),
+    [
+        (
+            "no mismatch",
+            2.17,
+            "verdict: no mismatch in the recordings of the fit; but on the held-out ones first_order "
+            "has 217% of the rms without a model",
+        ),
+        ("no mismatch", 0.3, "verdict: no mismatch"),
+        ("unexplained", 2.17, "verdict: unexplained"),
+    ],
+)
+def test_a_verdict_is_not_said_of_recordings_that_refute_it(verdict: str, share: float, said: str) -> None:
+    lead = Lead(0.5, 0.4, 0.6, 1.0)
+    end = Ending(
+        "a",
+        "a",
+        lead,
+        None,
+        None,
+        {"um": 1.0},
+        ["c"],
+        verdict,
+        "first_order",
+        share,
+        [],
+        [],
+        {},
+        {},
+        "",
+        "",
+        1.0,
+    )
+    assert end.lines()[2] == said
 
 
 def test_the_end_as_json_says_the_same(folder: Path) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from discovery.report.heat import diagnosed_key
 from discovery.report.lead import Lead, lead_over
-from discovery.report.ranking import astray, cells, ranked, rms_by_unit
+from discovery.report.ranking import astray, cells, ranked, ratio, rms_by_unit
 from discovery.report.run import Run, load_run
 from discovery.runfolder import DIAGNOSIS
 from discovery.terms import names
@@ -25,7 +25,10 @@ _MOVES = 0.05  # share of an effect from which a guess matters
 
 @dataclass(frozen=True)
 class Ending:
-    """What a run found. `winner`: None where no model is better than none, which is `best`, then."""
+    """What a run found. `winner`: None where no model is better than none, which is `best`, then.
+    `diagnosed`: the model that the verdict is about; `diagnosed_ratio`: its rms on held-out recordings over
+    that without a model.
+    """
 
     best: str | None
     winner: str | None
@@ -35,6 +38,8 @@ class Ending:
     rms: Mapping[str, float]
     held_out: Sequence[str]
     verdict: str | None
+    diagnosed: str | None
+    diagnosed_ratio: float | None
     effects: Sequence[str]
     findings: Sequence[str]
     guesses: Mapping[str, str]
@@ -93,7 +98,12 @@ class Ending:
         if self.verdict is None:
             return "verdict: no diagnosis ([mismatch] names no model)"
         effects = f": {', '.join(self.effects)}" if self.effects else ""
-        return f"verdict: {self.verdict}{effects}"
+        fails = self.diagnosed_ratio is not None and self.diagnosed_ratio > _BETTER
+        but = (
+            f" in the recordings of the fit; but on the held-out ones {self.diagnosed} has "
+            f"{self.diagnosed_ratio:.0%} of the rms without a model"
+        )
+        return f"verdict: {self.verdict}{effects}{but if fails and self.verdict == 'no mismatch' else ''}"
 
     def _doubts(self) -> str:
         told = []
@@ -124,6 +134,8 @@ def ending(folder: Path) -> Ending:
     helps = none is not None and none.ratio < _BETTER and not (best and astray(run, best))
     other = order[1] if len(order) > 1 else None
     diagnosis = run.diagnosis if (folder / DIAGNOSIS).exists() else None
+    about = diagnosed_key(run) if diagnosis else None
+    about = about if about and run.held_out and cells(run, about) else None
     guesses = dict(run.results.get("guessed") or {})
     rms = (
         {u: float(np.sqrt(np.mean(np.square(v)))) for u, v in rms_by_unit(run, best).items()} if best else {}
@@ -137,6 +149,8 @@ def ending(folder: Path) -> Ending:
         rms,
         list(run.held_out),
         str(diagnosis["verdict"]) if diagnosis else None,
+        about,
+        ratio(run, about, None) if about else None,
         [_effect(one) for one in (diagnosis or {}).get("physics") or []],
         list(run.results.get("findings") or []),
         guesses,
