@@ -24,7 +24,7 @@ from discovery.dynamics.prediction import output_matrix
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.signatures import signatures
 from discovery.fitting import Fit
-from discovery.terms import Apply, Number, Term, evaluate, names
+from discovery.terms import Apply, Name, Number, Term, evaluate, names
 
 Array = NDArray[np.float64]
 
@@ -112,12 +112,14 @@ def inner_columns(run: Trajectory) -> Array:
 
 
 def _outputs_of(run: Trajectory, state: str) -> list[int]:
-    """Indices of the outputs that show a state."""
+    """Indices of the outputs that a state is a part of. A state that is read itself is the place that its
+    sensor sees, and not the mean of a body.
+    """
     shown = run.system.model.outputs
     return [
         y
         for y, name in enumerate(run.system.grid.outputs)
-        if name == state or (name in shown and state in names(shown[name]))
+        if name in shown and state in names(shown[name]) and shown[name] != Name(state)
     ]
 
 

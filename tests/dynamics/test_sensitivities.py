@@ -158,7 +158,7 @@ def test_the_width_of_a_play_behind_a_body(campaign: Campaign) -> None:
 
 
 def test_a_play_begins_where_its_body_does(campaign: Campaign) -> None:
-    """Else the first reading, which zeroes a free run, would say nothing of the start of a body in its seat."""
+    """Else the first reading, which zeroes a free run, says nothing of the start of a body in its seat."""
     model = two_bodies("0*a", "play(a, w)", w=0.4)
     system = make_system(model, make_grid(campaign, "r", model.inputs, ["y"]))
     values = model.values()
