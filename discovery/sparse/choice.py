@@ -20,7 +20,8 @@ from discovery.sparse.search import Search, Terms, on_grid
 
 Array = NDArray[np.float64]
 
-SPREADS = (0.01, 0.03, 0.1, 0.3)  # of start values, as shares of the spread of the readings
+SPREADS = (0.01, 0.03, 0.1, 0.3, 1.0)  # of start values, as shares of the spread of the readings
+_WEAKER = (1.0, 0.1, 0.01, 1e-3, 1e-4)  # times the strongest prior of gains
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Choice:
     fit: tuple[float, ...] = ()  # rms of the fit to everything, of each
     row: int = 0  # the chosen one
     start_sd: float = 0.0  # spread of start values
+    zero_sd: float = 0.0  # spread of the zeros of trajectories
     spreads: tuple[float, ...] = ()  # of the coefficients in their prior
     costs: tuple[float, ...] = ()  # of each term: share by which the left-out rms grows without it
     stability: tuple[float, ...] = ()  # of each term: share of block bootstraps whose set has its family
@@ -41,24 +43,18 @@ class Choice:
 def chosen(problem: Problem) -> Choice:
     """The smallest set within `tolerance` standard errors of the best on left-out data.
 
-    No set is larger than the one of the least extended BIC at the effective number of readings. No term
-    ends at the slow end of the time constants: its family may then have one term fewer. Terms share a time
-    constant where the criterion is better for it.
+    No set is larger than the one of the least extended BIC at the effective number of readings. Terms share
+    a time constant where the criterion is better for it.
     """
     problem = _with_parts(_with_spread(problem))
-    while True:
-        search = problem.search()
-        path = search.path(problem.max_terms)
-        effective = _effective(problem, search, path[-1])
-        worth = partial(_criterion, problem, search.g, effective)
-        folds = problem.folds()
-        errors = _left_out(problem, folds, path, int(np.argmin([worth(one) for one in path])) + 1)
-        row = choose(errors, problem.tolerance)
-        terms = search.shared(path[row], worth)
-        ended = search.ended(terms)
-        if not ended:
-            break
-        problem = replace(problem, families=problem.families.limited(ended))
+    search = problem.search()
+    path = search.path(problem.max_terms)
+    effective = _effective(problem, search, path[-1])
+    worth = partial(_criterion, problem, search.g, effective)
+    folds = problem.folds()
+    errors = _left_out(problem, folds, path, int(np.argmin([worth(one) for one in path])) + 1)
+    row = choose(errors, problem.tolerance)
+    terms = search.shared(path[row], worth)
     problem, terms = _believed(problem, terms)
     found = evidence(problem, terms)
     fit = [max(search.g.square - one.gain, 0.0) / search.g.count for one in path[: len(errors)]]
@@ -74,13 +70,15 @@ def chosen(problem: Problem) -> Choice:
 def evidence(problem: Problem, terms: Terms) -> Choice:
     """A set as a choice: what each term costs, and how stable it is."""
     left, costs = _costs(problem, terms)
+    residual = np.concatenate(problem.residuals(on_grid(terms, problem.families)))
     return Choice(
         terms,
         (terms,),
         (left,),
-        (float("nan"),),
+        (float(np.sqrt(np.mean(residual**2))),),
         0,
         problem.start_sd,
+        problem.zero_sd,
         tuple(problem.spreads(terms).tolist()),
         costs,
         stability(problem, terms),
@@ -88,10 +86,12 @@ def evidence(problem: Problem, terms: Terms) -> Choice:
 
 
 def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
-    """The problem with a prior that is scaled by the error on unseen readings, and the set under it.
+    """The problem with the strongest prior of its gains that predicts left-out data, and the set under it.
 
     Every model lacks something. Its gains bend to that as well, so what it leaves of the readings that it was
-    fitted to says too little of how far it is off, and of how long it stays off.
+    fitted to says too little of how far it is off, and of how long it stays off. At most, the prior is scaled
+    by the error on unseen readings. Responses that really oppose each other would give way to so strong a
+    prior: it is weaker where left-out data ask for it.
     """
     if not problem.parts:
         return problem, terms
@@ -105,7 +105,13 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     moved = (search.g.square - search.of(problem.always).gain) / search.g.count
     off = float(np.nanmean(np.concatenate(left) ** 2))
     independent = search.g.count / readings_as_one([r[:, None] for r in left])
-    firm = replace(problem, parts=off / moved / independent * len(terms))
+    most = off / moved / independent * len(terms)
+    tried = [replace(problem, parts=most * weaker) for weaker in _WEAKER]
+    errors = np.full((len(tried), problem.blocks.count), np.nan)
+    for trial, row in zip(tried, errors, strict=True):
+        for fold, search in trial.folds():
+            _missed(trial, search.refined(terms.family, terms.place, terms.pole), fold, row)
+    firm = tried[choose(errors[:, np.isfinite(errors).all(axis=0)], problem.tolerance)]
     return firm, firm.search().refined(terms.family, terms.place, terms.pole)
 
 
