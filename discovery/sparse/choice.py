@@ -118,14 +118,17 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
 def _with_spread(problem: Problem) -> Problem:
     """The problem with the spread of start values that makes its readings most likely (empirical Bayes).
 
-    -2 log p = n log(cost/n) + log det(1 + P^-1 D'D), with D the decays of each trajectory over the noise and
-    P the precisions of the starts. Where trajectories have zeros of their own, masses may begin closer to
-    their declared starts than these.
+    -2 log p = n log(cost/n) + log det(1 + P^-1 D'D/k), with n the effective number of readings, k of which
+    say the same once, D the decays of each trajectory over the noise and P the precisions of the starts.
+    Counted as independent, readings of what the model lacks would buy starts that follow it. Where
+    trajectories have zeros of their own, masses may begin closer to their declared starts than these.
     """
     counts = [d.shape[1] for d in problem.nuisance]
     if not all(counts):
         return problem
     size = float(np.nanstd(np.concatenate(problem.readings)))
+    search = problem.search()
+    alike = search.g.count / _effective(problem, search, search.path(problem.max_terms)[-1])
 
     def tried(masses: float, zero: float) -> tuple[float, Problem]:
         precision = equal_shares(masses * size, counts, zero * size if problem.zeroed else None)
@@ -135,8 +138,8 @@ def _with_spread(problem: Problem) -> Problem:
         volume = 0.0
         for d, y, own in zip(one.nuisance, one.readings, precision, strict=True):
             scaled = d[np.isfinite(y)] / np.sqrt(own)
-            volume += float(np.linalg.slogdet(np.eye(len(own)) + scaled.T @ scaled)[1])
-        return search.g.count * np.log(left / search.g.count) + volume, one
+            volume += float(np.linalg.slogdet(np.eye(len(own)) + scaled.T @ scaled / alike)[1])
+        return search.g.count / alike * np.log(left / search.g.count) + volume, one
 
     found = {(share, share): tried(share, share) for share in SPREADS}
     if problem.zeroed:
