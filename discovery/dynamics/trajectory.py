@@ -152,12 +152,12 @@ def _window(
         if not np.all(np.abs(new) < _FAR):
             return None, False
         change = _change(x, new)
-        if count >= _FIRST and change > before and not shortest:
-            return None, False
-        x = new
         if change * min(1.0, change / before) < _TOLERANCE:
-            return x, count <= _FIRST
-        before = change
+            return new, count <= _FIRST
+        slow = count >= _FIRST and change > _SHRINKS * before
+        if slow and not shortest:
+            return None, False
+        x, before = (0.5 * (x + new) if slow else new), change
     return (x if shortest else None), False
 
 

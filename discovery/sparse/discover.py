@@ -30,6 +30,7 @@ from discovery.sparse.masses import fit_masses
 from discovery.sparse.options import HIDDEN, SparseOptions
 from discovery.sparse.ratedata import make_rate_data
 from discovery.sparse.rates import with_candidates
+from discovery.sparse.structures import WORDS
 from discovery.sparse.temperatures import discover_temperatures
 from discovery.terms import names
 from discovery.threads import one_thread
@@ -74,8 +75,7 @@ def discover(
         parts = [discover_temperatures(campaign, recordings, outputs, inputs, options)]
     else:
         forms = _forms(roles, options)
-        groups = [list(outputs)] if _coupled(outputs, options) else [[name] for name in outputs]
-        parts = [_best(campaign, recordings, group, inputs, forms, options, progress) for group in groups]
+        parts = _each(campaign, recordings, outputs, inputs, forms, options, progress)
         together = forms == ("masses",)
     found = joined("discovered", parts, 0.0)
     if together:
@@ -118,9 +118,37 @@ def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:
     return ("masses",) if roles <= {"error", "temperature"} else ("masses", *states)
 
 
-def _coupled(outputs: Sequence[str], options: SparseOptions) -> bool:
-    """Whether the rate of an output may hold another output."""
-    return len(outputs) > 1 and options.form != "masses" and "coupling" in (options.library or ())
+def _each(
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    inputs: Inputs,
+    forms: Sequence[str],
+    options: SparseOptions,
+    progress: Progress,
+) -> list[Discovery]:
+    """A discovery of each output, or of all together where outputs move each other, as a position and its
+    rate do.
+
+    Together they need no hidden states. So this comes first, and ends the search if it leaves nothing but
+    white noise; otherwise the better one on left-out data stands.
+    """
+    if "coupling" in (options.library or ()) and options.form != "masses":
+        return [_best(campaign, recordings, outputs, inputs, forms, options, progress)]
+    moved: list[Discovery] = []
+    rates = None
+    if len(outputs) > 1 and "own" in forms and options.library is None:
+        rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
+        coupled = options.model_copy(update={"library": (*WORDS, "coupling")})
+        moved = list(discover_states(rates, coupled, ["own"], progress))
+        if moved and leaves_noise(campaign, recordings, moved[0].model, outputs):
+            return moved
+    parts = [_best(campaign, recordings, [name], inputs, forms, options, progress) for name in outputs]
+    if not moved or rates is None:
+        return parts
+    apart = joined("apart", parts, 0.0).model
+    errors = np.array([left_out_of(rates, one) for one in (apart, moved[0].model)])
+    return (parts, moved)[choose(errors, PREDICT if options.tolerance is None else options.tolerance)]
 
 
 def _best(

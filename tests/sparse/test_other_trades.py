@@ -1,0 +1,38 @@
+"""Systems that are no machine tools: outputs that move each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from discovery.frames import campaign_from_frames
+from discovery.sparse.discover import discover
+from discovery.sparse.options import SparseOptions
+
+
+def two_tanks(seed: int) -> pd.DataFrame:
+    """A pump fills a tank that empties into another one, both in proportion to their levels [cm]."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([0.0, 0.5, 1.0], 12), 20)
+    upper = lower = 5.0
+    read = []
+    for pump in u:
+        read.append((upper, lower))
+        for _ in range(100):
+            out = 0.01 * upper
+            upper, lower = upper + 0.1 * (0.2 * pump - out), lower + 0.1 * (out - 0.02 * lower)
+    levels = np.array(read) + 0.05 * rng.standard_normal((len(u), 2))
+    table = {"u": u, "upper": levels[:, 0], "lower": levels[:, 1]}
+    return pd.DataFrame(table, index=10.0 * np.arange(len(u)))
+
+
+def test_outputs_that_move_each_other_are_found_together() -> None:
+    """The lower level follows the upper one, which is measured: no hidden body stands for it."""
+    channels = {"u": {"role": "other input", "unit": "1"}}
+    channels |= {y: {"role": "other output", "unit": "cm"} for y in ("upper", "lower")}
+    campaign = campaign_from_frames({"a": two_tanks(0), "b": two_tanks(1)}, channels)
+    found = discover(campaign, ["a", "b"], ["upper", "lower"], SparseOptions(bootstraps=0))
+    assert set(found.model.states) == {"upper", "lower"}
+    assert found.report["groups"][0]["kept"] == ["upper: u", "upper: upper", "lower: upper", "lower: lower"]
+    values = [p.value for p in found.model.parameters.values()]
+    np.testing.assert_allclose(values, [12.0, -0.6, 0.6, -1.2], rtol=0.05)  # per min
