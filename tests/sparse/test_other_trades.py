@@ -36,3 +36,35 @@ def test_outputs_that_move_each_other_are_found_together() -> None:
     assert found.report["groups"][0]["kept"] == ["upper: u", "upper: upper", "lower: upper", "lower: lower"]
     values = [p.value for p in found.model.parameters.values()]
     np.testing.assert_allclose(values, [12.0, -0.6, 0.6, -1.2], rtol=0.05)  # per min
+
+
+def drawn(seed: int) -> pd.DataFrame:
+    """Water that a current warms by its square, and that cold water cools while some is drawn."""
+    rng = np.random.default_rng(seed)
+    current = np.repeat(rng.choice([0.0, 4.0, 10.0], 20), 40)
+    draw = np.repeat(rng.choice([0.0, 0.0, 1.0], 32), 25)
+    inlet = 12 + 2 * np.sin(np.arange(800) / 90)
+    water, read = 20.0, []
+    for i, flow, cold in zip(current, draw, inlet, strict=True):
+        read.append(water)
+        water += 10 * (1e-4 * (20 - water) + 2e-4 * i**2 + 1e-3 * flow * (cold - water))
+    table = {"current": current, "draw": draw, "T_inlet": inlet, "T_room": 20.0 + 0.0 * inlet}
+    water_read = np.array(read) + 0.05 * rng.standard_normal(len(read))
+    return pd.DataFrame(table | {"T": water_read}, index=10.0 * np.arange(800))
+
+
+def test_a_temperature_has_squares_of_currents_and_what_a_flow_carries() -> None:
+    roles = {
+        "current": ("other input", "A"),
+        "draw": ("fluid flow", "1"),
+        "T_inlet": ("fluid temperature", "degC"),
+        "T_room": ("ambient temperature", "degC"),
+        "T": ("temperature", "degC"),
+    }
+    channels = {name: {"role": role, "unit": unit} for name, (role, unit) in roles.items()}
+    campaign = campaign_from_frames({"a": drawn(0), "b": drawn(1)}, channels)
+    found = discover(campaign, ["a", "b"], ["T"], SparseOptions(bootstraps=0))
+    kept = found.report["groups"][0]["kept"]
+    assert "T_body: (current/100)**2" in kept
+    assert "T_body: draw*(T_inlet - T_body)" in kept
+    assert "T_body: current" not in kept
