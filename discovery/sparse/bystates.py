@@ -36,6 +36,7 @@ from discovery.terms import Number
 Array = NDArray[np.float64]
 
 THERMAL_ROLES = {"error", "temperature"}  # their rates count per hour
+_SLOW = 60.0  # s: what moves more quickly is not thermal
 _ROUNDS = 6  # of a fit in a fold
 _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
@@ -66,7 +67,7 @@ def discover_states(
     """
     words = options.library or WORDS
     roles = {data.campaign.channels[y].role for y in data.outputs}
-    unit = "h" if roles <= THERMAL_ROLES else time_unit(data.scale)
+    unit = "h" if roles <= THERMAL_ROLES and data.scale >= _SLOW else time_unit(data.scale)
     flows = [word for word in FLOWS if word in words] or ["linear"]
     kinds = [k for kind in hidden for k in ([f"{kind} {f}" for f in flows] if kind == "upstream" else [kind])]
     nearest = np.inf

@@ -22,7 +22,7 @@ from discovery.sparse.byrates import discover_rates
 from discovery.sparse.bystates import discover_states, leaves_noise, left_out_of
 from discovery.sparse.constraints import UnknownTermError, kept
 from discovery.sparse.discovery import Discovery, joined
-from discovery.sparse.drives import Inputs, make_drives, make_inputs
+from discovery.sparse.drives import FLOW, Inputs, make_drives, make_inputs
 from discovery.sparse.families import candidates
 from discovery.sparse.folds import CLAIM, PREDICT, choose
 from discovery.sparse.growth import Growth, grown
@@ -66,6 +66,8 @@ def discover(
     began = clock.perf_counter()
     inputs = make_inputs(campaign, recordings, options.inputs)
     roles = {campaign.channels[name].role for name in outputs}
+    if not warmed(campaign):  # a displacement like any other
+        roles = {"other output" if role == "error" else role for role in roles}
     together = False  # whether all outputs are masses
     if options.built_on_file:
         progress("terms on the baseline")
@@ -104,6 +106,12 @@ def fitting(report: Mapping[str, Any]) -> Callable[..., Fit]:
     groups = report.get("groups", ())
     masses = bool(groups) and all(group["form"] == "masses" for group in groups)
     return fit_masses if masses else fit_model
+
+
+def warmed(campaign: Campaign) -> bool:
+    """Whether any channel says what warms or cools: only then is an error a thermal one."""
+    inputs = [channel for channel in campaign.channels.values() if channel.is_input]
+    return any(c.role not in (FLOW, "other input") or c.unit in ("degC", "K") for c in inputs)
 
 
 def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from discovery.frames import campaign_from_frames
+from discovery.models.model import TIME_UNITS
 from discovery.sparse.discover import discover
 from discovery.sparse.options import SparseOptions
 
@@ -26,16 +28,20 @@ def two_tanks(seed: int) -> pd.DataFrame:
     return pd.DataFrame(table, index=10.0 * np.arange(len(u)))
 
 
-def test_outputs_that_move_each_other_are_found_together() -> None:
-    """The lower level follows the upper one, which is measured: no hidden body stands for it."""
+@pytest.mark.parametrize("role", ["other output", "error"])
+def test_outputs_that_move_each_other_are_found_together(role: str) -> None:
+    """The lower level follows the upper one, which is measured: no hidden body stands for it. Where nothing
+    warms the outputs, errors are outputs like any other.
+    """
     channels = {"u": {"role": "other input", "unit": "1"}}
-    channels |= {y: {"role": "other output", "unit": "cm"} for y in ("upper", "lower")}
+    channels |= {y: {"role": role, "unit": "mm"} for y in ("upper", "lower")}
     campaign = campaign_from_frames({"a": two_tanks(0), "b": two_tanks(1)}, channels)
     found = discover(campaign, ["a", "b"], ["upper", "lower"], SparseOptions(bootstraps=0))
     assert set(found.model.states) == {"upper", "lower"}
     assert found.report["groups"][0]["kept"] == ["upper: u", "upper: upper", "lower: upper", "lower: lower"]
-    values = [p.value for p in found.model.parameters.values()]
-    np.testing.assert_allclose(values, [12.0, -0.6, 0.6, -1.2], rtol=0.05)  # per min
+    size = 1000.0 if role == "error" else 1.0  # errors count in um
+    rates = TIME_UNITS[found.model.time_unit] * np.array([0.2 * size, -0.01, 0.01, -0.02])
+    np.testing.assert_allclose([p.value for p in found.model.parameters.values()], rates, rtol=0.05)
 
 
 def drawn(seed: int) -> pd.DataFrame:
