@@ -14,7 +14,7 @@ from discovery.fitting.noise import readings_as_one
 from discovery.sparse.folds import Ints, bootstraps, choose
 from discovery.sparse.gram import Gram
 from discovery.sparse.masses import next_start
-from discovery.sparse.problem import Problem, equal_shares
+from discovery.sparse.problem import WHOLE, Problem, equal_shares
 from discovery.sparse.pursuit import POINTS
 from discovery.sparse.search import Search, Terms, on_grid
 
@@ -91,7 +91,8 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     Every model lacks something. Its gains bend to that as well, so what it leaves of the readings that it was
     fitted to says too little of how far it is off, and of how long it stays off. At most, the prior is scaled
     by the error on unseen readings. Responses that really oppose each other would give way to so strong a
-    prior: it is weaker where left-out data ask for it.
+    prior: it is weaker where recordings that are left out whole ask for it. Parts of the same recordings do
+    not say so: gains that cancel predict them as well.
     """
     if not problem.parts:
         return problem, terms
@@ -106,7 +107,8 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     off = float(np.nanmean(np.concatenate(left) ** 2))
     independent = search.g.count / readings_as_one([r[:, None] for r in left])
     most = off / moved / independent * len(terms)
-    tried = [replace(problem, parts=most * weaker) for weaker in _WEAKER]
+    weaker = _WEAKER if len(problem.columns) >= WHOLE else _WEAKER[:1]
+    tried = [replace(problem, parts=most * share) for share in weaker]
     errors = np.full((len(tried), problem.blocks.count), np.nan)
     for trial, row in zip(tried, errors, strict=True):
         for fold, search in trial.folds():
