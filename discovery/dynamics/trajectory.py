@@ -64,9 +64,9 @@ def simulate(
     Nonlinear terms are solved by Newton's method on the whole trajectory. Most of its time goes into the
     exponentials of a new linearisation, so the last one is used again as long as its steps help. At the kink
     of a threshold full steps may go to and fro over it for ever; half a step ends between. Where steps on the
-    whole trajectory lead away, as they do where something swings many times, its halves come first. Where
-    the slope of a law has no bound, as that of a root at zero, steps with an old linearisation come close and
-    those with a new one lead away: the closest trajectory is kept.
+    whole trajectory lead away or do not settle, as where something swings many times, it is solved window by
+    window. Where the slope of a law has no bound, as that of a root at zero, steps with an old linearisation
+    come close and those with a new one lead away: the closest trajectory is kept.
 
     Args:
         values: parameter values by name.
@@ -79,7 +79,8 @@ def simulate(
     first = start_values(system, values) if start is None else start
     last = None if system.affine else near
     x = last.x if last else np.tile(first, (len(system.grid.time), 1))
-    before, divided, away, closest = 1.0, False, 0, (np.inf, last)
+    before, away, closest = 1.0, 0, (np.inf, last)
+    change = np.inf
     for count in range(1 if system.affine else _ROUNDS):
         with np.errstate(all="ignore"):
             x, step = _nearer(system, values, first, last, x) if last else (x, np.inf)
@@ -87,14 +88,7 @@ def simulate(
         which, e, w0, w1 = kernel.transitions(a, system.grid.step)
         new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
         if not np.all(np.abs(new) < _FAR):
-            last_round = system.affine or count + 1 == _ROUNDS
-            if last_round or divided or len(system.grid.step) < _LEAST:
-                raise RunsAwayError(
-                    f"model '{system.model.name}' diverges on recording '{system.grid.recording}'; "
-                    "check signs, bounds and start values of its parameters"
-                )
-            x, last, before, divided = _by_halves(system, values, first), None, 1.0, True
-            continue
+            return _in_windows(system, values, first)
         change = _change(x, new)
         if step < closest[0]:
             closest = step, Trajectory(system, dict(values), x, a, which, e, w0, w1)
@@ -104,23 +98,67 @@ def simulate(
             break
         last = Trajectory(system, dict(values), new, a, which, e, w0, w1)
         # the next step shrinks at least as much as this one did, and the first one to less than its square
-        if change * min(1.0, change / before) < _TOLERANCE:
+        if system.affine or change * min(1.0, change / before) < _TOLERANCE:
             break
         halved = count >= _FIRST and change > _SHRINKS * before
         x, before = (0.5 * (x + new) if halved else new), change
+    else:
+        return _in_windows(system, values, first)
     assert last is not None
     return last
 
 
-def _by_halves(system: System, values: Mapping[str, float], first: Array) -> Array:
-    """A trajectory (T, n) to begin from: that of the first half, and that of the second one from its end."""
-    nodes, x = len(system.grid.time), first
-    pieces = []
-    for begin, end in ((0, nodes // 2), (nodes // 2, nodes - 1)):
-        part = simulate(system.between(begin, end), values, x).x
-        pieces.append(part[: end - begin])
-        x = part[-1]
-    return np.concatenate([*pieces, x[None]])
+def _in_windows(system: System, values: Mapping[str, float], first: Array) -> Trajectory:
+    """The free run, solved in windows one after the other, each from the end of the one before.
+
+    Newton's method on a window begins near enough where the window is short: windows become shorter until it
+    settles, and longer where it settles at once.
+
+    Raises:
+        RunsAwayError: the trajectory does not stay finite.
+    """
+    last = len(system.grid.step)
+    x, done, wide = np.tile(first, (last + 1, 1)), 0, max(last // 2, 1)
+    while done < last:
+        end = min(done + wide, last)
+        shortest = system.affine or end - done <= _LEAST
+        found, quick = _window(system.between(done, end), values, x[done], shortest)
+        if found is None and shortest:
+            raise RunsAwayError(
+                f"model '{system.model.name}' diverges on recording '{system.grid.recording}'; "
+                "check signs, bounds and start values of its parameters"
+            )
+        if found is None:
+            wide = max((end - done) // 2, 1)
+            continue
+        x[done : end + 1], done = found, end
+        wide *= 2 if quick else 1
+    a = _linearise(system, values, x)[0]
+    return Trajectory(system, dict(values), x, a, *kernel.transitions(a, system.grid.step))
+
+
+def _window(
+    system: System, values: Mapping[str, float], first: Array, shortest: bool
+) -> tuple[Array | None, bool]:
+    """States (T, n) of a window, if Newton's method settles there, and whether it did so at once; the
+    shortest window keeps what stays finite.
+    """
+    x, before = np.tile(first, (len(system.grid.time), 1)), 1.0
+    for count in range(_ROUNDS):
+        with np.errstate(all="ignore"):
+            a, g0, g1 = _linearise(system, values, x)
+            which, e, w0, w1 = kernel.transitions(a, system.grid.step)
+            new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
+        if not np.all(np.abs(new) < _FAR):
+            return None, False
+        change = _change(x, new)
+        if change * min(1.0, change / before) < _TOLERANCE:
+            return new, count <= _FIRST
+        slow = count >= _FIRST and change > _SHRINKS * before
+        if slow and not shortest:
+            return None, False
+        x, before = (0.5 * (x + new) if slow else new), change
+    return (x if shortest else None), False
 
 
 def _nearer(

@@ -21,7 +21,7 @@ from discovery.sparse.discovery import Discovery, PathPoint, path_points
 from discovery.sparse.drives import Drives
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.library import Feature, FilteredInputs
-from discovery.sparse.masses import Response, Rules, mass_model, responses_of, within
+from discovery.sparse.masses import Response, Rules, mass_model, responses_of, slowest, within
 from discovery.sparse.optimiser import SparseSearch, features_of
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.problem import WHOLE
@@ -29,6 +29,8 @@ from discovery.sparse.problem import WHOLE
 Array = NDArray[np.float64]
 
 CLEAR = 1.96  # standard errors that a gain must be from zero
+_SEARCHES = 3  # of an output: each takes for noise what the model of the one before leaves
+_MORE = 1.2  # times the noise: so much is left where the model lacks something
 
 
 @dataclass(frozen=True)
@@ -48,14 +50,14 @@ def discover_masses(
 ) -> Discovery:
     """Choose the inputs and time constants of one output and fit their numbers.
 
-    Where the masses begin in a further recording follows from all outputs together: see `starts_of`.
+    A term whose time constant the fit moves to the slow end only adds up its input there: the search then
+    begins anew with one term fewer of its family. Where the masses begin in a further recording follows from
+    all outputs together: see `starts_of`.
     """
-    import pysindy
-
     options = matched(options, data.drives.expressions, campaign.path)
     grids = {r: data.grids[r].part(outputs=[output]) for r in recordings}
     readings = [grids[r].readings[:, 0] for r in recordings]
-    noise = campaign.channels[output].noise or roughness(readings)
+    stated = campaign.channels[output].noise
     library = FilteredInputs(
         ["time", *data.drives.inputs, "read"],
         [d for d in data.drives.expressions if d not in options.forbid],
@@ -66,34 +68,74 @@ def discover_masses(
         # how far zeros are apart is known from several recordings alone
         zeroed=campaign.channels[output].role == "error" and len(recordings) >= WHOLE,
     )
-    search = SparseSearch(
-        library,
-        options.max_terms,
-        options.bounds,
-        options.keep,
-        [noise],
-        PREDICT if options.tolerance is None else options.tolerance,
-        options.blocks,
-        options.bootstraps,
-        options.seed,
-        chosen if options.optimiser == "search" else borrowed(options.optimiser, options.optimiser_arguments),
-    )
-    sindy = pysindy.SINDy(optimizer=search, feature_library=library)
-    tables = [_table(grids[r], data.drives.inputs) for r in recordings]
-    sindy.fit(tables, t=1.0, x_dot=[grids[r].readings for r in recordings])
-    choice = search.choices_[0]
-    features = features_of(library, choice.terms)
-    rules = Rules(
-        output,
-        {name: c.unit for name, c in campaign.channels.items()},
-        data.drives.settled,
-        options.bounds,
-        (float(library.taus_[0]), float(library.taus_[-1])),
-        choice.start_sd,
-        library.zeroed,
-    )
-    model, left = _clear(rules, features, choice, campaign, recordings, grids, options)
-    return Discovery(model, *_evidence(output, features, left, over(choice, noise), library))
+    most: dict[int, int] = {}
+    while True:
+        choice, noise = _searched(
+            library, grids, data.drives.inputs, options, stated or roughness(readings), most
+        )
+        features = features_of(library, choice.terms)
+        rules = Rules(
+            output,
+            {name: c.unit for name, c in campaign.channels.items()},
+            data.drives.settled,
+            options.bounds,
+            (float(library.taus_[0]), float(library.taus_[-1])),
+            choice.start_sd,
+            choice.zero_sd if library.zeroed else None,
+        )
+        # a fit that does not know the noise takes for it what the model leaves
+        missed = (stated or choice.fit[choice.row]) / noise
+        model, kept, slow = _clear(rules, features, choice, campaign, recordings, grids, options, missed)
+        fewer = {int(f): int(np.sum(choice.terms.family == f)) - 1 for f in choice.terms.family[slow]}
+        if all(most.get(f, many + 1) <= many for f, many in fewer.items()):
+            return Discovery(model, *_evidence(output, features, kept, over(choice, noise), library))
+        most |= fewer
+
+
+def _searched(
+    library: FilteredInputs,
+    grids: Mapping[str, Grid],
+    inputs: Sequence[str],
+    options: SparseOptions,
+    noise: float,
+    most: Mapping[int, int],
+) -> tuple[Choice, float]:
+    """The choice of a search, and the noise that it was made with.
+
+    Where the model leaves more than the noise, starts and gains would bend to what it lacks: the search
+    begins anew and takes for noise what was left.
+
+    Args:
+        noise: of a reading, as stated or as rough as the readings are. most: terms of some families.
+    """
+    import pysindy
+
+    theirs = options.optimiser != "search"
+    select = borrowed(options.optimiser, options.optimiser_arguments) if theirs else chosen
+    tables = [_table(grid, inputs) for grid in grids.values()]
+    readings = [grid.readings for grid in grids.values()]
+    for _ in range(_SEARCHES):
+        search = SparseSearch(
+            library,
+            options.max_terms,
+            options.bounds,
+            options.keep,
+            [noise],
+            PREDICT if options.tolerance is None else options.tolerance,
+            options.blocks,
+            options.bootstraps,
+            options.seed,
+            lambda problem: select(replace(problem, families=problem.families.limited(most))),
+        )
+        sindy = pysindy.SINDy(optimizer=search, feature_library=library)
+        sindy.fit(tables, t=1.0, x_dot=readings)
+        choice = search.choices_[0]
+        if choice.fit[choice.row] <= _MORE * noise:
+            break
+        noise, before = choice.fit[choice.row], noise
+    else:
+        noise = before
+    return choice, noise
 
 
 def over(choice: Choice, noise: float) -> Choice:
@@ -117,14 +159,20 @@ def _clear(
     recordings: Sequence[str],
     grids: Mapping[str, Grid],
     options: SparseOptions,
-) -> tuple[Model, list[Feature]]:
+    missed: float,
+) -> tuple[Model, list[Feature], NDArray[np.bool_]]:
     """The model of the chosen features, fitted by output error, without those whose interval holds zero;
-    and these.
+    these; and which of the chosen ones (n,) end as slow as a mass may be.
+
+    Args:
+        missed: noise by which the fit weighs readings, over that of the search: the prior of a gain counts
+            against a residual alike in both.
     """
     found = zip(features, choice.terms.theta, choice.terms.pole, choice.spreads, strict=True)
-    responses = [Response(f, float(gain), int(pole), f, spread) for f, gain, pole, spread in found]
+    responses = [Response(f, float(gain), int(pole), f, missed * spread) for f, gain, pole, spread in found]
+    slow = np.zeros(len(features), dtype=bool)
     if not options.refine:
-        return mass_model(rules, responses), list(features)
+        return mass_model(rules, responses), list(features), slow
 
     def fitted(model: Model) -> Fit:
         return fit_model(model, campaign, recordings, [rules.output], grids=grids)
@@ -132,6 +180,8 @@ def _clear(
     while True:
         fit = fitted(mass_model(rules, responses))
         responses, strength = responses_of(fit, responses)
+        ended = {r.chosen for r in responses if slowest(rules, r)}
+        slow |= [f in ended for f in features]
         inside = within(rules, responses)
         if inside != responses:
             responses = inside
@@ -139,7 +189,7 @@ def _clear(
         free = [i for i, r in enumerate(responses) if r.feature.drive not in options.keep]
         weakest = min(free, key=lambda i: strength[i], default=None)
         if weakest is None or strength[weakest] >= CLEAR:
-            return fit.model, [r.chosen for r in responses]
+            return fit.model, [r.chosen for r in responses], slow
         responses = [r for i, r in enumerate(responses) if i != weakest]
 
 

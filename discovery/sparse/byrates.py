@@ -128,12 +128,11 @@ class Judge:
         if self.grown:
             everything = search.of(np.union1d(problem.always, np.arange(len(self.names))))
             window += [everything] * (everything.members not in [one.members for one in window])
-        sets = sorted(window, key=len)
+        worth = float(dispersion * (np.log(max(g.count, 2)) + 2 * np.log(count)))  # of one more term
+        plain = [plainer(search, one, self.names, self.easy, worth) for one in window]
+        sets = sorted({one.members: one for one in plain}.values(), key=len)
         errors = np.array([self.left_out(one) for one in sets])
-        row = choose(errors, self.tolerance)
-        worth = dispersion * (np.log(max(g.count, 2)) + 2 * np.log(count))  # of one more term
-        sets[row] = plainer(search, sets[row], self.names, self.easy, self.labels, float(worth))
-        return self.evidence(problem, sets, errors, row)
+        return self.evidence(problem, sets, errors, choose(errors, self.tolerance))
 
     def on(self, options: SparseOptions) -> Callable[[Problem], Choice]:
         """The choice of an optimiser of PySINDy, with the evidence for it."""
@@ -211,17 +210,15 @@ def plainer(
     terms: Terms,
     names: Sequence[str],
     easy: Sequence[str],
-    labels: Mapping[str, str],
     worth: float,
 ) -> Terms:
-    """The set with terms of the first order in place of others into the same state, where the cost rises by
-    less than a further term would have to bring.
+    """The set with terms of the first order in place of others, where the cost rises by less than a further
+    term would have to bring.
     """
     first = [i for i, name in enumerate(names) if name in easy]
     bound = terms.gain - worth
     for term in [f for f in terms.family[len(search.always) :] if f not in first]:
-        into = labels[names[term]].split(": ")[0]
-        others = [i for i in first if i not in terms.family and labels[names[i]].split(": ")[0] == into]
+        others = [i for i in first if i not in terms.family]
         swaps = [search.of(np.where(terms.family == term, i, terms.family)) for i in others]
         best = max(swaps, key=lambda one: one.gain, default=None)
         if best is not None and best.gain > bound:

@@ -36,6 +36,7 @@ from discovery.terms import Number
 Array = NDArray[np.float64]
 
 THERMAL_ROLES = {"error", "temperature"}  # their rates count per hour
+_SLOW = 60.0  # s: what moves more quickly is not thermal
 _ROUNDS = 6  # of a fit in a fold
 _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
@@ -66,7 +67,7 @@ def discover_states(
     """
     words = options.library or WORDS
     roles = {data.campaign.channels[y].role for y in data.outputs}
-    unit = "h" if roles <= THERMAL_ROLES else time_unit(data.scale)
+    unit = "h" if roles <= THERMAL_ROLES and data.scale >= _SLOW else time_unit(data.scale)
     flows = [word for word in FLOWS if word in words] or ["linear"]
     kinds = [k for kind in hidden for k in ([f"{kind} {f}" for f in flows] if kind == "upstream" else [kind])]
     nearest = np.inf
@@ -126,7 +127,6 @@ def _discovered(data: RateData, kind: str, start: Start) -> Discovery:
     structure, entered, options = start.structure, start.entered, start.options
     stay = {i for i, c in enumerate(structure.candidates) if c.label in options.keep}
     for _ in range(_GROWTHS):
-        before = entered
         model, labels = with_candidates(structure.model, structure.candidates)
         names = list(labels)
         growth = Growth(
@@ -138,7 +138,7 @@ def _discovered(data: RateData, kind: str, start: Start) -> Discovery:
         small, kept = grown(data, model, labels, growth, options)
         entered = {names.index(name) for name in kept} | stay
         structure, moved = _refined(data, structure, small, names)
-        if not moved and entered == before:
+        if not moved:
             break
     always = [names[i] for i in stay]
     found = discover_rates(data, small, kept, always, options, grown=True, tolerance=PREDICT)
@@ -190,11 +190,12 @@ def _allowed(data: RateData, structure: Structure, options: SparseOptions) -> tu
 
 
 def _begun(data: RateData, bare: Structure) -> tuple[Structure, set[int], float]:
-    """Start values of the candidates and the set to begin with: of several widths of the weak form the one
-    from which a short fit of free runs comes nearest; and its cost.
+    """Start values of the candidates and the set to begin with: of several widths of the weak form the first
+    from which a short fit of free runs comes near, else the one from which it comes nearest; and its cost.
     """
     noise = rough_noise(data).white
     grids = [data.grids[r] for r in data.recordings]
+    near = 0.5 * sum(int(grid.measured.sum()) for grid in grids)  # cost of a fit that is off by this noise
     widths = [half_widths(grids, y, s, bare.order) for y, s in zip(data.outputs, noise, strict=True)]
     begun = []
     for k in range(max(map(len, widths))):
@@ -203,6 +204,8 @@ def _begun(data: RateData, bare: Structure) -> tuple[Structure, set[int], float]
         small = without(model, [name for i, name in enumerate(labels) if i not in entered])
         try:
             begun.append((structure, entered, _fit(data, small, {}, _FIRST).cost))
+            if begun[-1][2] <= near:
+                break
         except RunsAwayError:
             begun.append((structure, entered, np.inf))
     return min(begun, key=lambda one: one[2])

@@ -14,13 +14,14 @@ from discovery.fitting.noise import readings_as_one
 from discovery.sparse.folds import Ints, bootstraps, choose
 from discovery.sparse.gram import Gram
 from discovery.sparse.masses import next_start
-from discovery.sparse.problem import Problem, equal_shares
+from discovery.sparse.problem import WHOLE, Problem, equal_shares
 from discovery.sparse.pursuit import POINTS
 from discovery.sparse.search import Search, Terms, on_grid
 
 Array = NDArray[np.float64]
 
-SPREADS = (0.01, 0.03, 0.1, 0.3)  # of start values, as shares of the spread of the readings
+SPREADS = (0.01, 0.03, 0.1, 0.3, 1.0)  # of start values, as shares of the spread of the readings
+_WEAKER = (1.0, 0.1, 0.01, 1e-3, 1e-4)  # times the strongest prior of gains
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Choice:
     fit: tuple[float, ...] = ()  # rms of the fit to everything, of each
     row: int = 0  # the chosen one
     start_sd: float = 0.0  # spread of start values
+    zero_sd: float = 0.0  # spread of the zeros of trajectories
     spreads: tuple[float, ...] = ()  # of the coefficients in their prior
     costs: tuple[float, ...] = ()  # of each term: share by which the left-out rms grows without it
     stability: tuple[float, ...] = ()  # of each term: share of block bootstraps whose set has its family
@@ -41,24 +43,18 @@ class Choice:
 def chosen(problem: Problem) -> Choice:
     """The smallest set within `tolerance` standard errors of the best on left-out data.
 
-    No set is larger than the one of the least extended BIC at the effective number of readings. No term
-    ends at the slow end of the time constants: its family may then have one term fewer. Terms share a time
-    constant where the criterion is better for it.
+    No set is larger than the one of the least extended BIC at the effective number of readings. Terms share
+    a time constant where the criterion is better for it.
     """
     problem = _with_parts(_with_spread(problem))
-    while True:
-        search = problem.search()
-        path = search.path(problem.max_terms)
-        effective = _effective(problem, search, path[-1])
-        worth = partial(_criterion, problem, search.g, effective)
-        folds = problem.folds()
-        errors = _left_out(problem, folds, path, int(np.argmin([worth(one) for one in path])) + 1)
-        row = choose(errors, problem.tolerance)
-        terms = search.shared(path[row], worth)
-        ended = search.ended(terms)
-        if not ended:
-            break
-        problem = replace(problem, families=problem.families.limited(ended))
+    search = problem.search()
+    path = search.path(problem.max_terms)
+    effective = _effective(problem, search, path[-1])
+    worth = partial(_criterion, problem, search.g, effective)
+    folds = problem.folds()
+    errors = _left_out(problem, folds, path, int(np.argmin([worth(one) for one in path])) + 1)
+    row = choose(errors, problem.tolerance)
+    terms = search.shared(path[row], worth)
     problem, terms = _believed(problem, terms)
     found = evidence(problem, terms)
     fit = [max(search.g.square - one.gain, 0.0) / search.g.count for one in path[: len(errors)]]
@@ -74,13 +70,15 @@ def chosen(problem: Problem) -> Choice:
 def evidence(problem: Problem, terms: Terms) -> Choice:
     """A set as a choice: what each term costs, and how stable it is."""
     left, costs = _costs(problem, terms)
+    residual = np.concatenate(problem.residuals(on_grid(terms, problem.families)))
     return Choice(
         terms,
         (terms,),
         (left,),
-        (float("nan"),),
+        (float(np.sqrt(np.mean(residual**2))),),
         0,
         problem.start_sd,
+        problem.zero_sd,
         tuple(problem.spreads(terms).tolist()),
         costs,
         stability(problem, terms),
@@ -88,10 +86,13 @@ def evidence(problem: Problem, terms: Terms) -> Choice:
 
 
 def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
-    """The problem with a prior that is scaled by the error on unseen readings, and the set under it.
+    """The problem with the strongest prior of its gains that predicts left-out data, and the set under it.
 
     Every model lacks something. Its gains bend to that as well, so what it leaves of the readings that it was
-    fitted to says too little of how far it is off, and of how long it stays off.
+    fitted to says too little of how far it is off, and of how long it stays off. At most, the prior is scaled
+    by the error on unseen readings. Responses that really oppose each other would give way to so strong a
+    prior: it is weaker where recordings that are left out whole ask for it. Parts of the same recordings do
+    not say so: gains that cancel predict them as well.
     """
     if not problem.parts:
         return problem, terms
@@ -105,21 +106,31 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     moved = (search.g.square - search.of(problem.always).gain) / search.g.count
     off = float(np.nanmean(np.concatenate(left) ** 2))
     independent = search.g.count / readings_as_one([r[:, None] for r in left])
-    firm = replace(problem, parts=off / moved / independent * len(terms))
+    most = off / moved / independent * len(terms)
+    weaker = _WEAKER if len(problem.columns) >= WHOLE else _WEAKER[:1]
+    tried = [replace(problem, parts=most * share) for share in weaker]
+    errors = np.full((len(tried), problem.blocks.count), np.nan)
+    for trial, row in zip(tried, errors, strict=True):
+        for fold, search in trial.folds():
+            _missed(trial, search.refined(terms.family, terms.place, terms.pole), fold, row)
+    firm = tried[choose(errors[:, np.isfinite(errors).all(axis=0)], problem.tolerance)]
     return firm, firm.search().refined(terms.family, terms.place, terms.pole)
 
 
 def _with_spread(problem: Problem) -> Problem:
     """The problem with the spread of start values that makes its readings most likely (empirical Bayes).
 
-    -2 log p = n log(cost/n) + log det(1 + P^-1 D'D), with D the decays of each trajectory over the noise and
-    P the precisions of the starts. Where trajectories have zeros of their own, masses may begin closer to
-    their declared starts than these.
+    -2 log p = n log(cost/n) + log det(1 + P^-1 D'D/k), with n the effective number of readings, k of which
+    say the same once, D the decays of each trajectory over the noise and P the precisions of the starts.
+    Counted as independent, readings of what the model lacks would buy starts that follow it. Where
+    trajectories have zeros of their own, masses may begin closer to their declared starts than these.
     """
     counts = [d.shape[1] for d in problem.nuisance]
     if not all(counts):
         return problem
     size = float(np.nanstd(np.concatenate(problem.readings)))
+    search = problem.search()
+    alike = search.g.count / _effective(problem, search, search.path(problem.max_terms)[-1])
 
     def tried(masses: float, zero: float) -> tuple[float, Problem]:
         precision = equal_shares(masses * size, counts, zero * size if problem.zeroed else None)
@@ -129,8 +140,8 @@ def _with_spread(problem: Problem) -> Problem:
         volume = 0.0
         for d, y, own in zip(one.nuisance, one.readings, precision, strict=True):
             scaled = d[np.isfinite(y)] / np.sqrt(own)
-            volume += float(np.linalg.slogdet(np.eye(len(own)) + scaled.T @ scaled)[1])
-        return search.g.count * np.log(left / search.g.count) + volume, one
+            volume += float(np.linalg.slogdet(np.eye(len(own)) + scaled.T @ scaled / alike)[1])
+        return search.g.count / alike * np.log(left / search.g.count) + volume, one
 
     found = {(share, share): tried(share, share) for share in SPREADS}
     if problem.zeroed:

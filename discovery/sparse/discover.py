@@ -22,7 +22,7 @@ from discovery.sparse.byrates import discover_rates
 from discovery.sparse.bystates import discover_states, leaves_noise, left_out_of
 from discovery.sparse.constraints import UnknownTermError, kept
 from discovery.sparse.discovery import Discovery, joined
-from discovery.sparse.drives import Inputs, make_drives, make_inputs
+from discovery.sparse.drives import FLOW, Inputs, make_drives, make_inputs
 from discovery.sparse.families import candidates
 from discovery.sparse.folds import CLAIM, PREDICT, choose
 from discovery.sparse.growth import Growth, grown
@@ -30,6 +30,7 @@ from discovery.sparse.masses import fit_masses
 from discovery.sparse.options import HIDDEN, SparseOptions
 from discovery.sparse.ratedata import make_rate_data
 from discovery.sparse.rates import with_candidates
+from discovery.sparse.structures import WORDS
 from discovery.sparse.temperatures import discover_temperatures
 from discovery.terms import names
 from discovery.threads import one_thread
@@ -65,6 +66,8 @@ def discover(
     began = clock.perf_counter()
     inputs = make_inputs(campaign, recordings, options.inputs)
     roles = {campaign.channels[name].role for name in outputs}
+    if not warmed(campaign):  # a displacement like any other
+        roles = {"other output" if role == "error" else role for role in roles}
     together = False  # whether all outputs are masses
     if options.built_on_file:
         progress("terms on the baseline")
@@ -74,8 +77,7 @@ def discover(
         parts = [discover_temperatures(campaign, recordings, outputs, inputs, options)]
     else:
         forms = _forms(roles, options)
-        groups = [list(outputs)] if _coupled(outputs, options) else [[name] for name in outputs]
-        parts = [_best(campaign, recordings, group, inputs, forms, options, progress) for group in groups]
+        parts = _each(campaign, recordings, outputs, inputs, forms, options, progress)
         together = forms == ("masses",)
     found = joined("discovered", parts, 0.0)
     if together:
@@ -106,6 +108,12 @@ def fitting(report: Mapping[str, Any]) -> Callable[..., Fit]:
     return fit_masses if masses else fit_model
 
 
+def warmed(campaign: Campaign) -> bool:
+    """Whether any channel says what warms or cools: only then is an error a thermal one."""
+    inputs = [channel for channel in campaign.channels.values() if channel.is_input]
+    return any(c.role not in (FLOW, "other input") or c.unit in ("degC", "K") for c in inputs)
+
+
 def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:
     """Forms to try, the plainer one first: "masses", and what may stand behind an output in rates."""
     states = HIDDEN if options.hidden == "auto" else (options.hidden,)
@@ -118,9 +126,37 @@ def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:
     return ("masses",) if roles <= {"error", "temperature"} else ("masses", *states)
 
 
-def _coupled(outputs: Sequence[str], options: SparseOptions) -> bool:
-    """Whether the rate of an output may hold another output."""
-    return len(outputs) > 1 and options.form != "masses" and "coupling" in (options.library or ())
+def _each(
+    campaign: Campaign,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    inputs: Inputs,
+    forms: Sequence[str],
+    options: SparseOptions,
+    progress: Progress,
+) -> list[Discovery]:
+    """A discovery of each output, or of all together where outputs move each other, as a position and its
+    rate do.
+
+    Together they need no hidden states. So this comes first, and ends the search if it leaves nothing but
+    white noise; otherwise the better one on left-out data stands.
+    """
+    if "coupling" in (options.library or ()) and options.form != "masses":
+        return [_best(campaign, recordings, outputs, inputs, forms, options, progress)]
+    moved: list[Discovery] = []
+    rates = None
+    if len(outputs) > 1 and "own" in forms and options.library is None:
+        rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
+        coupled = options.model_copy(update={"library": (*WORDS, "coupling")})
+        moved = list(discover_states(rates, coupled, ["own"], progress))
+        if moved and leaves_noise(campaign, recordings, moved[0].model, outputs):
+            return moved
+    parts = [_best(campaign, recordings, [name], inputs, forms, options, progress) for name in outputs]
+    if not moved or rates is None:
+        return parts
+    apart = joined("apart", parts, 0.0).model
+    errors = np.array([left_out_of(rates, one) for one in (apart, moved[0].model)])
+    return (parts, moved)[choose(errors, PREDICT if options.tolerance is None else options.tolerance)]
 
 
 def _best(

@@ -129,8 +129,9 @@ def _family(
                 *((name, f"({name} - {state})*abs({name} - {state})**0.25") for name in [room, *partners])
             )
         case "load":
+            drawn = [*heat, *(name for name in inputs.of("other input") if name not in inputs.bodies)]
             return plain(
-                *(f"{name}*({state} - {room})/100" for name in heat), *(f"({name}/100)**2" for name in heat)
+                *(f"{name}*({state} - {room})/100" for name in drawn), *(f"({name}/100)**2" for name in drawn)
             )
         case "second mass":
             return towards(

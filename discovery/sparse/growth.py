@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
+from discovery.errors import RunsAwayError
 from discovery.fitting import Fit, Noise
 from discovery.models import Model
 from discovery.sparse.choice import Choice
@@ -50,7 +52,13 @@ def grown(
     noise = rough_noise(data)
     before = False
     for _ in range(growth.most + 1):
-        model, fit, alike = _fitted_with(data, model, labels, entered, growth, noise)
+        try:
+            model, fit, alike = _fitted_with(data, model, labels, entered, growth, noise)
+        except RunsAwayError:
+            if len(entered) == len(growth.entered):
+                raise
+            entered.pop()
+            break
         if alike and before:  # the bend is gone
             growth = replace(growth, restart={})
         before = alike and bool(entered)
@@ -90,7 +98,10 @@ def _exchanged(
         other = [seen.names[f] for f in choice.terms.members if seen.names[f] in labels]
         if set(other) == set(entered):
             break
-        tried, its, _ = _fitted_with(data, model, labels, other, growth, noise)
+        try:
+            tried, its, _ = _fitted_with(data, model, labels, other, growth, noise)
+        except RunsAwayError:
+            break
         dispersion = max(2 * min(fit.cost, its.cost) / seen.count, 1.0)
         price = np.log(max(seen.count, 2)) + 2 * np.log(len(labels))
         before, after = (
@@ -112,13 +123,20 @@ def _fitted_with(
 ) -> tuple[Model, Fit, bool]:
     """The model with all candidates, those that entered fitted and the others zero; that fit, and whether the
     fits from all starts ended alike.
+
+    Raises:
+        RunsAwayError: the model stays finite from none of the starts.
     """
     small = without(model, [name for name in labels if name not in entered])
     starts = [{}, growth.restart] if growth.restart else [{}]
-    fits = [
-        refit(small, data.campaign, data.recordings, data.outputs, start, data.grids, noise, 40)
-        for start in starts
-    ]
+    fits = []
+    for start in starts:
+        with suppress(RunsAwayError):
+            fits.append(
+                refit(small, data.campaign, data.recordings, data.outputs, start, data.grids, noise, 40)
+            )
+    if not fits:
+        raise RunsAwayError(f"no fit of {', '.join(entered)} stays finite")
     fit = min(fits, key=lambda one: one.cost)
     alike = max(one.cost for one in fits) <= (1 + _ALIKE) * fit.cost
     out = {

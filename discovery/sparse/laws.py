@@ -20,6 +20,7 @@ LAWS = {
     "drag": "{0}*abs({0})",
     "sign": "sign({0})",
 }
+BELOW = 0.05  # share of its range by which noise may take a variable below zero that is never negative
 QUANTILES = (0.5, 0.7, 0.85, 0.97)  # of a variable, where a threshold may stand
 
 
@@ -30,18 +31,20 @@ def laws(
 
     Args:
         seen: (N,) values of the variable, where they are known: thresholds stand at their quantiles, and a
-            root is offered to what is nowhere negative alone.
+            root is offered to what is nowhere negative but for noise.
         hidden: nothing says where the variable counts from: a root begins at its least value.
 
     >>> laws(["linear", "cubic"], "y")
     ['y', 'y**3']
     >>> laws(["sqrt"], "h", np.array([-1.5, 3.0]), hidden=True)
     ['sqrt(max(h - -1.5, 0))']
+    >>> laws(["sqrt"], "h", np.array([-0.1, 3.0]))
+    ['sqrt(max(h, 0))']
     """
     least = 0.0 if seen is None else float(np.min(seen))
-    root = least < 0 and hidden
-    found = [LAWS[w].format(variable) for w in words if w in LAWS and not (w == "sqrt" and least < 0)]
-    found += [LAWS["sqrt"].format(f"{variable} - {least:.3g}")] * ("sqrt" in words and root)
+    negative = seen is not None and least < -BELOW * float(np.ptp(seen))
+    found = [LAWS[w].format(variable) for w in words if w in LAWS and not (w == "sqrt" and negative)]
+    found += [LAWS["sqrt"].format(f"{variable} - {least:.3g}")] * ("sqrt" in words and negative and hidden)
     if "threshold" in words and seen is not None:
         levels = dict.fromkeys(float(f"{q:.3g}") for q in np.quantile(seen, QUANTILES))
         found += [f"max({variable} - {level:g}, 0)" for level in levels if np.min(seen) < level]

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 _AT = 1e-3  # share of a bound that counts as at it
 _OWN = 1e-4  # share of the variance of a start that the starts of other masses never explain
-QUICKER = 10.0  # times below the grid that the time constant of a fit may go
+QUICKER, SLOWER = 10.0, 3.0  # times beyond the grid that the time constant of a fit may go
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,14 @@ class Rules:
     units: Mapping[str, str]  # of channels
     settled: Collection[str]  # drives whose mass begins in balance with them
     bounds: Mapping[str, tuple[float, float]]
-    time_constants: tuple[float, float]  # s
+    time_constants: tuple[float, float]  # s, of the grid of the search
     start_sd: float
-    zeroed: bool = False  # each recording has a zero of its own
+    zero_sd: float | None = None  # of the zero that each recording has of its own; None: they have none
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Least and largest time constant of a fit [s]."""
+        return self.time_constants[0] / QUICKER, self.time_constants[1] * SLOWER
 
 
 def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
@@ -81,8 +86,7 @@ def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
         else:
             state, tau = f"{y}_{number[r.pole]}", f"{y}_tau{number[r.pole]}"
             if state not in states:
-                least, most = rules.time_constants
-                parameters[tau] = Parameter(r.feature.tau, "s", least / QUICKER, most)
+                parameters[tau] = Parameter(r.feature.tau, "s", *rules.limits)
                 states[state] = State(state, unit, None, Number(0.0), rules.start_sd, 1.0)
                 terms.append(Term(f"{state} settles", state, parse(f"-{state}/{tau}")))
             if drive in rules.settled:
@@ -92,8 +96,8 @@ def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
             terms.append(Term(f"{drive} through {state}", state, parse(f"{driven}/{tau}")))
         prior = (0.0, r.spread) if np.isfinite(r.spread) else None
         parameters[gain] = Parameter(r.gain, per, low, high, prior=prior)
-    if rules.zeroed and responses:
-        states[f"{y}_zero"] = State(f"{y}_zero", unit, None, Number(0.0), rules.start_sd, 1.0)
+    if rules.zero_sd is not None and responses:
+        states[f"{y}_zero"] = State(f"{y}_zero", unit, None, Number(0.0), rules.zero_sd, 1.0)
     output = parse(" + ".join([*states, *direct]) or "0")
     return Model(y, parameters, states, tuple(terms), {y: output}, "s")
 
@@ -124,16 +128,19 @@ def responses_of(fit: Fit, responses: Sequence[Response]) -> tuple[list[Response
     return found, strength
 
 
+def slowest(rules: Rules, response: Response) -> bool:
+    """Whether a time constant is at the long limit: the recordings do not determine it."""
+    return response.lagged and response.feature.tau >= rules.limits[1] * (1 - _AT)
+
+
 def within(rules: Rules, responses: Sequence[Response]) -> list[Response]:
-    """The responses whose time constant is not at a limit: at the short end there is no mass, at the long end
-    the recordings do not determine it.
-    """
-    least, most = rules.time_constants
+    """The responses whose time constant is not at a limit: at the short end there is no mass."""
+    least = rules.limits[0] * (1 + _AT)
     found = []
     for r in responses:
-        if not r.lagged or least / QUICKER * (1 + _AT) < r.feature.tau < most * (1 - _AT):
+        if not r.lagged or (r.feature.tau > least and not slowest(rules, r)):
             found.append(r)
-        elif r.feature.tau < most * (1 - _AT):
+        elif r.feature.tau <= least:
             direct = replace(r.feature, tau=0.0)
             if all(direct != other.feature for other in responses):
                 found.append(replace(r, feature=direct))

@@ -99,6 +99,7 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
             left_out=tuple(noise * rms for rms in found.left_out),
             fit=tuple(noise * rms for rms in found.fit),
             start_sd=found.start_sd * noise,
+            zero_sd=found.zero_sd * noise,
             spreads=tuple(noise * one for one in found.spreads),
         )
 
@@ -138,6 +139,7 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
             self.bootstraps,
             self.seed,
             zeroed,
+            size / noise,
         )
         return problem, float(noise)
 

@@ -175,7 +175,7 @@ class Search:
                 break
             terms = self._exchanged(more)
             found[len(terms)] = terms
-        if self.families.count.max() == 1:
+        if (self.families.count == 1).all():
             rest = np.setdiff1d(np.flatnonzero(np.diag(self.g.matrix) > 0), self.always)
             terms = self.of(np.concatenate([self.always, rest]))
         while len(terms) > len(self.always) + 1:

@@ -53,7 +53,7 @@ def own(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str,
         others = [o for o in outputs if o != y and "coupling" in words]
         seen = _seen(data, y)
         found += _driven(data, y, outputs, words)
-        found += [Candidate(y, parse(u)) for u in others if "linear" in words]
+        found += [Candidate(y, parse(one)) for o in others for one in laws(words, o, _seen(data, o))]
         found += [_law(y, y, one, stable) for one in laws(words, y, seen)]
         found += [Candidate(y, parse(one)) for one in products(words, [y, *others, *inputs])]
         found += _expressions(words, y, {"y": y})

@@ -20,7 +20,7 @@ from discovery.sparse.rates import Candidate, with_candidates, without_idle
 from discovery.sparse.starts import started
 from discovery.terms import Name, Term, parse, text
 
-LABORATORY = ("linear", "coupling", "radiation", "load", "second mass")
+LABORATORY = ("linear", "wet", "coupling", "radiation", "load", "second mass")
 # s, time constants of the masses behind each body: two of a series in steps of four, in proportion to the
 # recordings, of which the slower one shall see the sixth part
 SECOND_MASS, _STEP, _SEEN = (300.0, 1200.0), 4.0, 6.0

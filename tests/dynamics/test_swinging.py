@@ -48,3 +48,34 @@ def test_many_swings_are_followed() -> None:
     pushed = spring(-12.0)  # swings grow, and the cube stiffens for ever
     with pytest.raises(RunsAwayError, match="diverges"):
         simulate(make_system(pushed, grid), pushed.values(), np.array([1e30, 0.0]))
+
+
+def test_swings_that_grow_through_a_resonance_are_followed() -> None:
+    """Newton's method on the whole trajectory does not settle here, nor on its halves."""
+    time = np.arange(0.0, 60.001, 0.01)
+    force = 8 * np.sin(2 * np.pi * (0.3 * time + 0.0183 * time**2))
+    channels = {
+        "F": Channel("F", "other input", "N", None, "held"),
+        "x": Channel("x", "other output", "m", 0.01, "linear"),
+    }
+    recording = Recording("r", time, {"F": force, "x": np.zeros(len(time))})
+    grid = make_grid(Campaign("c", channels, {"r": recording}), "r", ["F"], ["x"])
+    states = {"x": State("x", "m", None, parse("0"), 0.0), "v": State("v", "m/s", None, parse("0"), 0.0)}
+    terms = (Term("moves", "x", parse("v")), Term("turns", "v", parse("(F - 0.9*v - 45*x - 160*x**3)/1.2")))
+    system = make_system(Model("spring", {}, states, terms, {}, "s"), grid)
+    found = simulate(system, {}, np.zeros(2)).x[:, 0]
+
+    at, exact = np.zeros(2), [0.0]
+    for u in force[:-1]:
+        for _ in range(10):  # Runge and Kutta in steps of 1 ms
+
+            def rate(s: np.ndarray, u: float = u) -> np.ndarray:
+                return np.array([s[1], (u - 0.9 * s[1] - 45 * s[0] - 160 * s[0] ** 3) / 1.2])
+
+            a = rate(at)
+            b = rate(at + 0.0005 * a)
+            c = rate(at + 0.0005 * b)
+            d = rate(at + 0.001 * c)
+            at = at + 0.001 / 6 * (a + 2 * b + 2 * c + d)
+        exact.append(at[0])
+    assert np.sqrt(np.mean((found - exact) ** 2)) < 0.02 * np.std(exact)

@@ -149,11 +149,10 @@ def test_the_plainer_of_two_twins_is_named_and_no_other() -> None:
         gram(x, 2 * x[:, 1] + x[:, 2] + 0.1 * rng.standard_normal(300)), plain(3), np.array([], int)
     )
     odd, names = search.of(np.array([1, 2])), ("a", "b", "c")
-    labels = {"a": "T: P", "b": "T: odd", "c": "T: other"}
-    assert plainer(search, odd, names, ["a"], labels, worth=20.0).members == (0, 2)
-    assert plainer(search, odd, names, ["a"], labels, worth=1e-9).members == (1, 2)
+    assert plainer(search, odd, names, ["a"], worth=20.0).members == (0, 2)
+    assert plainer(search, odd, names, ["a"], worth=1e-9).members == (1, 2)
     kept = Search(search.g, plain(3), np.array([1]))
-    assert plainer(kept, kept.of(np.array([1, 2])), names, ["a"], labels, worth=20.0).members == (1, 2)
+    assert plainer(kept, kept.of(np.array([1, 2])), names, ["a"], worth=20.0).members == (1, 2)
 
 
 def test_what_moves_no_output_leaves_with_its_numbers() -> None:

@@ -32,6 +32,11 @@ def test_what_was_planted_is_found(planted: Gram) -> None:
     np.testing.assert_allclose(path[3].theta[np.argsort(path[3].family)], [2, -1, 1.5], atol=0.05)
 
 
+def test_a_library_without_columns_has_the_empty_set_alone() -> None:
+    nothing = gram(np.zeros((5, 0)), np.arange(5.0))
+    assert [len(one) for one in Search(nothing, plain(0), NONE).path(3)] == [0]
+
+
 def test_a_term_that_two_others_imitate_together_is_found() -> None:
     rng = np.random.default_rng(5)
     speed = rng.uniform(0, 1.2, 400)
