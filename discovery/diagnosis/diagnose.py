@@ -50,6 +50,7 @@ class Diagnosis:
     search: Search
     posterior: Posterior
     verdict: Verdict
+    alone: Scored  # the answer with what is named and nothing else
     before: Fit  # the model as the user gave it, fitted as any model of an experiment
     after: Fit | None  # with what was named; None where nothing is
     location: Location
@@ -82,7 +83,7 @@ class Diagnosis:
         assert self.after is not None
         p = self.after.model.parameters[name]
         wider = thresholds.FORM * abs(p.value) if h.effect.is_physics and name in h.amplitudes else 0.0
-        known = [s for s in (self.verdict.answer.interval(name), (p.low, p.high)) if s and None not in s]
+        known = [s for s in (self.alone.interval(name), (p.low, p.high)) if s and None not in s]
         lows = [p.value - np.hypot(p.value - s[0], wider) for s in known if s[0] is not None]
         highs = [p.value + np.hypot(s[1] - p.value, wider) for s in known if s[1] is not None]
         low, high = min(lows, default=None), max(highs, default=None)
@@ -176,10 +177,9 @@ def diagnose(
     tell("proving in free runs")
     before = fitted or fit_model(model, seen, fit, outputs)
     verdict = decide(context, found, chances, _gain(context, found.best, model, seen, before))
-    after = None
-    if named := [n.hypothesis for n in verdict.named]:
-        alone = found.tried.get(frozenset(h.key for h in named), verdict.answer)
-        after = _repaired(context, alone, named, model, seen)
+    named = [n.hypothesis for n in verdict.named]
+    alone = found.tried.get(frozenset(h.key for h in named), verdict.answer) if named else verdict.answer
+    after = _repaired(context, alone, named, model, seen) if named else None
     noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     runs = free_runs(campaign, [*fit, *read], before, after or before, noise)
@@ -199,6 +199,7 @@ def diagnose(
         search=found,
         posterior=chances,
         verdict=verdict,
+        alone=alone,
         before=before,
         after=after,
         location=locate(context, found.baseline, verdict, chances, forces),
