@@ -98,12 +98,13 @@ class Ending:
         if self.verdict is None:
             return "verdict: no diagnosis ([mismatch] names no model)"
         effects = f": {', '.join(self.effects)}" if self.effects else ""
-        fails = self.diagnosed_ratio is not None and self.diagnosed_ratio > _BETTER
-        but = (
-            f" in the recordings of the fit; but on the held-out ones {self.diagnosed} has "
-            f"{self.diagnosed_ratio:.0%} of the rms without a model"
-        )
-        return f"verdict: {self.verdict}{effects}{but if fails and self.verdict == 'no mismatch' else ''}"
+        ratio, but = self.diagnosed_ratio, ""
+        if self.verdict == "no mismatch" and ratio is not None and ratio > _BETTER:
+            but = (
+                f" in the recordings of the fit; but on the held-out ones {self.diagnosed} has "
+                f"{ratio:.0%} of the rms without a model"
+            )
+        return f"verdict: {self.verdict}{effects}{but}"
 
     def _doubts(self) -> str:
         told = []

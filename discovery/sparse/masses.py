@@ -94,7 +94,7 @@ def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
                 begun = driven if start in (None, Number(0.0)) else f"{text(start)} + {driven}"
                 states[state] = replace(states[state], start=parse(begun))
             terms.append(Term(f"{drive} through {state}", state, parse(f"{driven}/{tau}")))
-        prior = (0.0, r.spread) if np.isfinite(r.spread) else None
+        prior = (0.0, r.spread) if 0.0 < r.spread < np.inf else None  # exact readings need none
         parameters[gain] = Parameter(r.gain, per, low, high, prior=prior)
     if rules.zero_sd is not None and responses:
         states[f"{y}_zero"] = State(f"{y}_zero", unit, None, Number(0.0), rules.zero_sd, 1.0)
