@@ -30,7 +30,8 @@ RESOLUTION = {  # finer gives the same answer in more time
     "diagnosis/diagnose.py": "ANOTHER_NOISE",
     "diagnosis/posterior.py": "FAR MOST IN_PLAY SETTINGS",
     "diagnosis/proof.py": "DRAWS BLOCKS",
-    "diagnosis/scored.py": "ENOUGH ROUNDS MOVED KEPT",
+    "diagnosis/refit.py": "ENOUGH ROUNDS MOVED",
+    "diagnosis/scored.py": "KEPT",
     "diagnosis/selection.py": "MOST REFITS RIVALS HOPE HALF FAR",
     "diagnosis/thresholds.py": "DRAWS BLOCKS",
 }

@@ -12,7 +12,8 @@ from typing import Any
 
 from discovery.diagnosis.context import Context, make_context
 from discovery.diagnosis.proof import explained, free_runs, improvement
-from discovery.diagnosis.scored import Scored, score, scored
+from discovery.diagnosis.refit import score
+from discovery.diagnosis.scored import Scored, scored
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.experiment import Experiment, load_experiment

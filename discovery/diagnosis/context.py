@@ -161,7 +161,6 @@ def make_context(
     outputs: Sequence[str],
     effects: Sequence[Effect],
     after: Mapping[str, tuple[str, ...]],
-    physical: bool = True,
 ) -> Context:
     """Fit the baseline to all recordings together and find the noise levels for the tests.
 
@@ -169,11 +168,10 @@ def make_context(
 
     Args:
         after: by recording, those of the whole campaign that were made then or later.
-        physical: the start values of the model are an engineer's beliefs.
     """
     inputs = _inputs(campaign, recordings, outputs)
     whole = {r: make_grid(campaign, r, inputs, outputs, coarse=NODES, most=2 * NODES) for r in recordings}
-    belief = thresholds.BELIEF if physical and not model.guessed else None
+    belief = None if model.guessed else thresholds.BELIEF
     stated = {name: campaign.channels[name].noise for name in outputs}
 
     def fitted(grids: Mapping[str, Grid], begin: Fit | None = None) -> Fit:

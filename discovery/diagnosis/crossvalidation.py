@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.proof import FreeRuns, Improvement, improvement
-from discovery.diagnosis.scored import ENOUGH, Scored, with_effects
+from discovery.diagnosis.refit import ENOUGH, with_effects
+from discovery.diagnosis.scored import Scored
 from discovery.dynamics import predict
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError

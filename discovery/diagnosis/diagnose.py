@@ -17,8 +17,9 @@ from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
 from discovery.diagnosis.posterior import Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, size_of
+from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
-from discovery.diagnosis.scored import Scored, shape_priors, with_effects, with_force
+from discovery.diagnosis.scored import Scored, with_force
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide, idle, refuted
 from discovery.effects.catalogue import catalogue
@@ -127,20 +128,17 @@ def diagnose(
     outputs: Sequence[str] | None = None,
     effects: Sequence[Effect] = (),
     *,
-    physical: bool = True,
     fitted: Fit | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """Find the physics that a model leaves out; `docs/mismatch.md` describes the method.
 
     Args:
-        model: the model to diagnose; its start values are beliefs of its author.
+        model: the model to diagnose; its start values are beliefs of its author, unless they are `guessed`.
         fit: recordings for fits and searches.
         held_out: recordings for the proof; nothing else uses them.
         outputs: measured channels; default all that model and campaign share.
         effects: further effects; one with the same word replaces that of the catalogue.
-        physical: whether an engineer chose the start values of the model (not a program); those of a model
-            file that says `guessed = true` are not believed in any case.
         fitted: the fit of the model, if there is one already.
         tell: is called with a few words when a step begins.
 
@@ -164,7 +162,7 @@ def diagnose(
     entries = [*(e for e in catalogue().values() if e.word not in own), *effects]
     seen = replace(campaign, recordings={r: campaign.recordings[r] for r in fit})  # nothing else can leak in
     tell("fitting the baseline and its noise")
-    context = make_context(seen, model, fit, outputs, entries, _after(campaign, fit), physical)
+    context = make_context(seen, model, fit, outputs, entries, _after(campaign, fit))
     tell("scoring the catalogue")
     found = Search(context, lambda what: tell(f"found so far: {what}")).run()
     other = with_noise_of(context, found.best.fit)

@@ -9,7 +9,8 @@ from math import inf
 import numpy as np
 
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.scored import Scored, is_usual, settled
+from discovery.diagnosis.refit import score
+from discovery.diagnosis.scored import Scored, is_usual
 from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score, Without, scan
@@ -96,7 +97,7 @@ def attempt(
         sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
     chosen = (*others, h)
     noises = _noises(context, current)
-    tries = [settled(context, chosen, noise, current.fit, sizes, goal(noise)) for noise in noises]
+    tries = [score(context, chosen, noise, current.fit, sizes, goal(noise)) for noise in noises]
     found = [one for one in tries if one is not None]
     return max(found, key=lambda one: one.evidence, default=None)
 

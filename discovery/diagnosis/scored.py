@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -12,22 +12,17 @@ from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
-from discovery.effects.form import Shape
 from discovery.effects.hypothesis import Hypothesis, Key
-from discovery.errors import RunsAwayError
 from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import effect_form
 from discovery.evidence.process_noise import Setting, UnknownHeat, neighbours, unknown_heat
 from discovery.evidence.whitening import Grams, Whitened, log_sum_exp
-from discovery.fitting import Fit, Noise, Prior, fit_model
+from discovery.fitting import Fit, Noise
 from discovery.fitting.covariance import Z95
 from discovery.models import Model
 
 Array = NDArray[np.float64]
 
-ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
-ROUNDS = 3  # of refits under a noise that is more likely
-MOVED = 1.0  # log-likelihood that calls for another one
 KEPT = 4  # noise settings of a model, the most likely ones
 
 
@@ -98,8 +93,7 @@ class Scored:
 
         A fit knows no form errors, so none take part.
         """
-        _, step, covariance = self.grams[self.best].without(self.seen.spread).solved()
-        return 0.5 * float(step @ np.linalg.solve(covariance, step)) if len(step) else 0.0
+        return self.grams[self.best].without(self.seen.spread).ahead
 
     @property
     def off(self) -> float:
@@ -108,38 +102,25 @@ class Scored:
 
     def level(self, k: int) -> float:
         """Log marginal likelihood under one noise setting."""
-        if (self.sizes < 0).any():  # what presses against zero does not act
-            return -inf
-        return float(log_sum_exp(np.array([self._level(g, k) for g in self._forms(k)])))
+        return float(self.drawn(k)[0])
 
     def _forms(self, k: int) -> tuple[Grams, ...]:
         """Form errors of the effects: each law is wrong by a share that depends on the operating point."""
         spread = self.seen.spread[sum(self.seen.form) :]
         return (self.grams[k].without(spread), self.grams[k]) if len(spread) else (self.grams[k],)
 
-    @property
-    def _count(self) -> int:
-        return 2 if len(self.seen.spread) > sum(self.seen.form) else 1
-
-    def _level(self, gram: Grams, k: int) -> float:
-        level, step, covariance = gram.solved()
-        level += self.settings[k].log_weight - float(np.log(self._count))
-        if not len(self.sizes):
-            return level
-        mean, variance = self.at + step[self.sizes], covariance[self.sizes, self.sizes]
-        return level + float(np.sum(self.slab.average(mean, variance) + 0.5 * np.log(2 * np.pi)))
-
-    def drawn(self, k: int, weights: Array, widths: Array) -> Array:
-        """(D,) `level` under a noise setting for many draws at once: (D, B) weights, (D,) prior widths."""
-        if (self.sizes < 0).any():
-            return np.full(len(weights), -inf)
-        found = []
-        for gram in self._forms(k):
-            level, step, variance = gram.drawn(weights, widths)
-            level = level + self.settings[k].log_weight - float(np.log(self._count))
-            for j, i in enumerate(self.sizes):
+    def drawn(self, k: int, weights: Array | None = None, widths: Array | None = None) -> Array:
+        """(D,) `level` under a noise setting for many draws at once; arguments as in `Grams.marginal`."""
+        if (self.sizes < 0).any():  # what presses against zero does not act
+            return np.full(1 if weights is None else len(weights), -inf)
+        forms, found = self._forms(k), []
+        for gram in forms:
+            level, step, covariance = gram.marginal(self.sizes, weights, widths)
+            level = level + self.settings[k].log_weight - float(np.log(len(forms)))
+            for j in range(len(self.sizes)):
                 one = self.slab.take(np.full(len(level), j))
-                level = level + one.average(self.at[j] + step[:, i], variance[:, i]) + 0.5 * np.log(2 * np.pi)
+                level = level + one.average(self.at[j] + step[:, j], covariance[:, j, j])
+                level = level + 0.5 * np.log(2 * np.pi)
             found.append(level)
         return np.asarray(log_sum_exp(np.array(found)))
 
@@ -162,105 +143,6 @@ class Scored:
         parts = zip(runs, self.seen.residuals, strict=True)
         z = np.concatenate([(r / white).ravel() for run, r in parts if run not in apart])
         return float(np.sqrt(np.nanmean(z**2)))
-
-
-def with_effects(model: Model, chosen: Sequence[Hypothesis]) -> Model:
-    """The model with effects added, not fitted."""
-    # what moves the zero of a sensor comes behind what smooths it: no lag makes a slope of a jump
-    for h in sorted(chosen, key=lambda h: h.shifts_the_zero):
-        model = h.added_to(model)
-    return model
-
-
-def refit(
-    context: Context,
-    chosen: Sequence[Hypothesis],
-    noise: Noise,
-    start: Fit | None = None,
-    sizes: Mapping[str, float] | None = None,
-    goal: float = inf,
-) -> Fit:
-    """The model with effects added, everything fitted to the recordings of the context.
-
-    Sizes are free; shapes have the prior that the scan integrated over.
-
-    Raises:
-        RunsAwayError: the model does not stay finite with them.
-    """
-    return fit_model(
-        with_effects(context.model, chosen),
-        context.campaign,
-        context.recordings,
-        context.outputs,
-        noise=noise,
-        grids=context.grids,
-        priors=shape_priors(chosen),
-        belief=context.belief,
-        guess=sizes,
-        begin=start or context.baseline,
-        max_rounds=25,
-        tolerance=ENOUGH,
-        goal=goal,
-    )
-
-
-def shape_priors(chosen: Sequence[Hypothesis]) -> dict[str, Prior]:
-    """Priors of the shape parameters of effects, by name."""
-    return {
-        name: _prior(shape)
-        for h in chosen
-        for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
-        if not shape.instant
-    }
-
-
-def _prior(shape: Shape) -> Prior:
-    assert shape.middle is not None
-    if shape.factor:
-        return Prior(float(np.log(shape.middle)), float(np.log(shape.factor)), is_log=True)
-    return Prior(shape.middle, shape.spread)
-
-
-def score(
-    context: Context,
-    chosen: Sequence[Hypothesis],
-    noise: Noise,
-    start: Fit | None = None,
-    sizes: Mapping[str, float] | None = None,
-    goal: float = inf,
-) -> Scored | None:
-    """Refit with a set of effects and score it; None if the model does not stay finite.
-
-    Args:
-        goal: as in `fit_model`.
-    """
-    try:
-        fit = refit(context, chosen, noise, start, sizes, goal)
-    except RunsAwayError:
-        return None
-    return scored(context, chosen, fit)
-
-
-def settled(
-    context: Context,
-    chosen: Sequence[Hypothesis],
-    noise: Noise,
-    start: Fit | None = None,
-    sizes: Mapping[str, float] | None = None,
-    goal: float = inf,
-) -> Scored | None:
-    """As `score`, and refitted under the noise that is most likely then, until nothing moves any more: what
-    process noise takes for granted far from the machine, a model with less of it may explain.
-    """
-    one = score(context, chosen, noise, start, sizes, goal)
-    for _ in range(ROUNDS):
-        if one is None or one.fit.ended_early or one.evidence == -inf or one.ahead < MOVED:
-            break
-        other = score(context, chosen, one.noise, one.fit)
-        if other is None or other.evidence <= one.evidence:
-            break
-        one = other
-    return one
 
 
 def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from math import inf
 
 from discovery.diagnosis.context import Context
+from discovery.diagnosis.refit import score
 from discovery.diagnosis.scan import Scan, attempt, scan_model
-from discovery.diagnosis.scored import Scored, light, score, scored, settled
+from discovery.diagnosis.scored import Scored, light, scored
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score
 from discovery.fitting import Noise
@@ -67,7 +68,7 @@ class Search:
     def run(self) -> Search:
         """Search from the most likely model that was tried, or from the baseline."""
         if not self.tried:
-            first = settled(self.context, (), self.context.usual)
+            first = score(self.context, (), self.context.usual)
             assert first is not None  # the context has fitted it
             self.keep(first)
         current = self.best

@@ -15,7 +15,8 @@ from discovery.diagnosis.context import Context
 from discovery.diagnosis.crossvalidation import left_out
 from discovery.diagnosis.posterior import Posterior
 from discovery.diagnosis.proof import Improvement
-from discovery.diagnosis.scored import Scored, score
+from discovery.diagnosis.refit import score
+from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.vetoes import vetoed
 from discovery.effects.hypothesis import Hypothesis, Key

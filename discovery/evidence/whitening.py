@@ -28,6 +28,7 @@ Ints = NDArray[np.intp]
 
 _AT_BOUND = 1e-6
 _UNSEEN = 1e-20  # of the largest entry of the normal equations
+_ROUNDING = 1e-10  # of the diagonal, added to it: no factor fails in the last digits
 _REMEMBERED = 8  # normal equations of the last noises; they differ in form errors next, and are large
 
 
@@ -46,26 +47,23 @@ class Grams:
     constant: float
     scale: Array
 
-    def level(self, weights: Array | None = None) -> float:
-        """Log-likelihood with all unknowns integrated out; `weights` (B,): how often each block counts."""
-        return self.solved(weights)[0]
+    def level(self) -> float:
+        """Log-likelihood with all unknowns integrated out."""
+        return float(self.marginal(np.zeros(0, dtype=np.intp))[0][0])
 
-    def solved(self, weights: Array | None = None) -> tuple[float, Array, Array]:
+    def solved(self) -> tuple[float, Array, Array]:
         """The level, the step (U,) from where the fit stands to its optimum under this noise, and the
         covariance (U, U) there.
         """
-        w = np.ones(len(self.logdet)) if weights is None else weights
-        total = np.tensordot(w, self.blocks, 1) * np.outer(self.scale, self.scale) + self.prior
-        hessian, slope = total[1:, 1:], total[1:, 0]
-        scale = _scale(np.diag(hessian))
-        size, axes = np.linalg.eigh(hessian / np.outer(scale, scale))
-        size = np.maximum(size, 1e-12)
-        inverse = (axes / size) @ axes.T / np.outer(scale, scale)
-        step = inverse @ slope
-        quadratic = float(total[0, 0]) - float(slope @ step)
-        volume = 0.5 * float(np.sum(np.log(size))) + float(np.sum(np.log(scale)))
-        level = -float(w @ self.logdet) - 0.5 * quadratic - volume + self.constant
-        return level, step, inverse
+        every = np.arange(self.prior.shape[0] - 1)
+        levels, steps, covariances = self.marginal(every)
+        return float(levels[0]), steps[0], covariances[0]
+
+    @property
+    def ahead(self) -> float:
+        """Log-likelihood by which the optimum under this noise lies above the fit, to first order."""
+        _, step, covariance = self.solved()
+        return 0.5 * float(step @ np.linalg.solve(covariance, step)) if len(step) else 0.0
 
     def without(self, extra: Array) -> Grams:
         """The same without the last columns, whose coefficients have the spreads `extra` (E,)."""
@@ -80,31 +78,43 @@ class Grams:
             self.scale[:kept],
         )
 
-    def drawn(self, weights: Array, widths: Array) -> tuple[Array, Array, Array]:
-        """As `solved` for many draws at once: levels (D,), steps (D, U), variances (D, U).
+    def marginal(
+        self, sizes: Ints, weights: Array | None = None, widths: Array | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Log-likelihoods (D,) with all unknowns integrated out, for several draws at once; the step (D, A)
+        of some unknowns from where the fit stands to the optimum, and their covariance (D, A, A) there.
+
+        With the columns in the order of the other unknowns, `sizes`, residual, one Cholesky factor holds
+        everything: its last row is the slope along the others and what is left of the residual, and the
+        corner before it is the root of the precision of the sizes after a refit of the others.
 
         Args:
-            weights: (D, B) how often each block counts.
+            sizes: (A,) indices of the unknowns.
+            weights: (D, B) how often each block counts; default each once.
             widths: (D,) of the priors, relative to what they are.
         """
-        size = self.prior.shape[0]
-        flat = self.blocks.reshape(len(self.logdet), -1)
-        widened = np.count_nonzero(np.diag(self.prior)[1:]) * np.log(widths)
-        blocks = (weights @ flat).reshape(-1, size, size) * np.outer(self.scale, self.scale)
-        total = blocks + self.prior / widths[:, None, None] ** 2
-        hessian, slope = total[:, 1:, 1:], total[:, 1:, 0]
-        scale = _scale(np.einsum("dii->di", hessian))
-        unit = hessian / (scale[:, :, None] * scale[:, None, :])
-        unit[:, np.arange(size - 1), np.arange(size - 1)] += 1e-10
-        chol = np.linalg.cholesky(unit)
-        inverse = np.linalg.inv(chol)
-        along = np.einsum("dij,dj->di", inverse, slope / scale)
-        step = np.einsum("dji,dj->di", inverse, along) / scale
-        variance = np.einsum("dji,dji->di", inverse, inverse) / scale**2
-        volume = np.log(np.einsum("dii->di", chol)).sum(axis=1) + np.log(scale).sum(axis=1)
-        quadratic = total[:, 0, 0] - np.sum(along**2, axis=1)
-        level = -weights @ self.logdet - 0.5 * quadratic - volume + self.constant - widened
-        return level, step, variance
+        count, few = self.prior.shape[0], len(sizes)
+        draws = next((len(one) for one in (weights, widths) if one is not None), 1)
+        w = np.ones((draws, len(self.logdet))) if weights is None else weights
+        wide = np.ones(draws) if widths is None else widths
+        order = np.concatenate([1 + np.setdiff1d(np.arange(count - 1), sizes), 1 + np.asarray(sizes), [0]])
+        total = (w @ self.blocks.reshape(len(self.logdet), -1)).reshape(-1, count, count)
+        total *= np.outer(self.scale, self.scale)
+        total += self.prior / wide[:, None, None] ** 2
+        total = total[:, order[:, None], order]
+        scale = _scale(np.einsum("dii->di", total))
+        total /= scale[:, :, None] * scale[:, None, :]
+        total[:, np.arange(count), np.arange(count)] += _ROUNDING
+        chol = np.linalg.cholesky(total)
+        size, left, first = np.einsum("dii->di", chol), scale[:, -1], count - 1 - few
+        corner, along = chol[:, first:-1, first:-1], chol[:, -1, first:-1]
+        root = np.linalg.inv(corner) / scale[:, None, first:-1]
+        step = left[:, None] * np.einsum("dji,dj->di", root, along)
+        quadratic = (left * size[:, -1]) ** 2
+        volume = np.sum(np.log(size[:, :-1]) + np.log(scale[:, :-1]), axis=1)
+        widened = np.count_nonzero(np.diag(self.prior)[1:]) * np.log(wide)
+        level = -w @ self.logdet - 0.5 * quadratic - volume + self.constant - widened
+        return level, step, np.einsum("dji,djk->dik", root, root)
 
 
 @dataclass(frozen=True)
@@ -264,10 +274,11 @@ class Whitened:
         for k, (here, columns) in enumerate(zip(self.places, self.acting, strict=True)):
             rows, log = self._part(k, unit)
             first = k * self.blocks  # readings stand in the order of time
+            own = slice(first, first + self.blocks)
             edges = np.searchsorted(self.block[here], np.arange(first, first + self.blocks + 1)).tolist()
-            for number, (a, b) in enumerate(pairwise(edges), first):
-                pieces[number][np.ix_(columns, columns)] = rows[a:b].T @ rows[a:b]
-                dets[number] = float(np.sum(log[a:b]))
+            products = np.array([rows[a:b].T @ rows[a:b] for a, b in pairwise(edges)])
+            pieces[own, columns[:, None], columns] = products
+            dets[own] = [log[a:b].sum() for a, b in pairwise(edges)]
         return pieces, dets
 
 

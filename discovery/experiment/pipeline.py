@@ -264,14 +264,15 @@ def diagnosis(experiment: Experiment, progress: Progress, fitted: Mapping[str, F
     name, entry = wanted.model, experiment.form.models[wanted.model]
     experiment = experiment.seen_by(entry)
     progress(f"looking for what {name} leaves out")
+    start = fitted[name].start
+    by_hand = entry.kind in ("file", "thermobalance")  # a program chose the start values of any other kind
     return find_missing(
-        fitted[name].start,
+        start if by_hand else replace(start, guessed=True),
         experiment.campaign,
         experiment.fit,
         experiment.held_out,
         experiment.outputs_of(entry),
         [form.effect() for form in wanted.effects],
-        physical=entry.kind in ("file", "thermobalance"),
         fitted=fitted[name].fit,
         tell=progress,
     )

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.firsthour.table import Column, OwnTable
+from discovery.recordings.responses import filtered
 
 Array = NDArray[np.float64]
 
@@ -215,10 +216,4 @@ def _filtered(values: Array, step: float, lag: float) -> Array:
     """Return what a change of the input does to the rate of a first-order answer: the input through a high
     pass.
     """
-    if lag == 0.0:
-        return values
-    from scipy.signal import lfilter
-
-    keep = np.exp(-step / lag)
-    slow = lfilter([1 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0]
-    return np.asarray(values - slow)
+    return values - filtered(values, step, lag) if lag else values

@@ -40,13 +40,15 @@ def filtered(values: Array, step: float, tau: float, *, rest: bool = False) -> A
 
     It begins in the balance of the first value, or at zero (`rest`).
     """
-    from scipy.signal import lfilter
+    from scipy.linalg import solve_banded  # a recursion is a matrix of two diagonals
 
     if tau <= 0.0:
         return values
     keep = float(np.exp(-step / tau))
-    first = 0.0 if rest else keep * values[0]
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=[first])[0])
+    drive = (1.0 - keep) * values
+    drive[0] += 0.0 if rest else keep * values[0]
+    two = np.array([np.ones(len(values)), np.full(len(values), -keep)])
+    return np.asarray(solve_banded((1, 0), two, drive, overwrite_ab=True, overwrite_b=True))
 
 
 def even_grid(time: Array, points: int = POINTS) -> Array:

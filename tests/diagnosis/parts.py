@@ -8,7 +8,8 @@ from typing import Any
 
 from discovery.diagnosis import Diagnosis
 from discovery.diagnosis.context import Context, make_context
-from discovery.diagnosis.scored import Scored, score
+from discovery.diagnosis.refit import score
+from discovery.diagnosis.scored import Scored
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.models import Model

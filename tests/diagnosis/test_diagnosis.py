@@ -322,7 +322,7 @@ def test_a_model_of_the_errors_themselves() -> None:
     """Equation (9) on a machine of three bodies: no crash, and it is said that effects act on rates."""
     runs = [simulated(seed, hours=20.0) for seed in (1, 2)]
     baseline = reduced(["T_env", "P_drive"], ["E_R"], CHANNELS)
-    found = document(diagnose(baseline, campaign(*runs), ["r1"], ["r2"], physical=False))
+    found = document(diagnose(replace(baseline, guessed=True), campaign(*runs), ["r1"], ["r2"]))
     assert found["verdict"] in ("missing physics", "unexplained")
     assert "rates" in found["about"]
     assert set(found["location"]["states"]) == {"E_R"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from discovery.diagnosis import diagnose
-from discovery.diagnosis.scored import with_effects
+from discovery.diagnosis.refit import with_effects
 from discovery.effects.hypothesis import Hypothesis
 from discovery.recordings import Recording
 from discovery.terms import Apply, Expression, names

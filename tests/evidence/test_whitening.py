@@ -189,15 +189,24 @@ def test_draws_count_blocks_as_often_as_they_came() -> None:
     """A block that is drawn twice is as readings that stand twice; one that is not drawn is as none."""
     rows, spread, block = rows_of(3)
     weights = np.array([[1.0] * 6, [2.0, 0.0, 1.0, 0.0, 3.0, 0.0]])
-    level, step, variance = grams_of(rows, spread, block).drawn(weights, np.ones(2))
+    level, step, variance = grams_of(rows, spread, block).marginal(np.array([2, 0]), weights)
     for k, often in enumerate(weights):
         again = np.repeat(np.arange(len(rows)), often[block].astype(int))
         one = grams_of(rows[again], spread, block[again])
         one = replace(one, logdet=grams_of(rows, spread, block).logdet * often)
         expected, at, covariance = one.solved()
         assert level[k] == pytest.approx(expected, abs=1e-5)
-        assert step[k] == pytest.approx(at, abs=1e-6)
-        assert variance[k] == pytest.approx(np.diag(covariance), rel=1e-6)
+        assert step[k] == pytest.approx(at[[2, 0]], abs=1e-6)
+        assert variance[k] == pytest.approx(covariance[np.ix_([2, 0], [2, 0])], rel=1e-6)
+
+
+def test_a_wider_prior_is_that_prior() -> None:
+    rows, spread, block = rows_of(8)
+    level, step, _ = grams_of(rows, spread, block).marginal(np.arange(3), widths=np.array([1.0, 3.0]))
+    expected, at, _ = grams_of(rows, 3 * spread, block).solved()
+    assert level[1] == pytest.approx(expected)
+    assert step[1] == pytest.approx(at)
+    assert abs(level[1] - level[0]) > 0.1
 
 
 def test_columns_that_are_taken_out_leave_the_model_without_them() -> None:
@@ -214,8 +223,6 @@ def test_form_errors_of_any_share_are_the_same_blocks() -> None:
     scaled = replace(grams_of(rows, spread, block), scale=np.array([1.0, 1.0, 1.0, 0.2]))
     shrunk = grams_of(rows * [1.0, 1.0, 1.0, 0.2], spread, block)
     assert scaled.level() == pytest.approx(shrunk.level())
-    ones = np.ones((1, 6)), np.ones(1)
-    assert scaled.drawn(*ones)[0][0] == pytest.approx(shrunk.level(), abs=1e-5)
 
 
 def test_what_is_absorbed_is_the_projection_of_ridge_regression() -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from discovery.challenge.methods.named import named_entry
 from discovery.challenge.problem import Answer, Problem
-from discovery.diagnosis.scored import refit
+from discovery.diagnosis.refit import refit
 from discovery.dynamics import Trajectory
 from discovery.dynamics.prediction import output_matrix
 from discovery.effects.candidates import with_shapes

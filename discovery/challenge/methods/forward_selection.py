@@ -11,8 +11,9 @@ import numpy as np
 
 from discovery.challenge.methods.named import named_entry, windows_of
 from discovery.challenge.problem import Answer, Problem
+from discovery.diagnosis.refit import score
 from discovery.diagnosis.scan import attempt, scan_model
-from discovery.diagnosis.scored import Scored, score
+from discovery.diagnosis.scored import Scored
 from discovery.effects.hypothesis import Hypothesis
 
 MOST = 3  # effects that may be added

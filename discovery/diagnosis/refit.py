@@ -1,0 +1,109 @@
+"""Refits of a model with a set of effects: everything is fitted again, under the noise it makes likely."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+
+import numpy as np
+
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.scored import Scored, scored
+from discovery.effects.form import Shape
+from discovery.effects.hypothesis import Hypothesis
+from discovery.errors import RunsAwayError
+from discovery.fitting import Fit, Noise, Prior, fit_model
+from discovery.models import Model
+
+ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
+ROUNDS = 3  # of refits under a noise that is more likely
+MOVED = 1.0  # log-likelihood that calls for another one
+
+
+def with_effects(model: Model, chosen: Sequence[Hypothesis]) -> Model:
+    """The model with effects added, not fitted."""
+    # what moves the zero of a sensor comes behind what smooths it: no lag makes a slope of a jump
+    for h in sorted(chosen, key=lambda h: h.shifts_the_zero):
+        model = h.added_to(model)
+    return model
+
+
+def refit(
+    context: Context,
+    chosen: Sequence[Hypothesis],
+    noise: Noise,
+    start: Fit | None = None,
+    sizes: Mapping[str, float] | None = None,
+    goal: float = inf,
+) -> Fit:
+    """The model with effects added, everything fitted to the recordings of the context.
+
+    Sizes are free; shapes have the prior that the scan integrated over.
+
+    Raises:
+        RunsAwayError: the model does not stay finite with them.
+    """
+    return fit_model(
+        with_effects(context.model, chosen),
+        context.campaign,
+        context.recordings,
+        context.outputs,
+        noise=noise,
+        grids=context.grids,
+        priors=shape_priors(chosen),
+        belief=context.belief,
+        guess=sizes,
+        begin=start or context.baseline,
+        max_rounds=25,
+        tolerance=ENOUGH,
+        goal=goal,
+    )
+
+
+def shape_priors(chosen: Sequence[Hypothesis]) -> dict[str, Prior]:
+    """Priors of the shape parameters of effects, by name."""
+    return {
+        name: _prior(shape)
+        for h in chosen
+        for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
+        if not shape.instant
+    }
+
+
+def _prior(shape: Shape) -> Prior:
+    assert shape.middle is not None
+    if shape.factor:
+        return Prior(float(np.log(shape.middle)), float(np.log(shape.factor)), is_log=True)
+    return Prior(shape.middle, shape.spread)
+
+
+def score(
+    context: Context,
+    chosen: Sequence[Hypothesis],
+    noise: Noise,
+    start: Fit | None = None,
+    sizes: Mapping[str, float] | None = None,
+    goal: float = inf,
+) -> Scored | None:
+    """Refit with a set of effects and score it; None if the model does not stay finite.
+
+    The refit is repeated under the noise that it makes likely, until little moves. Much process noise
+    explains any path of a model, so a score under the noise of a worse model is too low.
+
+    Args:
+        noise: of the first refit.
+        goal: of the first refit, as in `fit_model`.
+    """
+    one: Scored | None = None
+    for _ in range(1 + ROUNDS):
+        try:
+            other = scored(context, chosen, refit(context, chosen, noise, start, sizes, goal))
+        except RunsAwayError:
+            break
+        if one is not None and other.evidence <= one.evidence:
+            break
+        one = other
+        if one.fit.ended_early or one.evidence == -inf or one.ahead < MOVED:
+            break
+        noise, start, sizes, goal = one.noise, one.fit, None, inf
+    return one
