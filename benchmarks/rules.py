@@ -25,7 +25,7 @@ RESOLUTION = {  # finer gives the same answer in more time
     "evidence/form_error.py": "LAWS PLACES INNER DEPTH",
     "evidence/latent_force.py": "BLOCKS SIZES MEMORY_BLOCKS",
     "evidence/process_noise.py": "_TRIED _BLOCKS JITTER",
-    "evidence/whitening.py": "_AT_BOUND _UNSEEN _REMEMBERED",
+    "evidence/whitening.py": "_AT_BOUND _UNSEEN _ROUNDING _REMEMBERED",
     "diagnosis/context.py": "MOST_READINGS NODES",
     "diagnosis/diagnose.py": "ANOTHER_NOISE",
     "diagnosis/posterior.py": "FAR MOST IN_PLAY SETTINGS",

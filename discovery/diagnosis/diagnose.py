@@ -21,7 +21,7 @@ from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
 from discovery.diagnosis.scored import Scored, with_force
 from discovery.diagnosis.selection import Search
-from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide, idle, refuted
+from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide, idle, refuted, runs_away
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis
@@ -174,10 +174,14 @@ def diagnose(
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
     tell("proving in free runs")
     before = fitted or fit_model(model, seen, fit, outputs)
-    verdict = decide(context, found, chances, _gain(context, found.best, model, seen, before))
+    whole = _repaired(context, found.best, found.best.hypotheses, model, seen)
+    verdict = decide(context, found, chances, _gain(context, found.best, seen, before, whole))
     named = [n.hypothesis for n in verdict.named]
-    alone = found.tried.get(frozenset(h.key for h in named), verdict.answer) if named else verdict.answer
-    after = _repaired(context, alone, named, model, seen) if named else None
+    keys = frozenset(h.key for h in named)
+    alone = found.tried.get(keys, verdict.answer) if named else verdict.answer
+    after = whole if keys == found.best.keys else _repaired(context, alone, named, model, seen)
+    if named and after is None:
+        verdict = runs_away(verdict)
     noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     runs = free_runs(campaign, [*fit, *read], before, after or before, noise)
@@ -234,32 +238,37 @@ def _unknown(context: Context, found: Search) -> list[Scored]:
 
 def _repaired(
     context: Context, answer: Scored, chosen: Sequence[Hypothesis], model: Model, seen: Campaign
-) -> Fit:
-    """The model with effects of an answer, fitted in the same way as the baseline of the proof."""
+) -> Fit | None:
+    """The model with effects of an answer, fitted in the same way as the baseline of the proof; None without
+    effects, or if it does not stay finite from the starts of free runs.
+    """
+    if not chosen:
+        return None
     grown = with_effects(model, chosen)
     values = answer.fit.model.parameters
     start = {n: values[n].value for n in grown.free if n in values}
     priors = shape_priors(chosen)  # readings may leave the shape of an effect open
-    return fit_model(
-        grown,
-        seen,
-        context.recordings,
-        context.outputs,
-        priors=priors,
-        guess=start,
-        begin=answer.fit,
-        max_rounds=25,
-    )
-
-
-def _gain(context: Context, answer: Scored, model: Model, seen: Campaign, before: Fit) -> float:
-    """rms in reading noises that an answer explains in free runs of the fitted recordings."""
-    if not answer.hypotheses:
-        return inf  # what is left has no name, if anything is
     try:
-        after = _repaired(context, answer, answer.hypotheses, model, seen)
+        return fit_model(
+            grown,
+            seen,
+            context.recordings,
+            context.outputs,
+            priors=priors,
+            guess=start,
+            begin=answer.fit,
+            max_rounds=25,
+        )
     except RunsAwayError:
-        return inf  # it cannot run from the starts of a free run: nothing is known
+        return None
+
+
+def _gain(context: Context, answer: Scored, seen: Campaign, before: Fit, after: Fit | None) -> float:
+    """rms in reading noises that an answer explains in free runs of the fitted recordings; inf if that is not
+    known, because nothing has a name or its model does not run.
+    """
+    if after is None:
+        return inf
     runs = free_runs(seen, context.recordings, before, after, answer.noise)
     found = improvement(list(runs.values()), context.outputs)
     return found.explained / size_of(seen, answer.noise)

@@ -186,6 +186,13 @@ def _lower(runs: Iterable[Improvement]) -> float:
     return sum(logs) / max(len(logs), 1)
 
 
+def runs_away(verdict: Verdict) -> Verdict:
+    """The verdict with its names withdrawn, because the repaired model does not stay finite in free runs."""
+    names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in verdict.named)
+    reasons = (f"with {names}, free runs of the model do not stay finite", *verdict.reasons)
+    return replace(verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=reasons)
+
+
 def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     """The verdict with its names withdrawn where unseen recordings are predicted worse with them, on average
     over the recordings (of the logarithm of the rms).

@@ -16,7 +16,7 @@ from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import REST, SHORT
-from discovery.diagnosis.verdict import Verdict, decide, idle, refuted
+from discovery.diagnosis.verdict import Verdict, decide, idle, refuted, runs_away
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis, Key
 
@@ -342,3 +342,10 @@ def test_scores_are_no_part_of_these_tests() -> None:
     """What stands for a model here has what the verdict reads of a real one."""
     assert {"hypotheses", "fit", "forced"} <= set(Scored.__dataclass_fields__)
     assert {"keys", "evidence", "noise"} <= set(dir(Scored))
+
+
+def test_a_repair_that_cannot_run_has_no_name() -> None:
+    named = said(WET, {"fluid_convection": 0.9})
+    withdrawn = runs_away(named)
+    assert (withdrawn.word, withdrawn.named, withdrawn.candidates) == ("unexplained", (), named.named)
+    assert withdrawn.reasons[0] == "with fluid_convection at table, free runs of the model do not stay finite"
