@@ -16,12 +16,21 @@ from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
 from discovery.diagnosis.posterior import Posterior, posterior
-from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, size_of
+from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, size_of, unit_of
 from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
 from discovery.diagnosis.scored import Scored, with_force
 from discovery.diagnosis.selection import Search
-from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide, idle, refuted, runs_away
+from discovery.diagnosis.verdict import (
+    NO_MISMATCH,
+    UNEXPLAINED,
+    Verdict,
+    decide,
+    idle,
+    refuted,
+    runs_away,
+    unforeseen,
+)
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis
@@ -184,13 +193,16 @@ def diagnose(
         verdict = runs_away(verdict)
     noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
-    runs = free_runs(campaign, [*fit, *read], before, after or before, noise)
+    runs = free_runs(campaign, fit, before, after or before, noise)
+    known = (alone if named else found.baseline).known()
+    runs |= free_runs(campaign, read, before, after or before, noise, known)
     fitting = improvement([runs[r] for r in fit if r in runs], outputs)
     proof = {r: improvement([runs[r]], outputs) for r in read if r in runs}
     each = [improvement([one], outputs) for one in runs.values()]
     verdict = refuted(idle(found, verdict, each), proof)
     if not verdict.named and after is not None:
         after = None
+    verdict = unforeseen(verdict, proof, unit_of(campaign, outputs))
     verdict = replace(verdict, reasons=(*verdict.reasons, *_reasons(context, verdict, read, proof, effects)))
     tell("locating")
     setting = found.baseline.settings[found.baseline.best]

@@ -253,6 +253,7 @@ def _gain(i: Improvement) -> Gain:
         rms_before=number(i.before),
         rms_after=number(i.after),
         noise_floor=number(i.floor),
+        expected=number(i.expected),
         gain_low=number(i.low),
         gain_high=number(i.high),
         outputs=dict(each),

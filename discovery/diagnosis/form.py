@@ -99,6 +99,7 @@ class Gain(Strict):
     rms_before: Number
     rms_after: Number
     noise_floor: Number
+    expected: Number = Field(default=None, description="noise floor and the uncertainty of the parameters")
     gain_low: Number = None
     gain_high: Number = None
     outputs: dict[str, tuple[Number, Number]] = Field(

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import copysign, inf, isfinite, sqrt
+from math import copysign, hypot, inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Trajectory, predict
+from discovery.dynamics import Trajectory, predict, sensitivities
 from discovery.errors import RunsAwayError
 from discovery.evidence.outliers import find_outliers, without
 from discovery.evidence.process_noise import noise_in_free_runs
@@ -30,12 +30,20 @@ BLOCKS = 8  # of a recording, resampled: what a free run misses lasts for hours
 
 
 @dataclass(frozen=True)
+class Known:
+    """Parameters that all recordings share, `names` (P,), and their `covariance` (P, P)."""
+
+    names: tuple[str, ...]
+    covariance: Array
+
+
+@dataclass(frozen=True)
 class Improvement:
     """rms of a recording before and after the repair, and the rms of noise alone in a free run.
 
-    `low` and `high` bound the improvement of the rms (before - after) by block bootstrap, 95 %; `outputs` has
-    the plain rms of each output before and after, in its unit. `after` is infinite where the repaired model
-    runs away.
+    `unsure` is what the uncertainty of the parameters adds on a recording that no fit has seen. `low` and
+    `high` bound the improvement of the rms (before - after) by block bootstrap, 95 %; `outputs` has the plain
+    rms of each output before and after, in its unit. `after` is infinite where the repaired model runs away.
     """
 
     before: float
@@ -44,6 +52,12 @@ class Improvement:
     low: float
     high: float
     outputs: Mapping[str, tuple[float, float]]
+    unsure: float = 0.0
+
+    @property
+    def expected(self) -> float:
+        """rms that noise and the uncertainty of the parameters make likely."""
+        return hypot(self.floor, self.unsure)
 
     @property
     def explained(self) -> float:
@@ -65,12 +79,22 @@ class FreeRuns:
     after: Array | None  # None: the model runs away
     floor: float
     unit: Array  # (Y,) what turns a residual into its own unit
+    unsure: float = 0.0  # rms from the uncertainty of the parameters
 
 
 def free_runs(
-    campaign: Campaign, recordings: Sequence[str], before: Fit, after: Fit, noise: Noise
+    campaign: Campaign,
+    recordings: Sequence[str],
+    before: Fit,
+    after: Fit,
+    noise: Noise,
+    known: Known | None = None,
 ) -> dict[str, FreeRuns]:
-    """Free runs on each recording; a recording on which the baseline diverges is left out."""
+    """Free runs on each recording; a recording on which the baseline diverges is left out.
+
+    Args:
+        known: how well the parameters are known, for recordings that no fit has seen.
+    """
     one, white, found = size_of(campaign, noise), np.array(noise.white), {}
     for run in recordings:
         old, new = _run(before, campaign, run), _run(after, campaign, run)
@@ -85,8 +109,16 @@ def free_runs(
             None if new is None else (readings - predict(new)) * scale,
             one * noise_in_free_runs(new or old, noise),
             1 / scale,
+            one * _unsure(new or old, white, known) if known else 0.0,
         )
     return found
+
+
+def _unsure(trajectory: Trajectory, white: Array, known: Known) -> float:
+    """rms of a free run from the uncertainty of parameters, in reading noises."""
+    moved = sensitivities(trajectory, known.names) / white[None, :, None]
+    variance = np.einsum("ryp,pq,ryq->ry", moved, known.covariance, moved, optimize=True)
+    return float(np.sqrt(np.mean(variance)))
 
 
 def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement:
@@ -94,7 +126,9 @@ def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement
     before = np.concatenate([r.before for r in runs])
     lost = any(r.after is None for r in runs)
     after = before if lost else np.concatenate([r.after for r in runs if r.after is not None])
-    floor = float(np.sqrt(np.mean([r.floor**2 for r in runs])))
+    floor, unsure = (
+        _rms(np.array(sizes)) for sizes in zip(*((r.floor, r.unsure) for r in runs), strict=True)
+    )
     sums = [_block_sums(r.before, r.before if r.after is None else r.after) for r in runs]
     old, new, count = (np.concatenate(column) for column in zip(*sums, strict=True))
     draw = np.random.default_rng(0).integers(0, len(old), (DRAWS, len(old)))
@@ -106,9 +140,9 @@ def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement
         for y, name in enumerate(outputs)
     }
     if lost:
-        return Improvement(_rms(before), inf, floor, -inf, -inf, each)
+        return Improvement(_rms(before), inf, floor, -inf, -inf, each, unsure)
     low, high = (float(np.quantile(gain, q)) for q in (0.025, 0.975))
-    return Improvement(_rms(before), _rms(after), floor, low, high, each)
+    return Improvement(_rms(before), _rms(after), floor, low, high, each, unsure)
 
 
 def unit_of(campaign: Campaign, outputs: Sequence[str]) -> str:

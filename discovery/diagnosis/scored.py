@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
+from discovery.diagnosis.proof import Known
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import effect_form
@@ -135,6 +136,13 @@ class Scored:
         k = int(place[0])
         middle, half = float(self.fit.theta[index] + step[k]), Z95 * float(np.sqrt(covariance[k, k]))
         return max(middle - half, unknowns[index].low), min(middle + half, unknowns[index].high)
+
+    def known(self) -> Known:
+        """How well the recordings determine the parameters, under the most likely noise."""
+        unknowns = [self.fit.problem.unknowns[i] for i in self.seen.moving]
+        shared = [k for k, u in enumerate(unknowns) if not u.is_nuisance and u.recording is None]
+        _, _, covariance = self._forms(self.best)[0].solved()
+        return Known(tuple(unknowns[k].name for k in shared), covariance[np.ix_(shared, shared)])
 
     def rms(self, apart: Collection[str] = ()) -> float:
         """Root mean square of the residuals over their reading noise, without some recordings."""

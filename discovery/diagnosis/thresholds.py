@@ -38,6 +38,7 @@ MATTERS = 0.15  # reading noises, rms: what explains less of free runs (1 % of t
 SHORT = 11.0  # log evidence that a name has to add, and by which names may be short of the best answer
 CHANCE = 1.5  # standard deviations of all log evidence that a name has to add: 7 % lie above by chance
 REST = 0.2  # of all log evidence, by which names may be short: what has no name may not carry the answer
+MISSED = 2.0  # times the rms that is expected of a free run: from here on the model lacks something
 RIVAL = 3.0  # log evidence within which another answer may as well be right
 RIVALS_SHOWN = 12  # other answers in the document
 DRAWS = 100  # bootstrap draws over blocks and priors

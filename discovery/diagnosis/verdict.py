@@ -214,6 +214,24 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     )
 
 
+def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) -> Verdict:
+    """The verdict where unseen recordings show what the recordings to fit do not: free runs miss their
+    readings by more than noise and the uncertainty of the parameters make likely.
+    """
+    missed = {run: i for run, i in proof.items() if i.after > thresholds.MISSED * i.expected}
+    if not missed:
+        return verdict
+    sizes = ", ".join(
+        f"{printed(i.after)} on {run} ({printed(i.expected)} expected)" for run, i in missed.items()
+    )
+    reason = (
+        f"free runs on unseen recordings miss more than noise and the fit explain: rms {sizes} {unit}; "
+        "something acts there that the recordings to fit do not show"
+    )
+    word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
+    return replace(verdict, word=word, reasons=(*verdict.reasons, reason))
+
+
 def _nothing(context: Context, found: Search, answer: Scored, candidates: tuple[Named, ...]) -> Verdict:
     """Verdict without a name: "no mismatch", or "unexplained" if the model is so coarse that process noise
     explains any residual.

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from discovery.dynamics import Column, Trajectory, sensitivities
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Projected, Slab, project_one
+from discovery.evidence.outliers import MOST
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.whitening import Whitened, log_sum_exp
 from discovery.threads import side_by_side
@@ -23,7 +24,7 @@ from discovery.threads import side_by_side
 Array = NDArray[np.float64]
 
 COARSE = 60  # steps per recording in the first look
-LEAST = 4  # readings before and after a jump, while heat acts and after it began: fewer may be wrong ones
+LEAST = 2 * MOST  # readings before and after a jump, and while heat acts: fewer may be wrong ones
 FINE = 8  # steps on each side of an edge in the second, closer look
 CLOSER = 6  # claims that get one
 
@@ -82,8 +83,6 @@ class _Search:
 
     def _rough_window(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
         """Heat at a body between two instants; it may begin before the recording and end after it."""
-        if len(self.read) < 2 * LEAST:
-            return None
         coarse = self._coarse()
         body = h.states[0]
         if body not in self.known:
@@ -118,9 +117,9 @@ class _Search:
         return np.linspace(time[0], time[-1], COARSE + 1)
 
     def _allowed(self, gains: Array, instants: Array) -> Array:
-        """Windows that some readings see begin and end."""
-        gains[instants[None, :] - instants[:, None] < LEAST * float(np.median(np.diff(self.read)))] = -np.inf
-        gains[instants > float(self.read[-2 * LEAST])] = -np.inf
+        """Windows in which there are readings enough."""
+        before = np.searchsorted(self.read, instants, side="right")
+        gains[before[None, :] - before[:, None] < LEAST] = -np.inf
         return gains
 
     def _windows(self, body: str, instants: Array, slab: Slab) -> Array:

@@ -46,7 +46,7 @@ def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Out
         for y, name in enumerate(grid.outputs):
             rows = np.flatnonzero(np.isfinite(residual[:, y]))
             r = residual[rows, y]
-            if len(r) < 2 * AROUND:
+            if len(r) < 3:  # no reading has others on both sides
                 continue
             middle, scatter = _around(r)
             jump = r - middle
@@ -64,23 +64,21 @@ def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Out
 
 def _returns(r: Array, middle: Array, limit: Array) -> NDArray[np.bool_]:
     """Which readings (N,) are far from the median of those around, while the readings next to them, on both
-    sides, are near it; of `MOST` of about one size in a row, those next to the row. At its ends a recording
-    may just have begun to move.
+    sides, are near it; of at most `MOST` of about one size in a row, those next to the row. At its ends a
+    recording may just have begun to move.
     """
     size = np.abs(r - middle)
     suspect = size > limit
     found = np.zeros(len(r), dtype=bool)
     for k in np.flatnonzero(suspect):
-        before, after = k - 1, k + 1
         # what fades is a response, not a row of wrong readings
-        row = suspect & (size > 0.4 * size[k]) & (size < 2.5 * size[k])
-        while before > 0 and row[before] and after - before <= MOST:
-            before -= 1
-        while after < len(r) - 1 and row[after] and after - before <= MOST:
-            after += 1
-        if before < 0 or after >= len(r):
+        others = np.flatnonzero(~(suspect & (size > 0.4 * size[k]) & (size < 2.5 * size[k])))
+        place = int(np.searchsorted(others, k))
+        if place in (0, len(others)):
             continue
-        found[k] = max(abs(r[before] - middle[k]), abs(r[after] - middle[k])) < limit[k]
+        before, after = int(others[place - 1]), int(others[place])
+        near = max(abs(r[before] - middle[k]), abs(r[after] - middle[k])) < limit[k]
+        found[k] = near and after - before - 1 <= MOST
     return found
 
 

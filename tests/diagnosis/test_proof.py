@@ -15,6 +15,7 @@ from discovery.diagnosis.proof import (
     MULTIPLES,
     FreeRuns,
     Improvement,
+    Known,
     explained,
     free_runs,
     improvement,
@@ -74,6 +75,23 @@ def test_outputs_of_several_units_are_told_in_multiples_of_their_noise(unit: str
     seen = said({"E": np.zeros(240), "F": np.zeros(240)}, channels)
     assert unit_of(seen, ["E", "F"]) == word
     assert size_of(seen, WHITE) == pytest.approx(sqrt(5.0) if unit == "um" else 1.0)
+
+
+def test_what_parameters_leave_open_is_expected_of_an_unseen_recording() -> None:
+    """E = a t/day with a standard error of 0.3 in a: the rms of t/day over the readings times 0.3."""
+    seen = said({"E": np.zeros(240)})
+    states = {"x": State("x", "degC", 1000.0, parse("0"), 0.0, 1e-3)}
+    outputs = {"E": parse("a*time/86400")}
+    model = Model("m", {"a": Parameter(0.0, "um", fixed=True)}, states, (), outputs)
+    fit = fit_model(model, seen, ["r"], ["E"])
+    noise = Noise(("E",), (2.0,))
+    known = Known(("a",), np.array([[0.09]]))
+    found = improvement([free_runs(seen, ["r"], fit, fit, noise, known)["r"]], ["E"])
+    expected = 0.3 * sqrt(np.mean((TIME / 86400.0) ** 2))
+    assert found.unsure == pytest.approx(expected, rel=1e-6)
+    assert found.floor == pytest.approx(2.0)
+    assert found.expected == pytest.approx(sqrt(expected**2 + 4.0), rel=1e-6)
+    assert improvement([free_runs(seen, ["r"], fit, fit, noise)["r"]], ["E"]).unsure == 0.0
 
 
 def test_a_single_wrong_reading_is_set_aside_in_a_proof() -> None:

@@ -16,7 +16,7 @@ from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import REST, SHORT
-from discovery.diagnosis.verdict import Verdict, decide, idle, refuted, runs_away
+from discovery.diagnosis.verdict import Verdict, decide, idle, refuted, runs_away, unforeseen
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis, Key
 
@@ -322,6 +322,21 @@ def test_unseen_recordings_withdraw_a_name_and_never_add_one() -> None:
     assert withdrawn.reasons[0].startswith("with fluid_convection at table, free runs on r3 are worse")
     unnamed = said(WET, {"fluid_convection": 0.5})
     assert refuted(unnamed, {"r3": better}) is unnamed
+
+
+def test_what_only_unseen_recordings_show_is_unexplained() -> None:
+    """Twice what noise (0.8) and parameters (0.6) together make likely."""
+    nothing = said(Tried([Model((), 0.0)]), {})
+    near, far = (Improvement(rms, rms, 0.8, 0.0, 0.0, {}, unsure=0.6) for rms in (1.9, 2.1))
+    assert nothing.word == "no mismatch"
+    assert unforeseen(nothing, {"r3": near}, "um") is nothing
+    other = unforeseen(nothing, {"r3": near, "r4": far}, "um")
+    assert other.word == "unexplained"
+    assert "rms 2.1 on r4 (1 expected) um" in other.reasons[-1]
+    named = said(WET, {"fluid_convection": 0.9})
+    kept = unforeseen(named, {"r4": far}, "um")
+    assert (kept.word, kept.named) == (named.word, named.named)
+    assert "unseen recordings" in kept.reasons[-1]
 
 
 def test_one_recording_of_another_machine_is_told_and_refutes_nothing() -> None:
