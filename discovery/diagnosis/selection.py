@@ -129,7 +129,7 @@ class Search:
         for h in current.hypotheses if scan else ():
             others = tuple(o for o in current.hypotheses if o.key != h.key)
             without = self.tried.get(frozenset(o.key for o in others)) or score(
-                self.context, others, current.noise, current.fit, goal=self._goal(current.noise)
+                self.context, others, current.noise, current.fit, goal=self.goal(current.noise)
             )
             if scan is None or without is None:
                 continue
@@ -150,7 +150,7 @@ class Search:
         fresh = {k: claim for k, claim in zip(keys, pool, strict=True) if k not in known}
 
         def tried(claim: Score) -> Scored | None:
-            one = attempt(self.context, start, others, claim, self._goal)
+            one = attempt(self.context, start, others, claim, self.goal)
             return one if one is not None and one.evidence > -inf else None  # the evidence is found here
 
         found = dict(zip(fresh, side_by_side(tried, list(fresh.values())), strict=True))
@@ -162,10 +162,10 @@ class Search:
                 best = one
         return best
 
-    def _goal(self, noise: Noise) -> float:
-        """Cost of a fit from which it can be part of the answer."""
+    def goal(self, noise: Noise, below: float = 0.0) -> float:
+        """Cost of a fit from which it can be part of the answer, or `below` it in log evidence."""
         best = self.best.fit
-        return FAR + cost_under(best.problem, best.theta, best.trajectories, noise)
+        return FAR + below + cost_under(best.problem, best.theta, best.trajectories, noise)
 
 
 def _lighter(one: Scored) -> Scored:

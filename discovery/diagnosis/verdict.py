@@ -132,11 +132,16 @@ def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Na
     kept = list(chosen)
     least = _by_chance(found)
     while kept:
-        fewer = [[o for o in kept if o is not n] for n in kept]
-        best = max(fewer, key=lambda others: _alone(context, found, answer, others))
-        if not _alone(context, found, answer, kept) - _alone(context, found, answer, best) < least:
+        whole = _alone(context, found, answer, kept)
+        reach = least + found.best.evidence - whole
+        levels = {
+            n.hypothesis.key: _alone(context, found, answer, [o for o in kept if o is not n], reach)
+            for n in kept
+        }
+        last = max(kept, key=lambda n: levels[n.hypothesis.key])
+        if not whole - levels[last.hypothesis.key] < least:
             break
-        kept = best
+        kept.remove(last)
     return kept
 
 
@@ -147,19 +152,28 @@ def _by_chance(found: Search) -> float:
     return max(thresholds.SHORT, thresholds.CHANCE * sqrt(2 * max(found.gain, 0.0)))
 
 
-def _alone(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> float:
-    """Log evidence of a model with only these effects; -inf if it does not stay finite."""
-    model = _only(context, found, answer, chosen)
+def _alone(
+    context: Context, found: Search, answer: Scored, chosen: Sequence[Named], matters: float = inf
+) -> float:
+    """Log evidence of a model with only these effects; -inf if it does not stay finite.
+
+    Args:
+        matters: it need not be exact where it is further than this below the best of all models.
+    """
+    model = _only(context, found, answer, chosen, matters)
     return -inf if model is None else model.evidence
 
 
-def _only(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> Scored | None:
+def _only(
+    context: Context, found: Search, answer: Scored, chosen: Sequence[Named], matters: float = inf
+) -> Scored | None:
     """The model with only these effects, fitted if the search has not fitted it; None if it does not stay
     finite.
     """
     keys = frozenset(n.hypothesis.key for n in chosen)
-    if keys not in found.tried or found.tried[keys].fit.ended_early:
-        one = score(context, [n.hypothesis for n in chosen], answer.noise, answer.fit)
+    if keys not in found.tried or (found.tried[keys].fit.ended_early and matters == inf):
+        goal = found.goal(answer.noise, matters)
+        one = score(context, [n.hypothesis for n in chosen], answer.noise, answer.fit, goal=goal)
         if one is not None:
             found.keep(one)
     return found.tried.get(keys)

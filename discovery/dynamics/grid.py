@@ -95,6 +95,15 @@ class Grid:
     def _moved(self, values: dict[str, Array]) -> dict[str, Array]:
         return values | {name: values[name] + by for name, by in self.offset.items()}
 
+    @cached_property
+    def first(self) -> dict[str, float]:
+        """Channels at the first instant, outputs at their first reading."""
+        found = {name: float(series[0]) for name, series in self.nodes.items()}
+        for name, there, read in zip(self.outputs, self.measured.T, self.readings.T, strict=True):
+            if there.any():
+                found[name] = float(read[np.argmax(there)])
+        return found
+
     @property
     def single(self) -> Array:
         """Single readings (N, Y), to see the steps of their numbers."""

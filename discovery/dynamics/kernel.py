@@ -139,6 +139,27 @@ def transitions(a, h):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def left_over(rates, a, x):  # type: ignore[no-untyped-def]
+    """Forcing at both ends of each interval, (K, n) each: what state matrices leave of the rates.
+
+    Args:
+        rates: (2K, n) of the states at the interval ends.
+        a: (K, n, n) state matrices.
+        x: (K + 1, n) states at the nodes.
+    """
+    count, n = a.shape[0], a.shape[1]
+    g0, g1 = np.empty((count, n)), np.empty((count, n))
+    for k in range(count):
+        for i in range(n):
+            left, right = rates[2 * k, i], rates[2 * k + 1, i]
+            for j in range(n):
+                left -= a[k, i, j] * x[k, j]
+                right -= a[k, i, j] * x[k + 1, j]
+            g0[k, i], g1[k, i] = left, right
+    return g0, g1
+
+
+@njit(cache=True, nogil=True)
 def trajectory(which, e, w0, w1, g0, g1, start):  # type: ignore[no-untyped-def]
     """States (K + 1, n) from the start and the forcing at both ends of each interval, g0 and g1 (K, n)."""
     count, n = g0.shape

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from discovery.dynamics import kernel
 from discovery.dynamics.grid import interleaved
 from discovery.dynamics.prediction import output_matrix, outputs
-from discovery.dynamics.starts import balanced, first_values, memories, rates_at_start, starts_follow
+from discovery.dynamics.starts import balanced, memories, rates_at_start, starts_follow
 from discovery.dynamics.system import shifted
 from discovery.dynamics.trajectory import Trajectory
 from discovery.terms import evaluate, names
@@ -139,7 +139,7 @@ def _start_slopes(
     for i, state in enumerate(system.model.states.values()):
         # one that also moves freely does so around what its formula says
         if state.start is not None and not wanted.isdisjoint(names(state.start)):
-            known = {**first_values(system.grid), **trajectory.values}
+            known = {**system.grid.first, **trajectory.values}
             for name, slope in evaluate(state.start, known, wanted).partials.items():
                 start[i, parameters.index(name)] = float(np.mean(slope))
     free = balanced(system)

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics.grid import Grid, first_interval
-from discovery.dynamics.memory import Memory
 from discovery.dynamics.system import System
 from discovery.errors import RunsAwayError, UserError
 from discovery.terms import evaluate
@@ -29,7 +27,7 @@ def start_values(
         moved: shifts of start values by name. States whose starts follow move along, and memories are
             settled anew.
     """
-    known: dict[str, float] = {**first_values(system.grid), **values}
+    known: dict[str, float] = {**system.grid.first, **values}
     out = np.zeros(len(system.states))
     for i, name in enumerate(system.states):
         start = system.model.states[name].start
@@ -73,27 +71,29 @@ def rates_at_start(
 ) -> tuple[Array, Array]:
     """Rates (n,) of the states at the first instant, and their derivatives (n, M) by the names of `wrt`."""
     rates, slopes = np.zeros(len(system.states)), np.zeros((len(system.states), len(wrt)))
-    env, wanted = at_start(system, values, start), frozenset(wrt)
-    memory = Memory(first_interval(system.grid), True)
-    for dual, i, j in zip(system.rates(env, wanted, memory), system.into, system.source, strict=True):
+    ends, memory = system.first
+    env = {**ends, **values, **dict(zip(system.states, start.tolist(), strict=True))}
+    column = {name: k for k, name in enumerate(wrt)}
+    for dual, i, j in zip(system.rates(env, frozenset(wrt), memory), system.into, system.source, strict=True):
+        partials = [(column[name], _first(partial)) for name, partial in dual.partials.items()]
         for k, sign in ((i, 1.0), (j, -1.0)):
             if k >= 0:
-                rates[k] += sign * system.scale[k] * float(np.ravel(dual.value)[0])
-                for name, partial in dual.partials.items():
-                    slopes[k, wrt.index(name)] += sign * system.scale[k] * float(np.ravel(partial)[0])
+                rates[k] += sign * system.scale[k] * _first(dual.value)
+                for name, partial in partials:
+                    slopes[k, name] += sign * system.scale[k] * partial
     return rates, slopes
 
 
-def at_start(system: System, values: Mapping[str, float], start: Array) -> dict[str, Value]:
-    """States, channels and parameters at the first instant, ready for `evaluate`; series of one interval."""
-    ends: dict[str, Value] = {name: series[:2] for name, series in system.grid.ends.items()}
-    return {**ends, **values, **dict(zip(system.states, start.tolist(), strict=True))}
+def _first(value: Value) -> float:
+    """A number, or the first of a series."""
+    return float(value[0] if isinstance(value, np.ndarray) and value.ndim else value)
 
 
 def _balanced(system: System, values: Mapping[str, float], start: Array, free: Sequence[int]) -> Array:
     """The start values (n,) with some states in the balance of their terms, given the others."""
     names = [system.states[i] for i in free]
-    for _ in range(_ROUNDS if free else 0):
+    before = 1.0
+    for _ in range((1 if system.affine else _ROUNDS) if free else 0):
         rates, slopes = rates_at_start(system, values, start, names)
         if not (np.isfinite(rates).all() and np.isfinite(slopes).all()):
             raise RunsAwayError(
@@ -105,17 +105,9 @@ def _balanced(system: System, values: Mapping[str, float], start: Array, free: S
         if not np.all(np.isfinite(change)):
             break
         start[free] += change
-        if np.max(np.abs(change)) < _TOLERANCE * (1.0 + np.max(np.abs(start[free]))):
+        size = np.max(np.abs(change)) / (1.0 + np.max(np.abs(start[free])))
+        # the next step shrinks at least as much as this one did, and the first one to less than its square
+        if size * min(1.0, size / before) < _TOLERANCE:
             break
+        before = size
     return start
-
-
-def first_values(grid: Grid) -> dict[str, float]:
-    """Channels at the first instant, outputs at their first reading."""
-    first = {name: float(series[0]) for name, series in grid.nodes.items()}
-    for i, name in enumerate(grid.outputs):
-        read = grid.readings[:, i]
-        read = read[np.isfinite(read)]
-        if len(read):
-            first[name] = float(read[0])
-    return first

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics.grid import Grid
+from discovery.dynamics.grid import Grid, first_interval
 from discovery.dynamics.memory import Memory
 from discovery.models import Model, expanded
 from discovery.models.model import read_at_start
@@ -39,6 +40,14 @@ class System:
         if wrt not in self.programs:
             self.programs[wrt] = compiled(tuple(t.expression for t in self.model.terms), wrt)
         return self.programs[wrt].run(values, memory)
+
+    @cached_property
+    def first(self) -> tuple[dict[str, Value], Memory]:
+        """Channels at both ends of the first interval, and the memory of it, for what is asked of the first
+        instant alone.
+        """
+        ends: dict[str, Value] = {name: series[:2] for name, series in self.grid.ends.items()}
+        return ends, Memory(first_interval(self.grid), True)
 
     def between(self, begin: int, end: int) -> System:
         """The system from one node to another, without readings; what remembers inputs begins there."""

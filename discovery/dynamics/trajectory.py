@@ -173,7 +173,7 @@ def _nearer(
     """
     before, earlier = np.inf, x
     for _ in range(_ROUNDS):
-        g0, g1 = _left_over(_state_rates(system, _term_rates(system, values, x)), last.a, x)
+        g0, g1 = kernel.left_over(_state_rates(system, _term_rates(system, values, x)), last.a, x)
         new = kernel.trajectory(last.which, last.e, last.w0, last.w1, g0, g1, first)
         change = _change(x, new)
         if not change < _HELPS * before:  # also NaN
@@ -200,7 +200,7 @@ def _linearise(system: System, values: Mapping[str, float], x: Array) -> tuple[A
             a[:, i, s] += system.scale[i] * mean
             if j >= 0:
                 a[:, j, s] -= system.scale[j] * mean
-    return a, *_left_over(_state_rates(system, found), a, x)
+    return a, *kernel.left_over(_state_rates(system, found), a, x)
 
 
 def _term_rates(
@@ -218,13 +218,6 @@ def _state_rates(system: System, found: Sequence[Dual]) -> Array:
         if j >= 0:
             rates[:, j] -= system.scale[j] * dual.value
     return rates
-
-
-def _left_over(rates: Array, a: Array, x: Array) -> tuple[Array, Array]:
-    """Forcing (K, n) at the left and right interval ends: what the state matrices leave of the rates."""
-    left = rates[0::2] - np.matmul(a, x[:-1, :, None])[:, :, 0]
-    right = rates[1::2] - np.matmul(a, x[1:, :, None])[:, :, 0]
-    return left, right
 
 
 def _interval_means(ends: Value) -> Value:

@@ -101,22 +101,24 @@ def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, jumps):
 
 @njit(cache=True, nogil=True)
 def _whitened(f, b, h, measured, gains, roots, nv, slow_decay, heat_decay, data):  # type: ignore[no-untyped-def]
-    """Whitened data (R * Y rows in reading order, unmeasured rows zero) by gains from `_gains`.
+    """Whitened data, a row for each of the readings that were measured, by gains from `_gains`.
 
     `nv`: outputs with slow noise, all or none.
     """
     readings, outs, n = h.shape
     m, size = data.shape[2], gains.shape[2]
     z = np.zeros((size, m))
-    out = np.zeros((readings, outs, m))
+    out = np.empty((np.count_nonzero(measured), m))
     top_z = np.zeros((n, m))
+    made = 0
     for r in range(readings):
         if r > 0:
             _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], z, top_z)
         for y in range(outs):
             if not measured[r, y]:
                 continue
-            row = out[r, y]
+            row = out[made]
+            made += 1
             row[:] = data[r, y]
             if nv:
                 slow = z[size - nv + y]
@@ -198,10 +200,9 @@ class Filter:
         """Columns (measured readings, M) of data (R, Y, M), whitened, and the logarithm (measured readings,)
         of the standard deviation of each innovation.
         """
-        clean = np.where(self.measured[:, :, None], data, 0.0)
         if noise.is_white:
             white = self.trajectory.system.grid.sd(noise.white)[self.measured]
-            return clean[self.measured] / white[:, None], np.log(white)
+            return data[self.measured] / white[:, None], np.log(white)
         _, slow, response, decays = self._parts(noise)
         gains, roots = self.gains(noise)
         out = _whitened(
@@ -213,9 +214,9 @@ class Filter:
             roots,
             len(slow),
             *decays,
-            np.ascontiguousarray(clean),
+            np.ascontiguousarray(data),
         )
-        return out[self.measured], np.log(roots[self.measured])
+        return out, np.log(roots[self.measured])
 
 
 def make_filter(trajectory: Trajectory) -> Filter:
