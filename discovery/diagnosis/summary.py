@@ -46,7 +46,7 @@ def lines_of(d: dict[str, Any]) -> list[str]:
 def _left(improvement: dict[str, Any]) -> list[str]:
     """rms of free runs of the model, and the rms that noise explains."""
     runs = {"recordings to fit": improvement["fit"]} | {
-        f"unseen recording {run}": i for run, i in improvement["held_out"].items()
+        f"held-out recording {run}": i for run, i in improvement["held_out"].items()
     }
     unit = _unit(improvement)
     return [

@@ -80,6 +80,9 @@ class Tried:
     def baseline(self) -> Model:
         return self.tried[frozenset()]
 
+    def reduced(self, _: Model, parts: Sequence[Sequence[Hypothesis]], __: float = 0.0) -> list[Model | None]:
+        return [self.tried.get(frozenset(h.key for h in chosen)) for chosen in parts]
+
     @property
     def gain(self) -> float:
         return self.best.evidence - self.baseline.evidence
@@ -336,7 +339,7 @@ def test_what_only_unseen_recordings_show_is_unexplained() -> None:
     named = said(WET, {"fluid_convection": 0.9})
     kept = unforeseen(named, {"r4": far}, "um")
     assert (kept.word, kept.named) == (named.word, named.named)
-    assert "unseen recordings" in kept.reasons[-1]
+    assert "held-out recordings" in kept.reasons[-1]
 
 
 def test_one_recording_of_another_machine_is_told_and_refutes_nothing() -> None:
