@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.firsthour.answering import explained_by
 from discovery.firsthour.evidence import OTHER
 from discovery.firsthour.guess import (
     CURRENTS,
@@ -34,6 +35,7 @@ Hints = Mapping[str, Sequence[tuple[str, Mapping[str, float]]]]
 
 _ONE_OF_SEVERAL = re.compile(r"\d+|(?<![^\W\d_])(d ?)?[xyz](?![^\W\d_])")
 _BRACKETS = re.compile(r"[\[(（][^\])）]*[\])）]")
+MOSTLY = 0.3  # share of a fluid temperature that loads and flows explain where they warm it
 _PUSHES = ("torque", "current", "signal", "flow", "power", "speed")
 
 
@@ -49,7 +51,7 @@ def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str
     }
     guesses = _one_scale(columns, guesses)
     guesses = _one_unit(columns, guesses)
-    guesses = _the_fluid(_one_room(columns, guesses))
+    guesses = _the_fluid(_one_room(columns, _warmed_fluid(columns, guesses)))
     guesses = _corrections(columns, _signed(columns, _answers(columns, guesses)))
     return sensors_as_inputs(guesses)
 
@@ -213,6 +215,24 @@ def _one_room(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[s
             found[name] = guesses[name].doubtful(why, role="temperature")
         elif more:
             found[name] = guesses[name].doubtful("other words in its name may mean another place")
+    return found
+
+
+def _warmed_fluid(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """If no body and no error is measured, then the fluid that loads and flows explain is what is warmed, as
+    that of a boiler. Another one is only brought along.
+    """
+    found = dict(guesses)
+    if any(one.role in ("temperature", "error") for one in guesses.values()):
+        return found
+    values = {column.name: column.values for column in columns}
+    drivers = [values[n] for n, one in guesses.items() if one.role in ("heat load", "fluid flow")]
+    fluids = [n for n, one in guesses.items() if one.role in ("fluid temperature", "coolant temperature")]
+    shares = {name: explained_by(values[name], drivers) for name in fluids} if drivers else {}
+    warmed = max(shares, key=lambda name: shares[name], default="")
+    if warmed and shares[warmed] > MOSTLY:
+        why = f"loads and flows explain {shares[warmed]:.0%} of it, and nothing else is measured"
+        found[warmed] = guesses[warmed].doubtful(why, role="temperature")
     return found
 
 
