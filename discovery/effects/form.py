@@ -25,6 +25,7 @@ Place = Literal[
     "driven and another",  # a driven body and any other one; heat enters the driven one alone
     "fluid terms",  # terms in which the fluid temperature stands
     "cooling terms",  # terms in which the cooling power stands
+    "current terms",  # terms in which an electric current stands
     "loss terms",  # terms in which a heat load stands, or a law of the speed
     "air terms",  # terms in which the ambient temperature stands
     "error state",  # a state that is an error: its terms are rates
@@ -37,7 +38,14 @@ Place = Literal[
     "inputs of a recording",  # every input in one recording
     "recording",  # all errors of one recording
 ]
-TERM_PLACES = ("fluid terms", "cooling terms", "loss terms", "air terms", "input temperature")
+TERM_PLACES = (
+    "fluid terms",
+    "cooling terms",
+    "current terms",
+    "loss terms",
+    "air terms",
+    "input temperature",
+)
 
 # Variables that a formula may use, and the role of the channel that each is
 ROLE_OF = {

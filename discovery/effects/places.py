@@ -8,6 +8,7 @@ from itertools import combinations
 
 from discovery.effects.form import TERM, Effect
 from discovery.models import Model
+from discovery.models.units import same_dimension
 from discovery.recordings import Channel
 from discovery.terms import Name, Term, names, parse
 
@@ -89,6 +90,9 @@ def spots(
                     yield Spot((a, b))
         case "driven and another":
             yield from (Spot((a, b)) for a in _driven(effect, parts) for b in parts.bodies if a != b)
+        case "current terms":
+            currents = {n for n, c in channels.items() if same_dimension(c.unit, "A")}
+            yield from _of(effect, tuple(t for t in parts.own if names(t.expression) & currents))
         case "fluid terms" | "cooling terms" | "loss terms" | "air terms":
             yield from _of_terms(effect, model, parts, role)
         case "input temperature":
@@ -143,7 +147,7 @@ def _group(effect: Effect, parts: Layout, alone: tuple[str, ...]) -> tuple[str, 
 
 
 def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, str]) -> Iterator[Spot]:
-    """Terms of a kind: all of them, and, where a term itself is what changes, those of each body alone."""
+    """Terms of a kind."""
     wanted = {
         "fluid terms": "fluid temperature",
         "cooling terms": "cooling power",
@@ -155,6 +159,11 @@ def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, st
         for t in parts.own
         if _holds(t, wanted, role) or (wanted == "heat load" and _is_friction(t, model, role))
     )
+    yield from _of(effect, terms)
+
+
+def _of(effect: Effect, terms: tuple[Term, ...]) -> Iterator[Spot]:
+    """All of some terms, and, where a term itself is what changes, those of each body alone."""
     bodies = tuple(dict.fromkeys(t.into for t in terms))
     if terms:
         yield Spot(bodies, terms)

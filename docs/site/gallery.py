@@ -177,6 +177,7 @@ def _label(effect: Any) -> str:
     if effect.place == "error state":
         return "added to the rate"
     if "term" in effect.formula.replace("_", " ").split("*")[-1] or effect.place in (
+        "current terms",
         "loss terms",
         "air terms",
     ):

@@ -32,6 +32,7 @@ CHANNELS = {
     "spray": Channel("spray", "fluid flow", "l/min", None, "held"),
     "side": Channel("side", "nozzle side", "1", None, "held"),
     "rack": Channel("rack", "temperature", "degC", None, "linear"),
+    "servo": Channel("servo", "other input", "A", None, "held"),
     "E_Y": Channel("E_Y", "error", "um", 0.5, "linear"),
     "E_Z": Channel("E_Z", "error", "um", 0.5, "linear"),
 }
@@ -43,8 +44,9 @@ TERMS = (
     Term("air", "bed", parse("hA*(room - bed)")),
     Term("bearing", "table", parse("P_b*(rpm/1000)**1.5")),
     Term("fluid", "table", parse("hF*pump*(emulsion - table)")),
+    Term("winding", "motor", parse("R_w*servo**2")),
 )
-UNITS = {"G_mt": "W/K", "loss": "1", "cold": "1", "P_b": "W", "hA": "W/K", "hF": "W/K"}
+UNITS = {"G_mt": "W/K", "loss": "1", "cold": "1", "P_b": "W", "hA": "W/K", "hF": "W/K", "R_w": "W/A**2"}
 RUNS = ("one", "two")
 HIGH = {
     "pump": 4.0,
@@ -54,6 +56,7 @@ HIGH = {
     "cut": 2000.0,
     "spray": 9.0,
     "side": 1.0,
+    "servo": 5.0,
 }
 OF_ERRORS = ("error state", "output of errors")  # places of models whose states are the errors
 EVERY, LONG = 600.0, 10800.0  # s, between readings and of a recording

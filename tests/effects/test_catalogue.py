@@ -43,6 +43,7 @@ PLACE_NEEDS = {
     "air body": "ambient temperature",
     "fluid terms": "fluid temperature",
     "cooling terms": "cooling power",
+    "current terms": "other input",
     "air terms": "ambient temperature",
 }
 

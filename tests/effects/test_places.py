@@ -16,12 +16,12 @@ from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import TERM_PLACES
 from discovery.models import Model, read_model, write_model
-from discovery.terms import Term, names, parse, substitute
+from discovery.terms import Term, evaluate, names, parse, substitute
 from tests.effects.sample import EVENT_ODDS, ODDS, claims, expand, inside, sample, scene, trajectory
 
 DRIVEN = ("friction_speed", "viscosity_temperature", "thermal_preload", "windage")
 REPLACING = (*TERM_PLACES, "inputs of a recording")
-INPUTS = ("drive", "chiller", "emulsion", "pump", "room", "rpm")
+INPUTS = ("drive", "chiller", "emulsion", "pump", "room", "rpm", "servo")
 DELAYS = {"drive": 120.0, "chiller": 90.0, "emulsion": 60.0}  # s, of what its author wrote as late
 
 
@@ -86,6 +86,17 @@ def test_a_share_of_a_recorded_heat_is_asked_for_where_that_goes() -> None:
     assert not expand(copper, without={"heat load"})
 
 
+def test_a_current_warms_its_winding_the_more_the_warmer_that_is() -> None:
+    """The term of the current itself grows: 25 A**2 8 W/A**2 of copper alone, 10 K above 22 degC."""
+    copper = catalogue()["copper_resistance_current"]
+    (h,) = expand(copper)
+    assert h.states == ("motor",)
+    (term,) = h.terms
+    found = evaluate(term.expression, {"R_w": 8.0, "servo": 5.0, "motor": 32.0, h.amplitudes[0]: 1.0}).value
+    assert found == pytest.approx(0.0393 * 200.0)
+    assert not expand(copper, without={"other input"})
+
+
 @pytest.mark.parametrize(
     ("law", "friction"),
     [
@@ -125,7 +136,8 @@ def test_what_begins_acts_in_the_recordings_that_were_made_later() -> None:
 def test_every_recorded_input_may_be_heat_a_path_or_a_factor() -> None:
     """Each input of a role at each place, not the first alone; what the model has already is not offered."""
     heat = {(h.channels, h.states) for h in expand(catalogue()["input_heat"])}
-    assert heat == {((name,), (body,)) for name in ("cut", "spray") for body in ("motor", "table", "bed")}
+    everywhere = {((name,), (body,)) for name in ("cut", "spray") for body in ("motor", "table", "bed")}
+    assert heat == everywhere | {(("servo",), ("table",)), (("servo",), ("bed",))}
     path = {(h.channels, h.outputs) for h in expand(catalogue()["input_path"])}
     assert {c for (c,), _ in path} >= {"cut", "spray", "drive", "rpm", "pump"}
     assert {y for _, y in path} == {("E_Y",), ("E_Z",)}
