@@ -91,12 +91,11 @@ def _temperature(
         gain = block.parameter(f"gain_{output}_{load}", "0.0", f"K/{per}/s", least=least)
         block.term(f"{load} warms {output}", output, f"{gain}*{heat}")
     for fan in [name for name, one in guesses.items() if one.quantity == "fan"] if room else []:
-        more = block.parameter(f"{fan}_{output}", "1e-4", "1/s", least="0.0")
+        more = block.parameter(f"{fan}_{output}", "1e-4", f"1/s{_per(canonical(guesses[fan]))}", least="0.0")
         block.term(f"{fan} cools {output}", output, f"{more}*{fan}*({room} - {output})")
     fluid, pump = _first(guesses, "fluid temperature"), _first(guesses, "fluid flow")
     if fluid:
-        flow = canonical(guesses[pump]) if pump else "1"
-        per = "" if flow == "1" else f"/({flow})"
+        per = _per(canonical(guesses[pump])) if pump else ""
         name = block.parameter(f"fluid_{output}", "1e-4", f"1/s{per}", least="0.0")
         block.term(f"fluid on {output}", output, f"{name}*{f'{pump}*' if pump else ''}({fluid} - {output})")
     if masses == 2:
@@ -111,6 +110,11 @@ def _temperature(
         block.term(f"{core} on {output}", output, f"{into}*({core} - {output})")
         block.term(f"{output} on {core}", core, f"{back}*({output} - {core})")
     return block
+
+
+def _per(unit: str) -> str:
+    """What follows the unit of a number that counts for each one of another."""
+    return "" if unit == "1" else f"/({unit})"
 
 
 def _error(output: str, guesses: Mapping[str, Guess], inputs: Sequence[str], masses: int) -> _Block:

@@ -222,6 +222,23 @@ def test_body_temperatures_alone_drive_the_errors(tmp_path: Path) -> None:
     assert {"T1", "T2"} <= set(experiment.model_file("first_order").inputs)
 
 
+def test_a_fan_in_percent_cools_in_its_own_unit(tmp_path: Path) -> None:
+    from discovery.experiment import load_experiment
+    from discovery.models.dimensions import check_dimensions
+
+    rows = [
+        f"{60 * k},{21 + k % 4 / 9},{500 * (k // 9 % 2)},{50 * (k // 7 % 3)},{20 + k / 9}" for k in range(60)
+    ]
+    table = "\n".join(["time,Room (C),Heater (W),Fan %,Oven (C)", *rows])
+    (tmp_path / "run.csv").write_text(table, "utf-8")
+    result = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), "--from", str(tmp_path / "run.csv")])
+    assert result.exit_code == 0, result.output
+    experiment = load_experiment(tmp_path / "rig" / "experiment.toml")
+    model = experiment.model_file("first_order")
+    assert "Fan" in model.inputs
+    assert check_dimensions(model, experiment.campaign.channels) == []
+
+
 def test_a_coolant_with_a_flow_can_be_offered_as_convection(tmp_path: Path) -> None:
     """What the flow and its temperature are for: the model has a path to the fluid, gated by the flow."""
     from discovery.experiment import load_experiment
