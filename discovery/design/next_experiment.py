@@ -142,7 +142,14 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
     zero, one, first = np.zeros(len(time)), np.ones(len(time)), (time < length / 2).astype(float)
     sixth, twelfth = (((time // (length / n)) % 2 == 0).astype(float) for n in (6, 12))
     speed, load, pump = (r in roles.values() for r in ("rotation speed", "heat load", "fluid flow"))
-    moving = " and ".join(word for word, there in (("speed", speed), ("load", load)) if there)
+
+    def called(role: str, word: str) -> str:
+        """The only channel of a role by its name, several by a word."""
+        mine = [n for n, one in roles.items() if one == role]
+        return mine[0] if len(mine) == 1 else word
+
+    names = called("rotation speed", "speed"), called("heat load", "load")
+    moving = " and ".join(name for name, there in zip(names, (speed, load), strict=True) if there)
     dry, still = ", dry" if pump else "", "stand still" if speed else "leave everything off"
     half, two, hour = (_told(length / n) for n in (2, 6, 12))
     wanted: dict[str, Mapping[str, Array]] = {}
@@ -150,14 +157,14 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
         wanted[f"switch the pump every {two} at standstill with warm fluid"] = build(zero, zero, sixth, True)
     if pump and moving:
         wanted[f"switch the pump every {two} at full {moving}"] = build(one, one, sixth, False)
-        wanted[f"step the {moving} every {hour} with the pump running"] = build(twelfth, twelfth, one, False)
+        wanted[f"step {moving} every {hour} with the pump running"] = build(twelfth, twelfth, one, False)
     if moving:
         wanted[f"run {half} at full {moving}{dry}, then {still} for {half}"] = build(
             first, first, zero, False
         )
         wanted[f"step {moving} every {hour}{dry}"] = build(twelfth, twelfth, zero, False)
     if speed and load:
-        wanted[f"run at half speed and full load{dry}"] = build(0.5 * one, one, zero, False)
+        wanted[f"run at half {names[0]} and full {names[1]}{dry}"] = build(0.5 * one, one, zero, False)
     wanted[f"{still} and follow the room"] = build(zero, zero, zero, False)
     for n in (n for n, role in roles.items() if role == "other input"):
         low, high = np.quantile(series[n], (0.05, 0.95))

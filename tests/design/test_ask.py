@@ -71,7 +71,7 @@ def test_a_heated_plate_is_not_sent_to_pump_for_hours() -> None:
     said = next_experiment(where, other, fitted, Noise(("T",), (0.1,)), CONFIRM)
     for word in ("dry", "pump", "speed", "fluid", " h "):
         assert word not in said
-    assert "load" in said
+    assert "step heater" in said or "full heater" in said
     assert "would confirm the answer within about" in said
 
 
@@ -213,12 +213,12 @@ def test_patterns_move_what_the_machine_has() -> None:
     where = cast(Context, SimpleNamespace(campaign=seen, grids=grids, recordings=("r1",)))
     found, time = _designs(where, 43200.0), np.linspace(0.0, 43200.0, STEPS + 1)
     high = np.quantile(grids["r1"].samples["speed"].value, 0.95)
-    half = found["run 6 h at full speed and load, dry, then stand still for 6 h"]
+    half = found["run 6 h at full speed and P_drive, dry, then stand still for 6 h"]
     assert np.array_equal(half["speed"], np.where(time < 21600.0, high, 0.0))
     assert not half["pump"].any()
-    steps = found["step speed and load every 1 h, dry"]["speed"]
+    steps = found["step speed and P_drive every 1 h, dry"]["speed"]
     assert np.count_nonzero(np.diff(steps)) == 12
-    pump = found["switch the pump every 2 h at full speed and load"]
+    pump = found["switch the pump every 2 h at full speed and P_drive"]
     assert np.count_nonzero(np.diff(pump["pump"])) == 6
     assert np.all(pump["speed"] == high)
     still = found["stand still and follow the room"]
