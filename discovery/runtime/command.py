@@ -111,7 +111,11 @@ def compensate_rows(
         rows = csv_rows(lines, exported.compiled.inputs, say, dropped, oldest)
         first = next(rows, None)  # inputs that are refused leave no trace in the folder
         if first is None:
-            say("there was no row with a time; nothing was done" + (f"; {dropped}" if dropped.counts else ""))
+            if dropped.counts:
+                raise UserError(
+                    f"no row of the inputs can be used: {dropped}; give seconds or ISO 8601 instants"
+                )
+            say("there was no row with a time; nothing was done")
             return
         session = Session(
             exported, model=model, folder=folder, trusted=trusted, settings=settings, rule=rule, learn=learn,
