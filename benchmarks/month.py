@@ -1,10 +1,11 @@
 """Thirty days of a compensated machine with everything that an ordinary month brings, on a simulated clock.
 
-    python benchmarks/month.py [days] [seed] [--learn [--alone]]
+    python benchmarks/month.py [days] [seed] [--learn [--alone] [--known]]
 
 A hall door, a chiller step, 5 h without a sensor, a clock set by a day, a frozen server, 20 kills, a full
 disk and two power cuts; with --learn the machine ages as well (its losses fall by 1 % a day) and the
-compensation follows it; --alone runs it once more without learning. The session, its memory, guards, clock,
+compensation follows it; --alone runs it once more without learning, --known with the wear given to the model
+at every instant: what no learning can beat. The session, its memory, guards, clock,
 output and history are those of `discovery compensate --opcua`; simulated are the machine, the two clocks of
 the computer, and what the disk and the power do.
 """
@@ -361,6 +362,7 @@ def compare(
     *,
     learning: bool,
     alone: bool = False,
+    known: bool = False,
     exported: Exported | None = None,
 ) -> dict[str, Any]:
     """The month with and without its faults: figures by name."""
@@ -408,6 +410,13 @@ def compare(
         left_alone = live(exported, true_world, plan, folder / "left", faults=True)
         figures["without learning, last week, um"] = rms(left_alone.left[quiet & last])
         figures["without learning, by readings, um"] = rms((left_alone.left + read)[quiet & last])
+    if known:
+        (folder / "known").mkdir()
+        left = 1.0 - 0.01 * true_world.times / DAY  # the losses are shares of this power
+        told = {**true_world.inputs, "P_drive": true_world.inputs["P_drive"] * left}
+        best = live(exported, replace(true_world, inputs=told), plan, folder / "known", faults=True)
+        figures["with known wear, last week, um"] = rms(best.left[quiet & last])
+        figures["with known wear, by readings, um"] = rms((best.left + read)[quiet & last])
     figures["said"] = found.events
     return figures
 
@@ -419,7 +428,10 @@ def main(words: list[str]) -> None:
     days, seed = itertools.chain(numbers, (30, 4000)[len(numbers) :])
     fast = "/dev/shm" if Path("/dev/shm").is_dir() else None  # 40 000 flushes to a real disk take 20 min
     with tempfile.TemporaryDirectory(dir=fast) as name:
-        found = compare(days, seed, Path(name), learning="--learn" in words, alone="--alone" in words)
+        found = compare(
+            days, seed, Path(name),
+            learning="--learn" in words, alone="--alone" in words, known="--known" in words,
+        )  # fmt: skip
     for text in found.pop("said"):
         print(f"  {text}"[:260])
     for title, value in found.items():

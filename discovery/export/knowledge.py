@@ -60,7 +60,8 @@ class Knowledge:
     """What a fit knows. `residual`: rms of readings minus model by output (None: not read). `noise`: the most
     likely one on the ladders of the diagnosis; None: nothing was read. `floor`: usual unknown heat of each
     state, W or a rate. `scales`: mean and spread of each series, from which operating points are counted.
-    `rows` (K, 1 + P + E): whitened residual and slopes of `parameters`, then of form errors.
+    `rows` (K, 1 + P + E): whitened residual and slopes of `parameters`, then of form errors. `worn`:
+    parameters that revisions have moved; the machine goes on to wear there.
     """
 
     residual: Mapping[str, float | None]
@@ -69,6 +70,7 @@ class Knowledge:
     floor: Mapping[str, float]
     scales: Mapping[str, tuple[float, float]]
     rows: Array
+    worn: tuple[str, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """As it stands in an exported model."""
@@ -79,6 +81,7 @@ class Knowledge:
             "floor": dict(self.floor),
             "scales": {name: list(pair) for name, pair in self.scales.items()},
             "rows": [[float(f"{v:.6g}") for v in row] for row in self.rows.tolist()],
+            "worn": list(self.worn),
         }
 
 
@@ -104,6 +107,7 @@ def read_knowledge(model: str, written: Mapping[str, Any]) -> Knowledge:
         written["floor"],
         {name: (pair[0], pair[1]) for name, pair in written["scales"].items()},
         np.array(written["rows"]).reshape(len(written["rows"]), -1),
+        tuple(written.get("worn", ())),
     )
 
 
@@ -258,12 +262,20 @@ def _compressed(seen: Whitened, noise: Noise, names: Sequence[str]) -> Array:
     model = seen.fit.problem.model
     sd = np.array([UNKNOWN * abs(model.parameters[n].value) for n in names if n in place])
     scale = np.concatenate([[1.0], sd, np.full(seen.form[0], noise.form), np.full(seen.form[1], noise.edge)])
-    size, axes = np.linalg.eigh(gram[np.ix_(kept, kept)] * np.outer(scale, scale))
-    told = size > SEEN
-    rows = np.zeros((int(told.sum()), 1 + len(names) + len(gram) - 1 - count))
-    inverse = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
-    rows[:, where] = np.sqrt(size[told])[:, None] * axes[:, told].T * inverse
+    found = compressed(gram[np.ix_(kept, kept)] * np.outer(scale, scale), scale)
+    rows = np.zeros((len(found), 1 + len(names) + len(gram) - 1 - count))
+    rows[:, where] = found
     return rows
+
+
+def compressed(gram: Array, scale: Array) -> Array:
+    """Rows (K, M) whose normal equations are those of a residual and of its slopes in units of `scale` (M,):
+    one for each direction of which the readings say anything.
+    """
+    size, axes = np.linalg.eigh(gram)
+    told = size > SEEN
+    inverse = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+    return np.asarray(np.sqrt(size[told])[:, None] * axes[:, told].T * inverse)
 
 
 def _read(campaign: Campaign, recordings: Collection[str], name: str) -> bool:

@@ -22,7 +22,7 @@ from discovery.paper.active import exported_of
 from discovery.paper.chapter import Chapter, Material
 from discovery.recordings import Recording
 from discovery.runtime.hypotheses import compare
-from discovery.runtime.update import AS_NEW, revision_of
+from discovery.runtime.update import MAY, revision_of
 
 FEATURES_A_DAY = (12, 24)
 
@@ -71,7 +71,7 @@ def recalibration(m: Material) -> Chapter | None:
         shows=(*_notes(m), *shows),
         not_shown=(
             "The error of cutting and measuring a feature: it counts as noise of an R-Test reading.",
-            f"A revision is written only if it leaves less than {AS_NEW:g} times the residual of the fit: "
+            f"A revision is written only if it leaves less than {MAY:g} times the residual before: "
             "few features may show wear and still not say enough of it.",
         ),
     )

@@ -23,7 +23,7 @@ from discovery.dynamics import Trajectory, sensitivities
 from discovery.dynamics.trajectory import flows
 from discovery.evidence.events import heat_steps
 from discovery.evidence.form_error import edge_columns, law_columns
-from discovery.export.knowledge import Knowledge, spreads
+from discovery.export.knowledge import Knowledge, compressed, spreads
 from discovery.fitting.kalman import make_filter
 from discovery.fitting.noise import Noise
 from discovery.fitting.problem import Problem
@@ -42,6 +42,41 @@ class Change:
 
     columns: Ints
     root: Array
+
+    def and_also(self, other: Change) -> Change:
+        """This and another change, independent of each other."""
+        root = np.zeros((len(self.root) + len(other.root), self.root.shape[1] + other.root.shape[1]))
+        root[: len(self.root), : self.root.shape[1]] = self.root
+        root[len(self.root) :, self.root.shape[1] :] = other.root
+        return Change(np.concatenate([self.columns, other.columns]), root)
+
+
+@dataclass(frozen=True)
+class Wear:
+    """Parameters that may age, with a square root (A, K) of the covariance of their changes: columns (A,) of
+    the slopes for changes before the recordings, and bit by bit during them.
+    """
+
+    before: Ints
+    during: Ints
+    root: Array
+
+    @property
+    def change(self) -> Change:
+        """As something that may have changed: so much before the recordings, and so much during them."""
+        twice = np.asarray(np.kron(np.eye(2), self.root), dtype=float)
+        return Change(np.concatenate([self.before, self.during]), twice)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """How far parameters have worn at the end of the recordings (A,), its standard deviation (A,), and what
+    is known of all parameters and form errors then, as rows of `Knowledge`.
+    """
+
+    by: Array
+    sd: Array
+    rows: Array
 
 
 @dataclass(frozen=True)
@@ -100,9 +135,11 @@ class Heat:
 class Table:
     """Whitened readings (N,) of the fit and of new recordings, with their slopes.
 
-    `base` (N, B): what the fit left unknown, in standard deviations; `slopes` (N, K): of what may have
-    changed; `at`: their columns by name, of parameters "at once" and "bit by bit", of offsets of channels,
-    and of what else is asked; `heat`: of heat at each state.
+    `base` (N, B): what the fit left unknown, in standard deviations `spread` (B,): parameters, form errors,
+    then starts; `slopes` (N, K): of what may have changed; `at`: their columns by name, of parameters
+    "at once" and "bit by bit", of offsets of channels, and of what else is asked; `heat`: of heat at each
+    state. The rows of the fit, `fitted` in number, come first; the first `kept` columns of the base are in
+    them.
     """
 
     residual: Array
@@ -110,13 +147,60 @@ class Table:
     slopes: Array
     at: Mapping[str, Ints]
     heat: Mapping[str, Heat]
+    spread: Array
+    fitted: int
+    kept: int
 
-    def seen(self) -> Seen:
-        """With what the fit left unknown integrated out."""
+    def seen(self, usual: Change | None = None) -> Seen:
+        """With what the fit left unknown integrated out, and with what changes all the time."""
+        base = self.base
+        if usual is not None:
+            base = np.hstack([base, self.slopes[:, usual.columns] @ usual.root])
         columns = np.column_stack([self.residual, self.slopes])
-        factor = np.linalg.cholesky(self.base.T @ self.base + np.eye(self.base.shape[1]))
-        inside = np.linalg.solve(factor, self.base.T @ columns)
+        factor = np.linalg.cholesky(base.T @ base + np.eye(base.shape[1]))
+        inside = np.linalg.solve(factor, base.T @ columns)
         return Seen(columns.T @ columns - inside.T @ inside)
+
+    def followed(self, wear: Wear) -> Followed:
+        """The next revision under wear: parameters p + a at the end of the recordings, where the readings of
+        the fit see p, and the new ones p plus what has worn until then.
+
+        Only `a` may move, along the root of the wear. It moves to where the errors of the new recordings are
+        as near as it can bring them to the most likely ones.
+        """
+        size, kept, new = self.spread[: self.kept], self.kept, slice(self.fitted, None)
+        before, during = (self.slopes[:, at] @ wear.root for at in (wear.before, wear.during))
+        # per unit of wear before and during: what the readings show less than the parameters at the end do
+        rows_of_fit = self.base[: self.fitted, wear.before] @ _over(wear.root, size[wear.before])
+        lag = np.hstack([np.zeros_like(before), during - before])
+        lag[: self.fitted] = -np.tile(rows_of_fit, 2)
+        every = np.column_stack([self.residual, self.base, lag])
+        gram = _without(every.T @ every, 1 + kept)
+        covariance = np.linalg.inv(gram[1:, 1:] + np.eye(kept))
+        mine = before[new]
+        narrow = np.linalg.solve(mine.T @ mine + np.eye(mine.shape[1]), mine.T @ self.base[new, :kept])
+        to = wear.root @ narrow
+        by = to @ covariance @ gram[1:, 0]
+        moved = np.zeros(kept)
+        moved[wear.before] = _over(by, size[wear.before])
+        gram[:, 0] -= gram[:, 1:] @ moved
+        gram[0] -= moved @ gram[1:]
+        sd = np.sqrt(np.einsum("ij,jk,ik->i", to, covariance, to))
+        return Followed(by, sd, compressed(gram, np.concatenate([[1.0], size])))
+
+
+def _over(values: Array, size: Array) -> Array:
+    """Values (A, ...) over sizes (A,), zero where a size is."""
+    size = size.reshape(-1, *[1] * (values.ndim - 1))
+    return np.divide(values, size, out=np.zeros_like(values), where=size > 0)
+
+
+def _without(gram: Array, count: int) -> Array:
+    """Normal equations (count, count) with the rest integrated out, which has standard deviations of one."""
+    inner = gram[count:, count:] + np.eye(len(gram) - count)
+    return np.asarray(
+        gram[:count, :count] - gram[:count, count:] @ np.linalg.solve(inner, gram[count:, :count])
+    )
 
 
 def make_table(
@@ -189,6 +273,9 @@ def make_table(
         np.concatenate([np.zeros((count, before + first[-1])), *(j for _, _, j in parts)]),
         {n: np.arange(a, b) for n, a, b in zip(counts, edge[:-1], edge[1:], strict=True)},
         {n: _heat(runs, edges, i, noise.heat_time, before + first, n) for i, n in enumerate(states)},
+        spread,
+        count,
+        known.rows.shape[1] - 1,
     )
 
 

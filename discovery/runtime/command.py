@@ -23,6 +23,7 @@ from discovery.runtime.session import Say, Session, header
 from discovery.runtime.shadow import Rule
 from discovery.runtime.signals import Stopped, listening
 from discovery.runtime.store import step_back
+from discovery.runtime.thinking import other_process
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
@@ -110,11 +111,16 @@ def compensate_rows(
         rows = csv_rows(lines, exported.compiled.inputs, say, dropped, oldest)
         first = next(rows, None)  # inputs that are refused leave no trace in the folder
         if first is None:
-            say("there was no row with a time; nothing was done" + (f"; {dropped}" if dropped.counts else ""))
+            if dropped.counts:
+                raise UserError(
+                    f"no row of the inputs can be used: {dropped}; give seconds or ISO 8601 instants"
+                )
+            say("there was no row with a time; nothing was done")
             return
         session = Session(
             exported, model=model, folder=folder, trusted=trusted, settings=settings, rule=rule, learn=learn,
             now=first[0] if live else None, say=say,
+            thinking=stack.enter_context(other_process()) if live and learn is not None else None,
         )  # fmt: skip
         session.opens = partial(_output, session, out, live=live)
         asked, last = stack.enter_context(listening()), None

@@ -27,24 +27,30 @@ from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.runtime.changes import Change, Seen, Table, make_table
 from discovery.runtime.unused import Path, path_columns, paths, taken_in
-from discovery.terms import names, parse
+from discovery.runtime.wear import ageing, uses, usual_wear, wears
+from discovery.terms import parse
 from discovery.threads import one_thread
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Verdict = Literal[
-    "nothing", "wear", "input sensor", "unused input", "idle input", "something else", "undecided"
+    "nothing",
+    "wear",
+    "wear goes on",
+    "input sensor",
+    "unused input",
+    "idle input",
+    "something else",
+    "undecided",
 ]
 
 # Chosen on seeds set aside for it and confirmed on others, see benchmarks/runtime.md
-WEAR = (0.05, 0.2)  # relative change of a parameter that ages; both widths count half
 OTHER = (0.1, 0.4)  # relative change of a parameter that cannot age: something else changed
 OFFSET = (0.5, 2.0)  # K, of the sensor of an input
 ACTS = (1.0, 4.0)  # residuals of the fit that an unused input shows
 LEAST_ODDS = 2.5  # log of the odds against `nothing`, below which nothing has changed
 MEMORY_S = 24 * 3600.0  # in which a residual counts less and less: wear goes on meanwhile
 RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
-AGES = ("heat load", "rotation speed", "fluid flow", "cooling power", "coolant temperature")
 START_SD = 0.5  # K, um: of states that are known where a recording begins
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
 
@@ -54,8 +60,8 @@ class Comparison:
     """What the recordings say. `odds`: log of the probability of the readings under each hypothesis over that
     under `nothing`, prior odds included. `verdict` and `what`: the best one, and the sensor where it is one.
     `rms`: residual of the model at work in units of that of its fit; `lately`: the same, as of now.
-    `change`: of the parameters that age, under wear, with standard deviations. `path`: of the unused input,
-    with its parameters.
+    `change`: of the parameters that age, under wear, with standard deviations; `rows`: what is known after
+    it. `path`: of the unused input, with its parameters.
     """
 
     recordings: tuple[str, ...]
@@ -66,6 +72,7 @@ class Comparison:
     rms: float
     lately: float
     change: Mapping[str, tuple[float, float]]
+    rows: Array
     path: tuple[Path, Mapping[str, float]] | None = None
 
     def __str__(self) -> str:
@@ -75,26 +82,6 @@ class Comparison:
             f"{', '.join(self.recordings)}: {self.verdict}{what}; {self.readings} readings, "
             f"residual {self.rms:.2f} times that of the fit; log odds against no change: {others}"
         )
-
-
-def ageing(exported: Exported) -> tuple[str, ...]:
-    """Parameters that wear can change: all their terms depend on a load, a speed, a flow or a coolant. What
-    conducts and what the air takes does not wear.
-    """
-    roles = {i.name: i.role for i in exported.inputs}
-    return tuple(
-        name
-        for name, used in _uses(exported).items()
-        if used and all(any(roles.get(other) in AGES for other in one) for one in used)
-    )
-
-
-def _uses(exported: Exported) -> dict[str, list[frozenset[str]]]:
-    """By fitted parameter, the names in each formula that holds it."""
-    model = exported.model
-    formulas = [names(e) for e in (*(term.expression for term in model.terms), *model.outputs.values())]
-    fitted = exported.document["knowledge"]["parameters"]
-    return {name: [frozenset(one) for one in formulas if name in one] for name in fitted}
 
 
 @one_thread
@@ -124,8 +111,10 @@ def compare(
     columns = {name: path.columns for name, path in ways.items()}
     columns |= {channel: path_columns(problem, gains) for channel, gains in idle.items()}
     table = make_table(known, problem, channels, columns)
-    seen = table.seen()
-    offered = {"wear": [_wear(exported, table, width) for width in WEAR]}
+    worn = wears(exported, table)
+    usual = usual_wear(exported, table, known.worn)
+    seen = table.seen(usual.change if usual else None)
+    offered = {"wear": [one.change for one in worn]}
     for name in channels:
         offered[f"sensor of {name}"] = [Change(table.at[name], np.array([[size]])) for size in OFFSET]
     for name, path in ways.items():
@@ -140,11 +129,24 @@ def compare(
         evidence[f"no input {channel}"] = seen.log_odds_of(table.at[channel], by)
     odds = {"nothing": 0.0} | {n: value + _before(n, list(evidence)) for n, value in evidence.items()}
     verdict, what = _verdict(odds, evidence)
-    change = _worn(seen, offered["wear"], ageing(exported))
+    alone = table.seen()
+    if usual and verdict == "nothing":
+        verdict = "wear goes on"
+    if verdict == "wear":
+        best = max(offered["wear"], key=seen.log_odds)
+        more = _mean([seen.log_odds(best.and_also(other)) for other in offered["something else"]])
+        if more - seen.log_odds(best) - RARE >= LEAST_ODDS:
+            verdict, what = "something else", "wear does not explain all of it"
+    most = max([*worn, usual] if usual else worn, key=lambda one: alone.log_odds(one.change))
+    followed = table.followed(usual if usual and verdict == "wear goes on" else most)
+    pairs = zip(followed.by.tolist(), followed.sd.tolist(), strict=True)
+    change = {n: pair for n, pair in zip(ageing(exported), pairs, strict=True) if pair[1] > 0.0}
     chosen = _chosen(seen, table, [(n, p) for n, p in ways.items() if p.channel == what], levels)
     count = int(sum(np.isfinite(s.grid.readings).sum() for s in problem.systems))
     rms, lately = (_rms(problem, levels, outputs, memory) for memory in (np.inf, MEMORY_S))
-    return Comparison(tuple(recordings), count, verdict, what, odds, rms, lately, change, chosen)
+    return Comparison(
+        tuple(recordings), count, verdict, what, odds, rms, lately, change, followed.rows, chosen
+    )
 
 
 def residual_lately(exported: Exported, campaign: Campaign, recordings: Sequence[str]) -> float:
@@ -153,12 +155,6 @@ def residual_lately(exported: Exported, campaign: Campaign, recordings: Sequence
     levels = {n: r for n, r in residual.items() if r is not None}
     outputs = [n for n in levels if any(_read(campaign, r, n) for r in recordings)]
     return _rms(problem_of(exported.model, campaign, recordings, outputs), levels, outputs, MEMORY_S)
-
-
-def _sizes(exported: Exported) -> dict[str, float]:
-    """Sizes of the fitted parameters."""
-    fitted = exported.document["knowledge"]["parameters"]
-    return {n: abs(exported.model.parameters[n].value) for n in fitted}
 
 
 def _before(name: str, asked: Sequence[str]) -> float:
@@ -171,29 +167,10 @@ def _before(name: str, asked: Sequence[str]) -> float:
     return -RARE - float(np.log(len(alike)))
 
 
-def _wear(exported: Exported, table: Table, width: float) -> Change:
-    """Every parameter that ages, by a share of its own: before the recordings, and bit by bit during them."""
-    sizes, old = _sizes(exported), ageing(exported)
-    at = [k for k, n in enumerate(sizes) if n in old]
-    size = np.array([sizes[n] for n in sizes if n in old] * 2)
-    return Change(
-        np.concatenate([table.at["at once"][at], table.at["bit by bit"][at]]), width * np.diag(size)
-    )
-
-
-def _worn(seen: Seen, wear: Sequence[Change], old: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Change of each parameter that ages, at the end of the recordings, and its standard deviation, under the
-    most likely width of wear: little evidence moves parameters little.
-    """
-    by, covariance = seen.size(max(wear, key=seen.log_odds))
-    both = np.hstack([np.eye(len(old)), np.eye(len(old))])
-    total, variance = both @ by, np.diag(both @ covariance @ both.T)
-    return dict(zip(old, zip(total.tolist(), np.sqrt(variance).tolist(), strict=True), strict=True))
-
-
 def _exchanges(exported: Exported, table: Table, channels: Sequence[str]) -> list[Change]:
     """All exchange with one temperature alike, where it does not age: a fan, a door."""
-    used, old, sizes = _uses(exported), ageing(exported), _sizes(exported)
+    used, old = uses(exported), ageing(exported)
+    sizes = {n: abs(exported.model.parameters[n].value) for n in used}
     found = []
     for channel in channels:
         group = [n for n in used if n not in old and used[n] and all(channel in one for one in used[n])]

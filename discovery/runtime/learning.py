@@ -15,12 +15,12 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from discovery.errors import UserError
-from discovery.export.document import render
+from discovery.export.document import Exported
 from discovery.files import write_atomic
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.runtime.compensator import Compensator, State
@@ -45,6 +45,31 @@ SAVE_S = 3600.0  # between two copies on disk
 LONGEST_S = 8 * 24 * 3600.0  # of the recording; the older half is forgotten then
 
 
+@dataclass(frozen=True)
+class Question:
+    """Recordings of a model at work, and its states where they begin."""
+
+    exported: Exported
+    campaign: Campaign
+    begin: Mapping[str, float]
+
+
+Answer = tuple[Comparison, dict[str, Any] | None]
+
+
+def answer(question: Question) -> Answer:
+    """The hypotheses on what was seen, and the document of the next revision where it is wear or an input
+    that the model did not use. It takes seconds, so a live source asks another process.
+
+    Raises:
+        UserError: a model without knowledge of its parameters.
+    """
+    exported, campaign, begin = question.exported, question.campaign, question.begin
+    found = compare(begun(exported, begin), campaign, ["running"], choose=True)
+    revised = revision_of(exported, campaign, found, begin=begin)
+    return found, None if revised is None else revised[0]
+
+
 @dataclass
 class Learner:
     """What the running loop knows since the last revision.
@@ -54,6 +79,7 @@ class Learner:
 
     key: Ed25519PrivateKey | None
     advice: str = ""
+    said: tuple[str, str] = ("", "")  # the last verdict, and of what
     times: list[float] = field(default_factory=list)
     inputs: list[list[float]] = field(default_factory=list)
     others: list[dict[str, float]] = field(default_factory=list)  # readings that the model does not use
@@ -75,16 +101,28 @@ class Learner:
             rows.clear()
         self.new, self.advice = 0, ""
 
+    def follow(self, compensator: Compensator, since: float | None) -> None:
+        """Another model is at work that knows what was seen until `since`: keep what was seen afterwards."""
+        kept = {name: list(getattr(self, name)) for name in ("times", "inputs", "others", "errors", "marks")}
+        self.begin(compensator)
+        marks = [k for k, (row, _) in enumerate(kept["marks"]) if since and kept["times"][row] <= since]
+        if not marks or len(kept["inputs"][0]) != len(compensator.exported.inputs):
+            return
+        for name, rows in kept.items():
+            setattr(self, name, rows)
+        self._forget_before(marks[-1])
+        self.new = sum(1 for row in self.errors if row)
+
     def observe(self, compensator: Compensator, readings: Mapping[str, Reading], now: float) -> bool:
-        """Take in a tick; whether hypotheses should be compared now."""
-        if compensator.inputs is None or compensator.state not in (State.ACTIVE, State.DEGRADED):
-            self._interrupt(compensator, now)
-            return False
+        """Take in a tick; whether hypotheses should be compared now.
+
+        What the model works with while inputs are missing is a guess, so only ACTIVE ticks are learnt from.
+        """
         if self.times and now - self.times[-1] > GAP_S:
             self.begin(compensator)
         found = self._errors(compensator, readings)
-        if compensator.state is State.DEGRADED:  # under inputs that are only held an error says little
-            found = {}
+        if compensator.inputs is None or compensator.state is not State.ACTIVE:
+            return False
         if not self.times or now - self.times[-1] >= ROW_S - 1e-6 or found:
             if not self.marks or now - self.times[self.marks[-1][0]] >= EVERY_S:
                 self.marks.append((len(self.times), compensator.states()))
@@ -119,11 +157,6 @@ class Learner:
             if spec.between == "held":
                 row[k] += (float(compensator.inputs[k]) - row[k]) / self.merged
 
-    def _interrupt(self, compensator: Compensator, now: float) -> None:
-        """Begin a new recording if the model has not settled, or has failed, for more than GAP_S."""
-        if self.times and now - self.times[-1] > GAP_S:
-            self.begin(compensator)
-
     def beyond(self) -> bool:
         """Whether the errors left are beyond the action limit."""
         return len(self.left) >= RECENT // 2 and math.sqrt(float(np.mean(np.square(self.left)))) > ACTION
@@ -143,12 +176,15 @@ class Learner:
         return found
 
     def _forget(self, now: float) -> None:
-        if now - self.times[0] <= LONGEST_S or len(self.marks) < 3:
-            return
-        first = self.marks[len(self.marks) // 2][0]
+        if now - self.times[0] > LONGEST_S and len(self.marks) >= 3:
+            self._forget_before(len(self.marks) // 2)
+
+    def _forget_before(self, mark: int) -> None:
+        """Let the recording begin at a mark."""
+        first = self.marks[mark][0]
         for rows in (self.times, self.inputs, self.others, self.errors):
             del rows[:first]
-        self.marks = [(row - first, states) for row, states in self.marks if row >= first]
+        self.marks = [(row - first, states) for row, states in self.marks[mark:]]
 
     def campaign(self, compensator: Compensator) -> Campaign:
         """What was seen since the last revision, as a campaign of one recording."""
@@ -190,19 +226,13 @@ class Learner:
         except (OSError, ValueError, KeyError):
             return
 
-    def compare(self, compensator: Compensator, now: float) -> tuple[Comparison, bytes | None]:
-        """The hypotheses on what was seen, and the signed next revision where it is wear or an input that the
-        model did not use.
-
-        Raises:
-            UserError: a model without knowledge of its parameters.
-        """
+    def question(self, compensator: Compensator, now: float) -> Question:
+        """What was seen, for `answer`."""
         self.compared, self.new = now, 0
-        campaign = self.campaign(compensator)
-        exported = begun(compensator.exported, self.marks[0][1])
-        found = compare(exported, campaign, ["running"], choose=True)
-        revised = revision_of(compensator.exported, campaign, found, begin=self.marks[0][1])
-        return found, None if revised is None else render(revised[0], self.key)
+        question = Question(compensator.exported, self.campaign(compensator), dict(self.marks[0][1]))
+        if self.marks[-1][0] < len(self.times) - 1:
+            self.marks.append((len(self.times) - 1, compensator.states()))
+        return question
 
 
 def _others(compensator: Compensator, readings: Mapping[str, Reading]) -> dict[str, float]:

@@ -30,6 +30,7 @@ from discovery.runtime.opcua_link import Link, Seen
 from discovery.runtime.output import Output
 from discovery.runtime.session import Say, Session, header
 from discovery.runtime.signals import Asked
+from discovery.runtime.thinking import other_process
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
@@ -239,7 +240,7 @@ def compensate_opcua(
         _listen(asked)
         if not await _first_connection(link, seconds, asked, say):
             return Punctuality()
-        with ThreadPoolExecutor(max_workers=1) as background:
+        with ThreadPoolExecutor(max_workers=1) as background, other_process() as thinking:
             try:
                 session = Session(
                     exported,
@@ -250,6 +251,7 @@ def compensate_opcua(
                     rule=rule,
                     save_every_s=exported.compiled.step_s,
                     background=background,
+                    thinking=thinking if learn is not None else None,
                     clock=clock,
                     learn=learn,
                     say=say,

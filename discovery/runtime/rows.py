@@ -35,7 +35,8 @@ class Dropped:
 
     def __str__(self) -> str:
         each = (f"{n} {why} (the first in line {self.first[why]})" for why, n in self.counts.items())
-        return f"{self.counts.total()} rows were left out: {', '.join(each)}"
+        total = self.counts.total()
+        return f"{total} {'row was' if total == 1 else 'rows were'} left out: {', '.join(each)}"
 
 
 def csv_rows(
@@ -100,7 +101,7 @@ def _parsed(
                 )
             dropped.add("with more cells than the header", line)
             continue
-        stamp = _time(cells[place]) if place < len(cells) else math.nan
+        stamp = _time(cells[place], separator) if place < len(cells) else math.nan
         if not math.isfinite(stamp):
             dropped.add("without a time", line)
             continue
@@ -230,14 +231,13 @@ def ticks(
         yield following, newest
 
 
-def _time(cell: str) -> float:
+def _time(cell: str, separator: str) -> float:
     """Return seconds. An instant without a zone counts as UTC, so the time zone of the computer has no
     influence.
     """
-    try:
-        return float(cell)
-    except ValueError:
-        pass
+    seconds = _number(cell, separator)
+    if not math.isnan(seconds):
+        return seconds
     try:
         instant = parse_instant(cell)
         return (instant if instant.tzinfo else instant.replace(tzinfo=UTC)).timestamp()

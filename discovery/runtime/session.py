@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from discovery.errors import UserError
-from discovery.export.document import Exported
+from discovery.export.document import Exported, render
 from discovery.runtime.clock import Clock
 from discovery.runtime.compensator import Compensator, Settings, State, Tick
 from discovery.runtime.events import Event, instant
@@ -24,7 +24,7 @@ from discovery.runtime.store import offer, open_store, refuse_candidate, replace
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
-    from discovery.runtime.learning import Learner
+    from discovery.runtime.learning import Answer, Learner, Question
 
 Say = Callable[[str], None]
 
@@ -35,6 +35,7 @@ class Session:
     Args:
         model, folder, trusted: file of the model, folder of its memory, key that must have signed it.
         background: a thread that writes the state, so that a slow disk delays no tick.
+        thinking: another process that compares hypotheses, so that they delay no tick; None: they do.
         clock: the steady clock of a live source; None: the stamps of the readings are the only clock.
         now: instant [s] of the first tick, where it is known; a saved state from after it is refused.
 
@@ -53,13 +54,15 @@ class Session:
         rule: Rule | None = None,
         save_every_s: float = 600.0,
         background: Executor | None = None,
+        thinking: Executor | None = None,
         clock: Clock | None = None,
         learn: Learner | None = None,
         now: float | None = None,
         say: Say = lambda _: None,
     ) -> None:
         self.folder, self.say, self.save_every_s, self.background = folder, say, save_every_s, background
-        self.learn, self.rule = learn, rule or Rule()
+        self.learn, self.rule, self.thinking = learn, rule or Rule(), thinking
+        self.asking: Future[Answer] | None = None  # what was seen, of the other process
         self.clock, self.settings = clock, settings or Settings()
         self.shadow: Shadow | None = None
         self.resumed: float | None = None
@@ -204,7 +207,7 @@ class Session:
         else:
             refuse_candidate(self.folder)
         if self.learn is not None and passed:
-            self.learn.begin(self.compensator)
+            self.learn.follow(self.compensator, self.shadow.began)
         what = "the new model takes over" if passed else "the new model is refused"
         self.tell(now, what, f"revision {new.revision} after revision {old.revision}: {why}")
         self.shadow = None
@@ -243,15 +246,34 @@ class Session:
             self.tell(now, "action limit", "the residual errors exceed the action limit", learn.advice)
         elif advised and not learn.advice:
             self.tell(now, "action limit kept", "the residual errors are within the action limit again")
-        if not due or self.shadow is not None or self.folder is None:
-            return
+        if due and self.asking is None and self.shadow is None and self.folder is not None:
+            self.asking = self._ask(learn.question(self.compensator, now))
+        if self.asking is not None and self.asking.done():
+            asking, self.asking = self.asking, None
+            self._answered(learn, asking, now)
+
+    def _ask(self, question: Question) -> Future[Answer]:
+        from discovery.runtime.learning import answer
+
+        if self.thinking is not None:
+            return self.thinking.submit(answer, question)
+        asked: Future[Answer] = Future()
         try:
-            found, revised = learn.compare(self.compensator, now)
+            asked.set_result(answer(question))
         except UserError as error:
+            asked.set_exception(error)
+        return asked
+
+    def _answered(self, learn: Learner, asked: Future[Answer], now: float) -> None:
+        error = asked.exception()
+        if error is not None:
             self.learn = None
-            self.tell(now, "learning ends", str(error))
+            self.tell(now, "learning ends", str(error) or type(error).__name__)
             return
-        if found.verdict == "nothing":
+        found, revised = asked.result()
+        quiet = found.verdict in ("nothing", "wear goes on") or (found.verdict, found.what) == learn.said
+        learn.said = found.verdict, found.what
+        if quiet and revised is None:
             return
         remedy = {
             "input sensor": f"check the sensor of {found.what}",
@@ -260,7 +282,7 @@ class Session:
         }.get(found.verdict, "")
         self.tell(now, f"learning: {found.verdict}", str(found), remedy)
         if revised is not None:
-            self._offer(revised, now)
+            self._offer(render(revised, learn.key), now)
 
     def _offer(self, data: bytes, now: float) -> None:
         """Let a new revision run in the shadow. Measured errors must confirm it."""

@@ -49,7 +49,8 @@ class Shadow:
         if self.began is None:
             return
         found = self.compensator.tick(readings, now)
-        self.trouble |= found.state in (State.FROZEN, State.FAULT)
+        failed = found.state in (State.FROZEN, State.FAULT)
+        self.trouble |= failed and active.state is not found.state  # inputs that are missing fail both
         old, new = predictions(active), predictions(self.compensator)
         for name in old.keys() & new.keys():
             self.difference = max(self.difference, abs(old[name] - new[name]))
@@ -89,16 +90,9 @@ class Shadow:
         return self.difference <= self.rule.most_um, text
 
     def _rms(self, which: int) -> float:
-        """Return the rms of the residuals about their mean. The zero of a measurement does not concern the
-        model.
-        """
-        total, count = 0.0, 0
-        for pairs in self.residuals.values():
-            values = [pair[which] for pair in pairs]
-            mean = sum(values) / len(values)
-            total += sum((value - mean) ** 2 for value in values)
-            count += len(values)
-        return math.sqrt(total / max(count, 1))
+        """The rms of the residuals. A constant error left counts: for a day, wear looks like one."""
+        squares = [pair[which] ** 2 for pairs in self.residuals.values() for pair in pairs]
+        return math.sqrt(sum(squares) / max(len(squares), 1))
 
 
 def predictions(compensator: Compensator) -> dict[str, float]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from discovery.export.document import Exported, from_document, read_document, render, write_document
+from discovery.export.knowledge import read_knowledge
 from discovery.export.seal import open_seal
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 
-AS_NEW = 1.3  # residual after a change, as a multiple of the fit's, beyond which wear does not explain it
 MAY = 0.95  # residual after a change, as a share of that before: a revision that gains less is not written
 
 
@@ -81,8 +81,6 @@ def update_file(
     exported = read_document(path)
     found = compare(exported, campaign, recordings)
     revised = revision_of(exported, campaign, found)
-    if found.verdict == "wear" and revised is None:
-        found = replace(found, verdict="something else", what="wear does not explain all of it")
     if found.verdict == "something else":
         return Update(found, None, None, _diagnosis(exported.model, campaign, recordings))
     if revised is None:
@@ -101,13 +99,13 @@ def revision_of(
     Args:
         begin: states of the model where the recordings begin; default its own start.
     """
-    if found.verdict not in ("wear", "unused input", "idle input"):
+    if found.verdict not in ("wear", "wear goes on", "unused input", "idle input"):
         return None
     document = next_revision(exported, campaign, found)
     again = from_document(*open_seal(render(document), exported.model.name), exported.model.name)
     started = begun(again, begin) if begin is not None else again
     after = residual_lately(started, campaign, found.recordings)
-    return (document, after) if after < min(MAY * found.lately, AS_NEW) else None
+    return (document, after) if after < MAY * found.lately else None
 
 
 def next_name(path: Path) -> Path:
@@ -119,8 +117,8 @@ def next_name(path: Path) -> Path:
 
 def next_revision(exported: Exported, campaign: Campaign, found: Comparison) -> dict[str, Any]:
     """The document of the updated model with its changelog entry; only what wear can change has moved, or an
-    input has come in or is left out. Ranges, limits and what the fit knew of its parameters stay: the next
-    comparison holds the revision to it.
+    input has come in or is left out. Ranges and limits stay. What is known of the parameters after wear goes
+    with the revision: the next comparison holds it to that.
     """
     if found.verdict == "unused input" and found.path is not None:
         path, values = found.path
@@ -139,7 +137,10 @@ def next_revision(exported: Exported, campaign: Campaign, found: Comparison) -> 
         f"{n} {exported.model.parameters[n].value:.4g} -> {model.parameters[n].value:.4g}"
         for n in found.change
     )
-    return _revised(exported, document | {"parameters": entries}, found, moved)
+    before = read_knowledge(model.name, document["knowledge"])
+    known = replace(before, rows=found.rows, worn=tuple(sorted({*before.worn, *found.change})))
+    new = document | {"parameters": entries, "knowledge": known.document()}
+    return _revised(exported, new, found, moved)
 
 
 def _revised(exported: Exported, document: dict[str, Any], found: Comparison, moved: str) -> dict[str, Any]:

@@ -29,7 +29,7 @@ def test_one_stamp_two_days_ahead_costs_one_row() -> None:
     stamps[400] += 172_800.0
     times, dropped, said = read(stamps)
     assert times == [*MINUTES[:400], *MINUTES[401:]]
-    assert str(dropped) == "1 rows were left out: 1 with a time far ahead (the first in line 402)"
+    assert str(dropped) == "1 row was left out: 1 with a time far ahead (the first in line 402)"
     assert said == []
 
 
@@ -56,8 +56,8 @@ def test_a_gap_is_a_gap() -> None:
 
 @pytest.mark.parametrize("separator", [";", "\t"])
 def test_semicolons_and_decimal_commas_are_read(separator: str) -> None:
-    lines = [f"time{separator}T\n", f"0{separator}20,5\n", f"60{separator}20.75\n"]
-    assert [row["T"].value for _, row in csv_rows(lines)] == [20.5, 20.75]
+    lines = [f"time{separator}T\n", f"0{separator}20,5\n", f"60{separator}20.75\n", f"120,5{separator}21\n"]
+    assert [(time, row["T"].value) for time, row in csv_rows(lines)] == [(0, 20.5), (60, 20.75), (120.5, 21)]
 
 
 @pytest.mark.parametrize(
@@ -120,5 +120,10 @@ def test_a_run_tells_what_it_did(model_file: object, exported: Exported) -> None
     assert done.stdout == ""
     done = CliRunner().invoke(app, command, input=rows(middle, [0.0, 60.0, 120.0, 30.0, 180.0]))
     assert done.exit_code == 0, done.stderr
-    assert "1 rows were left out: 1 out of order (the first in line 5)" in done.stderr
+    assert "1 row was left out: 1 out of order (the first in line 5)" in done.stderr
+    refused = CliRunner().invoke(app, command, input=rows(middle, [0.0]).replace("\n0,", "\nnoon,"))
+    assert refused.exit_code == 1
+    assert "no row of the inputs can be used: 1 row was left out: 1 without a time (the first in line 2)" in (
+        refused.stderr
+    )
     assert "19 ticks: COLD 100.0 %; 1 events; ended COLD" in done.stderr

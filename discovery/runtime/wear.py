@@ -1,0 +1,78 @@
+"""Wear: which parameters of a model it can change, and how they change together."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.export.document import Exported
+from discovery.runtime.changes import Table, Wear
+from discovery.terms import names
+
+Array = NDArray[np.float64]
+
+# Chosen on seeds set aside for it and confirmed on others, see benchmarks/runtime.md
+WIDTHS = (0.05, 0.2)  # relative change of a parameter that ages; both widths count half
+AGES = ("heat load", "rotation speed", "fluid flow", "cooling power", "coolant temperature")
+
+
+def ageing(exported: Exported) -> dict[str, frozenset[str]]:
+    """Parameters that wear can change, with the inputs that wear them: all their terms depend on a load, a
+    speed, a flow or a coolant. What conducts and what the air takes does not wear.
+    """
+    loads = {i.name for i in exported.inputs if i.role in AGES}
+    return {
+        name: frozenset[str]().union(*used) & loads
+        for name, used in uses(exported).items()
+        if used and all(one & loads for one in used)
+    }
+
+
+def uses(exported: Exported) -> dict[str, list[frozenset[str]]]:
+    """By fitted parameter, the names in each formula that holds it."""
+    model = exported.model
+    formulas = [names(e) for e in (*(term.expression for term in model.terms), *model.outputs.values())]
+    fitted = exported.document["knowledge"]["parameters"]
+    return {name: [frozenset(one) for one in formulas if name in one] for name in fitted}
+
+
+def wears(exported: Exported, table: Table) -> list[Wear]:
+    """Wear of what one load wears, or of all: every parameter by one share, as of one bearing or one pump, or
+    each by a share of its own as well.
+    """
+    loads = list(dict.fromkeys(ageing(exported).values()))
+    parts = [*([load] for load in loads), loads] if len(loads) > 1 else [loads]
+    found = []
+    for part in parts:
+        common, own = _roots(exported, part)
+        found += [
+            _wear_of(exported, table, width * root)
+            for width in WIDTHS
+            for root in (common, np.hstack([common, own]))
+        ]
+    return found
+
+
+def usual_wear(exported: Exported, table: Table, worn: Sequence[str]) -> Wear | None:
+    """Wear that goes on where a machine has worn before."""
+    loads = {load for name, load in ageing(exported).items() if name in worn}
+    return _wear_of(exported, table, WIDTHS[0] * _roots(exported, loads)[0]) if loads else None
+
+
+def _roots(exported: Exported, part: Collection[frozenset[str]]) -> tuple[Array, Array]:
+    """Changes of the parameters that age, by their sizes: (A, L) those of each load in a part by one share,
+    (A, K) each of them by its own.
+    """
+    loads = ageing(exported)
+    size = np.array([abs(exported.model.parameters[name].value) for name in loads])
+    common = np.array([load == one for load in loads.values() for one in part], dtype=float)
+    common = common.reshape(len(loads), len(part))
+    return size[:, None] * common, np.diag(size)[:, common.any(axis=1)]
+
+
+def _wear_of(exported: Exported, table: Table, root: Array) -> Wear:
+    fitted, old = list(uses(exported)), ageing(exported)
+    at = [k for k, name in enumerate(fitted) if name in old]
+    return Wear(table.at["at once"][at], table.at["bit by bit"][at], root)
