@@ -136,27 +136,28 @@ def _each(
     progress: Progress,
 ) -> list[Discovery]:
     """A discovery of each output, or of all together where outputs move each other, as a position and its
-    rate do.
+    rate do, or two masses with a spring between them.
 
-    Together they need no hidden states. So this comes first, and ends the search if it leaves nothing but
-    white noise; otherwise the better one on left-out data stands.
+    Together they need no further hidden states. So this comes first, and ends the search if it leaves nothing
+    but white noise; otherwise the better one on left-out data stands.
     """
     if "coupling" in (options.library or ()) and options.form != "masses":
         return [_best(campaign, recordings, outputs, inputs, forms, options, progress)]
-    moved: list[Discovery] = []
+    together: list[Discovery] = []
     rates = None
     if len(outputs) > 1 and "own" in forms and options.library is None:
         rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
         coupled = options.model_copy(update={"library": (*WORDS, "coupling")})
-        moved = list(discover_states(rates, coupled, ["own"], progress))
-        if moved and leaves_noise(campaign, recordings, moved[0].model, outputs):
-            return moved
+        for one in discover_states(rates, coupled, [f for f in forms if f in ("own", "rate")], progress):
+            if leaves_noise(campaign, recordings, one.model, outputs):
+                return [one]
+            together.append(one)
     parts = [_best(campaign, recordings, [name], inputs, forms, options, progress) for name in outputs]
-    if not moved or rates is None:
+    if not together or rates is None:
         return parts
-    apart = joined("apart", parts, 0.0).model
-    errors = np.array([left_out_of(rates, one) for one in (apart, moved[0].model)])
-    return (parts, moved)[choose(errors, PREDICT if options.tolerance is None else options.tolerance)]
+    tried = [parts, *([one] for one in together)]
+    errors = np.array([left_out_of(rates, joined("tried", one, 0.0).model) for one in tried])
+    return tried[choose(errors, PREDICT if options.tolerance is None else options.tolerance)]
 
 
 def _best(
