@@ -34,7 +34,7 @@ QUANTITIES = (
     "fan",
 )
 PLACES = ("body", "air", "fluid", "coolant")
-SET_POINT, CELL = "set point", "cell"
+SET_POINT = "set point"
 
 # gloss (what replaces a word of another script in the name of a channel), log odds, words
 _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
@@ -202,7 +202,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "inlet inflow ~zulauf ~eintritt ~einlass entree ingresso entrada ~入口",
     ),
     (
-        CELL,
+        "cell",
         {},
         "cell cells battery batteries batt pack ~batterie akku ~akkus zelle accu bateria ~電池 ~电池 soc ocv",
     ),

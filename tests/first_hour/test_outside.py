@@ -206,7 +206,5 @@ def test_dates_in_which_a_logger_never_pauses_are_not_asked_about(tmp_path: Path
         f"{datetime(2026, 2, 4) + timedelta(minutes=5 * k):%Y-%m-%d %H:%M},{20 + k % 7}" for k in range(700)
     ]
     assert "?" not in read_own(write(tmp_path / "log.csv", "time,T1 [°C]", *rows)).about_time
-    apart = [f"0{1 + k // 9}.0{1 + k // 9}.2026 {8 + k % 9}:00,{20 + k % 7}" for k in range(27)]
-    assert "?" not in read_own(write(tmp_path / "same.csv", "time,T1 [°C]", *apart)).about_time
     days = [f"0{1 + k // 9}/01/2026 {8 + k % 9}:00,{20 + k % 7}" for k in range(27)]
     assert "?" in read_own(write(tmp_path / "days.csv", "time,T1 [°C]", *days)).about_time
