@@ -72,13 +72,16 @@ def discover(
     if options.built_on_file:
         progress("terms on the baseline")
         parts = [_on_file(campaign, recordings, outputs, inputs, options, folder or campaign.path.parent)]
-    elif roles == {"temperature"} and options.form == "auto":
-        progress("terms of " + ", ".join(outputs))
-        parts = [discover_temperatures(campaign, recordings, outputs, inputs, options)]
     else:
-        forms = _forms(roles, options)
-        parts = _each(campaign, recordings, outputs, inputs, forms, options, progress)
-        together = forms == ("masses",)
+        warm, others, parts = _warm(campaign, outputs, roles, options), list(outputs), []
+        if warm:
+            progress("terms of " + ", ".join(warm))
+            parts = [discover_temperatures(campaign, recordings, warm, inputs, options)]
+            others = [name for name in outputs if name not in warm]
+        if others:
+            forms = _forms(roles - {"temperature"} if warm else roles, options)
+            parts += _each(campaign, recordings, others, inputs, forms, options, progress)
+            together = not warm and forms == ("masses",)
     found = joined("discovered", parts, 0.0)
     if together:
         found = _begun(found, campaign, recordings, outputs, options)
@@ -112,6 +115,15 @@ def warmed(campaign: Campaign) -> bool:
     """Whether any channel says what warms or cools: only then is an error a thermal one."""
     inputs = [channel for channel in campaign.channels.values() if channel.is_input]
     return any(c.role not in (FLOW, "other input") or c.unit in ("degC", "K") for c in inputs)
+
+
+def _warm(campaign: Campaign, outputs: Sequence[str], roles: set[str], options: SparseOptions) -> list[str]:
+    """The temperatures among the outputs, if bodies with sensors stand behind them: where no error is among
+    them, of which temperatures are a part.
+    """
+    if options.form != "auto" or "error" in roles:
+        return []
+    return [name for name in outputs if campaign.channels[name].role == "temperature"]
 
 
 def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:
