@@ -182,12 +182,12 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     (
         "air",
         {"air": 7.5, "temperature": 1.5},
-        "air hall ~halle ~hallen ~luft shop workshop ~車間 ~车间 ~工場",
+        "air hall ~halle ~hallen ~luft shop workshop nave taller ~verkstad ~車間 ~车间 ~工場",
     ),
     (
         "room",
         {"air": 7, "temperature": 1.5},
-        "room ~raum ~raeume ~室温 ~室内 ~실내 "
+        "room ~raum ~raeume rum rumstemp rumstemperatur ~室温 ~室内 ~실내 "
         "salle atelier officina stanza sala cabinet lab ~labor chamber ~kammer ~チャンバ ~恒温室",
     ),
     (

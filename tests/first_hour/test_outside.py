@@ -208,3 +208,27 @@ def test_dates_in_which_a_logger_never_pauses_are_not_asked_about(tmp_path: Path
     assert "?" not in read_own(write(tmp_path / "log.csv", "time,T1 [°C]", *rows)).about_time
     days = [f"0{1 + k // 9}/01/2026 {8 + k % 9}:00,{20 + k % 7}" for k in range(27)]
     assert "?" in read_own(write(tmp_path / "days.csv", "time,T1 [°C]", *days)).about_time
+
+
+def test_rows_that_stand_twice_are_read_once(tmp_path: Path) -> None:
+    """An export that repeats rows here and there; a fast logger with a coarse clock repeats stamps alone."""
+    rows = [f"{30 * k},{20 + k % 7},{k % 5}" for k in range(100)]
+    twice = [row for k, row in enumerate(rows) for _ in range(1 + (k % 9 == 4))]
+    table = read_own(write(tmp_path / "twice.csv", "time,T1 [°C],P [W]", *twice))
+    assert table.time.tolist() == [30.0 * k for k in range(100)]
+    assert "11 rows repeat the row before: left out" in table.notes
+    fast = read_own(
+        write(
+            tmp_path / "fast.csv", "time [s],T1 [°C],P [W]", *(f"{k // 4},20,{k // 40}" for k in range(400))
+        )
+    )
+    assert len(fast.time) == 400
+
+
+@pytest.mark.parametrize(
+    "header", ["Temp. nave (°C)", "Rumstemperatur (°C)", "Verkstadstemp [°C]", "Temp. taller"]
+)
+def test_rooms_in_spanish_and_swedish(header: str) -> None:
+    slow = np.linspace(20.0, 23.0, 300)
+    head = Column("T1", "T1", "degC", slow + 5.0)
+    assert guess_all([Column(header, "room", "degC", slow), head])["room"].role == "ambient temperature"
