@@ -118,6 +118,12 @@ _LIKE_NUMBER = re.compile(r"[-+]?\s*(\d[\d.,'’\u00a0\u202f ]*|[.,]\d+)([eE][-+
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}([,.]\d{3})+")
 _DOTTED = re.compile(r"\d{1,4}\.\d{1,2}\.\d{1,4}")  # a date: groups of thousands have three digits
 _SPACED = re.compile(r"(?<=\d)['’\u00a0\u202f ](?=\d{3}(?!\d))")
+_DURATION = re.compile(
+    r"(?P<iso>p)?(?:(?P<d>\d+)\s*(?:d|days?|tage?|j)[\s,]*)?(?(iso)t?)"
+    r"(?:(?P<h>\d+)\s*(?:h|hrs?|std\.?)\s*)?(?:(?P<m>\d+)\s*(?:m|min)\s*)?(?:(?P<s>\d+(?:[.,]\d+)?)\s*(?:s|sec|sek)?)?",
+    re.IGNORECASE,
+)
+_PARTS = {"d": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0}
 _DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d*([eE][-+]?\d+)?")
 
 
@@ -151,20 +157,45 @@ def is_number(cell: str) -> bool:
     >>> is_number("1.234.567"), is_number("12,5 °C"), is_number("02.03.2026")
     (True, True, False)
     """
-    if _DOTTED.fullmatch(cell):
+    if _DOTTED.fullmatch(cell) or is_duration(cell):
         return False
     return bool(_LIKE_NUMBER.fullmatch(cell)) or bool(
         cell[:1] in "+-.,0123456789" and _WITH_UNIT.fullmatch(cell)
     )
 
 
+def is_duration(cell: str) -> bool:
+    """Whether a cell is a length of time with two parts or more, or one as ISO 8601 writes it.
+
+    >>> is_duration("1m30s"), is_duration("PT30S"), is_duration("30 s"), is_duration("1h")
+    (True, True, False, False)
+    """
+    found = _DURATION.fullmatch(cell) if cell[-1:].isalnum() else None
+    if not found:
+        return False
+    return sum(found[part] is not None for part in _PARTS) > (0 if found["iso"] else 1)
+
+
+def duration(cell: str) -> float | None:
+    """The length of time of a cell [s], None: it is none. A cell of one part needs its unit.
+
+    >>> duration("20h00m30s"), duration("P1DT30S"), duration("45s"), duration("45")
+    (72030.0, 86430.0, 45.0, None)
+    """
+    found = _DURATION.fullmatch(cell)
+    if not found or cell.isdecimal() or not cell[-1:].isalnum():
+        return None
+    parts = {part: found[part].replace(",", ".") for part in _PARTS if found[part]}
+    return sum(_PARTS[part] * float(number) for part, number in parts.items()) if parts else None
+
+
 def is_stamp(cell: str) -> bool:
-    """Whether a cell holds a date or a time of day.
+    """Whether a cell holds a date, a time of day or a length of time.
 
     >>> is_stamp("2021/06/13-20:05:00"), is_stamp("8:05"), is_stamp("13. Juni 2021"), is_stamp("2021.5")
     (True, True, True, False)
     """
-    return bool(
+    return is_duration(cell) or bool(
         re.match(
             r"\d{1,4}\s?[-./年]\s?(\d{1,2}|[^\W\d]{3,9}\.?)\s?[-./月 ]\s?\d{1,4}(?!\d)|\d{1,3}[:時h]\d{2}",
             cell,
@@ -235,7 +266,7 @@ def _value(cell: str, comma: bool | None, units: dict[str, int]) -> float | None
         return SWITCHES[folded]
     if (value := _spelled(folded, comma)) is not None:
         return value
-    found = _WITH_UNIT.fullmatch(folded)
+    found = None if is_duration(folded) else _WITH_UNIT.fullmatch(folded)
     value = _spelled(found[1], comma) if found else None
     if found and value is not None:
         unit = cell.strip()[-len(found[2]) :]

@@ -11,6 +11,8 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.firsthour.cells import duration
+
 Array = NDArray[np.float64]
 
 DAY = 86400.0
@@ -93,7 +95,11 @@ def read_instants(cells: Sequence[str]) -> Instants | None:
     zoned = bool((one := _INSTANT.fullmatch(cells[0][:_LONGEST])) and one["zone"])
     order, best, first = min(forward, key=lambda one: unevenness(one[1]))
     others = [one for one in forward if not np.array_equal(one[1], best)]
-    if not others or not (np.diff(best) >= 0).all():
+    if (
+        not others
+        or not (np.diff(best) >= 0).all()
+        or (unbroken(best) and not any(unbroken(one[1]) for one in others))
+    ):
         return Instants(best, first.isoformat(), "instants", zoned=zoned)
     other = min(others, key=lambda one: unevenness(one[1]))[0]
     about = f"instants (? dates read as {_order(order)}, the most even; {_order(other)} runs forward too)"
@@ -118,21 +124,25 @@ def read_times_of_day(cells: Sequence[str]) -> Array | None:
     >>> read_times_of_day(["23:59:30", "0:00:10"]).tolist()
     [0.0, 40.0]
     """
-    parts = [_OF_DAY.fullmatch(cell) for cell in cells]
-    if not all(parts):
+    read = [_since_midnight(cell) for cell in cells]
+    seconds = np.array([math.nan if one is None else one for one in read])
+    if not np.isfinite(seconds).all():
         return None
-    seconds = np.array(
-        [
-            int(p["d"] or 0) * DAY
-            + _hour(p["h"], p["half"] or p["early"]) * 3600.0
-            + int(p["m"]) * 60.0
-            + float((p["s"] or "0").replace(",", "."))
-            for p in parts
-            if p
-        ]
-    )
     days = np.concatenate(([0], np.cumsum(np.diff(seconds) < -DAY / 2)))
     return np.asarray(seconds + DAY * days - seconds[0], dtype=np.float64)
+
+
+def _since_midnight(cell: str) -> float | None:
+    """Return a time of day, or a length of time, in seconds."""
+    found = _OF_DAY.fullmatch(cell)
+    if not found:
+        return duration(cell)
+    return (
+        int(found["d"] or 0) * DAY
+        + _hour(found["h"], found["half"] or found["early"]) * 3600.0
+        + int(found["m"]) * 60.0
+        + float((found["s"] or "0").replace(",", "."))
+    )
 
 
 def of_two_parts(cells: Sequence[str]) -> bool:
@@ -168,6 +178,16 @@ def unevenness(seconds: Array) -> float:
     """Spread of the steps against their mean: 0 where all are alike."""
     steps = np.diff(seconds)
     return float(np.std(steps) / np.abs(np.mean(steps))) if steps.any() and np.mean(steps) else math.inf
+
+
+def unbroken(seconds: Array) -> bool:
+    """Whether a logger wrote stamps (N,) without a pause: no step is longer than two usual ones.
+
+    >>> unbroken(np.array([0.0, 300.0, 600.0])), unbroken(np.array([0.0, 300.0, 600.0, 86400.0]))
+    (True, False)
+    """
+    steps = np.diff(seconds)
+    return bool(steps.size and steps.max() <= 2.0 * np.median(steps))
 
 
 _Parts = tuple[tuple[str, str, str], float, float]

@@ -12,7 +12,7 @@ from discovery.firsthour.asking import Ask, answered, doubt, questions, read_sta
 from discovery.firsthour.guess import TEMPERATURES, Guess, drives
 from discovery.firsthour.joining import join_all
 from discovery.firsthour.measures import DEGREES
-from discovery.firsthour.plan import Plan, plan
+from discovery.firsthour.plan import Plan, plan, predicted
 from discovery.firsthour.recorded import Recorded, never_moves, recorded
 from discovery.firsthour.room import unknown_room
 from discovery.firsthour.table import OwnTable, read_tables
@@ -166,12 +166,10 @@ def _written(folder: Path) -> dict[str, dict[str, object]]:
 
 
 def _outputs(found: Recorded, guesses: Mapping[str, Guess]) -> list[str]:
-    """Return the errors and other outputs, or the temperatures if there are none. Outputs that never move
-    are left out, if another one moves.
-    """
-    stated = [column for column in found.seen if guesses[column.name].role in ("error", "other output")]
-    known = stated or [column for column in found.seen if guesses[column.name].role == "temperature"]
-    return [column.name for column in known if not never_moves(column)] or [column.name for column in known]
+    """Return what is predicted. Outputs that never move are left out, if another one moves."""
+    names = predicted({column.name: guesses[column.name].role for column in found.seen})
+    known = [column for column in found.seen if column.name in names]
+    return [column.name for column in known if not never_moves(column)] or names
 
 
 def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Guess]) -> list[str]:

@@ -89,13 +89,21 @@ def plan(
 
 
 def measured(campaign: Campaign, fit: Sequence[str]) -> list[str]:
-    """The errors and other outputs, else the temperatures; without those that never move, if any moves."""
-    for roles in (("error", "other output"), ("temperature",)):
-        found = [c.name for c in campaign.channels.values() if c.role in roles]
-        moving = [name for name in found if _moves(campaign, fit, name)]
-        if found:
-            return moving or found
-    return []
+    """The errors and other outputs, and the temperatures if there is no error; without those that never move,
+    if any moves.
+    """
+    found = predicted({name: channel.role for name, channel in campaign.channels.items()})
+    return [name for name in found if _moves(campaign, fit, name)] or found
+
+
+def predicted(roles: Mapping[str, str]) -> list[str]:
+    """Names of what models predict, by the roles of all channels.
+
+    >>> predicted({"I": "other input", "U": "other output", "T_cell": "temperature"})
+    ['U', 'T_cell']
+    """
+    measured = ("error", "other output") if "error" in roles.values() else ("other output", "temperature")
+    return [name for name, role in roles.items() if role in measured]
 
 
 def _moves(campaign: Campaign, fit: Sequence[str], name: str) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.errors import UserError
-from discovery.firsthour.cells import is_empty, is_number, is_stamp, read_numbers
+from discovery.firsthour.cells import is_duration, is_empty, is_number, is_stamp, read_numbers
 from discovery.firsthour.instants import (
     is_date,
     is_instant,
@@ -122,6 +122,10 @@ def _candidates(
         if not head:
             continue
         cells = sheet.cells(at)
+        if any(map(is_duration, head)):  # the first may be 0s
+            if (seconds := read_times_of_day(cells)) is not None:
+                yield Clock((at,), seconds, "as time since the start")
+            continue
         dated = is_instant(head[0]) and not head[0].isdecimal()
         if dated or (is_stamp(head[0]) and not is_number(head[0].replace(" ", ""))):
             yield from _stamped(sheet, at, cells, names, units)

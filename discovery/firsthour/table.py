@@ -138,9 +138,10 @@ def _table(sheet: Sheet) -> OwnTable:
         ]
         notes.append(wide.note)
     else:
+        clock, order, doubled = _without_doubles(sheet, clock, order)
         time, said = _spread(clock)
         columns, more = _columns(sheet, names, units, clock, order, comma, taken)
-        notes += [*said, *more]
+        notes += [*doubled, *said, *more]
     if not columns:
         raise UserError(f"{sheet.path}: there is no column of numbers except time")
     columns, steps = _whole_units(columns)
@@ -178,6 +179,21 @@ def _whole_units(columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
                 f'steps, say --is "{column.header}=x{column.unit}"'
             )
     return found, notes
+
+
+def _without_doubles(
+    sheet: Sheet, clock: Clock, order: NDArray[np.intp]
+) -> tuple[Clock, NDArray[np.intp], list[str]]:
+    """The rows without those that repeat the row before, stamp and all, if most stamps have one row alone."""
+    same = np.flatnonzero(np.diff(clock.seconds) == 0) + 1
+    if not same.size or same.size > 0.5 * len(clock.seconds):
+        return clock, order, []
+    cells = [sheet.cells(k) for k in range(len(sheet.header))]
+    doubles = [k for k in same.tolist() if all(one[order[k]] == one[order[k - 1]] for one in cells)]
+    if not doubles:
+        return clock, order, []
+    said = f"{len(doubles)} rows repeat the row before: left out"
+    return replace(clock, seconds=np.delete(clock.seconds, doubles)), np.delete(order, doubles), [said]
 
 
 def _spread(clock: Clock) -> tuple[Array, list[str]]:

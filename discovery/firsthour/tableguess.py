@@ -17,6 +17,7 @@ from discovery.firsthour.guess import (
     TEMPERATURES,
     VOLTAGES,
     Guess,
+    drives,
     evidence_of,
     guess,
     guessed,
@@ -26,7 +27,7 @@ from discovery.firsthour.odds import likely, probabilities
 from discovery.firsthour.shapes import HELD, shape
 from discovery.firsthour.table import Column
 from discovery.firsthour.unitodds import temperature_odds
-from discovery.firsthour.vocabulary import CELL, fold, words_of
+from discovery.firsthour.vocabulary import fold, words_of
 from discovery.recordings.correction import corrected_by_name
 from discovery.recordings.valuecheck import below_zero
 
@@ -37,6 +38,9 @@ _ONE_OF_SEVERAL = re.compile(r"\d+|(?<![^\W\d_])(d ?)?[xyz](?![^\W\d_])")
 _BRACKETS = re.compile(r"[\[(（][^\])）]*[\])）]")
 MOSTLY = 0.3  # share of a fluid temperature that loads and flows explain where they warm it
 _PUSHES = ("torque", "current", "signal", "flow", "power", "speed")
+_MOVED = ("rotation speed", "fluid flow")  # may be set, or answer to what is
+_OF_STEPS = 0.954  # median step of white noise over its standard deviation
+_STEP, _CALM = 6.0, 1.3  # times the noise: a step of what is set, and the scatter between two steps
 
 
 def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str, Guess]:
@@ -132,16 +136,17 @@ def _is_load(one: Guess) -> bool:
 
 
 def _answers(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
-    """Where no error and no temperature is measured: what never holds its value answers to what somebody
-    sets, and what a controller sends is no heat. A voltage that answers a current is that of a cell.
+    """What answers to what somebody sets is an output: an error that nothing warms, the voltage of a current
+    that alone is set, and, where no error and no temperature is measured, whatever never holds its value.
+
+    There, what a controller sends is no heat.
     """
-    found = dict(guesses)
-    holds = {c.name: _held(c.values) for c in columns if found[c.name].role != "applied correction"}
-    if any(one.role in TEMPERATURES or one.role == "error" for one in guesses.values()):
-        cell = any(word.gloss == CELL for c in columns for word in words_of(c.header))
-        return _cell(found, holds) if cell else found
-    for name, one in guesses.items():
-        if one.quantity == "signal" and one.role == "heat load" and not any(map(_is_heat, guesses.values())):
+    found = _unwarmed(guesses)
+    holds = _holds([c for c in columns if found[c.name].role != "applied correction"])
+    if any(one.role in TEMPERATURES or one.role == "error" for one in found.values()):
+        return _voltage(found, holds)
+    for name, one in found.items():
+        if one.quantity == "signal" and one.role == "heat load" and not any(map(_is_heat, found.values())):
             found[name] = replace(one, role=OTHER, why=f"{one.why}; nothing here is heated")
     if True not in holds.values():  # all move: what pushes drives what moves
         pushes = [name for name, one in found.items() if one.quantity in _PUSHES and one.role == OTHER]
@@ -150,7 +155,7 @@ def _answers(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[st
                 found[name] = one.doubtful(f"taken to answer to {pushes[0]}", role="other output")
         return found
     for name, held in holds.items():
-        if held is False and found[name].role == OTHER:
+        if held is False and found[name].role in (OTHER, *_MOVED):
             why = "it never holds its value, so nobody sets it; nothing else is measured"
             found[name] = found[name].doubtful(why, role="other output")
     return found
@@ -160,24 +165,64 @@ def _is_heat(one: Guess) -> bool:
     return one.role == "heat load" and one.quantity != "signal"
 
 
-def _cell(guesses: Mapping[str, Guess], holds: Mapping[str, bool | None]) -> dict[str, Guess]:
-    """If a current is set, a voltage is not, and there is no error, then the voltage is measured."""
+def _unwarmed(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """If nothing here warms, but a force or the like is recorded, a displacement is no thermal error."""
+    found = dict(guesses)
+    warm = drives({name: one for name, one in found.items() if one.unit not in VOLTAGES})
+    thermal = warm or any(one.role in TEMPERATURES for one in found.values())
+    pushed = [name for name, one in found.items() if one.role == OTHER and one.unit not in ("1", *DEGREES)]
+    if not thermal and pushed:
+        for name, one in found.items():
+            if one.role == "error" and not one.said:
+                why = f"{one.why}; {pushed[0]} moves it, nothing warms it"
+                found[name] = replace(one, role="other output", why=why)
+    return found
+
+
+def _voltage(guesses: Mapping[str, Guess], holds: Mapping[str, bool | None]) -> dict[str, Guess]:
+    """If a current is set, a voltage is not, and nothing else drives, then the voltage answers, as that of a
+    battery does.
+    """
     found = dict(guesses)
     currents = [n for n, one in guesses.items() if one.unit in CURRENTS and holds.get(n)]
     voltages = [n for n, one in guesses.items() if one.unit in VOLTAGES and holds.get(n) is False]
-    if len(currents) == 1 and not any(one.role == "error" for one in guesses.values()):
+    if currents == drives(guesses) and not any(one.role == "error" for one in guesses.values()):
         for name in voltages:
             why = f"it answers to {currents[0]}, which is set"
             found[name] = guesses[name].doubtful(why, role="other output")
     return found
 
 
+def _holds(columns: Sequence[Column]) -> dict[str, bool | None]:
+    """Whether each column holds its value between steps, so that somebody sets it. None: it never moves.
+
+    Most readings repeat the one before; where this is so for no column, it counts up to the noise.
+    """
+    found = {c.name: _held(c.values) for c in columns}
+    return found if True in found.values() else {c.name: _held_noisily(c.values) for c in columns}
+
+
 def _held(values: Array) -> bool | None:
-    """Return whether most readings repeat the one before. None: the column never moves."""
     known = values[np.isfinite(values)]
     if not known.size or known.min() == known.max():
         return None
     return bool(np.mean(np.diff(known) == 0) > HELD)
+
+
+def _held_noisily(values: Array) -> bool | None:
+    """Return whether readings scatter between steps no more than from one to the next. None: there is no
+    step.
+    """
+    known = values[np.isfinite(values)]
+    steps = np.abs(np.diff(known))
+    noise = float(np.median(steps)) / _OF_STEPS if steps.size else 0.0
+    if noise == 0.0:
+        return _held(values)
+    levels = np.split(known, np.flatnonzero(steps > _STEP * noise) + 1)
+    inside = np.concatenate([level - level.mean() for level in levels])
+    if float(np.sqrt(np.mean(inside**2))) > _CALM * noise:
+        return False
+    return True if len(levels) > 1 else None
 
 
 def _air(column: Column) -> tuple[float, int]:

@@ -34,7 +34,7 @@ QUANTITIES = (
     "fan",
 )
 PLACES = ("body", "air", "fluid", "coolant")
-SET_POINT, CELL = "set point", "cell"
+SET_POINT = "set point"
 
 # gloss (what replaces a word of another script in the name of a channel), log odds, words
 _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
@@ -182,12 +182,12 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     (
         "air",
         {"air": 7.5, "temperature": 1.5},
-        "air hall ~halle ~hallen ~luft shop workshop ~車間 ~车间 ~工場",
+        "air hall ~halle ~hallen ~luft shop workshop nave taller ~verkstad ~車間 ~车间 ~工場",
     ),
     (
         "room",
         {"air": 7, "temperature": 1.5},
-        "room ~raum ~raeume ~室温 ~室内 ~실내 "
+        "room ~raum ~raeume rum rumstemp rumstemperatur ~室温 ~室内 ~실내 "
         "salle atelier officina stanza sala cabinet lab ~labor chamber ~kammer ~チャンバ ~恒温室",
     ),
     (
@@ -202,7 +202,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "inlet inflow ~zulauf ~eintritt ~einlass entree ingresso entrada ~入口",
     ),
     (
-        CELL,
+        "cell",
         {},
         "cell cells battery batteries batt pack ~batterie akku ~akkus zelle accu bateria ~電池 ~电池 soc ocv",
     ),

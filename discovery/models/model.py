@@ -95,16 +95,19 @@ class Model:
         starts = (state.start for state in self.states.values() if state.start is not None)
         return frozenset().union(*(names(start) for start in starts))
 
+    @property
+    def only_starting(self) -> frozenset[str]:
+        """Names that the formulas of start values use, and nothing else."""
+        return self.start_names - frozenset().union(*(names(one) for one in self.expressions()))
+
     def with_starts_held(self) -> Model:
         """The model with fixed values of the parameters that only its start values use.
 
         They belong to the first readings of a recording. A fit to later readings would change them to absorb
         what the model lacks.
         """
-        used = frozenset().union(*(names(expression) for expression in self.expressions()))
-        starting = self.start_names - used
         parameters = {
-            name: replace(parameter, fixed=parameter.fixed or name in starting)
+            name: replace(parameter, fixed=parameter.fixed or name in self.only_starting)
             for name, parameter in self.parameters.items()
         }
         return replace(self, parameters=parameters)

@@ -56,7 +56,7 @@ _ROW = 3  # such readings in a row
 _TRACE = 3.0  # times the usual steps, or those next to it: a response leaves more behind
 _SOME = 3  # readings that are none: no slip any more
 _MANY, _MANY_SHARE = 5, 0.01  # so many lone readings, or such a share of all, pull at a fit
-_ZERO = 15.0  # median steps that a reading falls to be exactly zero
+_ZERO, _FALL = 15.0, 3.0  # median steps, and large ones, that a reading falls to be exactly zero
 _STEP = 12.0  # times the largest of the steps around it: a jump, not a response
 _SENSORS = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature", "error")
 
@@ -218,12 +218,15 @@ def _zeros(channel: Channel, read: Array) -> Lines:
         rows = rows[rows > others[0]]
     if not rows.size or others.size < FEW or rows.size > 0.4 * read.size:
         return np.zeros(0, dtype=np.intp)
-    usual = 1.4826 * float(np.median(np.abs(np.diff(read[others])))) or 1e-12
+    steps = np.abs(np.diff(read[others]))
+    usual = 1.4826 * float(np.median(steps))
+    # most steps are zero where a sensor is coarse or the air calm
+    largest = float(np.percentile(steps[steps > 0], 90)) if steps.any() else 0.0
     place = np.searchsorted(others, rows)
     before, after = others[np.maximum(place - 1, 0)], others[np.minimum(place, others.size - 1)]
     near = np.minimum(np.abs(read[before]), np.abs(read[after]))
     between = np.sign(read[before]) == np.sign(read[after])
-    return np.asarray(rows[(near > _ZERO * usual) & between])
+    return np.asarray(rows[(near > max(_ZERO * usual, _FALL * largest)) & between])
 
 
 def _steps(read: Array, wrong: Lines) -> Iterator[int]:

@@ -21,10 +21,12 @@ from discovery.sparse.discovery import Discovery, PathPoint, path_points
 from discovery.sparse.drives import Drives
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.library import Feature, FilteredInputs
-from discovery.sparse.masses import Response, Rules, mass_model, responses_of, slowest, within
+from discovery.sparse.masses import Response, Rules, mass_model, responses_of, slowest, surprise, within
 from discovery.sparse.optimiser import SparseSearch, features_of
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.problem import WHOLE
+from discovery.sparse.ratedata import half_forgotten
+from discovery.terms import evaluate, parse
 
 Array = NDArray[np.float64]
 
@@ -78,6 +80,7 @@ def discover_masses(
             output,
             {name: c.unit for name, c in campaign.channels.items()},
             data.drives.settled,
+            _lasting(data, features),
             options.bounds,
             (float(library.taus_[0]), float(library.taus_[-1])),
             choice.start_sd,
@@ -138,6 +141,22 @@ def _searched(
     return choice, noise
 
 
+def _lasting(data: MassData, features: Sequence[Feature]) -> dict[str, float]:
+    """How long [s] the drives of responses have been about what they are, in the mean over an exponential
+    autocorrelation.
+    """
+    found = {}
+    for drive in {f.drive for f in features if 0.0 < f.tau < np.inf} & set(data.drives.passing):
+        halves = []
+        for grid in data.grids.values():
+            series = np.broadcast_to(evaluate(parse(drive), dict(grid.nodes)).value, grid.time.shape)
+            if len(grid.time) > 1 and np.ptp(series) > 0:
+                halves.append(half_forgotten(grid.time, np.asarray(series)))
+        if halves:
+            found[drive] = float(np.median(halves) / np.log(2.0))
+    return found
+
+
 def over(choice: Choice, noise: float) -> Choice:
     """The choice with what it misses counted in reading noises."""
     left_out, fit = (tuple(rms / noise for rms in some) for some in (choice.left_out, choice.fit))
@@ -164,6 +183,9 @@ def _clear(
     """The model of the chosen features, fitted by output error, without those whose interval holds zero;
     these; and which of the chosen ones (n,) end as slow as a mass may be.
 
+    Recordings may begin cold, or while the machine works and its masses have followed their drives: of both
+    that one stands which makes the readings likelier.
+
     Args:
         missed: noise by which the fit weighs readings, over that of the search: the prior of a gain counts
             against a residual alike in both.
@@ -177,8 +199,9 @@ def _clear(
     def fitted(model: Model) -> Fit:
         return fit_model(model, campaign, recordings, [rules.output], grids=grids)
 
+    cold = replace(rules, lasting={})
     while True:
-        fit = fitted(mass_model(rules, responses))
+        fit = fitted(mass_model(cold, responses))
         responses, strength = responses_of(fit, responses)
         ended = {r.chosen for r in responses if slowest(rules, r)}
         slow |= [f in ended for f in features]
@@ -189,7 +212,8 @@ def _clear(
         free = [i for i, r in enumerate(responses) if r.feature.drive not in options.keep]
         weakest = min(free, key=lambda i: strength[i], default=None)
         if weakest is None or strength[weakest] >= CLEAR:
-            return fit.model, [r.chosen for r in responses], slow
+            begun = [fit, fitted(mass_model(rules, responses))] if rules.lasting else [fit]
+            return min(begun, key=surprise).model, [r.chosen for r in responses], slow
         responses = [r for i, r in enumerate(responses) if i != weakest]
 
 

@@ -77,10 +77,11 @@ def discover_rates(
     fit = judge.refit(choice.terms, data.grids, None, 25)
     names = [labels.get(name, name) for name in seen.names]
     kept_labels = [names[j] for j in choice.terms.members if seen.names[j] in labels]
+    path = path_points(data.outputs, choice, names, model.only_starting)
     report = {
         "outputs": list(data.outputs),
         "form": "rates",
-        "terms": len(choice.terms),
+        "terms": path[choice.row].terms,
         "left_out_rms": round(choice.left_out[choice.row], 4),
         "library": len(labels),
         "kept": kept_labels,
@@ -92,7 +93,7 @@ def discover_rates(
     }
     shares = zip(choice.terms.family, choice.stability, strict=True)
     named = {names[f]: share for f, share in shares if seen.names[f] in labels}
-    return Discovery(fit.model, path_points(data.outputs, choice, names), named, report)
+    return Discovery(fit.model, path, named, report)
 
 
 @dataclass(frozen=True)

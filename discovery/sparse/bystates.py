@@ -110,11 +110,7 @@ def _start(data: RateData, kind: str, words: Sequence[str], unit: str, options: 
         structure, options = _allowed(data, full, options)
         entered = {i for i, c in enumerate(structure.candidates) if c.start != 0.0}
         return Start(structure, entered, options, cost)
-    bare = (
-        own(data, data.outputs, words, unit, options.stable)
-        if kind == "own"
-        else rate(data, y, words, unit, options.stable)
-    )
+    bare = (own if kind == "own" else rate)(data, data.outputs, words, unit, options.stable)
     bare, options = _allowed(data, bare, options)
     structure, entered, cost = _begun(data, bare)
     return Start(structure, entered, options, cost)
@@ -219,12 +215,12 @@ def _weakly(data: RateData, structure: Structure, widths: Sequence[float]) -> tu
     values: dict[int, float] = {}
     chosen: set[int] = set()
     for k, output in enumerate(data.outputs):
-        into = structure.rate or output
+        into = structure.rates.get(output, output)
         mine = [i for i, c in enumerate(structure.candidates) if c.into == into]
         library = [structure.candidates[i].expression for i in mine]
         grids = [data.grids[r] for r in data.recordings]
         rows = [
-            weak_rows(g, output, library, None, None, structure.order, widths[k], structure.rate, second)
+            weak_rows(g, output, library, None, None, structure.order, widths[k], structure.rates, second)
             for g in grids
         ]
         g = total([one.gram for one in rows])

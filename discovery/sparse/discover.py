@@ -72,13 +72,16 @@ def discover(
     if options.built_on_file:
         progress("terms on the baseline")
         parts = [_on_file(campaign, recordings, outputs, inputs, options, folder or campaign.path.parent)]
-    elif roles == {"temperature"} and options.form == "auto":
-        progress("terms of " + ", ".join(outputs))
-        parts = [discover_temperatures(campaign, recordings, outputs, inputs, options)]
     else:
-        forms = _forms(roles, options)
-        parts = _each(campaign, recordings, outputs, inputs, forms, options, progress)
-        together = forms == ("masses",)
+        warm, others, parts = _warm(campaign, outputs, roles, options), list(outputs), []
+        if warm:
+            progress("terms of " + ", ".join(warm))
+            parts = [discover_temperatures(campaign, recordings, warm, inputs, options)]
+            others = [name for name in outputs if name not in warm]
+        if others:
+            forms = _forms(roles - {"temperature"} if warm else roles, options)
+            parts += _each(campaign, recordings, others, inputs, forms, options, progress)
+            together = not warm and forms == ("masses",)
     found = joined("discovered", parts, 0.0)
     if together:
         found = _begun(found, campaign, recordings, outputs, options)
@@ -114,6 +117,15 @@ def warmed(campaign: Campaign) -> bool:
     return any(c.role not in (FLOW, "other input") or c.unit in ("degC", "K") for c in inputs)
 
 
+def _warm(campaign: Campaign, outputs: Sequence[str], roles: set[str], options: SparseOptions) -> list[str]:
+    """The temperatures among the outputs, if bodies with sensors stand behind them: where no error is among
+    them, of which temperatures are a part.
+    """
+    if options.form != "auto" or "error" in roles:
+        return []
+    return [name for name in outputs if campaign.channels[name].role == "temperature"]
+
+
 def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:
     """Forms to try, the plainer one first: "masses", and what may stand behind an output in rates."""
     states = HIDDEN if options.hidden == "auto" else (options.hidden,)
@@ -136,27 +148,28 @@ def _each(
     progress: Progress,
 ) -> list[Discovery]:
     """A discovery of each output, or of all together where outputs move each other, as a position and its
-    rate do.
+    rate do, or two masses with a spring between them.
 
-    Together they need no hidden states. So this comes first, and ends the search if it leaves nothing but
-    white noise; otherwise the better one on left-out data stands.
+    Together they need no further hidden states. So this comes first, and ends the search if it leaves nothing
+    but white noise; otherwise the better one on left-out data stands.
     """
     if "coupling" in (options.library or ()) and options.form != "masses":
         return [_best(campaign, recordings, outputs, inputs, forms, options, progress)]
-    moved: list[Discovery] = []
+    together: list[Discovery] = []
     rates = None
     if len(outputs) > 1 and "own" in forms and options.library is None:
         rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
         coupled = options.model_copy(update={"library": (*WORDS, "coupling")})
-        moved = list(discover_states(rates, coupled, ["own"], progress))
-        if moved and leaves_noise(campaign, recordings, moved[0].model, outputs):
-            return moved
+        for one in discover_states(rates, coupled, [f for f in forms if f in ("own", "rate")], progress):
+            if leaves_noise(campaign, recordings, one.model, outputs):
+                return [one]
+            together.append(one)
     parts = [_best(campaign, recordings, [name], inputs, forms, options, progress) for name in outputs]
-    if not moved or rates is None:
+    if not together or rates is None:
         return parts
-    apart = joined("apart", parts, 0.0).model
-    errors = np.array([left_out_of(rates, one) for one in (apart, moved[0].model)])
-    return (parts, moved)[choose(errors, PREDICT if options.tolerance is None else options.tolerance)]
+    tried = [parts, *([one] for one in together)]
+    errors = np.array([left_out_of(rates, joined("tried", one, 0.0).model) for one in tried])
+    return tried[choose(errors, PREDICT if options.tolerance is None else options.tolerance)]
 
 
 def _best(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -32,19 +32,20 @@ class Discovery:
     report: dict[str, Any]
 
 
-def path_points(outputs: Sequence[str], choice: Choice, names: Sequence[str]) -> tuple[PathPoint, ...]:
-    """The sets of a choice as points of its path; `names` (F,) of the families."""
-    return tuple(
-        PathPoint(
-            tuple(outputs),
-            len(one),
-            choice.left_out[k],
-            choice.fit[k],
-            k == choice.row,
-            tuple(names[f] for f in one.members),
-        )
-        for k, one in enumerate(choice.path)
-    )
+def path_points(
+    outputs: Sequence[str], choice: Choice, names: Sequence[str], starts: Collection[str] = ()
+) -> tuple[PathPoint, ...]:
+    """The sets of a choice as points of its path.
+
+    Args:
+        names: (F,) of the families. starts: those of them that are no terms, but where states begin.
+    """
+    points = []
+    for k, one in enumerate(choice.path):
+        shown = tuple(names[f] for f in one.members if names[f] not in starts)
+        fits = choice.left_out[k], choice.fit[k]
+        points.append(PathPoint(tuple(outputs), len(shown), *fits, k == choice.row, shown))
+    return tuple(points)
 
 
 def merged(name: str, parts: Sequence[Model]) -> Model:

@@ -89,8 +89,9 @@ class Drives:
     inputs: tuple[str, ...]
     expressions: tuple[str, ...]
     linear: tuple[str, ...]  # inputs that run straight between their stamps
-    settled: tuple[str, ...]  # expressions whose mass begins in balance with them: air, measured bodies
+    settled: tuple[str, ...]  # expressions whose mass begins in balance with them: temperatures
     integrals: tuple[str, ...] = ()  # expressions that may add up without bound
+    passing: tuple[str, ...] = ()  # expressions of no air and no body: a machine need not have stood in them
 
 
 def make_drives(inputs: Inputs, campaign: Campaign, library: Sequence[str] | None = None) -> Drives:
@@ -115,10 +116,17 @@ def make_drives(inputs: Inputs, campaign: Campaign, library: Sequence[str] | Non
     air = frozenset((*inputs.of(*TEMPERATURES), *inputs.bodies))
     gate = names(parse(inputs.gate)) if inputs.gate else frozenset()
     settled = [e for e in expressions if names(parse(e)) & air and not names(parse(e)) & gate]
+    stood = {*inputs.of(AMBIENT), *inputs.bodies}
+    passing = [e for e in expressions if not names(parse(e)) & stood or names(parse(e)) & gate]
     linear = [name for name in inputs.names if campaign.channels[name].between == "linear"]
     charges = [name for name in inputs.of("other input") if name not in inputs.bodies]
     return Drives(
-        inputs.names, tuple(dict.fromkeys(expressions)), tuple(linear), tuple(settled), tuple(charges)
+        inputs.names,
+        tuple(dict.fromkeys(expressions)),
+        tuple(linear),
+        tuple(settled),
+        tuple(charges),
+        tuple(passing),
     )
 
 

@@ -134,7 +134,6 @@ def _family(
                 *(f"{name}*({state} - {room})/100" for name in drawn), *(f"({name}/100)**2" for name in drawn)
             )
         case "second mass":
-            return towards(
-                *((name, f"{name} - {state}") for name in model.states if name.startswith(f"{state}_mass"))
-            )
+            behind = (f"{state}_mass", f"{room}_mass")
+            return towards(*((name, f"{name} - {state}") for name in model.states if name.startswith(behind)))
     return []

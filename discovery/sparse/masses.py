@@ -52,6 +52,7 @@ class Rules:
     output: str
     units: Mapping[str, str]  # of channels
     settled: Collection[str]  # drives whose mass begins in balance with them
+    lasting: Mapping[str, float]  # s, for which another drive has been about what it is at the start
     bounds: Mapping[str, tuple[float, float]]
     time_constants: tuple[float, float]  # s, of the grid of the search
     start_sd: float
@@ -87,11 +88,14 @@ def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
             state, tau = f"{y}_{number[r.pole]}", f"{y}_tau{number[r.pole]}"
             if state not in states:
                 parameters[tau] = Parameter(r.feature.tau, "s", *rules.limits)
-                states[state] = State(state, unit, None, Number(0.0), rules.start_sd, 1.0)
+                states[state] = State(
+                    state, unit, None, Number(0.0), _start_sd(rules, responses, r.pole), 1.0
+                )
                 terms.append(Term(f"{state} settles", state, parse(f"-{state}/{tau}")))
-            if drive in rules.settled:
+            if share := _share(rules, drive, tau):
                 start = states[state].start
-                begun = driven if start in (None, Number(0.0)) else f"{text(start)} + {driven}"
+                begun = text(parse(f"{driven}*{share}"))
+                begun = begun if start in (None, Number(0.0)) else f"{text(start)} + {begun}"
                 states[state] = replace(states[state], start=parse(begun))
             terms.append(Term(f"{drive} through {state}", state, parse(f"{driven}/{tau}")))
         prior = (0.0, r.spread) if 0.0 < r.spread < np.inf else None  # exact readings need none
@@ -100,6 +104,30 @@ def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
         states[f"{y}_zero"] = State(f"{y}_zero", unit, None, Number(0.0), rules.zero_sd, 1.0)
     output = parse(" + ".join([*states, *direct]) or "0")
     return Model(y, parameters, states, tuple(terms), {y: output}, "s")
+
+
+def _share(rules: Rules, drive: str, tau: str) -> str:
+    """The share of its balance with a drive that a mass has at the start, or "": all of it where the mass
+    settles sooner than the drive changes.
+
+    Of a drive u whose autocorrelation falls off as exp(-t/T), E[s | u] = gain u T/(T + tau).
+    """
+    if drive not in rules.lasting:
+        return "1" if drive in rules.settled else ""
+    lasts = f"{rules.lasting[drive]:.4g}"
+    return f"({lasts}/({lasts} + {tau}))"
+
+
+def _start_sd(rules: Rules, responses: Sequence[Response], pole: int) -> float:
+    """Spread of the start of a mass: a mass that settles sooner than its drives change is near its balance.
+
+    A drive that lasts T explains T/(T + tau) of the variance; the drive that explains least counts.
+    """
+    left = []
+    for r in (r for r in responses if r.lagged and r.pole == pole):
+        lasts = rules.lasting.get(r.feature.drive, 0.0)
+        left.append(r.feature.tau / (lasts + r.feature.tau))
+    return rules.start_sd * float(np.sqrt(max(left)))
 
 
 def _gain(output: str, k: int, response: Response) -> str:
@@ -126,6 +154,16 @@ def responses_of(fit: Fit, responses: Sequence[Response]) -> tuple[list[Response
         found.append(replace(r, feature=replace(r.feature, tau=tau), gain=values[gain].value))
         strength.append(abs(values[gain].value) / max(errors[gain], 1e-300))
     return found, strength
+
+
+def surprise(fit: Fit) -> float:
+    """-log of how likely the readings are under where the masses of a fit are said to begin, up to a constant
+    (Laplace): a wide prior of starts costs what it leaves open.
+    """
+    starts = [k for k, u in enumerate(fit.problem.unknowns) if u.is_start and u.prior]
+    spreads = [np.log(u.prior[1]) for u in fit.problem.unknowns if u.is_start and u.prior]
+    found = float(np.linalg.slogdet(fit.covariance[np.ix_(starts, starts)])[1]) if starts else 0.0
+    return fit.cost / fit.together + float(np.sum(spreads)) - 0.5 * found
 
 
 def slowest(rules: Rules, response: Response) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, make_grid, predict
 from discovery.errors import RunsAwayError
@@ -66,15 +67,21 @@ def time_scale(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[
         recording = campaign.recordings[name]
         known = np.isfinite(recording.values[output])
         time, series = recording.time[known], recording.values[output][known]
-        if len(time) < 8 or np.ptp(series) == 0:
-            continue
-        raster = np.linspace(time[0], time[-1], min(_RASTER, 2 * len(time)))
-        x = np.interp(raster, time, series)
-        power = np.abs(np.fft.rfft(x - x.mean(), 2 * len(x))) ** 2
-        rho = np.fft.irfft(power)[: len(x)]
-        below = np.flatnonzero(rho[1:] < 0.5 * rho[1])
-        found.append((below[0] + 1 if len(below) else len(x)) * (raster[1] - raster[0]))
+        if len(time) >= 8 and np.ptp(series) > 0:
+            found.append(half_forgotten(time, series))
     return float(np.median(found)) if found else 1.0
+
+
+def half_forgotten(time: NDArray[np.float64], series: NDArray[np.float64]) -> float:
+    """Time [s] after which the autocorrelation of a series (N,) at instants `time` (N,) [s] is one half of
+    that at the smallest lag.
+    """
+    raster = np.linspace(time[0], time[-1], min(_RASTER, 2 * len(time)))
+    x = np.interp(raster, time, series)
+    power = np.abs(np.fft.rfft(x - x.mean(), 2 * len(x))) ** 2
+    rho = np.fft.irfft(power)[: len(x)]
+    below = np.flatnonzero(rho[1:] < 0.5 * rho[1])
+    return float((below[0] + 1 if len(below) else len(x)) * (raster[1] - raster[0]))
 
 
 def readings_that_show(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> int:

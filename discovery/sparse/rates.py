@@ -114,7 +114,8 @@ def without_idle(model: Model, outputs: Sequence[str]) -> Model:
     states = {name: state for name, state in model.states.items() if name in needed}
     left = replace(model, states=states, terms=tuple(mine))
     used = left.start_names.union(*(names(t.expression) for t in mine), *(names(e) for e in read))
-    idle = frozenset().union(*(names(t.expression) for t in model.terms if t not in mine)) - used
+    gone = [names(t.expression) for t in model.terms if t not in mine]
+    idle = model.start_names.union(*gone) - used
     parameters = {name: p for name, p in model.parameters.items() if name not in idle}
     return replace(left, parameters=parameters)
 

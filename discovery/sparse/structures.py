@@ -2,9 +2,8 @@
 empties into it.
 
     own        y' = sum of terms in y and the inputs
-    rate       y' = v,  v' = sum of terms in y, v and the inputs            a mass on a spring, a resonant
-    circuit upstream   y' = flow(h) - flow(y),  h' = terms in the inputs - flow(h)  a tank above a tank, a
-    body behind a body
+    rate       y' = v,  v' = sum of terms in y, v and the inputs            a mass on a spring
+    upstream   y' = flow(h) - flow(y),  h' = terms in the inputs - flow(h)  a tank above a tank
 
 The flow out of the upstream body enters the output. This fixes the scale of the hidden state.
 """
@@ -12,7 +11,7 @@ The flow out of the upstream body enters the output. This fixes the scale of the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +40,7 @@ class Structure:
     model: Model
     candidates: tuple[Candidate, ...]
     order: int = 1  # of the derivative that the library makes
-    rate: str | None = None  # hidden state that is the rate of the output
+    rates: Mapping[str, str] = field(default_factory=dict)  # of outputs, where these are hidden states
 
 
 def own(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str, stable: bool) -> Structure:
@@ -60,24 +59,31 @@ def own(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str,
     return Structure("own", Model("own", {}, states, (), {}, unit), tuple(found))
 
 
-def rate(data: RateData, output: str, words: Sequence[str], unit: str, stable: bool) -> Structure:
-    """Terms in the second derivative of an output."""
-    v = f"{output}_rate"
-    measured = _measured(data, output, unit)
-    speed = float(np.nanstd(np.diff(_seen(data, output)))) or 1.0
-    per = 1.0 / TIME_UNITS[unit]
-    states = {
-        output: measured,
-        v: State(v, f"{measured.unit}/{unit}", None, Number(0.0), REST * speed, per),
-    }
-    terms = (Term(f"{v} moves {output}", output, parse(v)),)
-    inputs = _inputs(data, [output])
-    found = _driven(data, v, [output], words)
-    found += [_law(v, output, one, stable) for one in laws(words, output, _seen(data, output))]
-    found += [_law(v, v, one, stable) for one in laws([w for w in words if w not in ("sqrt", "square")], v)]
-    found += [Candidate(v, parse(one)) for one in products(words, [output, v, *inputs])]
-    found += _expressions(words, v, {"y": output, "rate": v})
-    return Structure("rate", Model("rate", {}, states, terms, {}, unit), tuple(found), 2, v)
+def rate(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str, stable: bool) -> Structure:
+    """Terms in the second derivatives of outputs. What couples two of them, as a spring between two masses
+    does, follows their difference.
+    """
+    per, inputs = 1.0 / TIME_UNITS[unit], _inputs(data, outputs)
+    rates = {y: f"{y}_rate" for y in outputs}
+    states, terms, found = {}, [], []
+    for y, v in rates.items():
+        states[y] = _measured(data, y, unit)
+        speed = float(np.nanstd(np.diff(_seen(data, y)))) or 1.0
+        states[v] = State(v, f"{states[y].unit}/{unit}", None, Number(0.0), REST * speed, per)
+        terms.append(Term(f"{v} moves {y}", y, parse(v)))
+        found += _driven(data, v, outputs, words)
+        found += [_law(v, y, one, stable) for one in laws(words, y, _seen(data, y))]
+        found += [
+            _law(v, v, one, stable) for one in laws([w for w in words if w not in ("sqrt", "square")], v)
+        ]
+        others = [o for o in outputs if o != y and "coupling" in words]
+        for o in others:
+            found += [Candidate(v, parse(one)) for one in (o, rates[o])]
+            bent = laws([w for w in words if w in ("cubic", "drag")], f"({o} - {y})")
+            found += [Candidate(v, parse(one)) for one in bent]
+        found += [Candidate(v, parse(one)) for one in products(words, [y, v, *others, *inputs])]
+        found += _expressions(words, v, {"y": y, "rate": v})
+    return Structure("rate", Model("rate", {}, states, tuple(terms), {}, unit), tuple(found), 2, rates)
 
 
 def upstream(

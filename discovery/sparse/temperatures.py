@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign
+from discovery.sparse.bymasses import CLEAR
 from discovery.sparse.byrates import discover_rates
 from discovery.sparse.constraints import kept
 from discovery.sparse.discovery import Discovery
 from discovery.sparse.drives import AMBIENT, Inputs
 from discovery.sparse.families import candidates
 from discovery.sparse.options import SparseOptions
-from discovery.sparse.ratedata import make_rate_data, nearer
-from discovery.sparse.rates import Candidate, with_candidates, without_idle
+from discovery.sparse.ratedata import RateData, make_rate_data, nearer
+from discovery.sparse.rates import Candidate, refit, with_candidates, without, without_idle
 from discovery.sparse.starts import started
 from discovery.terms import Name, Term, parse, text
 
@@ -35,7 +36,11 @@ def discover_temperatures(
     inputs: Inputs,
     options: SparseOptions,
 ) -> Discovery:
-    """Choose the terms that move bodies behind sensors, and fit their numbers."""
+    """Choose the terms that move bodies behind sensors, and fit their numbers.
+
+    The time constants of the masses behind them are those of a list while terms are chosen, then free. Masses
+    begin as far from the first reading in every recording, so that free runs of others begin there, too.
+    """
     room, states = _room(outputs, inputs, len(recordings))
     longest = max(float(campaign.recordings[r].time[-1]) for r in recordings)
     masses = second_masses(longest) if "second mass" in (options.library or LABORATORY) else ()
@@ -47,10 +52,14 @@ def discover_temperatures(
         states[name] = State(name, "degC", None, None, START_SD, 1.0)
         terms.append(Term(f"sensor {name} follows", name, parse(f"({body} - {name})/{name}_lag")))
         states[body] = State(body, "degC", None, Name(name), START_SD, 1 / 3600)
-        for k, tau in enumerate(masses, start=1):
-            mass = f"{body}_mass{k}"
-            states[mass] = State(mass, "degC", None, Name(name), 0.0, 1.0)
-            terms.append(Term(f"{mass} follows", mass, parse(f"({body} - {mass})/{tau:g}")))
+    air = inputs.of(AMBIENT)[:1]
+    for source, start in [*zip(bodies, outputs, strict=True), *((one, one) for one in air)]:
+        for k, tau in enumerate(masses, start=1):  # what is behind a body, or between it and the air: a wall
+            mass = f"{source}_mass{k}"
+            parameters[f"{mass}_off"] = Parameter(0.0, "K", prior=(0.0, START_SD))
+            parameters[f"{mass}_tau"] = Parameter(tau, "s", tau / _STEP, tau * _STEP, fixed=True)
+            states[mass] = State(mass, "degC", None, parse(f"{start} + {mass}_off"), 0.0, 1.0)
+            terms.append(Term(f"{mass} follows", mass, parse(f"({source} - {mass})/{mass}_tau")))
     empty = Model("temperatures", parameters, states, tuple(terms), {}, "h")
     words = options.library or LABORATORY
     own = [Candidate(body, parse(f"{room} - {body}"), 0.0) for body in bodies]
@@ -73,7 +82,36 @@ def discover_temperatures(
     easy = [n for n, label in labels.items() if label.split(": ", 1)[1] in first]
     always = [*decay, *kept(labels, options, campaign.path)]
     found = discover_rates(data, nearer(data, model, slow), labels, always, options, plain=plain, easy=easy)
-    return replace(found, model=without_idle(found.model, outputs))
+    model = _timed(data, without_idle(found.model, outputs), [n for n in labels if n not in always])
+    gone = {label for n, label in labels.items() if n in found.model.parameters and n not in model.parameters}
+    left = [label for label in found.report["kept"] if label not in gone]
+    terms = found.report["terms"] - len(found.report["kept"]) + len(left)
+    return replace(found, model=model, report=found.report | {"kept": left, "terms": terms})
+
+
+def _timed(data: RateData, model: Model, leaving: Collection[str]) -> Model:
+    """The model with free time constants of its masses, without terms whose coefficient may then be zero.
+
+    Args:
+        leaving: coefficients that may leave.
+    """
+    free = {
+        n: replace(p, fixed=False) if p.fixed and n.endswith("_tau") else p
+        for n, p in model.parameters.items()
+    }
+    model = replace(model, parameters=free)
+    while any("_mass" in name for name in model.states):
+        fit = refit(model, data.campaign, data.recordings, data.outputs, {}, data.grids)
+        unknowns = zip(fit.problem.unknowns, fit.standard_errors, strict=True)
+        errors = {u.name: error for u, error in unknowns if not u.is_nuisance}
+        strength = {
+            n: abs(fit.model.parameters[n].value) / max(errors[n], 1e-300) for n in model.free if n in leaving
+        }
+        weakest = min(strength, key=lambda n: strength[n])
+        if strength[weakest] >= CLEAR:
+            return fit.model
+        model = without_idle(without(fit.model, [weakest]), data.outputs)
+    return model
 
 
 def _room(outputs: Sequence[str], inputs: Inputs, count: int) -> tuple[str, dict[str, State]]:

@@ -111,7 +111,7 @@ def weak_rows(
     aliases: Mapping[str, str] | None = None,
     order: int = 1,
     half: float | None = None,
-    rate: str | None = None,
+    rates: Mapping[str, str] | None = None,
     second: float = 1.0,
 ) -> Rows:
     """Rows of the weak regression of d(output)/dt (of order 2: its second derivative) on a library.
@@ -121,7 +121,7 @@ def weak_rows(
         constants: values of further names.
         aliases: further names of outputs, as {"y": "E_Y0C"}.
         half: half width [s]; default a 36th of the recording and at least 8 readings; at most a quarter.
-        rate: name of the rate of the output in the library.
+        rates: names of the rates of outputs in the library.
         second: seconds in the unit of time that rates count in.
     """
     span = float(grid.time[-1] - grid.time[0])
@@ -139,9 +139,11 @@ def weak_rows(
         values[alias] = values[name]
     window = Window.make(half, step, _POWER[order])
     seen = np.asarray(values[output])
-    if rate is not None:
-        smoother = Window.make(max(_SMOOTHER * half, 2 * step), step, 2)
-        values[rate] = second * np.convolve(seen, smoother.slope, "same") / smoother.w.sum()
+    smoother = Window.make(max(_SMOOTHER * half, 2 * step), step, 2)
+    for name, rate in (rates or {}).items():
+        values[rate] = (
+            second * np.convolve(np.asarray(values[name]), smoother.slope, "same") / smoother.w.sum()
+        )
     reach = (len(window.w) - 1) // 2
     middles = np.arange(reach, len(time) - reach, max(1, reach // _OVERLAP))
     windows = middles[:, None] + np.arange(-reach, reach + 1)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from discovery.errors import UserError
 from discovery.firsthour.guess import guess
 from discovery.firsthour.new import new
 from discovery.firsthour.recorded import recorded
@@ -170,6 +171,10 @@ def test_dates_of_many_forms(tmp_path: Path, form: str) -> None:
         ("Time [h:mm]", 30, "{m}:{s:02d}", 1800.0),
         ("Time", 30, "{days} days {h:02d}:{min:02d}:{s:02d}", 30.0),
         ("Time", 30, "{days}d {h:02d}:{min:02d}:{s:02d}", 30.0),
+        ("Time", 30, "{h:02d}h{min:02d}m{s:02d}s", 30.0),
+        ("Time", 30, "{m}m{s}s", 30.0),
+        ("Time", 30, "PT{m}M{s}S", 30.0),
+        ("Time", 30, "P{days}DT{h}H{min}M{s}.0S", 30.0),
     ],
 )
 def test_times_since_the_start(tmp_path: Path, head: str, step: int, form: str, seconds: float) -> None:
@@ -186,4 +191,44 @@ def test_times_since_the_start(tmp_path: Path, head: str, step: int, form: str, 
         rows.append(f"{form.format(**parts)},{20 + k % 7}")
     table = read_own(write(tmp_path / "log.csv", f"{head},T1 [°C]", *rows))
     assert (np.diff(table.time) == seconds).all()
-    assert ("?" in table.about_time) is (head == "Time" and "days" not in form and "d " not in form)
+    assert ("?" in table.about_time) is (head == "Time" and form == "{m}:{s:02d}")
+
+
+def test_a_length_of_time_in_a_column_of_readings_is_no_number(tmp_path: Path) -> None:
+    """1m30s is neither 1 nor 90."""
+    rows = [f"{30 * k},{20 + k % 7},{k}m30s" for k in range(40)]
+    with pytest.raises(UserError, match="column 'lap': '0m30s' is not a number"):
+        read_own(write(tmp_path / "log.csv", "time,T1 [°C],lap", *rows))
+
+
+def test_dates_in_which_a_logger_never_pauses_are_not_asked_about(tmp_path: Path) -> None:
+    rows = [
+        f"{datetime(2026, 2, 4) + timedelta(minutes=5 * k):%Y-%m-%d %H:%M},{20 + k % 7}" for k in range(700)
+    ]
+    assert "?" not in read_own(write(tmp_path / "log.csv", "time,T1 [°C]", *rows)).about_time
+    days = [f"0{1 + k // 9}/01/2026 {8 + k % 9}:00,{20 + k % 7}" for k in range(27)]
+    assert "?" in read_own(write(tmp_path / "days.csv", "time,T1 [°C]", *days)).about_time
+
+
+def test_rows_that_stand_twice_are_read_once(tmp_path: Path) -> None:
+    """An export that repeats rows here and there; a fast logger with a coarse clock repeats stamps alone."""
+    rows = [f"{30 * k},{20 + k % 7},{k % 5}" for k in range(100)]
+    twice = [row for k, row in enumerate(rows) for _ in range(1 + (k % 9 == 4))]
+    table = read_own(write(tmp_path / "twice.csv", "time,T1 [°C],P [W]", *twice))
+    assert table.time.tolist() == [30.0 * k for k in range(100)]
+    assert "11 rows repeat the row before: left out" in table.notes
+    fast = read_own(
+        write(
+            tmp_path / "fast.csv", "time [s],T1 [°C],P [W]", *(f"{k // 4},20,{k // 40}" for k in range(400))
+        )
+    )
+    assert len(fast.time) == 400
+
+
+@pytest.mark.parametrize(
+    "header", ["Temp. nave (°C)", "Rumstemperatur (°C)", "Verkstadstemp [°C]", "Temp. taller"]
+)
+def test_rooms_in_spanish_and_swedish(header: str) -> None:
+    slow = np.linspace(20.0, 23.0, 300)
+    head = Column("T1", "T1", "degC", slow + 5.0)
+    assert guess_all([Column(header, "room", "degC", slow), head])["room"].role == "ambient temperature"

@@ -41,6 +41,17 @@ def test_what_lasts_or_fades_is_no_fault() -> None:
     assert impossible_readings(sensor, heated).size == 0
 
 
+def test_air_may_be_exactly_zero(write: Write) -> None:
+    """Calm air read by a coarse sensor touches zero; a sensor that fails there falls to it."""
+    air = np.round(2.0 * np.cos(np.arange(600) / 95.0) + 1.95, 1)
+    air[np.abs(air) < 0.15] = 0.0
+    assert (air == 0.0).sum() > 20
+    assert found(write(with_column(1, [f"{value:.1f}" for value in air]))) == []
+    air[[20, 21, 22]] = 0.0
+    [finding] = found(write(with_column(1, [f"{value:.1f}" for value in air])))
+    assert "exactly zero between readings far from zero" in finding
+
+
 def test_slow_quantised_and_switched_signals_are_no_frozen_sensors(write: Write) -> None:
     random = np.random.default_rng(1)
     slow = 22 + np.cumsum(random.normal(0, 0.02, 600))

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from discovery.fitting import fit_model
 from discovery.frames import campaign_from_frames
 from discovery.models.model import TIME_UNITS
 from discovery.sparse.discover import discover
+from discovery.sparse.discovery import Discovery
 from discovery.sparse.options import SparseOptions
+from discovery.terms import names, text
 
 
 def two_tanks(seed: int) -> pd.DataFrame:
@@ -44,6 +49,49 @@ def test_outputs_that_move_each_other_are_found_together(role: str) -> None:
     np.testing.assert_allclose([p.value for p in found.model.parameters.values()], rates, rtol=0.05)
 
 
+SPRINGS = np.array([[-3.25, 1.25], [2.5, -2.5]])  # 1/s2
+DAMPERS = np.array([[-0.25, 0.10], [0.20, -0.20]])  # 1/s
+STIFFER = np.array([0.02, -0.04])  # 1/(mm2 s2), of the spring between the masses
+
+
+def two_masses(seed: int) -> pd.DataFrame:
+    """A force [N] moves a mass, and a spring that is stiffer the longer it is moves a second one [mm]."""
+    rng = np.random.default_rng(seed)
+    force = np.repeat(rng.choice([-4.0, 0.0, 4.0], 30), 20)
+    x, v, read = np.zeros(2), np.zeros(2), []
+    for f in force:
+        read.append(x)
+        for _ in range(100):
+            longer = x[1] - x[0]
+            v = v + 0.001 * (SPRINGS @ x + DAMPERS @ v + STIFFER * longer**3 + np.array([2.0 * f, 0.0]))
+            x = x + 0.001 * v
+    places = np.array(read) + 0.02 * rng.standard_normal((len(force), 2))
+    return pd.DataFrame(
+        {"F": force, "x1": places[:, 0], "x2": places[:, 1]}, index=0.1 * np.arange(len(force))
+    )
+
+
+def test_masses_with_a_spring_between_them_are_found_together() -> None:
+    channels = {"F": {"role": "other input", "unit": "N"}}
+    channels |= {x: {"role": "other output", "unit": "mm"} for x in ("x1", "x2")}
+    campaign = campaign_from_frames({"a": two_masses(0), "b": two_masses(1)}, channels)
+    found = discover(campaign, ["a", "b"], ["x1", "x2"], SparseOptions(bootstraps=0))
+    law = {label: found.model.parameters[n].value for label, n in _coefficients(found).items()}
+    true = {"x1_rate: F": 2.0}
+    for i, x in enumerate(("x1", "x2")):
+        for j, other in enumerate(("x1", "x2")):
+            true |= {f"{x}_rate: {other}": SPRINGS[i, j], f"{x}_rate: {other}_rate": DAMPERS[i, j]}
+    true |= {"x1_rate: (x2 - x1)**3": STIFFER[0], "x2_rate: (x1 - x2)**3": -STIFFER[1]}
+    assert set(law) == set(true)
+    np.testing.assert_allclose([law[label] for label in true], list(true.values()), rtol=0.05)
+
+
+def _coefficients(found: Discovery) -> dict[str, str]:
+    """Name of the parameter of each term that was chosen, by its label."""
+    free = iter(found.model.free)
+    return {label: next(free) for label in found.report["groups"][0]["kept"]}
+
+
 def drawn(seed: int) -> pd.DataFrame:
     """Water that a current warms by its square, and that cold water cools while some is drawn."""
     rng = np.random.default_rng(seed)
@@ -74,3 +122,75 @@ def test_a_temperature_has_squares_of_currents_and_what_a_flow_carries() -> None
     assert "T_body: (current/100)**2" in kept
     assert "T_body: draw*(T_inlet - T_body)" in kept
     assert "T_body: current" not in kept
+
+
+def room(seed: int) -> pd.DataFrame:
+    """A room with a radiator, a window to the air outside, and a heavy wall that the air cools as well."""
+    rng = np.random.default_rng(seed)
+    heat = np.repeat(rng.choice([0.0, 500.0, 1000.0, 2000.0], 36), 8)
+    outside = 3.0 + 5.0 * np.sin(2 * np.pi * (np.arange(288) / 96 - rng.uniform())) + rng.uniform(-2, 2)
+    inside, wall, read = 19.0, 16.0, []
+    for power, cold in zip(heat, outside, strict=True):
+        read.append(inside)
+        for _ in range(15):
+            moved = 135 * (cold - inside) + 540 * (wall - inside) + 3 * power
+            wall += 60 / 3.6e6 * (72 * (inside - wall) + 16 * (cold - wall))
+            inside += 60 / 3.6e6 * moved
+    table = {"outside": outside, "heat": heat, "T": np.array(read) + 0.05 * rng.standard_normal(288)}
+    return pd.DataFrame(table, index=900.0 * np.arange(288))
+
+
+def test_a_wall_between_a_room_and_the_air_outside_is_found() -> None:
+    """It is not read, colder than the room at first, and its time constant is none of a list."""
+    channels = {
+        "outside": {"role": "ambient temperature", "unit": "degC"},
+        "heat": {"role": "heat load", "unit": "W"},
+        "T": {"role": "temperature", "unit": "degC"},
+    }
+    campaign = campaign_from_frames({str(seed): room(seed) for seed in range(4)}, channels)
+    found = discover(campaign, ["0", "1", "2"], ["T"], SparseOptions(bootstraps=0))
+    values = found.model.values()
+    law = {text(term.expression): names(term.expression) & set(values) for term in found.model.terms}
+    rates = {re.sub(r".*\*\(?|\)|\d", "", one): values[min(used)] for one, used in law.items() if "_p" in one}
+    true = {"outside - T_body": 0.135, "heat": 0.003}
+    true |= {"T_body_mass - T_body": 0.54 * 72 / 88, "outside_mass - T_body": 0.54 * 16 / 88}
+    assert set(rates) - {"T_body_p"} == set(true)  # a little constant heat does no harm
+    np.testing.assert_allclose([rates[one] for one in true], list(true.values()), rtol=0.15)
+    times = [values[f"{name}_tau"] for name in found.model.states if "_mass" in name]
+    np.testing.assert_allclose(times, 3.6e6 / 88, rtol=0.3)
+
+
+def test_the_voltage_and_the_temperature_of_a_battery_are_found_together() -> None:
+    """Each in the form of its kind: a sum of responses to the current, and a body that its square warms."""
+    channels = {
+        "I": {"role": "other input", "unit": "A"},
+        "T_room": {"role": "ambient temperature", "unit": "degC"},
+        "U": {"role": "other output", "unit": "V"},
+        "T": {"role": "temperature", "unit": "degC"},
+    }
+    campaign = campaign_from_frames({"a": battery(0), "b": battery(1)}, channels)
+    found = discover(campaign, ["a", "b"], ["U", "T"], SparseOptions(bootstraps=0))
+    kept = {group["outputs"][0]: group["kept"] for group in found.report["groups"]}
+    assert set(kept["T"]) == {"T_body: T_room - T_body", "T_body: (I/100)**2"}
+    assert {one.split(",")[0] for one in kept["U"]} == {"1", "I", "lag(I", "integral(I)"}
+    fit = fit_model(found.model, campaign, ["a", "b"], ["U", "T"])
+    np.testing.assert_allclose(fit.noise.white, [0.002, 0.05], rtol=0.1)
+
+
+def battery(seed: int) -> pd.DataFrame:
+    """A cell of 2 Ah between 3 and 4 V, warmed by the square of its current."""
+    rng = np.random.default_rng(seed)
+    current = np.repeat(rng.permutation([-4.0, -2.0, 0.0, 0.0, 2.0, 4.0] * 4), 30)
+    room = 23.0 + np.sin(np.arange(len(current)) / 70)
+    charge, slow, warm, read = 0.5, 0.0, 23.0, []
+    for i, air in zip(current, room, strict=True):
+        read.append((3.2 + 0.8 * charge - 0.03 * i - slow, warm))
+        slow += 10 / 200 * (0.02 * i - slow)
+        charge -= 10 * i / 7200
+        warm += 10 / 60 * (0.05 * i**2 - 0.1 * (warm - air))
+    noise = np.array([0.002, 0.05]) * rng.standard_normal((len(current), 2))
+    table = np.array(read) + noise
+    return pd.DataFrame(
+        {"I": current, "T_room": room, "U": table[:, 0], "T": table[:, 1]},
+        index=10.0 * np.arange(len(current)),
+    )

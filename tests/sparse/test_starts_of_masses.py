@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
-from discovery.sparse.masses import fit_masses
+from discovery.sparse.library import Feature
+from discovery.sparse.masses import Response, Rules, fit_masses, mass_model
 from discovery.terms import Number, Term, evaluate, parse
 
 TIME = np.arange(0.0, 36_001.0, 600.0)
@@ -49,3 +52,26 @@ def test_starts_make_up_for_an_offset(offset: float) -> None:
     assert start is not None
     assert float(evaluate(start, {}).value) == pytest.approx(-offset, abs=0.6)
     assert not isinstance(start, Number)  # what was declared stays a formula
+
+
+@pytest.mark.parametrize("tau", [600.0, 3600.0, 20_000.0])
+def test_a_mass_begins_as_its_drive_has_lasted(tau: float) -> None:
+    """Against a long run: a load that is on or off for T on average, and the mass that it drives."""
+    rng, lasts, gain, step = np.random.default_rng(1), 3600.0, 0.02, 10.0
+    load = 500.0 * np.cumprod(np.where(rng.random(4_000_000) < step / lasts / 2, -1.0, 1.0))
+    kept = np.exp(-step / tau)
+    mass = lfilter([gain * (1 - kept)], [1.0, -kept], load)[100_000:]
+    now = load[100_000:]
+    slope = float(now @ mass / (now @ now))
+    rules = Rules("E", {"E": "um", "P": "W"}, (), {"P": lasts}, {}, (10.0, 1e6), 4.0)
+    feature = Feature("P", tau)
+    model = mass_model(rules, [Response(feature, gain, 0, feature)])
+    start = model.states["E_1"]
+    assert start.start is not None
+    assert start.start_sd is not None
+    declared = float(evaluate(start.start, {"P": 500.0, **model.values()}).value)
+    assert declared == pytest.approx(500.0 * slope, abs=0.4)
+    left = float(np.std(mass - slope * now) / np.std(mass))
+    assert start.start_sd == pytest.approx(4.0 * left, rel=0.1)
+    settled = mass_model(replace(rules, settled=("P",), lasting={}), [Response(feature, gain, 0, feature)])
+    assert settled.states["E_1"].start_sd == 4.0
