@@ -99,9 +99,9 @@ class Grid:
     def first(self) -> dict[str, float]:
         """Channels at the first instant, outputs at their first reading."""
         found = {name: float(series[0]) for name, series in self.nodes.items()}
-        for name, there, read in zip(self.outputs, self.measured.T, self.readings.T, strict=True):
-            if there.any():
-                found[name] = float(read[np.argmax(there)])
+        for i, name in enumerate(self.outputs):
+            if (there := self.measured[:, i]).any():
+                found[name] = float(self.readings[np.argmax(there), i])
         return found
 
     @property

@@ -11,7 +11,7 @@ from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="copper_resistance",
-    title="Copper resistance",
+    title="Copper resistance of a winding",
     group="drive and cooling",
     place="current terms",
     formula="R_cu*0.00393*(body - 22)*term",
