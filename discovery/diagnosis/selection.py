@@ -35,8 +35,7 @@ class Search:
     """The course of a search under one context.
 
     `tried`: the best refit of each set of effects; `lost`: sets that run away or press against zero;
-    `scans`: of each model taken up; `reached`: how far below the best model the evidence of a part of another
-    model is exact; `first`: claims of an earlier search under another noise.
+    `scans`: of each model taken up; `first`: claims of an earlier search under another noise.
     """
 
     context: Context
@@ -44,7 +43,6 @@ class Search:
     tried: dict[Keys, Scored] = field(default_factory=dict)
     lost: set[Keys] = field(default_factory=set)
     scans: dict[Keys, Scan] = field(default_factory=dict)
-    reached: dict[tuple[Keys, Keys], float] = field(default_factory=dict)  # by `reduced`
     first: tuple[Score, ...] = ()
 
     @property
@@ -128,11 +126,14 @@ class Search:
     def _questioned(self, current: Scored) -> Scored:
         """Remove each effect, and try its rivals instead."""
         scan = self.scanned(current) if current.hypotheses else None
-        parts = [[o for o in current.hypotheses if o is not h] for h in current.hypotheses]
-        for h, others, without in zip(current.hypotheses, parts, self.reduced(current, parts), strict=True):
+        for h in current.hypotheses if scan else ():
+            others = tuple(o for o in current.hypotheses if o.key != h.key)
+            without = self.tried.get(frozenset(o.key for o in others)) or score(
+                self.context, others, current.noise, current.fit, goal=self.goal(current.noise)
+            )
             if scan is None or without is None:
                 continue
-            own = current.evidence - without.evidence
+            own = current.evidence - self.keep(without).evidence
             # an infinite gain: what is left has a size of the wrong sign, so that nothing is reached
             reached = own if own < inf else -inf
             pool = _hopeful(scan.without[h.key], RIVALS, reached)
@@ -160,33 +161,6 @@ class Search:
             if one is not None and self.keep(one).evidence > best.evidence:
                 best = one
         return best
-
-    def reduced(
-        self, larger: Scored, parts: Sequence[Sequence[Hypothesis]], below: float = 0.0
-    ) -> list[Scored | None]:
-        """Models with some effects of a larger one, None where one does not stay finite. Each is the best of
-        what was tried and of a fit that begins at the larger model, where it may have another optimum.
-
-        Args:
-            below: how far below the best model an evidence matters.
-        """
-        goal = self.goal(larger.noise, below)
-        keys = [frozenset(h.key for h in chosen) for chosen in parts]
-        fresh = {
-            one: chosen
-            for one, chosen in zip(keys, parts, strict=True)
-            if one != larger.keys and self.reached.get((one, larger.keys), -inf) < below
-        }
-
-        def refitted(chosen: Sequence[Hypothesis]) -> Scored | None:
-            one = score(self.context, chosen, larger.noise, larger.fit, goal=goal)
-            return one if one is not None and one.evidence > -inf else None  # the evidence is found here
-
-        for key, one in zip(fresh, side_by_side(refitted, list(fresh.values())), strict=True):
-            self.reached[key, larger.keys] = below if one and one.fit.ended_early else inf
-            if one:
-                self.keep(one)
-        return [self.tried.get(one) for one in keys]
 
     def goal(self, noise: Noise, below: float = 0.0) -> float:
         """Cost of a fit from which it can be part of the answer, or `below` it in log evidence."""

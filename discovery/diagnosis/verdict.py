@@ -15,6 +15,7 @@ from discovery.diagnosis.context import Context
 from discovery.diagnosis.crossvalidation import left_out
 from discovery.diagnosis.posterior import Posterior
 from discovery.diagnosis.proof import Improvement
+from discovery.diagnosis.refit import score
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.vetoes import vetoed
@@ -74,13 +75,13 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
         return _nothing(context, found, answer, candidates)
     probable = [n for n in candidates if n.probability >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
-    sure = _needed(found, answer, [n for n in probable if n.hypothesis.key not in refused])
+    sure = _needed(context, found, answer, [n for n in probable if n.hypothesis.key not in refused])
     named, idle = _proved(context, found, answer, sure)
     reasons = [*refused.values(), *idle.values()]
     # what changes no free run outside the fit is not lacking either
     rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
     best = max(rest, key=lambda m: m.evidence)
-    short = best.evidence - _alone(found, answer, [named])[0]
+    short = best.evidence - _alone(context, found, answer, named)
     if short > max(thresholds.SHORT, thresholds.REST * (best.evidence - found.baseline.evidence)):
         if best.forced:
             reasons.append(f"heat of unknown cause at {best.forced} explains more than effects do")
@@ -102,7 +103,7 @@ def _proved(
     """Effects that improve free runs outside the fit, and why each other one is not named."""
     kept, idle = tuple(chosen), dict[Key, str]()
     while kept:
-        whole = found.reduced(answer, [[n.hypothesis for n in kept]], inf)[0] or answer
+        whole = _only(context, found, answer, kept) or answer
         proofs = left_out(context, whole, [n.hypothesis for n in kept])
         more = {n.hypothesis.key: text for n in kept if (text := _idle(n.hypothesis, proofs))}
         if not more:
@@ -124,19 +125,23 @@ def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None
     )
 
 
-def _needed(found: Search, answer: Scored, chosen: Sequence[Named]) -> list[Named]:
+def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> list[Named]:
     """Effects that are all needed: each adds evidence to a model of the others, and more than chance does
     next to large effects.
     """
     kept = list(chosen)
     least = _by_chance(found)
     while kept:
-        whole = _alone(found, answer, [kept])[0]
-        fewer = [[o for o in kept if o is not n] for n in kept]
-        levels = _alone(found, answer, fewer, least + found.best.evidence - whole)
-        if not whole - max(levels) < least:
+        whole = _alone(context, found, answer, kept)
+        reach = least + found.best.evidence - whole
+        levels = {
+            n.hypothesis.key: _alone(context, found, answer, [o for o in kept if o is not n], reach)
+            for n in kept
+        }
+        last = max(kept, key=lambda n: levels[n.hypothesis.key])
+        if not whole - levels[last.hypothesis.key] < least:
             break
-        kept = fewer[levels.index(max(levels))]
+        kept.remove(last)
     return kept
 
 
@@ -148,15 +153,30 @@ def _by_chance(found: Search) -> float:
 
 
 def _alone(
-    found: Search, answer: Scored, sets: Sequence[Sequence[Named]], matters: float = inf
-) -> list[float]:
-    """Log evidence of models with only these effects; -inf for one that does not stay finite.
+    context: Context, found: Search, answer: Scored, chosen: Sequence[Named], matters: float = inf
+) -> float:
+    """Log evidence of a model with only these effects; -inf if it does not stay finite.
 
     Args:
         matters: it need not be exact where it is further than this below the best of all models.
     """
-    models = found.reduced(answer, [[n.hypothesis for n in chosen] for chosen in sets], matters)
-    return [-inf if model is None else model.evidence for model in models]
+    model = _only(context, found, answer, chosen, matters)
+    return -inf if model is None else model.evidence
+
+
+def _only(
+    context: Context, found: Search, answer: Scored, chosen: Sequence[Named], matters: float = inf
+) -> Scored | None:
+    """The model with only these effects, fitted if the search has not fitted it; None if it does not stay
+    finite.
+    """
+    keys = frozenset(n.hypothesis.key for n in chosen)
+    if keys not in found.tried or (found.tried[keys].fit.ended_early and matters == inf):
+        goal = found.goal(answer.noise, matters)
+        one = score(context, [n.hypothesis for n in chosen], answer.noise, answer.fit, goal=goal)
+        if one is not None:
+            found.keep(one)
+    return found.tried.get(keys)
 
 
 def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:

@@ -80,9 +80,6 @@ class Tried:
     def baseline(self) -> Model:
         return self.tried[frozenset()]
 
-    def reduced(self, _: Model, parts: Sequence[Sequence[Hypothesis]], __: float = 0.0) -> list[Model | None]:
-        return [self.tried.get(frozenset(h.key for h in chosen)) for chosen in parts]
-
     @property
     def gain(self) -> float:
         return self.best.evidence - self.baseline.evidence
