@@ -232,12 +232,11 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
     """The verdict where unseen recordings show what the recordings to fit do not: free runs miss their
     readings by more than noise and the uncertainty of the parameters make likely.
     """
-    missed = {run: i for run, i in proof.items() if i.after > thresholds.MISSED * i.expected}
+    rms = {run: i.after if verdict.named else i.before for run, i in proof.items()}
+    missed = [run for run, i in proof.items() if rms[run] > thresholds.MISSED * i.expected]
     if not missed:
         return verdict
-    sizes = ", ".join(
-        f"{printed(i.after)} on {run} ({printed(i.expected)} expected)" for run, i in missed.items()
-    )
+    sizes = ", ".join(f"{printed(rms[r])} on {r} ({printed(proof[r].expected)} expected)" for r in missed)
     reason = (
         f"free runs on held-out recordings miss more than noise and the fit explain: rms {sizes} {unit}; "
         "something acts there that the recordings to fit do not show"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.recordings.responses import POINTS, filtered
+from discovery.recordings.responses import even_grid, responses
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,7 @@ def explained_by(values: Array, drivers: Sequence[Array]) -> float:
     """Share of the changes of a column (N,), beyond a slow drift, that first-order responses to others (N,)
     explain; from 0 to 1.
 
+    >>> from discovery.recordings.responses import filtered
     >>> heat = np.repeat([0.0, 1.0, 0.0, 0.5], 200)
     >>> body = filtered(heat, 1.0, 80.0)
     >>> explained_by(body, [heat]) > 0.99
@@ -31,14 +32,11 @@ def explained_by(values: Array, drivers: Sequence[Array]) -> float:
     known = np.isfinite(values)
     if not known.any() or np.ptp(values[known]) == 0.0:
         return 0.0
-    every = max(1, len(values) // POINTS)
-    y, apart = _held(values)[::every], max(1, len(values) // every // _APART)
-    columns = [
-        filtered(_held(driver)[::every], every / len(values), lag, rest=True)
-        for driver in drivers
-        for lag in _LAGS
-    ]
-    F = np.column_stack(columns)
+    rows = np.arange(len(values), dtype=float)
+    at = even_grid(rows)
+    inputs = {str(k): driver for k, driver in enumerate(drivers)}
+    F = responses(inputs, rows, dict.fromkeys(inputs, "held"), at, [lag * len(rows) for lag in _LAGS])
+    y, apart = np.interp(at, rows[known], values[known]), max(1, len(at) // _APART)
     change, answers = y[apart:] - y[:-apart], F[apart:] - F[:-apart]
     answers = answers / np.maximum(np.linalg.norm(answers, axis=0), 1e-300)
     slow = np.vander(np.linspace(-1.0, 1.0, len(change)), _DRIFT)
@@ -47,10 +45,3 @@ def explained_by(values: Array, drivers: Sequence[Array]) -> float:
         for some in (slow, np.hstack([slow, answers]))
     ]
     return float(1.0 - np.mean(left[1] ** 2) / max(np.mean(left[0] ** 2), 1e-300))
-
-
-def _held(values: Array) -> Array:
-    """The column with its last value held where there is none; the first one before it."""
-    known = np.isfinite(values)
-    last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
-    return values[np.where(last < 0, int(np.argmax(known)), last)]

@@ -48,7 +48,7 @@ def filtered(values: Array, step: float, tau: float, *, rest: bool = False) -> A
     drive = (1.0 - keep) * values
     drive[0] += 0.0 if rest else keep * values[0]
     two = np.array([np.ones(len(values)), np.full(len(values), -keep)])
-    return np.asarray(solve_banded((1, 0), two, drive, overwrite_ab=True, overwrite_b=True))
+    return np.asarray(solve_banded((1, 0), two, drive, True, True, check_finite=False))
 
 
 def even_grid(time: Array, points: int = POINTS) -> Array:

@@ -258,7 +258,7 @@ def test_held_out_recordings_cannot_influence_the_answer() -> None:
     expected = document(solved("a body that the fluid wets"))
     assert without_proof(found) == without_proof(expected)
     assert found["improvement"]["held_out"] != expected["improvement"]["held_out"]
-    assert len(found["reasons"]) == len(expected["reasons"]) + 1  # the reader is told that r3 is different
+    assert len(found["reasons"]) == len(expected["reasons"]) + 1  # one sentence says that r3 is different
 
 
 def test_the_same_recordings_give_the_same_answer() -> None:

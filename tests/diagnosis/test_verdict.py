@@ -333,7 +333,10 @@ def test_what_only_unseen_recordings_show_is_unexplained() -> None:
     other = unforeseen(nothing, {"r3": near, "r4": far}, "um")
     assert other.word == "unexplained"
     assert "rms 2.1 on r4 (1 expected) um" in other.reasons[-1]
+    better = Improvement(2.1, 0.5, 0.8, 0.0, 0.0, {}, unsure=0.6)  # a repair whose names were withdrawn
+    assert unforeseen(nothing, {"r4": better}, "um").word == "unexplained"
     named = said(WET, {"fluid_convection": 0.9})
+    assert unforeseen(named, {"r4": better}, "um") is named
     kept = unforeseen(named, {"r4": far}, "um")
     assert (kept.word, kept.named) == (named.word, named.named)
     assert "held-out recordings" in kept.reasons[-1]

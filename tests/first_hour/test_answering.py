@@ -68,5 +68,7 @@ def test_cells_that_are_empty_count_as_unchanged() -> None:
     heater, flow, _, _, tank = boiler(2)
     sparse = np.where(np.arange(ROWS) % 5 == 0, heater, np.nan)
     assert explained_by(tank, [sparse, flow]) == pytest.approx(explained_by(tank, [heater, flow]), abs=0.05)
-    assert explained_by(np.full(ROWS, np.nan), [heater]) == 0.0
+    empty = np.full(ROWS, np.nan)
+    assert explained_by(tank, [heater, flow, empty]) == pytest.approx(explained_by(tank, [heater, flow]))
+    assert explained_by(empty, [heater]) == 0.0
     assert explained_by(np.full(ROWS, 3.0), [heater]) == 0.0
