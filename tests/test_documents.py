@@ -102,7 +102,6 @@ def test_the_numbers_of_the_diagnosis_are_those_that_decide() -> None:
         f"its probability is at least {t.NAMED}",
         f"at least {t.SHORT:g} units of log evidence",
         f"({t.CHANCE} sqrt(2 G)",
-        f"more than {t.SHORT:g} units and more than {t.REST:g} of all log evidence",
         f"{numbers(t.UNKNOWN_HEAT)} times the usual unrecorded heat",
         f"off by {numbers(100 * s for s in t.UNKNOWN_SHARES)} %",
         f"differs by {t.AIR} K from the air that is measured",

@@ -82,7 +82,8 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
     best = max(rest, key=lambda m: m.evidence)
     short = best.evidence - _alone(context, found, answer, named)
-    if short > max(thresholds.SHORT, thresholds.REST * (best.evidence - found.baseline.evidence)):
+    # names hold next to effects that are not sure, but not next to heat that no effect explains
+    if (best.forced or not named) and short > _by_chance(found):
         if best.forced:
             reasons.append(f"heat of unknown cause at {best.forced} explains more than effects do")
         reasons.append(f"the surest effects explain too little (log evidence {short:.0f} below the best)")
