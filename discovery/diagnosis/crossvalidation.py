@@ -16,7 +16,7 @@ from discovery.dynamics import predict
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
 from discovery.evaluation.crossvalidation import Fold, folds
-from discovery.fitting import fit_model, predict_recording
+from discovery.fitting import fit_model, from_known_starts, predict_recording
 from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
@@ -87,7 +87,8 @@ def _residuals(
                 answer.noise.white,
                 context.grids[name],
             )
-            out[name] = (run.system.grid.readings - predict(run)) / white
+            left = run.system.grid.readings - predict(run)
+            out[name] = from_known_starts(run, left, white, together=fit.together) / white
     except RunsAwayError:
         pass
     return out

@@ -17,7 +17,7 @@ from discovery.dynamics import Trajectory, predict, sensitivities
 from discovery.errors import RunsAwayError
 from discovery.evidence.outliers import find_outliers, without
 from discovery.evidence.process_noise import noise_in_free_runs
-from discovery.fitting import Fit, Noise, predict_recording
+from discovery.fitting import Fit, Noise, from_known_starts, predict_recording
 from discovery.models.units import differences
 from discovery.recordings import Campaign
 
@@ -44,6 +44,9 @@ class Improvement:
     `unsure` is what the uncertainty of the parameters adds on a recording that no fit has seen. `low` and
     `high` bound the improvement of the rms (before - after) by block bootstrap, 95 %; `outputs` has the plain
     rms of each output before and after, in its unit. `after` is infinite where the repaired model runs away.
+    `started`: the rms before and after from the starts that all readings of a recording show. What a body
+    that no sensor reads begins with is no merit of a model; whatever is decided is decided by these two, and
+    `low` and `high` are theirs.
     """
 
     before: float
@@ -53,6 +56,12 @@ class Improvement:
     high: float
     outputs: Mapping[str, tuple[float, float]]
     unsure: float = 0.0
+    started: tuple[float, float] | None = None  # None: as before and after
+
+    @property
+    def judged(self) -> tuple[float, float]:
+        """The rms before and after that decide."""
+        return self.started or (self.before, self.after)
 
     @property
     def expected(self) -> float:
@@ -62,7 +71,8 @@ class Improvement:
     @property
     def explained(self) -> float:
         """What the repair explains of what was left before, rms; below zero where it leaves more."""
-        square = self.before**2 - self.after**2
+        before, after = self.judged
+        square = before**2 - after**2
         return copysign(sqrt(abs(square)), square) if isfinite(square) else -inf
 
     @property
@@ -73,13 +83,22 @@ class Improvement:
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """Residuals (R, Y) of two models on one recording, wrong readings left out, over the size of one unit."""
+    """Residuals (R, Y) of two models on one recording, wrong readings left out, over the size of one unit.
+
+    `started`: the same from the starts that all readings show, if they differ.
+    """
 
     before: Array
     after: Array | None  # None: the model runs away
     floor: float
     unit: Array  # (Y,) what turns a residual into its own unit
     unsure: float = 0.0  # rms from the uncertainty of the parameters
+    started: tuple[Array, Array | None] | None = None
+
+    @property
+    def judged(self) -> tuple[Array, Array | None]:
+        """The residuals that decide."""
+        return self.started or (self.before, self.after)
 
 
 def free_runs(
@@ -104,14 +123,24 @@ def free_runs(
         wrong = find_outliers(before, grids, white)
         readings = without(grids, wrong)[run].readings
         scale = one / white
+        first = readings - predict(old)
+        then = None if new is None else readings - predict(new)
+        started = None if new is None or then is None else _started(after, new, then) * scale
         found[run] = FreeRuns(
-            (readings - predict(old)) * scale,
-            None if new is None else (readings - predict(new)) * scale,
+            first * scale,
+            None if then is None else then * scale,
             one * noise_in_free_runs(new or old, noise),
             1 / scale,
             one * _unsure(new or old, white, known) if known else 0.0,
+            (_started(before, old, first) * scale, started),
         )
     return found
+
+
+def _started(fit: Fit, run: Trajectory, left: Array) -> Array:
+    """Residuals (R, Y) of a free run from the starts that all its readings show."""
+    known = fit.offset_in(run.system.grid.recording)
+    return from_known_starts(run, left, np.array(fit.noise.white), known, fit.together)
 
 
 def _unsure(trajectory: Trajectory, white: Array, known: Known) -> float:
@@ -126,10 +155,11 @@ def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement
     before = np.concatenate([r.before for r in runs])
     lost = any(r.after is None for r in runs)
     after = before if lost else np.concatenate([r.after for r in runs if r.after is not None])
+    judged = [r.judged for r in runs]
     floor, unsure = (
         _rms(np.array(sizes)) for sizes in zip(*((r.floor, r.unsure) for r in runs), strict=True)
     )
-    sums = [_block_sums(r.before, r.before if r.after is None else r.after) for r in runs]
+    sums = [_block_sums(b, b if a is None else a) for b, a in judged]
     old, new, count = (np.concatenate(column) for column in zip(*sums, strict=True))
     draw = np.random.default_rng(0).integers(0, len(old), (DRAWS, len(old)))
     total = np.maximum(count[draw].sum(axis=1), 1)
@@ -139,10 +169,12 @@ def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement
         name: (_rms(before[:, y] * unit[y]), inf if lost else _rms(after[:, y] * unit[y]))
         for y, name in enumerate(outputs)
     }
+    started = _rms(np.concatenate([b for b, _ in judged]))
     if lost:
-        return Improvement(_rms(before), inf, floor, -inf, -inf, each, unsure)
+        return Improvement(_rms(before), inf, floor, -inf, -inf, each, unsure, (started, inf))
     low, high = (float(np.quantile(gain, q)) for q in (0.025, 0.975))
-    return Improvement(_rms(before), _rms(after), floor, low, high, each, unsure)
+    ended = _rms(np.concatenate([a for _, a in judged if a is not None]))
+    return Improvement(_rms(before), _rms(after), floor, low, high, each, unsure, (started, ended))
 
 
 def unit_of(campaign: Campaign, outputs: Sequence[str]) -> str:
@@ -165,9 +197,10 @@ def explained(found: Mapping[str, Improvement]) -> float | None:
     """Share of the closable mismatch that the repair removes; None where there is none."""
     gap = gain = 0.0
     for i in found.values():
-        if i.before > CLOSABLE * i.floor:
-            gap += i.before**2 - i.floor**2
-            gain += i.before**2 - max(i.after, i.floor) ** 2
+        before, after = i.judged
+        if before > CLOSABLE * i.floor:
+            gap += before**2 - i.floor**2
+            gain += before**2 - max(after, i.floor) ** 2
     return float(np.clip(gain / gap, -1.0, 1.0)) if gap > 0 else None
 
 

@@ -119,7 +119,8 @@ def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None
     outside = proofs[h.key]
     if outside is None or outside.explained >= thresholds.MATTERS:
         return None
-    rms = f"{printed(outside.before)} without it, {printed(outside.after)} with it"
+    old, new = outside.judged
+    rms = f"{printed(old)} without it, {printed(new)} with it"
     return (
         f"{h.effect.word} at {h.where} does not improve free runs enough on recordings that are left out of "
         f"the fit (rms over the reading noise: {rms})"
@@ -197,7 +198,8 @@ def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdic
 
 def _lower(runs: Iterable[Improvement]) -> float:
     """Mean over the recordings of the logarithm by which the rms of free runs falls."""
-    logs = [log(max(i.before, 1e-12) / max(i.after, 1e-12)) if isfinite(i.after) else -inf for i in runs]
+    judged = [i.judged for i in runs]
+    logs = [log(max(old, 1e-12) / max(new, 1e-12)) if isfinite(new) else -inf for old, new in judged]
     return sum(logs) / max(len(logs), 1)
 
 
@@ -233,7 +235,7 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
     """The verdict where unseen recordings show what the recordings to fit do not: free runs miss their
     readings by more than noise and the uncertainty of the parameters make likely.
     """
-    rms = {run: i.after if verdict.named else i.before for run, i in proof.items()}
+    rms = {run: i.judged[1 if verdict.named else 0] for run, i in proof.items()}
     missed = [run for run, i in proof.items() if rms[run] > thresholds.MISSED * i.expected]
     if not missed:
         return verdict

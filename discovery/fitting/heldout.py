@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,27 +52,71 @@ def predict_recording(
     known = known or {}
     system = shifted(make_system(model, grid), known)
     values = model.values(recording)
-    noise = white if white is not None else np.ones(len(outputs))
-    spreads = {
-        name: sd
-        for name, state in system.model.states.items()
-        if (sd := _spread(system, state, dict(zip(outputs, noise, strict=True)))) > 0
-    }
-    inputs = tuple(name for name in uncertain(system) if name not in known)
+    noise = np.array(white) if white is not None else np.ones(len(outputs))
+    inputs, spreads = _unsure_starts(system, noise, known)
     trajectory = simulate(system, values)
     if not (spreads or inputs) or not len(grid.read):
         return trajectory
     residual = grid.readings - predict(trajectory)
-    seen = np.isfinite(residual[0])
-    sd = np.array(noise)[seen]
-    spread = np.array([*(grid.spread[n] for n in inputs), *spreads.values()])
-    c = sensitivities(trajectory, inputs, list(spreads))[0][seen] / sd[:, None]
-    gram = c.T @ c + np.diag(1 / spread**2)
-    shift = np.linalg.solve(gram, c.T @ (residual[0][seen] / sd))
+    shift = _shift(trajectory, residual[:1], noise, inputs, spreads)[0]
     if inputs:
         system = shifted(system, dict(zip(inputs, shift[: len(inputs)].tolist(), strict=True)))
     moved = dict(zip(spreads, shift[len(inputs) :].tolist(), strict=True))
     return simulate(system, values, start_values(system, values, moved), trajectory)
+
+
+def from_known_starts(
+    run: Trajectory,
+    residual: Array,
+    white: Array,
+    known: Collection[str] = (),
+    together: float = 1.0,
+) -> Array:
+    """Residuals (R, Y) of a free run as they would be from the starts that all its readings show.
+
+    A body that no sensor reads may begin far from what one first reading shows, and no model is better or
+    worse for that. Starts stay within their spread, and so do inputs known only within a spread.
+
+    Args:
+        residual: readings minus model (R, Y).
+        white: (Y,) reading noise.
+        known: inputs whose offsets are known in this recording.
+        together: readings that count as one, as in the fit (`Fit.together`).
+    """
+    inputs, spreads = _unsure_starts(run.system, white, known)
+    if not (spreads or inputs) or not len(residual):
+        return residual
+    shift, moved = _shift(run, residual, white, inputs, spreads, together)
+    return residual - moved @ shift
+
+
+def _unsure_starts(
+    system: System, white: Array, known: Collection[str]
+) -> tuple[tuple[str, ...], dict[str, float]]:
+    """Inputs with an offset that is not known, and the spread of each start that is not exact."""
+    noise = dict(zip(system.grid.outputs, white, strict=True))
+    spreads = {n: sd for n, s in system.model.states.items() if (sd := _spread(system, s, noise)) > 0}
+    return tuple(name for name in uncertain(system) if name not in known), spreads
+
+
+def _shift(
+    run: Trajectory,
+    residual: Array,
+    white: Array,
+    inputs: Sequence[str],
+    spreads: Mapping[str, float],
+    together: float = 1.0,
+) -> tuple[Array, Array]:
+    """Most likely offsets of inputs and starts (K,) given the first rows of a residual (N, Y), and what the
+    outputs answer to each, (N, Y, K).
+    """
+    seen = np.isfinite(residual)
+    spread = np.array([*(run.system.grid.spread[n] for n in inputs), *spreads.values()])
+    moved = sensitivities(run, inputs, list(spreads))[: len(residual)]
+    c = (moved / white[None, :, None])[seen]
+    gram = c.T @ c / together + np.diag(1 / spread**2)
+    shift = np.linalg.solve(gram, c.T @ (residual / white)[seen] / together)
+    return np.asarray(shift), moved
 
 
 def _spread(system: System, state: State, white: Mapping[str, float]) -> float:
