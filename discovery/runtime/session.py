@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from discovery.errors import UserError
 from discovery.export.document import Exported, render
+from discovery.printed import counted
 from discovery.runtime.clock import Clock
 from discovery.runtime.compensator import Compensator, Settings, State, Tick
 from discovery.runtime.events import Event, instant
@@ -214,10 +215,10 @@ class Session:
 
     def summary(self) -> str:
         """How the run went, in a line."""
-        total = max(sum(self.counts.values()), 1)
+        total = sum(self.counts.values())
         shares = ", ".join(f"{name} {100 * n / total:.1f} %" for name, n in self.counts.items())
         last = self.found.state.name if self.found is not None else "OFF"
-        return f"{total} ticks: {shares}; {self.events} events; ended {last}"
+        return f"{counted(total, 'tick')}: {shares}; {counted(self.events, 'event')}; ended {last}"
 
     def judge(self) -> None:
         """What the exit status has to say.
