@@ -278,7 +278,7 @@ class Session:
             return
         remedy = {
             "input sensor": f"check the sensor of {found.what}",
-            "something else": "record the machine and run `discovery diagnose`, which can name the change",
+            "something else": "record the machine and run `discovery update`, which can name the change",
             "undecided": "measure more often, wet and dry",
         }.get(found.verdict, "")
         self.tell(now, f"learning: {found.verdict}", str(found), remedy)
