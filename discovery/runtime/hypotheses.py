@@ -331,9 +331,9 @@ def _without(odds: Mapping[str, float], physics: Mapping[str, Score], name: str)
 
 def _share(seen: Seen, changes: Sequence[Change]) -> tuple[float, float]:
     """How far a change of one coefficient goes, as a share of what it is, and its standard deviation."""
-    best = max(changes, key=seen.log_odds)
+    width, best = max(zip(OTHER, changes, strict=True), key=lambda one: seen.log_odds(one[1]))
     size, covariance = seen.size(best)
-    whole = best.root[0, 0] / OTHER[changes.index(best)]
+    whole = best.root[0, 0] / width
     return float(size[0] / whole), float(np.sqrt(covariance[0, 0]) / abs(whole))
 
 
