@@ -71,7 +71,7 @@ class Comparison:
     `change`: of the parameters that age, under wear, with standard deviations; `rows`: what is known after
     it. `path`: of the unused input, with its parameters. `physics`: effects of the catalogue that were
     fitted, by name; `probability`: of the verdict, where it is new physics. `share`: by which all exchange
-    with a temperature changed, where it is that, and its standard deviation.
+    with a temperature changed, where it is that, to first order.
     """
 
     recordings: tuple[str, ...]
@@ -86,7 +86,7 @@ class Comparison:
     path: tuple[Path, Mapping[str, float]] | None = None
     physics: Mapping[str, Score] = field(default_factory=dict)
     probability: float | None = None
-    share: tuple[float, float] | None = None
+    share: float | None = None
 
     def __str__(self) -> str:
         others = ", ".join(f"{name} {value:+.1f}" for name, value in self.odds.items() if name != "nothing")
@@ -329,12 +329,10 @@ def _without(odds: Mapping[str, float], physics: Mapping[str, Score], name: str)
     return {n: value for n, value in odds.items() if n not in same}
 
 
-def _share(seen: Seen, changes: Sequence[Change]) -> tuple[float, float]:
-    """How far a change of one coefficient goes, as a share of what it is, and its standard deviation."""
+def _share(seen: Seen, changes: Sequence[Change]) -> float:
+    """How far a change of one coefficient goes, as a share of what it is, to first order."""
     width, best = max(zip(OTHER, changes, strict=True), key=lambda one: seen.log_odds(one[1]))
-    size, covariance = seen.size(best)
-    whole = best.root[0, 0] / width
-    return float(size[0] / whole), float(np.sqrt(covariance[0, 0]) / abs(whole))
+    return float(width * seen.size(best)[0][0] / best.root[0, 0])
 
 
 def _mean(logs: Sequence[float]) -> float:

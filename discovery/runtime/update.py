@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from discovery.export.document import Exported, from_document, read_document, render, write_document
 from discovery.export.knowledge import read_knowledge
 from discovery.export.seal import open_seal
-from discovery.fitting.covariance import Z95
 from discovery.recordings import Campaign
 from discovery.runtime.hypotheses import Comparison, begun, compare, model_with, residual_lately
 from discovery.runtime.newphysics import sizes_of
@@ -55,10 +54,7 @@ def _size(found: Comparison) -> str:
     """How large the effect is that began."""
     if found.share is None:
         return sizes_of(found.physics[found.what])
-    share, sd = found.share
-    low, high = 100 * (share - Z95 * sd), 100 * (share + Z95 * sd)
-    interval = f"95 % {low:+.0f} to {high:+.0f} %"
-    return f"all of it changed by {100 * share:+.0f} %, {interval}, as with a fan or a door"
+    return f"all of it changed by about {100 * found.share:+.0f} %, as with a fan or a door"
 
 
 def _why(found: Comparison) -> str:

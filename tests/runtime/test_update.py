@@ -325,9 +325,8 @@ def test_a_fan_is_another_exchange_with_the_room(
     found = update_file(at_work, campaign, list(campaign.recordings), at_work.with_name("new.json"))
     assert (found.comparison.verdict, found.comparison.what) == ("new physics", "exchange with T_env")
     assert found.comparison.share is not None
-    share, sd = found.comparison.share
-    assert share == pytest.approx(0.6, abs=3 * sd + 0.15)
-    assert "all of it changed by +" in found.lines()[-2]
+    assert found.comparison.share == pytest.approx(0.6, abs=0.15)  # to first order
+    assert "all of it changed by about +" in found.lines()[-2]
     assert found.path is None
 
 
