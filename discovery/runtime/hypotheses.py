@@ -271,11 +271,12 @@ def _verdict(
     odds: Mapping[str, float], evidence: Mapping[str, float], physics: Mapping[str, Score]
 ) -> tuple[Verdict, str]:
     """The best hypothesis, if it beats `nothing` and its rivals clearly. A sensor or an input needs the
-    evidence of a name in a diagnosis. So does an effect of the catalogue, over all that explains the readings
-    without it.
+    evidence of a name in a diagnosis. So does an effect of the catalogue, or another exchange with a
+    temperature, over all that explains the readings without it.
     """
-    best, second, *_ = sorted(evidence, key=lambda name: -odds[name])
-    effect = max(physics, key=lambda name: odds[name], default="")
+    effects = {*physics, *(name for name in evidence if name.startswith("exchange with "))}
+    best, second, *_ = sorted(evidence.keys() - effects, key=lambda name: -odds[name])
+    effect = max(effects, key=lambda name: odds[name], default="")
     if effect and odds[effect] - max(odds[best], 0.0) >= by_chance(odds[effect]):
         if _probability(odds, physics, effect) >= NAMED:
             return "new physics", effect
@@ -291,8 +292,6 @@ def _verdict(
         return "something else", ""
     if evidence[best] < SHORT:
         return "undecided", f"{best} or something else"
-    if best.startswith("exchange with "):
-        return "new physics", best
     if best.startswith("no input "):
         return "idle input", best.removeprefix("no input ")
     if best.startswith("input "):

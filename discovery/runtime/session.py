@@ -278,6 +278,7 @@ class Session:
             return
         remedy = {
             "input sensor": f"check the sensor of {found.what}",
+            "new physics": "record the machine and run `discovery update`, which can say more",
             "something else": "record the machine and run `discovery update`, which can name the change",
             "undecided": "measure more often, wet and dry",
         }.get(found.verdict, "")

@@ -294,6 +294,15 @@ def test_an_effect_is_named_only_where_it_is_sure() -> None:
     assert _verdict({**odds, "path": 19.5}, evidence, physics) == ("undecided", "gap or path")
     assert _verdict({**odds, "gap": 12.0, "path": 1.0, "gap 2": 1.0}, evidence, physics)[0] == "undecided"
     assert _verdict({**odds, "wear": 10.0}, evidence, physics) == ("wear", "")  # an effect adds too little
+    fan = {**odds, "exchange with T": 19.5}  # one effect more
+    assert _verdict(fan, {**evidence, "exchange with T": 23.0}, physics) == (
+        "undecided",
+        "gap or exchange with T",
+    )
+    assert _verdict({**fan, "exchange with T": 30.0}, {**evidence, "exchange with T": 34.0}, physics) == (
+        "new physics",
+        "exchange with T",
+    )
     small = {"nothing": 0.0, "wear": -1.0, "something else": -2.0, "gap": 10.0}
     assert _verdict(small, evidence, {"gap": physics["gap"]}) == ("nothing", "")
 
