@@ -136,14 +136,14 @@ def cases(exported: Exported, campaign: Campaign, seed: int, done: Done) -> None
     fresh = five_axis()
     fan = fresh.scaled("air", 1.6)
     gap = (Request("flooded_gap", 25.0, ("c_body_1", "b_body_1")),)
-    hysteresis = (Request("cooling_hysteresis", 1.5, ("c_body_2",)),)
+    hysteresis = (Request("joint_hysteresis", 1.5, ("E_Y0C",)),)
     for readings in (None, 8):
         given = "all readings" if readings is None else f"{readings} readings a day"
         changes: tuple[tuple[str, dict[str, Any]], ...] = (
             ("flooded gap 25 W/K", {"effects": gap}),
             ("fan, air +60 %", {"plant": fan}),
             ("room sensor +1.5 K", {"spoil": warm}),
-            ("hysteresis 1.5 K", {"effects": hysteresis}),
+            ("hysteresis of a joint, 1.5 um", {"effects": hysteresis}),
             ("wear, losses -10 %", {"effects": worn(0.9)}),
         )
         for title, options in changes:

@@ -1,4 +1,4 @@
-"""Numbers as the sentences of a diagnosis print them."""
+"""Numbers and counts as sentences print them."""
 
 from __future__ import annotations
 
@@ -10,3 +10,12 @@ def printed(value: float, digits: int = 3) -> str:
     ('170', '73700', '0.0123', '2e-09')
     """
     return f"{float(f'{value:.{digits}g}'):.12g}"
+
+
+def counted(count: int, word: str) -> str:
+    """A number of things.
+
+    >>> counted(1, "state"), counted(3, "term")
+    ('1 state', '3 terms')
+    """
+    return f"{count} {word}{'s' * (count != 1)}"

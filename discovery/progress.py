@@ -2,42 +2,31 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Lock
 
 Progress = Callable[[str], None]  # called with what begins
 
 _TOO_SOON = 5.0  # s, before which nothing is said of the time left
-_SHARE = 0.1  # done, at least, before it is
 
 
 def silent(what: str) -> None:
     """A progress that nobody watches."""
 
 
-class Steps:
-    """A progress of steps whose relative lengths are known: says about how long the rest takes."""
+def time_left(done: int, count: int, passed: float) -> str:
+    """About how long the rest takes, at the speed seen; nothing where no step is done, or the last one.
 
-    def __init__(
-        self, progress: Progress, weights: Sequence[float], clock: Callable[[], float] = time.perf_counter
-    ) -> None:
-        self._progress, self._all, self._clock = progress, sum(weights) or 1.0, clock
-        self._began, self._done, self._whole = clock(), 0.0, 0.0
-        self._lock = Lock()  # steps may run side by side
+    Args:
+        done: steps that have ended, of `count` steps that are alike.
+        passed: seconds since the first one began.
 
-    def end(self, weight: float) -> None:
-        """A step of this weight is done: what has passed says how long the whole takes."""
-        with self._lock:
-            self._done += weight
-            share, passed = self._done / self._all, self._clock() - self._began
-            self._whole = passed / share if share >= _SHARE and passed >= _TOO_SOON else 0.0
-
-    def __call__(self, what: str) -> None:
-        with self._lock:
-            left = self._whole - (self._clock() - self._began)
-            self._progress(f"{what} (about {_duration(left)} left)" if left > 0 else what)
+    >>> time_left(2, 10, 60.0), time_left(0, 10, 60.0), time_left(1, 10, 2.0)
+    (', about 4 min left', '', '')
+    """
+    if not 0 < done < count or passed < _TOO_SOON:
+        return ""
+    return f", about {_duration(passed / done * (count - done))} left"
 
 
 def _duration(seconds: float) -> str:

@@ -13,7 +13,7 @@ from discovery.challenge.lines import LINES, behind, rows
 from discovery.challenge.methods import WORKBENCH
 from discovery.challenge.scoring import NEAR, RIGHT
 from discovery.challenge.tally import Scored, Tally
-from discovery.report.text import counted
+from discovery.printed import counted
 
 _HERE = Path(__file__).parent
 

@@ -5,13 +5,14 @@ effect.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
+from discovery.diagnosis.sizes import Sizes
 from discovery.dynamics import Grid, make_grid
 from discovery.effects.candidates import Scene, candidates
 from discovery.effects.form import Effect
@@ -24,16 +25,13 @@ from discovery.evidence.process_noise import (
     Prior,
     Setting,
     floors,
-    flow_sizes,
     neighbours,
     reading_noise,
     settings,
 )
-from discovery.evidence.signatures import signatures
 from discovery.fitting import Fit, Noise, fit_model
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.terms import evaluate
 
 Array = NDArray[np.float64]
 
@@ -71,7 +69,6 @@ class Context:
     outliers: tuple[Outlier, ...]  # set aside
     form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
     laws: int  # of these, the first, that are of laws and not of edges
-    known: dict[tuple[str, ...], list[tuple[float, float, float]]] = field(default_factory=dict, repr=False)
 
     @property
     def white(self) -> Noise:
@@ -98,60 +95,13 @@ class Context:
         """Every effect at every place of the model where it can act."""
         return candidates(self.model, self.effects, self.scene)
 
-    def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:
-        """Prior of the size of each amplitude: usual on machines of the catalogue, but no more than a share
-        of what flows in the model; of what an output shows more, some reading noises.
-        """
-        for h in hypotheses:
-            if h.amplitudes not in self.known:
-                self.known[h.amplitudes] = self._sizes(h)
-        found = [one for h in hypotheses for one in self.known[h.amplitudes]]
-        median, factor, sign = (np.array(column, dtype=float) for column in zip(*found, strict=True))
-        return Slab(median, factor, sign)
-
-    def _sizes(self, h: Hypothesis) -> list[tuple[float, float, float]]:
-        amplitude, count = h.effect.amplitude, len(h.amplitudes)
-        if amplitude.most < np.inf or (h.terms and not h.effect.is_physics):
-            return [(amplitude.plausible, thresholds.FACTOR, float(amplitude.sign))] * count
-        if h.shown:
-            return [
-                (thresholds.JUMP * noise / max(size, 1e-12), thresholds.FACTOR, float(amplitude.sign))
-                for size, noise in self._shown(h)
-            ]
-        states = {t.into for t in h.terms}
-        kind = any(self.model.states[s].capacity for s in states if s in self.model.states)
-        largest = max(v for n, v in self.flows.items() if bool(self.model.states[n].capacity) == kind)
-        usual = min(amplitude.plausible, thresholds.USUAL * largest / max(self._unit_flow(h), 1e-300))
-        return [(usual, thresholds.FACTOR, float(amplitude.sign))] * count
-
     @cached_property
-    def flows(self) -> dict[str, float]:
-        """rms of what flows through each state of the baseline."""
-        return {n: v for n, v in flow_sizes(self.baseline).items() if n in self.model.states}
+    def _usual_sizes(self) -> Sizes:
+        return Sizes(self.model, self.baseline.trajectories, self.white)
 
-    def _shown(self, h: Hypothesis) -> list[tuple[float, float]]:
-        """For each amplitude: rms of the outputs for an amplitude of one, and the reading noise there."""
-        white = dict(zip(self.outputs, self.white.white, strict=True))
-        several = len(h.amplitudes) > 1
-        names = list(h.shown) if several else [next(iter(h.shown))]
-        size = np.zeros(len(names))
-        for run in self.baseline.trajectories:
-            for k, name in enumerate(names):
-                column = signatures(run, [h])[:, self.outputs.index(name), k]
-                size[k] = max(size[k], float(np.sqrt(np.mean(column**2))))
-        return [(float(size[k]), white[name]) for k, name in enumerate(names)]
-
-    def _unit_flow(self, h: Hypothesis) -> float:
-        """rms of what an effect of size one lets flow along the baseline. The largest recording counts: one
-        may be dry, and which comes first says nothing.
-        """
-        found = 0.0
-        for run in self.baseline.trajectories:
-            values = {**run.at_ends(), **h.values(run.system.grid.recording)}
-            for term in h.terms:
-                series = evaluate(term.expression, values, memory=run.system.ends).value
-                found = max(found, float(np.sqrt(np.mean(np.square(series)))))
-        return found
+    def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:
+        """Prior of the size of each amplitude."""
+        return self._usual_sizes.slab(hypotheses)
 
 
 def make_context(
@@ -169,7 +119,7 @@ def make_context(
     Args:
         after: by recording, those of the whole campaign that were made then or later.
     """
-    inputs = _inputs(campaign, recordings, outputs)
+    inputs = recorded_inputs(campaign, recordings, outputs)
     whole = {r: make_grid(campaign, r, inputs, outputs, coarse=NODES, most=2 * NODES) for r in recordings}
     belief = None if model.guessed else thresholds.BELIEF
     stated = {name: campaign.channels[name].noise for name in outputs}
@@ -194,25 +144,14 @@ def make_context(
     form, laws = model_form(fit, np.array(white.white))
     spreads = fit.problem.start_spreads()
     own = {n: replace(s, start_sd=spreads.get(n, s.start_sd)) for n, s in model.states.items()}
-    scene = Scene(
-        campaign.channels,
-        tuple(outputs),
-        tuple(recordings),
-        after,
-        {n: size for n in inputs if (size := _largest(campaign, recordings, n)) > 0},
-        frozenset(set(inputs) - set(model.inputs)),
-        thresholds.ODDS,
-        thresholds.ODDS,
-    )
-    duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
-    spacing = min(float(np.median(np.diff(g.time[g.read]))) for g in grids.values() if len(g.read) > 1)
+    scene = make_scene(campaign, model, recordings, outputs, after)
     return Context(
         campaign,
         replace(model, states=own),  # how far states begin from their starts is found once
         tuple(recordings),
         tuple(outputs),
         grids,
-        tuple(_within(e, spacing, duration) for e in effects),
+        tuple(shown_by(grids, effects)),
         scene,
         fit,
         settings(white, floor, process_prior(), any(g.unsure for g in grids.values())),
@@ -241,7 +180,7 @@ def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:
     return {r: g.part(slice(None, None, every)) for r, g in grids.items()}
 
 
-def _inputs(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> list[str]:
+def recorded_inputs(campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]) -> list[str]:
     """Channels that could drive a model: recorded in every recording."""
 
     def known(name: str) -> bool:
@@ -262,6 +201,29 @@ def _largest(campaign: Campaign, recordings: Sequence[str], name: str) -> float:
     return float(np.abs(series).max()) if np.ptp(series) > 0 else 0.0
 
 
-def _within(effect: Effect, spacing: float, duration: float) -> Effect:
-    """The effect, its generic time constants limited to those that the recordings can show."""
-    return replace(effect, shapes=tuple(s.within(0.5 * spacing, duration) for s in effect.shapes))
+def make_scene(
+    campaign: Campaign,
+    model: Model,
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    after: Mapping[str, tuple[str, ...]],
+) -> Scene:
+    """What candidates for a model are made for. `after`: as in `make_context`."""
+    inputs = recorded_inputs(campaign, recordings, outputs)
+    return Scene(
+        campaign.channels,
+        tuple(outputs),
+        tuple(recordings),
+        after,
+        {n: size for n in inputs if (size := _largest(campaign, recordings, n)) > 0},
+        frozenset(set(inputs) - set(model.inputs)),
+        thresholds.ODDS,
+        thresholds.ODDS,
+    )
+
+
+def shown_by(grids: Mapping[str, Grid], effects: Sequence[Effect]) -> list[Effect]:
+    """The effects, their generic time constants limited to those that the recordings can show."""
+    duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
+    spacing = min(float(np.median(np.diff(g.time[g.read]))) for g in grids.values() if len(g.read) > 1)
+    return [replace(e, shapes=tuple(s.within(0.5 * spacing, duration) for s in e.shapes)) for e in effects]

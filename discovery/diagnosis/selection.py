@@ -106,7 +106,7 @@ class Search:
     def _grown(self, current: Scored) -> Scored:
         """Add the best candidate, or let an effect act at more places, as long as the posterior grows."""
         while len(current.hypotheses) < MOST:
-            best = self._refitted(current, current.hypotheses, _hopeful(self.scanned(current).claims, REFITS))
+            best = self._refitted(current, current.hypotheses, hopeful(self.scanned(current).claims, REFITS))
             best = max(best, self._widened(current), key=lambda one: one.evidence)
             if best.evidence <= current.evidence:
                 break
@@ -136,7 +136,7 @@ class Search:
             own = current.evidence - self.keep(without).evidence
             # an infinite gain: what is left has a size of the wrong sign, so that nothing is reached
             reached = own if own < inf else -inf
-            pool = _hopeful(scan.without[h.key], RIVALS, reached)
+            pool = hopeful(scan.without[h.key], RIVALS, reached)
             best = self._refitted(without, others, [*pool, *_alike(h, scan.without[h.key])])
             if max(best.evidence, without.evidence) > current.evidence:
                 return self._questioned(max(best, without, key=lambda a: a.evidence))
@@ -182,7 +182,7 @@ def _alike(h: Hypothesis, claims: Sequence[Score]) -> list[Score]:
     return [c for c in found if c is not None and c.odds > 0]
 
 
-def _hopeful(claims: Sequence[Score], most: int, reached: float = -inf) -> list[Score]:
+def hopeful(claims: Sequence[Score], most: int, reached: float = -inf) -> list[Score]:
     """Candidates that are worth a refit: the scan sees a large effect only to first order."""
     best = max([reached, *(c.odds for c in claims[:1])])
     return [c for c in claims[:most] if c.odds > max(-HOPE, HALF * best - HOPE)]

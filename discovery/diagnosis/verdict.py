@@ -83,7 +83,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     best = max(rest, key=lambda m: m.evidence)
     short = best.evidence - _alone(context, found, answer, named)
     # names hold next to effects that are not sure, but not next to heat that no effect explains
-    if (best.forced or not named) and short > _by_chance(found):
+    if (best.forced or not named) and short > by_chance(found.gain):
         if best.forced:
             reasons.append(f"heat of unknown cause at {best.forced} explains more than effects do")
         reasons.append(f"the surest effects explain too little (log evidence {short:.0f} below the best)")
@@ -132,7 +132,7 @@ def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Na
     next to large effects.
     """
     kept = list(chosen)
-    least = _by_chance(found)
+    least = by_chance(found.gain)
     while kept:
         whole = _alone(context, found, answer, kept)
         reach = least + found.best.evidence - whole
@@ -147,11 +147,11 @@ def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Na
     return kept
 
 
-def _by_chance(found: Search) -> float:
+def by_chance(gain: float) -> float:
     """Log evidence that may come by chance. A log evidence of G varies by sqrt(2 G) from one set of readings
     to another: it is half of the square of a distance known within one standard deviation.
     """
-    return max(thresholds.SHORT, thresholds.CHANCE * sqrt(2 * max(found.gain, 0.0)))
+    return max(thresholds.SHORT, thresholds.CHANCE * sqrt(2 * max(gain, 0.0)))
 
 
 def _alone(

@@ -131,17 +131,18 @@ class Projected:
 
 def project(seen: Whitened, setting: Setting, columns: Sequence[Array]) -> Projected:
     """Columns (R, Y, A) by recording, whitened, with everything that a refit would absorb projected out."""
-    return _projected(seen.whiten(setting.noise, columns)[0], seen.absorbed(setting.noise))
+    return projected(seen.whiten(setting.noise, columns)[0], seen.absorbed(setting.noise))
 
 
 def project_one(seen: Whitened, setting: Setting, recording: int, columns: Array) -> Projected:
     """As `project`, of columns (R, Y, A) that are zero but in one recording."""
     gone, here = seen.absorbed(setting.noise), seen.places[recording]
     z = seen.whiten_one(setting.noise, recording, columns)
-    return _projected(z, replace(gone, residual=gone.residual[here], basis=gone.basis[here]))
+    return projected(z, replace(gone, residual=gone.residual[here], basis=gone.basis[here]))
 
 
-def _projected(z: Array, gone: Absorbed) -> Projected:
+def projected(z: Array, gone: Absorbed) -> Projected:
+    """Whitened signatures (N, A), seen through what a refit absorbs."""
     inside = gone.basis.T @ z
     length = np.einsum("na,na->a", z, z)
     left = length - np.einsum("ua,ua->a", inside, inside)
@@ -195,13 +196,13 @@ def scan(
             gone: Sequence[Absorbed] = gone,
         ) -> list[Products]:
             z = seen.whiten(noise, pair[1])[0]
-            return [_products(_projected(z, view), pair[0]) for view in gone]
+            return [products(projected(z, view), pair[0]) for view in gone]
 
         pieces = side_by_side(looked, list(zip(batches, columns, strict=True)))
         for i, part in enumerate(parts):
             part.append(_joined([piece[i] for piece in pieces]))
         levels[:, k] = [view.level - float(log.sum()) + setting.log_weight for view in gone]
-    return [_ranked(hypotheses, slab, level, part) for level, part in zip(levels, parts, strict=True)]
+    return [ranked(hypotheses, slab, level, part) for level, part in zip(levels, parts, strict=True)]
 
 
 def _batches(hypotheses: Sequence[Hypothesis]) -> list[Sequence[Hypothesis]]:
@@ -222,7 +223,8 @@ class Products:
     matrices: tuple[Array, ...]
 
 
-def _products(part: Projected, hypotheses: Sequence[Hypothesis]) -> Products:
+def products(part: Projected, hypotheses: Sequence[Hypothesis]) -> Products:
+    """Inner products of the signatures of hypotheses, in their order."""
     edges = np.concatenate([[0], np.cumsum([len(h.amplitudes) for h in hypotheses])]).tolist()
     least = _ROUNDING * (part.length**2 + 1e-30)
     matrices = tuple(
@@ -243,10 +245,16 @@ def _joined(pieces: Sequence[Products]) -> Products:
     )
 
 
-def _ranked(
+def ranked(
     hypotheses: Sequence[Hypothesis], slab: Slab, levels: Array, parts: Sequence[Products]
 ) -> list[Score]:
-    """One score for each claim, over noise settings and shapes."""
+    """One score for each claim, over noise settings (S,) and shapes, best odds first.
+
+    Args:
+        slab: prior of each amplitude, in the order of the hypotheses.
+        levels: (S,) log likelihood of the model without them, under each noise setting.
+        parts: what the signatures say under each.
+    """
     if not hypotheses:
         return []
     counts = np.array([len(h.amplitudes) for h in hypotheses])

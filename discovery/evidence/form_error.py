@@ -57,7 +57,11 @@ def _laws(runs: Sequence[Trajectory]) -> list[Array]:
 
 
 def law_columns(
-    run: Trajectory, scales: Mapping[str, tuple[float, float]], index: int = 0, count: int = 1
+    run: Trajectory,
+    scales: Mapping[str, tuple[float, float]],
+    index: int = 0,
+    count: int = 1,
+    flows: Sequence[Term] | None = None,
 ) -> Array:
     """What the readings show more (R, Y, M) where each flow, and each output, is off by its own size times
     each psi.
@@ -65,15 +69,16 @@ def law_columns(
     Args:
         scales: as of `scales_of`.
         index: which of `count` recordings it is; with one, no psi distinguishes recordings.
+        flows: of the model; default all.
     """
     pieces: list[Column] = []
     owners = 0
-    for term in _flows(run):
+    for term in _flows(run) if flows is None else flows:
         points = _points(run, scales, term.into, index, count)
         pieces += _pieces(run, term, points, owners)
         owners += len(points)
-    flows = sensitivities(run, (), (), pieces, count=owners)
-    return np.concatenate([flows, _levers(run, scales, index, count)], axis=2)
+    seen = sensitivities(run, (), (), pieces, count=owners)
+    return np.concatenate([seen, _levers(run, scales, index, count)], axis=2)
 
 
 def place_columns(run: Trajectory) -> Array:
@@ -130,13 +135,14 @@ def _only(seen: Array, y: int) -> Array:
     return out
 
 
-def edge_columns(run: Trajectory) -> Array:
+def edge_columns(run: Trajectory, flows: Sequence[Term] | None = None) -> Array:
     """What the readings show more (R, Y, M) where each flow enters each neighbour of its body in place of the
-    body.
+    body. `flows`: of the model; default all.
     """
+    flows = _flows(run) if flows is None else flows
     pieces: list[Column] = []
-    for term in _flows(run):
-        pieces += _beyond(run, term, len(pieces))
+    for term in flows:
+        pieces += _beyond(run, term, flows, len(pieces))
     return sensitivities(run, (), (), pieces, count=len(pieces))
 
 
@@ -185,9 +191,9 @@ def _pieces(run: Trajectory, term: Term, points: Sequence[Array], first: int) ->
     return [Column(first + m, term.into, flow * point, term.source) for m, point in enumerate(points)]
 
 
-def _beyond(run: Trajectory, term: Term, first: int) -> list[Column]:
-    """A flow that enters each neighbour of its body in place of the body."""
-    links = {(t.into, t.source) for t in run.system.model.terms if t.source}
+def _beyond(run: Trajectory, term: Term, flows: Sequence[Term], first: int) -> list[Column]:
+    """A flow that enters each neighbour of its body in place of the body; `flows` link the bodies."""
+    links = {(t.into, t.source) for t in flows if t.source}
     near = {a if b == term.into else b for a, b in links if term.into in (a, b)}
     flow = np.asarray(evaluate(term.expression, run.at_ends(), memory=run.system.ends).value)
     others = [n for n in run.system.states if n in near and n != term.source]

@@ -76,7 +76,7 @@ def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float =
         ambient: channels that measure the air.
         apart: rms difference [K] of the air at a body from these.
     """
-    largest = flow_sizes(fit)
+    largest = flow_sizes(fit.trajectories)
     states = {n: s for n, s in fit.problem.model.states.items() if not s.memory}
     top = {
         kind: max((largest[n] for n, s in states.items() if bool(s.capacity) == kind), default=0.0)
@@ -90,10 +90,10 @@ def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float =
     return {n: float(np.hypot(share * top[bool(s.capacity)], air[n])) for n, s in states.items()}
 
 
-def flow_sizes(fit: Fit) -> dict[str, float]:
+def flow_sizes(trajectories: Sequence[Trajectory]) -> dict[str, float]:
     """rms of the flow through each state, W or a rate, in the recording where it is largest."""
     found: dict[str, float] = {}
-    for trajectory in fit.trajectories:
+    for trajectory in trajectories:
         size = np.sqrt(np.mean(flows(trajectory) ** 2, axis=0))
         for name, one in zip(trajectory.system.states, size.tolist(), strict=True):
             found[name] = max(found.get(name, 0.0), one)

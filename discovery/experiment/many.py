@@ -8,6 +8,7 @@ and whose files have not changed since is not run again.
 from __future__ import annotations
 
 import hashlib
+import time as clock
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from typing import Any
 
 from discovery.errors import UserError
 from discovery.extras import need
-from discovery.progress import Progress, Steps, silent
+from discovery.progress import Progress, silent, time_left
 from discovery.recordings.campaignfile import campaign_path
 from discovery.runfolder import RESULTS, default_folder, read_results
 from discovery.threads import use_jobs
@@ -74,13 +75,13 @@ def run_many(
         found[path] = _kept(path, target) if is_finished(path, target) else Done(str(path), target)
     todo = [path for path in paths if not found[path].skipped]
     tasks = [(str(path.resolve()), str(found[path].folder), force) for path in todo]
-    steps = Steps(progress, [1.0] * len(tasks))
+    began = clock.perf_counter()
     results = _here(tasks) if address is None else _on(address, tasks)
     for count, (k, (lines, failure)) in enumerate(results, start=1):
         one = found[todo[k]]
         found[todo[k]] = Done(one.experiment, one.folder, lines, failure)
-        steps.end(1.0)
-        steps(f"{len(paths) - len(todo) + count} of {len(paths)} experiments done")
+        left = time_left(count, len(tasks), clock.perf_counter() - began)
+        progress(f"{len(paths) - len(todo) + count} of {len(paths)} experiments done{left}")
     return list(found.values())
 
 

@@ -22,7 +22,8 @@ from discovery.experiment.quality import quality, refuse
 from discovery.experiment.results import results_document, write_run
 from discovery.fitting.fit import written_with
 from discovery.models import Model
-from discovery.progress import Progress, Steps, silent
+from discovery.printed import counted
+from discovery.progress import Progress, silent
 from discovery.recordings.finding import Finding, folded
 from discovery.report import write_report
 from discovery.runfolder import default_folder, staged
@@ -66,13 +67,12 @@ def run(
     """
     began = clock.perf_counter()
     experiment, findings = _looked_at(path, progress, tell, force=force)
-    progress = steps = Steps(progress, [*map(_weight, experiment.form.models.values()), _DIAGNOSIS])
     folder = out or default_folder(experiment.name)
     if experiment.form.export:
         check_targets(experiment.form.export.to)
     with staged(folder) as temporary:
         begun = begin_roles(experiment)
-        fitted = fit_all(experiment, steps)
+        fitted = fit_all(experiment, progress)
         found = diagnosis(experiment, progress, fitted)
         if found is not None and found.repaired is not None:
             name = _free_name("repaired", fitted)
@@ -106,23 +106,24 @@ def _looked_at(
     return experiment, findings
 
 
-_DIAGNOSIS = 4.0  # how long it takes, relative to a model that is only fitted
-
-
 def _weight(entry: ModelEntry) -> float:
     """Return how long a model takes, relative to a model that is only fitted."""
     return 3.0 if isinstance(entry, SparseOptions) else 1.0
 
 
-def fit_all(experiment: Experiment, steps: Steps) -> dict[str, Fitted]:
+def fit_all(experiment: Experiment, progress: Progress = silent) -> dict[str, Fitted]:
     """Every model of the experiment, in the order of its file. Models know nothing of each other, so they are
-    fitted side by side, the longest first.
+    fitted side by side, the longest first. Progress says how many are done, and not how long the rest takes:
+    no model says how long another one takes.
     """
-    models = experiment.form.models
+    models, done = experiment.form.models, list[str]()
+
+    def counting(what: str) -> None:
+        progress(f"{what} ({len(done)} of {counted(len(models), 'model')} done)")
 
     def fitted(name: str) -> Fitted:
-        one = fit_entry(experiment, name, models[name], steps)
-        steps.end(_weight(models[name]))
+        one = fit_entry(experiment, name, models[name], counting)
+        done.append(name)
         return one
 
     order = sorted(models, key=lambda name: -_weight(models[name]))

@@ -164,7 +164,7 @@ def _model(document: Mapping[str, Any], place: str | Path) -> Model:
         s["name"]: State(
             s["name"],
             s["unit"],
-            None,
+            s.get("capacity"),
             None if s["start"] is None else parsed(s["start"], f"start of {s['name']}"),
             s["start_sd"],
             s["scale"],

@@ -146,8 +146,9 @@ def _state(state: State) -> dict[str, Any]:
         "start": text(state.start) if state.start is not None else None,
         "start_sd": state.start_sd,
     }
+    body = {"capacity": state.capacity} if state.capacity else {}
     follows = {"start_with": dict(state.start_with)} if state.start_with else {}
-    return entry | follows | ({"memory": True} if state.memory else {})
+    return entry | body | follows | ({"memory": True} if state.memory else {})
 
 
 def _term(term: Term) -> dict[str, Any]:

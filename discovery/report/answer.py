@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from discovery.printed import counted
 from discovery.report.heat import diagnosed_key, subject
 from discovery.report.lead import Lead, lead_over
 from discovery.report.mismatch import NEAR, leads, sizes
@@ -24,7 +25,7 @@ from discovery.report.ranking import (
 )
 from discovery.report.recommended import recommended
 from discovery.report.run import Run, pretty_unit
-from discovery.report.text import counted, listed, number, percent, words
+from discovery.report.text import listed, number, percent, words
 
 _CLEARLY = 0.95  # ratio of two rms from which one is clearly smaller
 _VERDICTS = {

@@ -14,12 +14,13 @@ from discovery import __version__
 from discovery.evaluation import rolematrix
 from discovery.evaluation.tables import budget_tables
 from discovery.models import Model
+from discovery.printed import counted
 from discovery.report import equations, heat, series
 from discovery.report.chart import Chart, Panel, Series
 from discovery.report.printed import Line, Printed, printed
 from discovery.report.ranking import is_discovered, is_error, ranked
 from discovery.report.run import Run
-from discovery.report.text import counted, number, percent
+from discovery.report.text import number, percent
 from discovery.terms import names
 
 _MOST_DETAILED = 6  # models with a section of their own

@@ -68,12 +68,3 @@ def words(identifier: str) -> str:
     'flooded gap'
     """
     return identifier.replace("_", " ")
-
-
-def counted(count: int, word: str) -> str:
-    """A number of things.
-
-    >>> counted(1, "state"), counted(3, "term")
-    ('1 state', '3 terms')
-    """
-    return f"{count} {word}{'s' * (count != 1)}"

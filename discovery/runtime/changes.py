@@ -27,6 +27,7 @@ from discovery.export.knowledge import Knowledge, compressed, spreads
 from discovery.fitting.kalman import make_filter
 from discovery.fitting.noise import Noise
 from discovery.fitting.problem import Problem
+from discovery.terms import Term
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -203,13 +204,88 @@ def _without(gram: Array, count: int) -> Array:
     )
 
 
+@dataclass(frozen=True)
+class Rows:
+    """Whitened readings (N,) of the fit and of new recordings: `base` (N, B), what the fit left unknown, in
+    standard deviations `spread` (B,); `more`: what else is asked, of the readings of each recording alone.
+    The rows of the fit, `fitted` in number, come first; the first `kept` columns of the base are in them.
+    `log`: of the standard deviations of all innovations, summed.
+    """
+
+    residual: Array
+    base: Array
+    more: tuple[Array, ...]
+    spread: Array
+    fitted: int
+    kept: int
+    log: float
+
+
+def whitened(
+    known: Knowledge,
+    problem: Problem,
+    runs: Sequence[Trajectory],
+    more: Sequence[Array],
+    flows: Sequence[Term] | None = None,
+) -> Rows:
+    """What the readings of a problem and of the fit say of what the fit left unknown.
+
+    Args:
+        problem: a model on new recordings; start values count as unknown.
+        runs: of the model on each recording.
+        more: further columns (R, Y, M) of each recording.
+        flows: terms that the fit knew; default all of the model.
+
+    Raises:
+        UserError: what is known is of another model.
+    """
+    starts = [u for u in problem.unknowns if u.is_start]
+    noise = noise_of(known, problem.outputs)
+    residuals, bases, others, log = [], [], [], 0.0
+    for k, run in enumerate(runs):
+        mine = [i for i, u in enumerate(starts) if u.recording == run.system.grid.recording]
+        laws = law_columns(run, known.scales, flows=flows)
+        bounds = edge_columns(run, flows)
+        blocks = [
+            problem.residual(run)[:, :, None],
+            np.concatenate([sensitivities(run, known.parameters), laws, bounds], axis=2),
+            sensitivities(run, (), [starts[i].name for i in mine]),
+            more[k],
+        ]
+        white, logs = make_filter(run).whitened(noise, np.concatenate(blocks, axis=2))
+        ends = np.cumsum([block.shape[2] for block in blocks])[:-1]
+        residual, base, begun, other = np.split(white, ends, axis=1)
+        began = np.zeros((len(white), len(starts)))
+        began[:, mine] = begun
+        residuals.append(residual[:, 0])
+        bases.append(np.hstack([base, began]))
+        others.append(other)
+        log += float(np.sum(logs))
+    spread = np.concatenate(
+        [
+            spreads(known, problem.model, laws.shape[2], bounds.shape[2]),
+            [u.prior[1] if u.prior else 1.0 for u in starts],
+        ]
+    )
+    fitted = np.hstack([known.rows[:, 1:], np.zeros((len(known.rows), len(starts)))])
+    return Rows(
+        np.concatenate([known.rows[:, 0], *residuals]),
+        np.concatenate([fitted, *bases]) * spread,
+        tuple(others),
+        spread,
+        len(known.rows),
+        known.rows.shape[1] - 1,
+        log,
+    )
+
+
 def make_table(
     known: Knowledge,
     problem: Problem,
     channels: Sequence[str],
     more: Mapping[str, Sequence[Array]] | None = None,
 ) -> Table:
-    """What the readings of a problem and of the fit say, whitened with the noise of the fit.
+    """What the readings of a problem and of the fit say of changes, whitened with the noise of the fit.
 
     Args:
         problem: the model at work on new recordings; start values count as unknown.
@@ -221,65 +297,46 @@ def make_table(
     """
     more = more or {}
     runs = [problem.run(system, problem.start) for system in problem.systems]
-    starts = [u for u in problem.unknowns if u.is_start]
-    noise, own = _noise(known, problem.outputs), len(known.parameters)
+    noise, own = noise_of(known, problem.outputs), len(known.parameters)
     edges = _block_edges(runs, noise)
     states = [name for name, floor in known.floor.items() if floor > 0]
-    first = np.cumsum([0, *((len(e) - 1) * len(states) for e in edges)])
     lasts = [float(run.system.grid.time[-1]) for run in runs]
-    parts = []
+    asked = []
     for k, run in enumerate(runs):
-        grid = run.system.grid
-        mine = [i for i, u in enumerate(starts) if u.recording == grid.recording]
-        grown = (sum(lasts[:k]) + grid.time) / sum(lasts)
-        laws, bounds = law_columns(run, known.scales), edge_columns(run)
-        blocks = [
-            problem.residual(run)[:, :, None],
-            np.concatenate([sensitivities(run, known.parameters), laws, bounds], axis=2),
-            sensitivities(run, (), [starts[i].name for i in mine]),
-            np.concatenate(
-                [
-                    sensitivities(run, known.parameters, grown=grown),
-                    sensitivities(run, channels),
-                    *(group[k] for group in more.values()),
-                ],
-                axis=2,
-            ),
-            np.concatenate([-np.diff(heat_steps(run, n, edges[k]), axis=2) for n in states], axis=2),
+        grown = (sum(lasts[:k]) + run.system.grid.time) / sum(lasts)
+        changing = [
+            sensitivities(run, known.parameters),
+            sensitivities(run, known.parameters, grown=grown),
+            sensitivities(run, channels),
+            *(group[k] for group in more.values()),
         ]
-        white = make_filter(run).whitened(noise, np.concatenate(blocks, axis=2))[0]
-        ends = np.cumsum([block.shape[2] for block in blocks])[:-1]
-        residual, base, begun, changing, heat = np.split(white, ends, axis=1)
-        began = np.zeros((len(white), len(starts)))
-        began[:, mine] = begun
-        heats = np.zeros((len(white), first[-1]))
-        heats[:, first[k] : first[k + 1]] = heat
-        parts.append((residual[:, 0], np.hstack([base, began]), np.hstack([base[:, :own], changing, heats])))
-    spread = np.concatenate(
-        [
-            spreads(known, problem.model, laws.shape[2], bounds.shape[2]),
-            [u.prior[1] if u.prior else 1.0 for u in starts],
-        ]
-    )
-    count = len(known.rows)
-    fitted = np.hstack([known.rows[:, 1:], np.zeros((count, len(starts)))])
+        heat = [-np.diff(heat_steps(run, n, edges[k]), axis=2) for n in states]
+        asked.append(np.concatenate([*changing, *heat], axis=2))
+    rows = whitened(known, problem, runs, asked)
     counts = {"at once": own, "bit by bit": own} | dict.fromkeys(channels, 1)
     counts |= {name: group[0].shape[2] for name, group in more.items()}
     edge = np.cumsum([0, *counts.values()])
     before = int(edge[-1])
+    first = np.cumsum([0, *((len(e) - 1) * len(states) for e in edges)])
+    slopes = [np.zeros((rows.fitted, before + first[-1]))]
+    for k, part in enumerate(rows.more):
+        mine = np.zeros((len(part), before + first[-1]))
+        mine[:, :before] = part[:, :before]
+        mine[:, before + first[k] : before + first[k + 1]] = part[:, before:]
+        slopes.append(mine)
     return Table(
-        np.concatenate([known.rows[:, 0], *(r for r, _, _ in parts)]),
-        np.concatenate([fitted, *(j for _, j, _ in parts)]) * spread,
-        np.concatenate([np.zeros((count, before + first[-1])), *(j for _, _, j in parts)]),
+        rows.residual,
+        rows.base,
+        np.concatenate(slopes),
         {n: np.arange(a, b) for n, a, b in zip(counts, edge[:-1], edge[1:], strict=True)},
         {n: _heat(runs, edges, i, noise.heat_time, before + first, n) for i, n in enumerate(states)},
-        spread,
-        count,
-        known.rows.shape[1] - 1,
+        rows.spread,
+        rows.fitted,
+        rows.kept,
     )
 
 
-def _noise(known: Knowledge, outputs: Sequence[str]) -> Noise:
+def noise_of(known: Knowledge, outputs: Sequence[str]) -> Noise:
     """The noise of the fit, of the outputs that were read now."""
     assert known.noise is not None
     at = [known.noise.outputs.index(name) for name in outputs]

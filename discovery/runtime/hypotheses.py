@@ -1,34 +1,40 @@
-"""What new recordings say of a model at work: nothing, wear, a faulty input sensor, or something else.
+"""What new recordings say of a model at work: nothing, wear, a faulty input sensor, new physics, or something
+else.
 
 All are hypotheses of one comparison (`changes.py`). Under `nothing` the parameters and laws are as uncertain
 as their fit left them. Under `wear` the parameters that can age have changed, under `sensor of X` this sensor
-has an offset. `something else` is heat of unknown cause at one body, as in the diagnosis, or from one body to
-another, or another exchange with one temperature (a fan, a door). In the running loop, an input that the
+has an offset. `new physics` is an effect of the catalogue that began to act (`newphysics.py`), named as in a
+diagnosis, or another exchange with one temperature (a fan, a door). `something else` is heat of unknown cause
+at one body, as in the diagnosis, or from one body to another. In the running loop, an input that the
 model does not use may act by a path of its own, or one that came in so acts no longer (`unused.py`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.diagnosis.thresholds import RIVAL, SHORT, UNKNOWN_HEAT, UNKNOWN_SHARES
+from discovery.diagnosis.thresholds import NAMED, ODDS, RIVAL, SHORT, SUREST, UNKNOWN_HEAT, UNKNOWN_SHARES
+from discovery.diagnosis.verdict import by_chance
 from discovery.errors import UserError
+from discovery.evidence.bayes import Score
 from discovery.export.document import Exported
 from discovery.export.knowledge import problem_of, read_knowledge, settle_starts
 from discovery.fitting.covariance import Z95
 from discovery.fitting.problem import Problem
 from discovery.models import Model
+from discovery.printed import counted
 from discovery.recordings import Campaign
 from discovery.runtime.changes import Change, Seen, Table, make_table
+from discovery.runtime.newphysics import new_physics
 from discovery.runtime.unused import Path, path_columns, paths, taken_in
 from discovery.runtime.wear import ageing, uses, usual_wear, wears
-from discovery.terms import parse
+from discovery.terms import Apply, Expression, Name, names, parse
 from discovery.threads import one_thread
 
 Array = NDArray[np.float64]
@@ -40,6 +46,7 @@ Verdict = Literal[
     "input sensor",
     "unused input",
     "idle input",
+    "new physics",
     "something else",
     "undecided",
 ]
@@ -52,6 +59,7 @@ LEAST_ODDS = 2.5  # log of the odds against `nothing`, below which nothing has c
 MEMORY_S = 24 * 3600.0  # in which a residual counts less and less: wear goes on meanwhile
 RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
 START_SD = 0.5  # K, um: of states that are known where a recording begins
+OTHERS = ("something else", "exchange with ")  # what may have changed together with wear or a sensor
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
 
 
@@ -61,7 +69,9 @@ class Comparison:
     under `nothing`, prior odds included. `verdict` and `what`: the best one, and the sensor where it is one.
     `rms`: residual of the model at work in units of that of its fit; `lately`: the same, as of now.
     `change`: of the parameters that age, under wear, with standard deviations; `rows`: what is known after
-    it. `path`: of the unused input, with its parameters.
+    it. `path`: of the unused input, with its parameters. `physics`: effects of the catalogue that were
+    fitted, by name; `probability`: of the verdict, where it is new physics. `share`: by which all exchange
+    with a temperature changed, where it is that, to first order.
     """
 
     recordings: tuple[str, ...]
@@ -74,24 +84,33 @@ class Comparison:
     change: Mapping[str, tuple[float, float]]
     rows: Array
     path: tuple[Path, Mapping[str, float]] | None = None
+    physics: Mapping[str, Score] = field(default_factory=dict)
+    probability: float | None = None
+    share: float | None = None
 
     def __str__(self) -> str:
         others = ", ".join(f"{name} {value:+.1f}" for name, value in self.odds.items() if name != "nothing")
         what = f" ({self.what})" if self.what else ""
         return (
-            f"{', '.join(self.recordings)}: {self.verdict}{what}; {self.readings} readings, "
+            f"{', '.join(self.recordings)}: {self.verdict}{what}; {counted(self.readings, 'reading')}, "
             f"residual {self.rms:.2f} times that of the fit; log odds against no change: {others}"
         )
 
 
 @one_thread
 def compare(
-    exported: Exported, campaign: Campaign, recordings: Sequence[str], choose: bool = False
+    exported: Exported,
+    campaign: Campaign,
+    recordings: Sequence[str],
+    *,
+    choose: bool = False,
+    named: bool = True,
 ) -> Comparison:
     """Compare the hypotheses on recordings taken since the last revision.
 
     Args:
-        choose: a recorded input that the model does not use may act, too.
+        choose: a recorded input that the model does not use may act by a path of its own, too.
+        named: effects of the catalogue may have begun; to try them all takes a minute.
 
     Raises:
         UserError: a model without knowledge of its parameters, or no reading of any output.
@@ -119,24 +138,26 @@ def compare(
         offered[f"sensor of {name}"] = [Change(table.at[name], np.array([[size]])) for size in OFFSET]
     for name, path in ways.items():
         offered.setdefault(f"input {path.channel}", []).extend(_acting(path, table.at[name], levels))
-    offered["something else"] = [
-        *_exchanges(exported, table, channels),
-        *_heats(exported.model, table, known.floor),
-    ]
+    for name in channels:
+        if exchanges := _exchanges(exported, table, name):
+            offered[f"exchange with {name}"] = exchanges
+    offered["something else"] = _heats(exported.model, table, known.floor)
     evidence = {name: _mean([seen.log_odds(one) for one in alike]) for name, alike in offered.items()}
     for channel, gains in idle.items():
         by = np.array([-exported.model.parameters[n].value for n in gains])
         evidence[f"no input {channel}"] = seen.log_odds_of(table.at[channel], by)
     odds = {"nothing": 0.0} | {n: value + _before(n, list(evidence)) for n, value in evidence.items()}
-    verdict, what = _verdict(odds, evidence)
+    physics = new_physics(exported, known, campaign, recordings, outputs) if named else {}
+    odds |= {n: one.odds for n, one in physics.items()}
+    verdict, what = _verdict(odds, evidence, physics)
     alone = table.seen()
     if usual and verdict == "nothing":
         verdict = "wear goes on"
-    if verdict == "wear":
-        best = max(offered["wear"], key=seen.log_odds)
-        more = _mean([seen.log_odds(best.and_also(other)) for other in offered["something else"]])
-        if more - seen.log_odds(best) - RARE >= LEAST_ODDS:
-            verdict, what = "something else", "wear does not explain all of it"
+    if verdict in ("wear", "input sensor"):
+        best = max(offered[f"sensor of {what}" if what else verdict], key=seen.log_odds)
+        others = [one for n, alike in offered.items() if n.startswith(OTHERS) for one in alike]
+        also = _mean([seen.log_odds(best.and_also(other)) for other in others])
+        verdict, what = _alone(verdict, what, also - seen.log_odds(best) - RARE)
     most = max([*worn, usual] if usual else worn, key=lambda one: alone.log_odds(one.change))
     followed = table.followed(usual if usual and verdict == "wear goes on" else most)
     pairs = zip(followed.by.tolist(), followed.sd.tolist(), strict=True)
@@ -145,7 +166,19 @@ def compare(
     count = int(sum(np.isfinite(s.grid.readings).sum() for s in problem.systems))
     rms, lately = (_rms(problem, levels, outputs, memory) for memory in (np.inf, MEMORY_S))
     return Comparison(
-        tuple(recordings), count, verdict, what, odds, rms, lately, change, followed.rows, chosen
+        tuple(recordings),
+        count,
+        verdict,
+        what,
+        odds,
+        rms,
+        lately,
+        change,
+        followed.rows,
+        chosen,
+        physics,
+        _probability(odds, physics, what) if verdict == "new physics" else None,
+        _share(seen, offered[what]) if verdict == "new physics" and what in offered else None,
     )
 
 
@@ -159,25 +192,41 @@ def residual_lately(exported: Exported, campaign: Campaign, recordings: Sequence
 
 def _before(name: str, asked: Sequence[str]) -> float:
     """Log of the odds of a hypothesis against `nothing` before any reading: that one of the sensors is off is
-    as likely as that one of the other inputs acts, or that something else changed.
+    as likely as that one of the other inputs acts, or that something else changed; another exchange is as
+    likely as any effect of the catalogue.
     """
     if name == "wear":
         return 0.0
-    alike = [other for other in asked if other.rpartition(" ")[0] == name.rpartition(" ")[0]]
-    return -RARE - float(np.log(len(alike)))
+    kind = name.rpartition(" ")[0]
+    alike = [other for other in asked if other.rpartition(" ")[0] == kind]
+    return (float(np.log(ODDS)) if kind == "exchange with" else -RARE) - float(np.log(len(alike)))
 
 
-def _exchanges(exported: Exported, table: Table, channels: Sequence[str]) -> list[Change]:
-    """All exchange with one temperature alike, where it does not age: a fan, a door."""
-    used, old = uses(exported), ageing(exported)
-    sizes = {n: abs(exported.model.parameters[n].value) for n in used}
-    found = []
-    for channel in channels:
-        group = [n for n in used if n not in old and used[n] and all(channel in one for one in used[n])]
-        if any(sizes[n] for n in group):
-            at = table.at["at once"][[list(used).index(n) for n in group]]
-            found += [Change(at, width * np.array([[sizes[n]] for n in group])) for width in OTHER]
-    return found
+def _exchanges(exported: Exported, table: Table, channel: str) -> list[Change]:
+    """All exchange with one temperature by the same share, where it does not age: a fan, a door."""
+    model, old = exported.model, ageing(exported)
+    formulas = [*(term.expression for term in model.terms), *model.outputs.values()]
+    used = list(uses(exported))
+    group = []
+    for name in used:
+        mine = [e for e in formulas if name in names(e)]
+        alike = mine and all(channel in names(e) and _is_factor(name, e) for e in mine)
+        if alike and name not in old and model.parameters[name].value:
+            group.append(name)
+    at = table.at["at once"][[used.index(name) for name in group]]
+    sizes = np.array([[model.parameters[name].value] for name in group])
+    return [Change(at, width * sizes) for width in OTHER] if group else []
+
+
+def _is_factor(name: str, expression: Expression) -> bool:
+    """Whether a formula is in proportion to a parameter.
+
+    >>> _is_factor("h", parse("h*2*(T - body)")), _is_factor("t", parse("(T - body)/t"))
+    (True, False)
+    """
+    if isinstance(expression, Apply) and expression.function == "*":
+        return any(_is_factor(name, one) for one in expression.arguments)
+    return expression == Name(name)
 
 
 def _acting(path: Path, at: Ints, levels: Mapping[str, float]) -> list[Change]:
@@ -218,11 +267,21 @@ def _read(campaign: Campaign, recording: str, name: str) -> bool:
     return name in values and bool(np.isfinite(values[name]).any())
 
 
-def _verdict(odds: Mapping[str, float], evidence: Mapping[str, float]) -> tuple[Verdict, str]:
+def _verdict(
+    odds: Mapping[str, float], evidence: Mapping[str, float], physics: Mapping[str, Score]
+) -> tuple[Verdict, str]:
     """The best hypothesis, if it beats `nothing` and its rivals clearly. A sensor or an input needs the
-    evidence of a name in a diagnosis.
+    evidence of a name in a diagnosis. So does an effect of the catalogue, or another exchange with a
+    temperature, over all that explains the readings without it.
     """
-    best, second, *_ = sorted(evidence, key=lambda name: -odds[name])
+    effects = {*physics, *(name for name in evidence if name.startswith("exchange with "))}
+    best, second, *_ = sorted(evidence.keys() - effects, key=lambda name: -odds[name])
+    effect = max(effects, key=lambda name: odds[name], default="")
+    if effect and odds[effect] - max(odds[best], 0.0) >= by_chance(odds[effect]):
+        if _probability(odds, physics, effect) >= NAMED:
+            return "new physics", effect
+        others = _without(odds, physics, effect)
+        return "undecided", f"{effect} or {max(others, key=lambda name: others[name])}"
     if odds[best] < LEAST_ODDS:
         return "nothing", ""
     if odds[best] - odds[second] < RIVAL:
@@ -238,6 +297,41 @@ def _verdict(odds: Mapping[str, float], evidence: Mapping[str, float]) -> tuple[
     if best.startswith("input "):
         return "unused input", best.removeprefix("input ")
     return "input sensor", best.removeprefix("sensor of ")
+
+
+def _alone(verdict: Verdict, what: str, also: float) -> tuple[Verdict, str]:
+    """Whether wear, or the sensor of an input, explains all. A sensor is off by a constant, so it leaves
+    nothing else to explain: that is what distinguishes it from heat that it explains in part.
+
+    Args:
+        also: log of the odds that something else changed, too.
+    """
+    if verdict == "wear" and also >= LEAST_ODDS:
+        return "something else", "wear does not explain all of it"
+    if verdict == "input sensor" and also > -RIVAL:
+        return "undecided", f"sensor of {what} or something else"
+    return verdict, what
+
+
+def _probability(odds: Mapping[str, float], physics: Mapping[str, Score], name: str) -> float:
+    """Probability that an effect began, at any place: the best answer with it against the best one without,
+    as in a diagnosis.
+    """
+    ahead = odds[name] - max(_without(odds, physics, name).values())
+    return min(SUREST, float(1.0 / (1.0 + np.exp(-np.clip(ahead, -500.0, 500.0)))))
+
+
+def _without(odds: Mapping[str, float], physics: Mapping[str, Score], name: str) -> dict[str, float]:
+    """Hypotheses under which an effect did not begin anywhere."""
+    word = physics[name].hypothesis.effect.word if name in physics else ""
+    same = {name, *(n for n, one in physics.items() if one.hypothesis.effect.word == word)}
+    return {n: value for n, value in odds.items() if n not in same}
+
+
+def _share(seen: Seen, changes: Sequence[Change]) -> float:
+    """How far a change of one coefficient goes, as a share of what it is, to first order."""
+    width, best = max(zip(OTHER, changes, strict=True), key=lambda one: seen.log_odds(one[1]))
+    return float(width * seen.size(best)[0][0] / best.root[0, 0])
 
 
 def _mean(logs: Sequence[float]) -> float:

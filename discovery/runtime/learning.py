@@ -65,7 +65,7 @@ def answer(question: Question) -> Answer:
         UserError: a model without knowledge of its parameters.
     """
     exported, campaign, begin = question.exported, question.campaign, question.begin
-    found = compare(begun(exported, begin), campaign, ["running"], choose=True)
+    found = compare(begun(exported, begin), campaign, ["running"], choose=True, named=False)
     revised = revision_of(exported, campaign, found, begin=begin)
     return found, None if revised is None else revised[0]
 

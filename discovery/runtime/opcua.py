@@ -20,6 +20,7 @@ from discovery.errors import UserError
 from discovery.export.document import Exported
 from discovery.export.stepper import Stepper
 from discovery.files import read_toml
+from discovery.printed import counted
 from discovery.runtime.clock import Clock
 from discovery.runtime.compensator import Settings
 from discovery.runtime.guards import Reading
@@ -59,8 +60,8 @@ class Punctuality:
     def __str__(self) -> str:
         mean = 1e3 * self.work_s / max(self.ticks, 1)
         return (
-            f"{self.ticks} ticks, {100 * self.share:.2f} % in time, {mean:.1f} ms of work each, worst "
-            f"{1e3 * self.worst_s:.0f} ms; "
+            f"{counted(self.ticks, 'tick')}, {100 * self.share:.2f} % in time, {mean:.1f} ms of work each, "
+            f"worst {1e3 * self.worst_s:.0f} ms; "
             + ", ".join(f"{name} {count}" for name, count in self.states.items())
         )
 
@@ -104,7 +105,7 @@ async def run_loop(
                     await asyncio.wait_for(link.write(tick), 0.8 * tick_s)
                 except Exception as error:
                     await _lost(link, session, f"the offsets cannot be written ({_word(error)})")
-            notify(WATCHDOG=1, STATUS=f"{tick.state.name}, {tick.heartbeat} ticks")
+            notify(WATCHDOG=1, STATUS=f"{tick.state.name}, {counted(tick.heartbeat, 'tick')}")
             end = time.monotonic()
             found.ticks += 1
             found.late += start - due > 0.1 * tick_s or end > due + tick_s

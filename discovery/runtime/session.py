@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from discovery.errors import UserError
 from discovery.export.document import Exported, render
+from discovery.printed import counted
 from discovery.runtime.clock import Clock
 from discovery.runtime.compensator import Compensator, Settings, State, Tick
 from discovery.runtime.events import Event, instant
@@ -214,10 +215,10 @@ class Session:
 
     def summary(self) -> str:
         """How the run went, in a line."""
-        total = max(sum(self.counts.values()), 1)
+        total = sum(self.counts.values())
         shares = ", ".join(f"{name} {100 * n / total:.1f} %" for name, n in self.counts.items())
         last = self.found.state.name if self.found is not None else "OFF"
-        return f"{total} ticks: {shares}; {self.events} events; ended {last}"
+        return f"{counted(total, 'tick')}: {shares}; {counted(self.events, 'event')}; ended {last}"
 
     def judge(self) -> None:
         """What the exit status has to say.
@@ -277,7 +278,8 @@ class Session:
             return
         remedy = {
             "input sensor": f"check the sensor of {found.what}",
-            "something else": "record the machine and run `discovery diagnose`, which can name the change",
+            "new physics": "record the machine and run `discovery update`, which can say more",
+            "something else": "record the machine and run `discovery update`, which can name the change",
             "undecided": "measure more often, wet and dry",
         }.get(found.verdict, "")
         self.tell(now, f"learning: {found.verdict}", str(found), remedy)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from discovery.export.document import Exported
+from discovery.printed import counted
 from discovery.runtime.compensator import Compensator, Settings, State
 from discovery.runtime.guards import Reading, number
 
@@ -82,10 +83,12 @@ class Shadow:
         count = sum(len(pairs) for pairs in self.residuals.values())
         if count >= self.rule.least_readings:
             old, new = self._rms(0), self._rms(1)
-            text = f"rms of {count} measured errors {new:.2f} with the new model, {old:.2f} with the old one"
+            rms = f"{new:.2f} with the new model, {old:.2f} with the old one"
+            text = f"rms of {counted(count, 'measured error')} {rms}"
             return new <= self.rule.worse * old, text
         if self.rule.most_um is None:
-            return False, f"only {count} measured errors came, {self.rule.least_readings} are needed"
+            came = counted(count, "measured error")
+            return False, f"only {came} came, {self.rule.least_readings} are needed"
         text = f"the two models differ by at most {self.difference:.2f} um"
         return self.difference <= self.rule.most_um, text
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from discovery.export.document import Exported, from_document, read_document, render, write_document
 from discovery.export.knowledge import read_knowledge
 from discovery.export.seal import open_seal
-from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.runtime.hypotheses import Comparison, begun, compare, model_with, residual_lately
+from discovery.runtime.newphysics import sizes_of
 from discovery.runtime.unused import with_input, without_input
 
 if TYPE_CHECKING:
@@ -25,23 +25,20 @@ MAY = 0.95  # residual after a change, as a share of that before: a revision tha
 
 @dataclass(frozen=True)
 class Update:
-    """What an update found and wrote; `path` None: nothing to change. `after`: residual of the next
-    revision in
-    units of that of the fit."""
+    """What an update found and wrote; `path` None: nothing to change. `after`: residual of the next revision
+    in units of that of the fit.
+    """
 
     comparison: Comparison
-    path: Path | None
-    after: float | None
-    diagnosis: Mapping[str, Any] | None
+    path: Path | None = None
+    after: float | None = None
 
     def lines(self) -> list[str]:
         """What a user wants to know of it."""
         lines = [str(self.comparison)]
-        if self.diagnosis is not None:
-            named = ", ".join(
-                f"{p['effect']} at {'+'.join(p['states'])}" for p in self.diagnosis.get("physics", [])
-            )
-            lines.append(f"diagnosis: {self.diagnosis['verdict']}{named and ': ' + named}")
+        found = self.comparison
+        if found.probability is not None:
+            lines.append(f"{found.what}: probability {found.probability:.2f}; {_size(found)}")
         if self.path is not None:
             lines.append(
                 f"{self.path}: the next revision, residual {self.after:.2f} of the fit's; "
@@ -49,8 +46,15 @@ class Update:
                 "runs it in the shadow of the active one first"
             )
             return lines
-        lines.append(f"the model is kept: {_why(self.comparison)}")
+        lines.append(f"the model is kept: {_why(found)}")
         return lines
+
+
+def _size(found: Comparison) -> str:
+    """How large the effect is that began."""
+    if found.share is None:
+        return sizes_of(found.physics[found.what])
+    return f"all of it changed by about {100 * found.share:+.0f} %, as with a fan or a door"
 
 
 def _why(found: Comparison) -> str:
@@ -63,9 +67,13 @@ def _why(found: Comparison) -> str:
             return f"{found.what}: these recordings do not distinguish them; measure more often, wet and dry"
         case "something else":
             return (
-                "something changed that wear cannot change; add what the diagnosis names to the model, "
-                "and fit it again"
+                "something changed that wear cannot change and no effect of the catalogue explains; look at "
+                "the machine, then record it and fit the model again"
             )
+        case "new physics" if found.share is not None:
+            return f"the {found.what} changed; record the machine as it is now, and fit the model again"
+        case "new physics":
+            return f"add {found.what} to it, record the machine as it is now, and fit the model again"
         case _:
             return "the revision would not lower the residual"
 
@@ -81,13 +89,11 @@ def update_file(
     exported = read_document(path)
     found = compare(exported, campaign, recordings)
     revised = revision_of(exported, campaign, found)
-    if found.verdict == "something else":
-        return Update(found, None, None, _diagnosis(exported.model, campaign, recordings))
     if revised is None:
-        return Update(found, None, None, None)
+        return Update(found)
     document, after = revised
     write_document(out, document, key)
-    return Update(found, out, after, None)
+    return Update(found, out, after)
 
 
 def revision_of(
@@ -152,9 +158,3 @@ def _revised(exported: Exported, document: dict[str, Any], found: Comparison, mo
         "of": exported.seal.sha256,
     }
     return document | {"revision": note["revision"], "changelog": [*document["changelog"], note]}
-
-
-def _diagnosis(model: Model, campaign: Campaign, recordings: Sequence[str]) -> dict[str, Any]:
-    from discovery.diagnosis import diagnose
-
-    return dict(diagnose(model, campaign, recordings).document())

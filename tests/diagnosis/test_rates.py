@@ -100,7 +100,7 @@ def test_process_noise_of_rates_has_nothing_to_do_with_the_heat_of_the_bodies_be
     )
     runs = machine.campaign(machine.simulated(1))
     context = context_of(runs, followed)
-    found, sizes = context.baseline.model.values(), flow_sizes(context.baseline)
+    found, sizes = context.baseline.model.values(), flow_sizes(context.baseline.trajectories)
     air = thresholds.AIR / found["tau"]  # K/s, where the air is so much warmer
     assert context.floor["foundation"] == pytest.approx(np.hypot(thresholds.FLOOR * sizes["foundation"], air))
     assert sizes["foundation"] < 1.5 / 13751.0  # K/s, of the room: a follower is slower

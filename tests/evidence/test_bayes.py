@@ -14,7 +14,7 @@ from scipy.stats import lognorm, norm
 from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
-from discovery.evidence.bayes import Projected, Slab, _products, _projected, _ranked, scan
+from discovery.evidence.bayes import Projected, Slab, products, projected, ranked, scan
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.signatures import signatures
 from discovery.evidence.whitening import Whitened, absorbed
@@ -75,7 +75,7 @@ def test_a_size_of_the_wrong_sign_cannot_be(deviations: float) -> None:
     assert gain < -1.0
 
 
-def projected(*which: int, scale: float = 1.0) -> Projected:
+def of_columns(*which: int, scale: float = 1.0) -> Projected:
     """Some columns of Z as signatures, nothing absorbed."""
     z = scale * Z[:, which]
     gram = np.einsum("na,na->a", z, z)
@@ -84,7 +84,7 @@ def projected(*which: int, scale: float = 1.0) -> Projected:
 
 def gain_of(word: str, part: Projected, amplitudes: int, prior_of: Slab) -> float:
     h = Hypothesis(catalogue()[word], (), tuple(f"a{k}" for k in range(amplitudes)))
-    (found,) = _ranked([h], prior_of, np.zeros(1), [_products(part, [h])])
+    (found,) = ranked([h], prior_of, np.zeros(1), [products(part, [h])])
     return found.gain
 
 
@@ -103,31 +103,31 @@ def factor_of(z: Array, *, median: float = 0.4, sign: float = 0.0) -> float:
 @pytest.mark.parametrize(("word", "sign"), [("fluid_convection", 1.0), ("sensor_offset", 0.0)])
 @pytest.mark.parametrize("column", [0, 1, 2])
 def test_a_bayes_factor_is_an_integral(column: int, word: str, sign: float, median: float) -> None:
-    found = gain_of(word, projected(column), 1, slab(median, sign=sign))
+    found = gain_of(word, of_columns(column), 1, slab(median, sign=sign))
     expected = np.log(factor_of(Z[:, column], median=median, sign=sign))
     assert found == pytest.approx(expected, abs=0.03)
 
 
 def test_sizes_that_do_not_look_alike_multiply() -> None:
     expected = np.log(factor_of(Z[:, 0])) + np.log(factor_of(Z[:, 1]))
-    assert gain_of("rezero", projected(0, 1), 2, slab(count=2)) == pytest.approx(expected, abs=0.05)
+    assert gain_of("rezero", of_columns(0, 1), 2, slab(count=2)) == pytest.approx(expected, abs=0.05)
 
 
 def test_an_effect_that_is_on_or_off_has_nothing_to_integrate() -> None:
     z = Z[:, 0]
     ratio = z @ RESIDUAL - 0.5 * (z @ z)
-    assert gain_of("fluid_delay", projected(0), 1, slab()) == pytest.approx(ratio)
+    assert gain_of("fluid_delay", of_columns(0), 1, slab()) == pytest.approx(ratio)
 
 
 def test_what_shows_nothing_gains_nothing() -> None:
-    assert gain_of("sensor_offset", projected(0, scale=0.0), 1, slab()) == -np.inf
+    assert gain_of("sensor_offset", of_columns(0, scale=0.0), 1, slab()) == -np.inf
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_what_a_refit_absorbs_whole_gains_nothing(scale: float) -> None:
     """Only rounding is left of it, with which any size would look certain."""
     z = scale * Z[:, :1]
-    part = _projected(z, absorbed(np.column_stack([RESIDUAL, Z[:, :1]]), np.zeros((2, 2))))
+    part = projected(z, absorbed(np.column_stack([RESIDUAL, Z[:, :1]]), np.zeros((2, 2))))
     assert part.gram[0] / part.length[0] ** 2 < 1e-8
     assert gain_of("sensor_offset", part, 1, slab(scale**-1)) < 1.0
 
@@ -137,8 +137,8 @@ def test_noise_settings_and_shapes_are_summed_over() -> None:
     h = Hypothesis(catalogue()["bed_memory"], (), ("a",), shapes={"t": 1.0})
     two = [h.at({"t": 1.0}, np.log(0.3)), h.at({"t": 2.0}, np.log(0.7))]
     levels = np.array([0.0, 1.5])
-    parts = [projected(0, 1), projected(0, 1, scale=1.3)]
-    (found,) = _ranked(two, slab(sign=1.0, count=2), levels, [_products(part, two) for part in parts])
+    parts = [of_columns(0, 1), of_columns(0, 1, scale=1.3)]
+    (found,) = ranked(two, slab(sign=1.0, count=2), levels, [products(part, two) for part in parts])
     weights = np.exp(levels) / np.exp(levels).sum()
     expected = sum(
         weight * share * factor_of(scale * Z[:, column], sign=1.0)
@@ -200,7 +200,7 @@ def test_a_scan_integrates_everything_that_a_refit_could_absorb() -> None:
 
 def test_odds_of_a_place_do_not_change_what_the_readings_say() -> None:
     h = Hypothesis(catalogue()["sensor_offset"], (), ("a",))
-    (plain,) = _ranked([h], slab(), np.zeros(1), [_products(projected(0), [h])])
-    (rare,) = _ranked([replace(h, log_odds=-5.0)], slab(), np.zeros(1), [_products(projected(0), [h])])
+    (plain,) = ranked([h], slab(), np.zeros(1), [products(of_columns(0), [h])])
+    (rare,) = ranked([replace(h, log_odds=-5.0)], slab(), np.zeros(1), [products(of_columns(0), [h])])
     assert rare.gain == plain.gain
     assert rare.odds == pytest.approx(plain.odds - 5.0)

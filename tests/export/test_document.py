@@ -30,6 +30,15 @@ def document(model: Model, campaign: Campaign) -> dict[str, Any]:
     return make_document(model, campaign, ["fit"], 10.0, {"experiment": "small"})
 
 
+def test_a_body_keeps_its_heat_capacity(document: dict[str, Any], model: Model) -> None:
+    """Without it an effect would be a rate, with no usual size in W."""
+    back = from_document(*open_seal(render(document), "model"), "model").model
+    assert {n: s.capacity for n, s in back.states.items()} == {
+        n: s.capacity for n, s in with_settled_memories(expanded(model)).states.items()
+    }
+    assert any(s.capacity for s in back.states.values())
+
+
 def test_what_is_written_is_read_back_and_steps_the_same(
     document: dict[str, Any], model: Model, campaign: Campaign, tmp_path: Path
 ) -> None:

@@ -126,4 +126,4 @@ def test_a_run_tells_what_it_did(model_file: object, exported: Exported) -> None
     assert "no row of the inputs can be used: 1 row was left out: 1 without a time (the first in line 2)" in (
         refused.stderr
     )
-    assert "19 ticks: COLD 100.0 %; 1 events; ended COLD" in done.stderr
+    assert "19 ticks: COLD 100.0 %; 1 event; ended COLD" in done.stderr
