@@ -193,13 +193,14 @@ def _begun(data: RateData, bare: Structure) -> tuple[Structure, set[int], float]
     grids = [data.grids[r] for r in data.recordings]
     near = 0.5 * sum(int(grid.measured.sum()) for grid in grids)  # cost of a fit that is off by this noise
     widths = [half_widths(grids, y, s, bare.order) for y, s in zip(data.outputs, noise, strict=True)]
-    begun = []
+    begun: list[tuple[Structure, set[int], float]] = []
     for k in range(max(map(len, widths))):
         structure, entered = _weakly(data, bare, [one[min(k, len(one) - 1)] for one in widths])
         model, labels = with_candidates(structure.model, structure.candidates)
         small = without(model, [name for i, name in enumerate(labels) if i not in entered])
         try:
-            begun.append((structure, entered, _fit(data, small, {}, _FIRST).cost))
+            least = min((cost for *_, cost in begun), default=np.inf)
+            begun.append((structure, entered, _fit(data, small, {}, _FIRST, least).cost))
             if begun[-1][2] <= near:
                 break
         except RunsAwayError:
@@ -252,12 +253,12 @@ def _chain(
         flow: word of the law, as "sqrt".
     """
     bare = upstream(data, output, [flow], unit)
-    fits = []
+    fits: list[Fit] = []
     for first, then in product(_CHAIN, _CHAIN):
         guess = balanced(data, bare, first * data.scale, then * data.scale)
         model, _ = with_candidates(bare.model, started(bare, guess).candidates)
         try:
-            fits.append(_fit(data, model, {}, _FIRST))
+            fits.append(_fit(data, model, {}, _FIRST, min((one.cost for one in fits), default=np.inf)))
         except RunsAwayError:
             continue
     if not fits:
@@ -276,10 +277,9 @@ def _chain(
     return started(full, values), fit.cost
 
 
-def _fit(data: RateData, model: Model, values: Mapping[str, float], rounds: int) -> Fit:
-    return refit(
-        model, data.campaign, data.recordings, data.outputs, values, data.grids, rough_noise(data), rounds
-    )
+def _fit(data: RateData, model: Model, values: Mapping[str, float], rounds: int, goal: float = np.inf) -> Fit:
+    noise, recordings = rough_noise(data), data.recordings
+    return refit(model, data.campaign, recordings, data.outputs, values, data.grids, noise, rounds, goal)
 
 
 def with_free_levels(data: RateData, model: Model) -> Model:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.fitting.noise import roughness
 from discovery.models import Model, Parameter, State
 from discovery.models.model import TIME_UNITS
 from discovery.sparse.laws import LAWS, laws, products
@@ -26,7 +27,7 @@ from discovery.terms import Number, Term, evaluate, names, parse
 Array = NDArray[np.float64]
 
 FLOWS = ("linear", "sqrt")  # laws from which a chain of two bodies begins
-WORDS = ("linear", "square", "cubic", "drag", "sqrt")
+WORDS = ("linear", "square", "cubic", "drag", "sqrt", "sign", "abs")
 FREE, UP, DOWN = (-np.inf, np.inf), (0.0, np.inf), (-np.inf, 0.0)
 FINER = 10.0  # times the distance of two readings: quicker rates look like steps
 REST = 0.1  # spread of the start of a hidden state, as a share of its size
@@ -53,7 +54,7 @@ def own(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str,
         seen = _seen(data, y)
         found += _driven(data, y, outputs, words)
         found += [Candidate(y, parse(one)) for o in others for one in laws(words, o, _seen(data, o))]
-        found += [_law(y, y, one, stable) for one in laws(words, y, seen)]
+        found += [_law(y, y, one, stable) for one in laws(words, y, seen, width=_width(data, y))]
         found += [Candidate(y, parse(one)) for one in products(words, [y, *others, *inputs])]
         found += _expressions(words, y, {"y": y})
     return Structure("own", Model("own", {}, states, (), {}, unit), tuple(found))
@@ -178,6 +179,14 @@ def _measured(data: RateData, output: str, unit: str) -> State:
 
 def _inputs(data: RateData, outputs: Sequence[str]) -> list[str]:
     return [name for name in next(iter(data.grids.values())).samples if name not in outputs]
+
+
+def _width(data: RateData, output: str) -> float:
+    """Width of a step that the readings of an output cannot show."""
+    column = data.outputs.index(output)
+    rough = roughness([data.grids[r].readings[:, column] for r in data.recordings])
+    spread = float(np.std(_seen(data, output)))
+    return float(np.clip(rough, 1e-3 * spread, 2e-2 * spread)) or 1.0
 
 
 def _seen(data: RateData, output: str) -> Array:
