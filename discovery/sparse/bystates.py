@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -42,6 +43,7 @@ _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
 _MOVED = 0.02  # share by which a level moves that makes the set grow anew
 _FIRST = 12  # of a fit of a linear chain from one of its starts
+_NEAREST = 3  # of these starts, by their first step, are fitted further
 _FAR = 3.0  # times the rms of another form at its start
 _WHITE = 1.5  # readings that say the same once: less is noise
 _CHAIN = (0.3, 1.0, 3.0)  # times the time scale of the readings: time constants that a chain starts from
@@ -60,10 +62,14 @@ class Start:
 
 
 def discover_states(
-    data: RateData, options: SparseOptions, hidden: Sequence[str], progress: Progress
+    data: RateData, options: SparseOptions, hidden: Sequence[str], progress: Progress, rival: float = np.inf
 ) -> Iterator[Discovery]:
     """A discovery for each kind of hidden state that was asked for and does not run away, made when it is
     asked for; none for a kind that begins far from the readings where another one begins near.
+
+    Args:
+        rival: mean squared error of another model on left-out data. A kind that leaves more of the readings
+            that it is fitted to is no better on others: it is not made.
     """
     words = options.library or WORDS
     roles = {data.campaign.channels[y].role for y in data.outputs}
@@ -93,9 +99,11 @@ def discover_states(
             begin(kind)
         if kind in starts and starts[kind].cost <= _FAR**2 * nearest:
             try:
-                yield _discovered(data, kind.split()[0], starts[kind])
+                found = _discovered(data, kind.split()[0], starts[kind], rival)
             except RunsAwayError:
                 continue
+            if found:
+                yield found
     if lacking is not None and not starts and options.form != "auto" and len(hidden) == 1:
         raise lacking
 
@@ -116,10 +124,11 @@ def _start(data: RateData, kind: str, words: Sequence[str], unit: str, options: 
     return Start(structure, entered, options, cost)
 
 
-def _discovered(data: RateData, kind: str, start: Start) -> Discovery:
+def _discovered(data: RateData, kind: str, start: Start, rival: float) -> Discovery | None:
     """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free
-    runs.
+    runs; None where they leave more than a rival.
     """
+    goal = 0.5 * rival * sum(int(data.grids[r].measured.sum()) for r in data.recordings)
     structure, entered, options = start.structure, start.entered, start.options
     stay = {i for i, c in enumerate(structure.candidates) if c.label in options.keep}
     for _ in range(_GROWTHS):
@@ -130,12 +139,15 @@ def _discovered(data: RateData, kind: str, start: Start) -> Discovery:
             tuple(names[i] for i in sorted(stay)),
             options.max_terms,
             model.values(),
+            goal,
         )
         small, kept = grown(data, model, labels, growth, options)
         entered = {names.index(name) for name in kept} | stay
         structure, moved = _refined(data, structure, small, names)
         if not moved:
             break
+    if _fit(data, small, {}, _FIRST).cost > goal:
+        return None
     always = [names[i] for i in stay]
     found = discover_rates(data, small, kept, always, options, grown=True, tolerance=PREDICT)
     model = with_free_levels(data, found.model) if options.refine else found.model
@@ -257,10 +269,13 @@ def _chain(
     for first, then in product(_CHAIN, _CHAIN):
         guess = balanced(data, bare, first * data.scale, then * data.scale)
         model, _ = with_candidates(bare.model, started(bare, guess).candidates)
-        try:
-            fits.append(_fit(data, model, {}, _FIRST, min((one.cost for one in fits), default=np.inf)))
-        except RunsAwayError:
-            continue
+        with suppress(RunsAwayError):
+            fits.append(_fit(data, model, {}, 1))
+    nearest = sorted(fits, key=lambda one: one.cost)[:_NEAREST]
+    fits = []
+    for one in nearest:
+        with suppress(RunsAwayError):
+            fits.append(_fit(data, one.model, {}, _FIRST, min((f.cost for f in fits), default=np.inf)))
     if not fits:
         raise RunsAwayError(f"no chain of two bodies stays finite on the readings of {output}")
     fit = min(fits, key=lambda one: one.cost)

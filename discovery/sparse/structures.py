@@ -30,6 +30,7 @@ FLOWS = ("linear", "sqrt")  # laws from which a chain of two bodies begins
 WORDS = ("linear", "square", "cubic", "drag", "sqrt", "sign", "abs")
 FREE, UP, DOWN = (-np.inf, np.inf), (0.0, np.inf), (-np.inf, 0.0)
 FINER = 10.0  # times the distance of two readings: quicker rates look like steps
+_FINEST, _FINE = 1e-3, 0.02  # width of a step, as a share of the spread of its variable
 REST = 0.1  # spread of the start of a hidden state, as a share of its size
 
 
@@ -68,6 +69,7 @@ def rate(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str
     rates = {y: f"{y}_rate" for y in outputs}
     states, terms, found = {}, [], []
     for y, v in rates.items():
+        width = _FINE * _moving(data, y) * TIME_UNITS[unit]
         states[y] = _measured(data, y, unit)
         speed = float(np.nanstd(np.diff(_seen(data, y)))) or 1.0
         states[v] = State(v, f"{states[y].unit}/{unit}", None, Number(0.0), REST * speed, per)
@@ -75,7 +77,8 @@ def rate(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str
         found += _driven(data, v, outputs, words)
         found += [_law(v, y, one, stable) for one in laws(words, y, _seen(data, y))]
         found += [
-            _law(v, v, one, stable) for one in laws([w for w in words if w not in ("sqrt", "square")], v)
+            _law(v, v, one, stable)
+            for one in laws([w for w in words if w not in ("sqrt", "square")], v, width=width)
         ]
         others = [o for o in outputs if o != y and "coupling" in words]
         for o in others:
@@ -186,7 +189,24 @@ def _width(data: RateData, output: str) -> float:
     column = data.outputs.index(output)
     rough = roughness([data.grids[r].readings[:, column] for r in data.recordings])
     spread = float(np.std(_seen(data, output)))
-    return float(np.clip(rough, 1e-3 * spread, 2e-2 * spread)) or 1.0
+    return float(np.clip(rough, _FINEST * spread, _FINE * spread)) or 1.0
+
+
+def _moving(data: RateData, output: str) -> float:
+    """How fast [1/s] an output moves: the largest rms of its differences over 1, 2, 4, ... readings, less
+    their noise, over the time between them.
+    """
+    column = data.outputs.index(output)
+    grids = [data.grids[r] for r in data.recordings]
+    noise = 2 * roughness([g.readings[:, column] for g in grids]) ** 2
+    found = 0.0
+    for g in grids:
+        known = np.isfinite(g.readings[:, column])
+        time, y = g.time[g.read][known], g.readings[known, column]
+        for lag in 2 ** np.arange(max(len(y), 1).bit_length() - 1):
+            moved = float(np.mean((y[lag:] - y[:-lag]) ** 2)) - noise
+            found = max(found, moved / float(np.mean(time[lag:] - time[:-lag])) ** 2)
+    return float(np.sqrt(found))
 
 
 def _seen(data: RateData, output: str) -> Array:
