@@ -94,7 +94,7 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     prior: it is weaker where recordings that are left out whole ask for it. Parts of the same recordings do
     not say so: gains that cancel predict them as well.
     """
-    if not problem.parts:
+    if not np.any(problem.parts):
         return problem, terms
     left = [np.full(len(readings), np.nan) for readings in problem.readings]
     for fold, search in problem.folds():
@@ -105,8 +105,8 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     search = problem.search()
     moved = (search.g.square - search.of(problem.always).gain) / search.g.count
     off = float(np.nanmean(np.concatenate(left) ** 2))
-    independent = search.g.count / readings_as_one([r[:, None] for r in left])
-    most = off / moved / independent * len(terms)
+    alike = _alike(problem, terms, left)
+    most = off / moved * alike / search.g.count * len(terms)
     weaker = _WEAKER if len(problem.columns) >= WHOLE else _WEAKER[:1]
     tried = [replace(problem, parts=most * share) for share in weaker]
     errors = np.full((len(tried), problem.blocks.count), np.nan)
@@ -115,6 +115,23 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
             _missed(trial, search.refined(terms.family, terms.place, terms.pole), fold, row)
     firm = tried[choose(errors[:, np.isfinite(errors).all(axis=0)], problem.tolerance)]
     return firm, firm.search().refined(terms.family, terms.place, terms.pole)
+
+
+def _alike(problem: Problem, terms: Terms, left: Sequence[Array]) -> Array:
+    """How many readings say the same once (F,) about each family of a set; about others, as the slowest.
+
+    What is left moves the gain of a column through its product with the column alone: a column that changes
+    often averages out what lasts.
+    """
+    found = np.full(len(problem.families.count), readings_as_one([r[:, None] for r in left]))
+    theta = on_grid(terms, problem.families)
+    for f in set(terms.members) - set(problem.always.tolist()):
+        first = problem.families.start[f]
+        mine = slice(first, first + problem.families.count[f])
+        parts = [x[:, mine] @ theta[mine] for x in problem.columns]
+        mean = np.mean(np.concatenate(parts))
+        found[f] = readings_as_one([((p - mean) * r)[:, None] for p, r in zip(parts, left, strict=True)])
+    return found
 
 
 def _with_spread(problem: Problem) -> Problem:
