@@ -69,14 +69,15 @@ def discover_states(
 
     Args:
         rival: mean squared error of another model on left-out data. A kind that leaves more of the readings
-            that it is fitted to is no better on others: it is not made.
+            that it is fitted to is no better on others: it is not made. Nor is one that begins far from it.
     """
     words = options.library or WORDS
     roles = {data.campaign.channels[y].role for y in data.outputs}
     unit = "h" if roles <= THERMAL_ROLES and data.scale >= _SLOW else time_unit(data.scale)
     flows = [word for word in FLOWS if word in words] or ["linear"]
     kinds = [k for kind in hidden for k in ([f"{kind} {f}" for f in flows] if kind == "upstream" else [kind])]
-    nearest = np.inf
+    goal = 0.5 * rival * sum(int(data.grids[r].measured.sum()) for r in data.recordings)
+    nearest = goal
     lacking: UnknownTermError | None = None
     starts: dict[str, Start] = {}
 
@@ -99,7 +100,7 @@ def discover_states(
             begin(kind)
         if kind in starts and starts[kind].cost <= _FAR**2 * nearest:
             try:
-                found = _discovered(data, kind.split()[0], starts[kind], rival)
+                found = _discovered(data, kind.split()[0], starts[kind], goal)
             except RunsAwayError:
                 continue
             if found:
@@ -124,11 +125,10 @@ def _start(data: RateData, kind: str, words: Sequence[str], unit: str, options: 
     return Start(structure, entered, options, cost)
 
 
-def _discovered(data: RateData, kind: str, start: Start, rival: float) -> Discovery | None:
+def _discovered(data: RateData, kind: str, start: Start, goal: float) -> Discovery | None:
     """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free
-    runs; None where they leave more than a rival.
+    runs; None where they leave more than `goal`.
     """
-    goal = 0.5 * rival * sum(int(data.grids[r].measured.sum()) for r in data.recordings)
     structure, entered, options = start.structure, start.entered, start.options
     stay = {i for i, c in enumerate(structure.candidates) if c.label in options.keep}
     for _ in range(_GROWTHS):
