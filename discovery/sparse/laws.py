@@ -35,7 +35,9 @@ def laws(
 
     Args:
         seen: (N,) values of the variable, where they are known: thresholds stand at their quantiles, and a
-            root is offered to what is nowhere negative but for noise.
+            root is offered to what is nowhere negative but for noise; sign, abs and drag to what is on both
+            sides of zero.
+        width: of the step of a sign, over which it is a tanh: a system with dry friction comes to rest.
         hidden: nothing says where the variable counts from: a root begins at its least value.
 
     >>> laws(["linear", "cubic"], "y")

@@ -52,10 +52,9 @@ def own(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str,
     found = []
     for y in outputs:
         others = [o for o in outputs if o != y and "coupling" in words]
-        seen = _seen(data, y)
         found += _driven(data, y, outputs, words)
-        found += [Candidate(y, parse(one)) for o in others for one in laws(words, o, _seen(data, o))]
-        found += [_law(y, y, one, stable) for one in laws(words, y, seen, width=_width(data, y))]
+        found += [Candidate(y, parse(one)) for o in others for one in _laws(data, words, o)]
+        found += [_law(y, y, one, stable) for one in _laws(data, words, y)]
         found += [Candidate(y, parse(one)) for one in products(words, [y, *others, *inputs])]
         found += _expressions(words, y, {"y": y})
     return Structure("own", Model("own", {}, states, (), {}, unit), tuple(found))
@@ -69,16 +68,16 @@ def rate(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str
     rates = {y: f"{y}_rate" for y in outputs}
     states, terms, found = {}, [], []
     for y, v in rates.items():
-        width = _FINE * _moving(data, y) * TIME_UNITS[unit]
+        speed = _moving(data, y) / per or 1.0
         states[y] = _measured(data, y, unit)
-        speed = float(np.nanstd(np.diff(_seen(data, y)))) or 1.0
-        states[v] = State(v, f"{states[y].unit}/{unit}", None, Number(0.0), REST * speed, per)
+        # a recording may begin in the middle of a motion
+        states[v] = State(v, f"{states[y].unit}/{unit}", None, Number(0.0), speed, per)
         terms.append(Term(f"{v} moves {y}", y, parse(v)))
         found += _driven(data, v, outputs, words)
-        found += [_law(v, y, one, stable) for one in laws(words, y, _seen(data, y))]
+        found += [_law(v, y, one, stable) for one in _laws(data, words, y)]
         found += [
             _law(v, v, one, stable)
-            for one in laws([w for w in words if w not in ("sqrt", "square")], v, width=width)
+            for one in laws([w for w in words if w not in ("sqrt", "square")], v, width=_FINE * speed)
         ]
         others = [o for o in outputs if o != y and "coupling" in words]
         for o in others:
@@ -109,6 +108,7 @@ def upstream(
     wide = float(np.ptp(known))  # where no reading shows the start, it is near its values
     low, high = float(known.min()) - wide, float(known.max()) + wide
     parameters = {start: Parameter(float(known[0]), measured.unit, low, high)}
+    words = [word for word in words if word != "sign"]  # what flows out of a body does not jump
     found = _driven(data, h, [output], words)
     most = quickest(data, unit)
     found += [_flow(output, one, most, h) for one in laws(words, h, level, hidden=True)]
@@ -184,12 +184,12 @@ def _inputs(data: RateData, outputs: Sequence[str]) -> list[str]:
     return [name for name in next(iter(data.grids.values())).samples if name not in outputs]
 
 
-def _width(data: RateData, output: str) -> float:
-    """Width of a step that the readings of an output cannot show."""
-    column = data.outputs.index(output)
+def _laws(data: RateData, words: Sequence[str], output: str) -> list[str]:
+    """Laws of an output; a step in one is as wide as the readings cannot show."""
+    column, seen = data.outputs.index(output), _seen(data, output)
     rough = roughness([data.grids[r].readings[:, column] for r in data.recordings])
-    spread = float(np.std(_seen(data, output)))
-    return float(np.clip(rough, _FINEST * spread, _FINE * spread)) or 1.0
+    width = float(np.clip(rough, _FINEST * np.std(seen), _FINE * np.std(seen))) or 1.0
+    return laws(words, output, seen, width=width)
 
 
 def _moving(data: RateData, output: str) -> float:
