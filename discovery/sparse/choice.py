@@ -21,6 +21,7 @@ from discovery.sparse.search import Search, Terms, on_grid
 Array = NDArray[np.float64]
 
 SPREADS = (0.01, 0.03, 0.1, 0.3, 1.0)  # of start values, as shares of the spread of the readings
+_BENT = 1.2  # times the mean square that is left without a prior: a prior that leaves more bends the fit
 _WEAKER = (1.0, 0.1, 0.01, 1e-3, 1e-4)  # times the strongest prior of gains
 
 
@@ -92,9 +93,10 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     fitted to says too little of how far it is off, and of how long it stays off. At most, the prior is scaled
     by the error on unseen readings. Responses that really oppose each other would give way to so strong a
     prior: it is weaker where recordings that are left out whole ask for it. Parts of the same recordings do
-    not say so: gains that cancel predict them as well.
+    not say so: gains that cancel predict them as well. It is also weaker where it bends the fit itself: what
+    is left over long times, as of a start, says little of a gain that short times determine.
     """
-    if not np.any(problem.parts):
+    if not problem.parts:
         return problem, terms
     left = [np.full(len(readings), np.nan) for readings in problem.readings]
     for fold, search in problem.folds():
@@ -105,33 +107,24 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     search = problem.search()
     moved = (search.g.square - search.of(problem.always).gain) / search.g.count
     off = float(np.nanmean(np.concatenate(left) ** 2))
-    alike = _alike(problem, terms, left)
-    most = off / moved * alike / search.g.count * len(terms)
-    weaker = _WEAKER if len(problem.columns) >= WHOLE else _WEAKER[:1]
-    tried = [replace(problem, parts=most * share) for share in weaker]
+    independent = search.g.count / readings_as_one([r[:, None] for r in left])
+    most = off / moved / independent * len(terms)
+    free = _left(problem, terms)
+    tried = [replace(problem, parts=most * share) for share in _WEAKER]
+    firm = [trial for trial in tried if _left(trial, terms) <= _BENT * free] or tried[-1:]
+    tried = firm if len(problem.columns) >= WHOLE else firm[:1]
     errors = np.full((len(tried), problem.blocks.count), np.nan)
     for trial, row in zip(tried, errors, strict=True):
         for fold, search in trial.folds():
             _missed(trial, search.refined(terms.family, terms.place, terms.pole), fold, row)
-    firm = tried[choose(errors[:, np.isfinite(errors).all(axis=0)], problem.tolerance)]
-    return firm, firm.search().refined(terms.family, terms.place, terms.pole)
+    best = tried[choose(errors[:, np.isfinite(errors).all(axis=0)], problem.tolerance)]
+    return best, best.search().refined(terms.family, terms.place, terms.pole)
 
 
-def _alike(problem: Problem, terms: Terms, left: Sequence[Array]) -> Array:
-    """How many readings say the same once (F,) about each family of a set; about others, as the slowest.
-
-    What is left moves the gain of a column through its product with the column alone: a column that changes
-    often averages out what lasts.
-    """
-    found = np.full(len(problem.families.count), readings_as_one([r[:, None] for r in left]))
-    theta = on_grid(terms, problem.families)
-    for f in set(terms.members) - set(problem.always.tolist()):
-        first = problem.families.start[f]
-        mine = slice(first, first + problem.families.count[f])
-        parts = [x[:, mine] @ theta[mine] for x in problem.columns]
-        mean = np.mean(np.concatenate(parts))
-        found[f] = readings_as_one([((p - mean) * r)[:, None] for p, r in zip(parts, left, strict=True)])
-    return found
+def _left(problem: Problem, terms: Terms) -> float:
+    """Mean square of what a set leaves of the readings, its numbers fitted under the prior of the problem."""
+    found = problem.search().refined(terms.family, terms.place, terms.pole)
+    return float(np.mean(np.concatenate(problem.residuals(on_grid(found, problem.families))) ** 2))
 
 
 def _with_spread(problem: Problem) -> Problem:

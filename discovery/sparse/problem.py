@@ -41,8 +41,7 @@ class Problem:
     seed: int = 0
     zeroed: bool = False  # the last nuisance is a zero of each trajectory
     zero_sd: float = 1.0  # its spread
-    # (F,) or one for all: precision of the part that a family has in the readings, of what it moves there
-    parts: Array | float = 0.0
+    parts: float = 0.0  # precision of the part that a family has in the readings, of what it moves there
 
     @cached_property
     def grams(self) -> tuple[dict[int, Gram], ...]:
@@ -76,17 +75,12 @@ class Problem:
         """Normal equations with the prior of the parts: rho |X_f theta_f|^2 of each family f, what is always
         in the set (the offset) taken out of X_f.
         """
-        if not np.any(self.parts):
+        if not self.parts:
             return g
         matrix = g.matrix.copy()
-        for precision, (mine, moved) in zip(self._precisions, self._moved(g), strict=True):
-            matrix[mine, mine] += precision * moved
+        for mine, moved in self._moved(g):
+            matrix[mine, mine] += self.parts * moved
         return replace(g, matrix=matrix)
-
-    @property
-    def _precisions(self) -> Array:
-        """`parts` of each family (F,)."""
-        return np.broadcast_to(self.parts, self.families.count.shape)
 
     def _moved(self, g: Gram) -> Iterator[tuple[slice, Array]]:
         """Columns of each family, and their normal equations without what is always in the set."""
@@ -102,14 +96,14 @@ class Problem:
         moved = [some for _, some in self._moved(self.pooled())]
         found = np.full(len(terms), np.inf)
         for k, f in enumerate(terms.family):
-            if f in self.always or not self._precisions[f]:
+            if f in self.always or not self.parts:
                 continue
             alone = replace(
                 terms, family=terms.family[k : k + 1], place=terms.place[k : k + 1], theta=np.ones(1)
             )
             first = self.families.start[f]
             column = on_grid(alone, self.families)[first : first + self.families.count[f]]
-            found[k] = (self._precisions[f] * max(column @ moved[f] @ column, 1e-300)) ** -0.5
+            found[k] = (self.parts * max(column @ moved[f] @ column, 1e-300)) ** -0.5
         return found
 
     def folds(self) -> list[tuple[Ints, Search]]:
