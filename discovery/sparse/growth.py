@@ -21,6 +21,7 @@ from discovery.sparse.rates import around, extended_bic, linearised, refit, regr
 from discovery.sparse.search import Terms
 
 _PACE = 2  # terms whose mean gain says whether growth comes near its goal
+_WORSE = 2.0  # times the cost of one set: another one of that size is not better
 _ALIKE = 1e-4  # of the cost: two fits that differ by less ended at the same place
 
 
@@ -109,7 +110,7 @@ def _exchanged(
         if set(other) == set(entered):
             break
         try:
-            tried, its, _ = _fitted_with(data, model, labels, other, growth, noise)
+            tried, its, _ = _fitted_with(data, model, labels, other, growth, noise, _WORSE * fit.cost)
         except RunsAwayError:
             break
         dispersion = max(2 * min(fit.cost, its.cost) / seen.count, 1.0)
@@ -130,9 +131,13 @@ def _fitted_with(
     entered: Sequence[str],
     growth: Growth,
     noise: Noise,
+    most: float = np.inf,
 ) -> tuple[Model, Fit, bool]:
     """The model with all candidates, those that entered fitted and the others zero; that fit, and whether the
     fits from all starts ended alike.
+
+    Args:
+        most: a cost that is of no use: a fit that would not fall below it ends early.
 
     Raises:
         RunsAwayError: the model stays finite from none of the starts.
@@ -141,7 +146,7 @@ def _fitted_with(
     starts = [{}, growth.restart] if growth.restart else [{}]
     fits: list[Fit] = []
     for start in starts:
-        goal = (1 + _ALIKE) * min((one.cost for one in fits), default=np.inf)
+        goal = min([most, *((1 + _ALIKE) * one.cost for one in fits)])
         with suppress(RunsAwayError):
             fits.append(
                 refit(small, data.campaign, data.recordings, data.outputs, start, data.grids, noise, 40, goal)
