@@ -1,4 +1,5 @@
-"""Systems of other trades as their users would bring them: a lathe, a battery cell, a spring, a vessel.
+"""Systems of other trades as their users would bring them: a lathe, two battery cells, a spring, a vessel, a
+motor.
 
     python benchmarks/outsiders.py FOLDER      # writes FOLDER/lathe/run1.csv ... FOLDER/vessel/b.csv
     discovery new FOLDER/lathe/job --from FOLDER/lathe/run1.csv --from ...
@@ -6,7 +7,8 @@
 
 None is in the form of the models of the tool: bodies of the lathe are bars cut into ten pieces with a sensor
 at one of them; the open-circuit voltage of the cell is a curve; the spring is stiffer the further it is out;
-the vessel is filled by a compressor and blown off through an orifice.
+the vessel is filled by a compressor and blown off through an orifice; the motor has dry friction and sticks;
+the second cell warms up, and a drive cycle takes it over a curve of its open-circuit voltage.
 """
 
 from __future__ import annotations
@@ -142,6 +144,57 @@ def vessel(rng: np.random.Generator, hours: float) -> pd.DataFrame:
     )
 
 
+def motor(rng: np.random.Generator, seconds: float) -> pd.DataFrame:
+    """Current [A] and speed [rad/s] of a motor with dry friction (0.03 Nm) under voltage steps, 200 Hz."""
+    rows, fine, step = int(seconds * 200), 200, 0.005
+    volts = held(rng, [-24, -12, -6, -2, 0, 2, 6, 12, 24], rows, 60, 400)
+    resistance, inductance, constant, inertia, viscous, dry = 1.2, 0.002, 0.05, 2e-4, 1e-4, 0.03
+    i, w, out, h = 0.0, 0.0, [], step / fine
+    for u in volts:
+        out.append((i, w))
+        for _ in range(fine):
+            half = i + h / 2 * (u - resistance * i - constant * w) / inductance
+            before, i = i, i + h * (u - resistance * half - constant * w) / inductance
+            drive = constant * (before + i) / 2 - viscous * w
+            if w == 0.0 and abs(drive) <= dry:
+                continue
+            after = w + h * (drive - dry * np.sign(w or drive)) / inertia
+            w = 0.0 if w * after < 0 else after
+    read = np.array(out)
+    return pd.DataFrame(
+        {
+            "t [s]": (step * np.arange(rows)).round(4),
+            "Voltage [V]": volts,
+            "Current [A]": (read[:, 0] + 0.05 * rng.standard_normal(rows)).round(3),
+            "Speed [rad/s]": (read[:, 1] + 0.5 * rng.standard_normal(rows)).round(2),
+        }
+    )
+
+
+def driven_cell(rng: np.random.Generator, seconds: int) -> pd.DataFrame:
+    """Voltage and temperature of a 20 Ah cell on drive cycles with pauses (discharge: positive), at 1 Hz."""
+    base = held(rng, [0, 0, 2, 5, 8, 12, 20, -6, -12], seconds, 4, 40)
+    current = np.convolve(np.r_[np.zeros(4), base], np.ones(5) / 5, "valid")[:seconds] + 1.0
+    current[(np.arange(seconds) // 900) % 4 == 3] = 0.0
+    soc, v1, v2, temperature, out = 0.92, 0.0, 0.0, 25.0, []
+    for i in current:
+        ocv = 3.0 + soc + 0.18 * np.exp(-20 * (1 - soc)) - 0.4 * np.exp(-20 * soc) - 0.08 * np.sin(5 * soc)
+        out.append((ocv - 0.006 * i - v1 - v2, temperature))
+        v1 += (i * 0.004 - v1) / 18
+        v2 += (i * 0.005 - v2) / 320
+        soc -= i / 72_000
+        temperature += (0.015 * i * i - 0.25 * (temperature - 25.0)) / 180.0
+    read = np.array(out)
+    return pd.DataFrame(
+        {
+            "Time [s]": np.arange(seconds),
+            "Current [A]": current.round(3),
+            "Voltage [V]": (read[:, 0] + 0.002 * rng.standard_normal(seconds)).round(4),
+            "Temperature [°C]": (read[:, 1] + 0.05 * rng.standard_normal(seconds)).round(2),
+        }
+    )
+
+
 def main(folder: Path) -> None:
     rng = np.random.default_rng(20261122)
     made = {
@@ -149,6 +202,11 @@ def main(folder: Path) -> None:
         "battery": {name: battery(rng, 3.0) for name in ("a", "b", "c")},
         "spring": {name: spring(rng, 40.0) for name in ("a", "b", "c")},
         "vessel": {name: vessel(rng, 3.0) for name in ("a", "b", "c")},
+    }
+    rng = np.random.default_rng(20261123)  # written a day later
+    made["motor"] = {name: motor(rng, 40.0) for name in ("a", "b", "c", "d")}
+    made["driven_cell"] = {
+        name: driven_cell(rng, 9000 + 1500 * k) for k, name in enumerate(("a", "b", "c", "d"))
     }
     for trade, tables in made.items():
         (folder / trade).mkdir(parents=True, exist_ok=True)

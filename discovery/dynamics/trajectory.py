@@ -23,7 +23,7 @@ _ROUNDS = 30  # of Newton on the trajectory
 _TOLERANCE = 1e-8  # largest change of a state in its unit, relative to 1 + its size
 _CLOSE = 1e-6  # change from which one step of Newton ends it
 _HELPS = 0.3  # factor by which steps with an old linearisation have to become shorter
-_LEAST = 8  # intervals of a trajectory that is not divided
+_LEAST, _FEW = 8, 10  # intervals of a trajectory that is not divided, and steps of Newton on it
 _FIRST = 3  # steps of Newton that may become longer
 _SHRINKS = 0.5  # factor by which later ones have to become shorter, else half of them is taken
 _AWAY = 3  # steps of Newton that lead away from a trajectory that old linearisations have come close to ...
@@ -144,7 +144,7 @@ def _window(
     shortest window keeps what stays finite.
     """
     x, before = np.tile(first, (len(system.grid.time), 1)), 1.0
-    for count in range(_ROUNDS):
+    for count in range(_FEW if shortest and not system.affine else _ROUNDS):
         with np.errstate(all="ignore"):
             a, g0, g1 = _linearise(system, values, x)
             which, e, w0, w1 = kernel.transitions(a, system.grid.step)

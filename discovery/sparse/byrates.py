@@ -19,7 +19,7 @@ from discovery.sparse.borrowed import borrowed
 from discovery.sparse.choice import Choice, stability
 from discovery.sparse.discovery import Discovery, path_points
 from discovery.sparse.folds import NAME, choose, make_folds
-from discovery.sparse.freeruns import RAN_AWAY, left_out
+from discovery.sparse.freeruns import RAN_AWAY, block_errors, left_out
 from discovery.sparse.options import SparseOptions
 from discovery.sparse.problem import Problem
 from discovery.sparse.ratedata import RateData, rough_noise, stated_noise
@@ -29,6 +29,7 @@ from discovery.sparse.search import Search, Terms
 Array = NDArray[np.float64]
 
 _ROUNDS = 4  # of a fit in a fold: it starts at the fit to everything
+_FAR = 2.0  # times the rms of a richer set
 _SIZES = 5  # that are refitted and run freely, down from the one that the criterion names
 
 
@@ -132,7 +133,7 @@ class Judge:
         worth = float(dispersion * (np.log(max(g.count, 2)) + 2 * np.log(count)))  # of one more term
         plain = [plainer(search, one, self.names, self.easy, worth) for one in window]
         sets = sorted({one.members: one for one in plain}.values(), key=len)
-        errors = np.array([self.left_out(one) for one in sets])
+        errors = self.compared(sets)
         return self.evidence(problem, sets, errors, choose(errors, self.tolerance))
 
     def on(self, options: SparseOptions) -> Callable[[Problem], Choice]:
@@ -141,7 +142,7 @@ class Judge:
 
         def select(problem: Problem) -> Choice:
             terms = theirs(problem).terms
-            return self.evidence(problem, [terms], np.array([self.left_out(terms)]), 0)
+            return self.evidence(problem, [terms], self.compared([terms]), 0)
 
         return select
 
@@ -158,8 +159,14 @@ class Judge:
             stability=stability(problem, sets[row]),
         )
 
-    def refit(self, terms: Terms, grids: Mapping[str, Grid], noise: Noise | None, rounds: int) -> Fit:
-        """The model with only the terms of a set, fitted by output error from its present coefficients."""
+    def refit(
+        self, terms: Terms, grids: Mapping[str, Grid], noise: Noise | None, rounds: int, goal: float = np.inf
+    ) -> Fit:
+        """The model with only the terms of a set, fitted by output error from its present coefficients.
+
+        Args:
+            goal: the cost that is good enough to matter, as in `fit_model`.
+        """
         found = {self.names[f]: float(v) for f, v in zip(terms.family, terms.theta, strict=True)}
         small = without(self.model, [name for name in self.names if name not in found])
         recordings = [r for r in self.data.recordings if r in grids]
@@ -168,7 +175,15 @@ class Judge:
             try:
                 fits.append(
                     refit(
-                        small, self.data.campaign, recordings, self.data.outputs, start, grids, noise, rounds
+                        small,
+                        self.data.campaign,
+                        recordings,
+                        self.data.outputs,
+                        start,
+                        grids,
+                        noise,
+                        rounds,
+                        goal,
                     )
                 )
             except RunsAwayError:
@@ -177,16 +192,26 @@ class Judge:
             raise RunsAwayError(f"no fit of {', '.join(found)} stays finite")
         return min(fits, key=lambda one: one.cost)
 
-    def left_out(self, terms: Terms) -> Array:
-        """Mean squared error (B,) of the free run on each block, by fits that have not seen its fold.
+    def compared(self, sets: Sequence[Terms]) -> Array:
+        """Mean squared errors (sizes, B) of the free runs on each block, by fits that have not seen its fold.
 
-        They begin at the fit to everything: the linearised one may be far where terms are not linear.
+        These fits begin at the fit to everything: the linearised one may be far where terms are not linear.
+        A set that leaves far more of what it was fitted to than a richer one is judged by that alone: on
+        what was left out it is no better, and the fits of models that lack much take longest.
         """
-        try:
-            whole = self.refit(terms, self.data.grids, self.noise, 25).model
-        except RunsAwayError:
-            return np.full(self.data.blocks.count, RAN_AWAY)
-        return left_out(self.data, whole, self.noise, _ROUNDS, self.whole)
+        errors = np.full((len(sets), self.data.blocks.count), RAN_AWAY)
+        least = np.inf
+        for row, terms in sorted(enumerate(sets), key=lambda one: -len(one[1])):
+            try:
+                fit = self.refit(terms, self.data.grids, self.noise, 25, _FAR**2 * least)
+            except RunsAwayError:
+                continue
+            least = min(least, fit.cost)
+            if fit.cost > _FAR**2 * least:
+                errors[row] = block_errors(self.data, fit)
+            else:
+                errors[row] = left_out(self.data, fit.model, self.noise, _ROUNDS, self.whole)
+        return errors
 
     def costs(self, problem: Problem, terms: Terms) -> tuple[float, ...]:
         """Share by which the left-out error of the linearised fit grows without each term."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -42,6 +43,7 @@ _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
 _MOVED = 0.02  # share by which a level moves that makes the set grow anew
 _FIRST = 12  # of a fit of a linear chain from one of its starts
+_NEAREST = 3  # of these starts, by their first step, are fitted further
 _FAR = 3.0  # times the rms of another form at its start
 _WHITE = 1.5  # readings that say the same once: less is noise
 _CHAIN = (0.3, 1.0, 3.0)  # times the time scale of the readings: time constants that a chain starts from
@@ -60,17 +62,22 @@ class Start:
 
 
 def discover_states(
-    data: RateData, options: SparseOptions, hidden: Sequence[str], progress: Progress
+    data: RateData, options: SparseOptions, hidden: Sequence[str], progress: Progress, rival: float = np.inf
 ) -> Iterator[Discovery]:
     """A discovery for each kind of hidden state that was asked for and does not run away, made when it is
     asked for; none for a kind that begins far from the readings where another one begins near.
+
+    Args:
+        rival: mean squared error of another model on left-out data. A kind that leaves more of the readings
+            that it is fitted to is no better on others: it is not made. Nor is one that begins far from it.
     """
     words = options.library or WORDS
     roles = {data.campaign.channels[y].role for y in data.outputs}
     unit = "h" if roles <= THERMAL_ROLES and data.scale >= _SLOW else time_unit(data.scale)
     flows = [word for word in FLOWS if word in words] or ["linear"]
     kinds = [k for kind in hidden for k in ([f"{kind} {f}" for f in flows] if kind == "upstream" else [kind])]
-    nearest = np.inf
+    goal = 0.5 * rival * sum(int(data.grids[r].measured.sum()) for r in data.recordings)
+    nearest = goal
     lacking: UnknownTermError | None = None
     starts: dict[str, Start] = {}
 
@@ -93,9 +100,11 @@ def discover_states(
             begin(kind)
         if kind in starts and starts[kind].cost <= _FAR**2 * nearest:
             try:
-                yield _discovered(data, kind.split()[0], starts[kind])
+                found = _discovered(data, kind.split()[0], starts[kind], goal)
             except RunsAwayError:
                 continue
+            if found:
+                yield found
     if lacking is not None and not starts and options.form != "auto" and len(hidden) == 1:
         raise lacking
 
@@ -116,9 +125,9 @@ def _start(data: RateData, kind: str, words: Sequence[str], unit: str, options: 
     return Start(structure, entered, options, cost)
 
 
-def _discovered(data: RateData, kind: str, start: Start) -> Discovery:
+def _discovered(data: RateData, kind: str, start: Start, goal: float) -> Discovery | None:
     """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free
-    runs.
+    runs; None where they leave more than `goal`.
     """
     structure, entered, options = start.structure, start.entered, start.options
     stay = {i for i, c in enumerate(structure.candidates) if c.label in options.keep}
@@ -130,12 +139,15 @@ def _discovered(data: RateData, kind: str, start: Start) -> Discovery:
             tuple(names[i] for i in sorted(stay)),
             options.max_terms,
             model.values(),
+            goal,
         )
         small, kept = grown(data, model, labels, growth, options)
         entered = {names.index(name) for name in kept} | stay
         structure, moved = _refined(data, structure, small, names)
         if not moved:
             break
+    if _fit(data, small, {}, _FIRST).cost > goal:
+        return None
     always = [names[i] for i in stay]
     found = discover_rates(data, small, kept, always, options, grown=True, tolerance=PREDICT)
     model = with_free_levels(data, found.model) if options.refine else found.model
@@ -193,13 +205,14 @@ def _begun(data: RateData, bare: Structure) -> tuple[Structure, set[int], float]
     grids = [data.grids[r] for r in data.recordings]
     near = 0.5 * sum(int(grid.measured.sum()) for grid in grids)  # cost of a fit that is off by this noise
     widths = [half_widths(grids, y, s, bare.order) for y, s in zip(data.outputs, noise, strict=True)]
-    begun = []
+    begun: list[tuple[Structure, set[int], float]] = []
     for k in range(max(map(len, widths))):
         structure, entered = _weakly(data, bare, [one[min(k, len(one) - 1)] for one in widths])
         model, labels = with_candidates(structure.model, structure.candidates)
         small = without(model, [name for i, name in enumerate(labels) if i not in entered])
         try:
-            begun.append((structure, entered, _fit(data, small, {}, _FIRST).cost))
+            least = min((cost for *_, cost in begun), default=np.inf)
+            begun.append((structure, entered, _fit(data, small, {}, _FIRST, least).cost))
             if begun[-1][2] <= near:
                 break
         except RunsAwayError:
@@ -252,14 +265,17 @@ def _chain(
         flow: word of the law, as "sqrt".
     """
     bare = upstream(data, output, [flow], unit)
-    fits = []
+    fits: list[Fit] = []
     for first, then in product(_CHAIN, _CHAIN):
         guess = balanced(data, bare, first * data.scale, then * data.scale)
         model, _ = with_candidates(bare.model, started(bare, guess).candidates)
-        try:
-            fits.append(_fit(data, model, {}, _FIRST))
-        except RunsAwayError:
-            continue
+        with suppress(RunsAwayError):
+            fits.append(_fit(data, model, {}, 1))
+    nearest = sorted(fits, key=lambda one: one.cost)[:_NEAREST]
+    fits = []
+    for one in nearest:
+        with suppress(RunsAwayError):
+            fits.append(_fit(data, one.model, {}, _FIRST, min((f.cost for f in fits), default=np.inf)))
     if not fits:
         raise RunsAwayError(f"no chain of two bodies stays finite on the readings of {output}")
     fit = min(fits, key=lambda one: one.cost)
@@ -276,10 +292,9 @@ def _chain(
     return started(full, values), fit.cost
 
 
-def _fit(data: RateData, model: Model, values: Mapping[str, float], rounds: int) -> Fit:
-    return refit(
-        model, data.campaign, data.recordings, data.outputs, values, data.grids, rough_noise(data), rounds
-    )
+def _fit(data: RateData, model: Model, values: Mapping[str, float], rounds: int, goal: float = np.inf) -> Fit:
+    noise, recordings = rough_noise(data), data.recordings
+    return refit(model, data.campaign, recordings, data.outputs, values, data.grids, noise, rounds, goal)
 
 
 def with_free_levels(data: RateData, model: Model) -> Model:

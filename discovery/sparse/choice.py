@@ -21,6 +21,7 @@ from discovery.sparse.search import Search, Terms, on_grid
 Array = NDArray[np.float64]
 
 SPREADS = (0.01, 0.03, 0.1, 0.3, 1.0)  # of start values, as shares of the spread of the readings
+_BENT = 1.2  # times the mean square that is left without a prior: a prior that leaves more bends the fit
 _WEAKER = (1.0, 0.1, 0.01, 1e-3, 1e-4)  # times the strongest prior of gains
 
 
@@ -92,7 +93,8 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     fitted to says too little of how far it is off, and of how long it stays off. At most, the prior is scaled
     by the error on unseen readings. Responses that really oppose each other would give way to so strong a
     prior: it is weaker where recordings that are left out whole ask for it. Parts of the same recordings do
-    not say so: gains that cancel predict them as well.
+    not say so: gains that cancel predict them as well. It is also weaker where it bends the fit itself: what
+    is left over long times, as of a start, says little of a gain that short times determine.
     """
     if not problem.parts:
         return problem, terms
@@ -107,14 +109,22 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     off = float(np.nanmean(np.concatenate(left) ** 2))
     independent = search.g.count / readings_as_one([r[:, None] for r in left])
     most = off / moved / independent * len(terms)
-    weaker = _WEAKER if len(problem.columns) >= WHOLE else _WEAKER[:1]
-    tried = [replace(problem, parts=most * share) for share in weaker]
+    free = _left(problem, terms)
+    tried = [replace(problem, parts=most * share) for share in _WEAKER]
+    firm = [trial for trial in tried if _left(trial, terms) <= _BENT * free] or tried[-1:]
+    tried = firm if len(problem.columns) >= WHOLE else firm[:1]
     errors = np.full((len(tried), problem.blocks.count), np.nan)
     for trial, row in zip(tried, errors, strict=True):
         for fold, search in trial.folds():
             _missed(trial, search.refined(terms.family, terms.place, terms.pole), fold, row)
-    firm = tried[choose(errors[:, np.isfinite(errors).all(axis=0)], problem.tolerance)]
-    return firm, firm.search().refined(terms.family, terms.place, terms.pole)
+    best = tried[choose(errors[:, np.isfinite(errors).all(axis=0)], problem.tolerance)]
+    return best, best.search().refined(terms.family, terms.place, terms.pole)
+
+
+def _left(problem: Problem, terms: Terms) -> float:
+    """Mean square of what a set leaves of the readings, its numbers fitted under the prior of the problem."""
+    found = problem.search().refined(terms.family, terms.place, terms.pole)
+    return float(np.mean(np.concatenate(problem.residuals(on_grid(found, problem.families))) ** 2))
 
 
 def _with_spread(problem: Problem) -> Problem:

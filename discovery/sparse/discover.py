@@ -201,9 +201,12 @@ def _best(
         return found[0]
     found = [_begun(one, campaign, recordings, outputs, options) for one in found]
     rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
+    errors = [left_out_of(rates, one.model) for one in found]
     if not (found and leaves_noise(campaign, recordings, found[0].model, outputs)):
-        for one in discover_states(rates, options, states, progress):
+        rival = float(errors[0].mean()) if errors else np.inf
+        for one in discover_states(rates, options, states, progress, rival):
             found.append(one)
+            errors.append(left_out_of(rates, one.model))
             if leaves_noise(campaign, recordings, one.model, outputs):
                 break
     if not found:
@@ -214,8 +217,7 @@ def _best(
         )
     if len(found) == 1:
         return found[0]
-    errors = np.array([left_out_of(rates, one.model) for one in found])
-    return found[choose(errors, PREDICT if options.tolerance is None else options.tolerance)]
+    return found[choose(np.array(errors), PREDICT if options.tolerance is None else options.tolerance)]
 
 
 def _on_file(

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import predict
 from discovery.errors import RunsAwayError
-from discovery.fitting import Noise, predict_recording
+from discovery.fitting import Fit, Noise, predict_recording
 from discovery.models import Model
 from discovery.sparse.folds import make_folds
 from discovery.sparse.ratedata import RateData, has_reading
@@ -29,7 +29,7 @@ def left_out(data: RateData, model: Model, noise: Noise, rounds: int, whole: boo
         rounds: of each fit.
         whole: leave whole recordings out, where there are several.
     """
-    blocks, size = data.blocks, np.array(data.size)
+    blocks = data.blocks
     errors = np.full(blocks.count, np.nan)
     for fold in make_folds(blocks, whole):
         keep = {r: ~np.isin(block, fold) for r, block in zip(data.recordings, blocks.of, strict=True)}
@@ -38,20 +38,28 @@ def left_out(data: RateData, model: Model, noise: Noise, rounds: int, whole: boo
         start = model.with_starts_held() if in_parts else model
         try:
             fit = refit(start, data.campaign, list(train), data.outputs, {}, train, noise, rounds)
-            trajectories = {t.system.grid.recording: t for t in fit.trajectories}
-            for i, r in enumerate(data.recordings):
-                mine = [b for b in fold if blocks.recording[b] == i]
-                if not mine:
-                    continue
-                trajectory = trajectories.get(r) or predict_recording(
-                    fit.model, data.campaign, r, data.outputs, fit.noise.white, data.grids[r]
-                )
-                left = (data.grids[r].readings - predict(trajectory)) / size
-                for b in mine:
-                    here = left[blocks.of[i] == b] ** 2
-                    errors[b] = np.nanmean(here) if np.isfinite(here).any() else np.nan
+            errors[fold] = block_errors(data, fit)[fold]
         except RunsAwayError:  # a sparse model that runs away is a bad model
-            errors[fold] = np.inf
-    # a block without a reading says nothing: it must not decide between the sizes
-    silent = np.array([not has_reading(data, b) for b in range(blocks.count)])
-    return np.where(np.isfinite(errors), errors, np.where(silent, 1.0, RAN_AWAY))
+            errors[fold] = RAN_AWAY
+    return errors
+
+
+def block_errors(data: RateData, fit: Fit) -> Array:
+    """Mean squared error (B,) of the free run of a fit on each block, over outputs; of recordings that it was
+    not fitted to as well.
+
+    Raises:
+        RunsAwayError: the model runs away on such a recording.
+    """
+    size, errors = np.array(data.size), np.ones(data.blocks.count)
+    trajectories = {t.system.grid.recording: t for t in fit.trajectories}
+    for r, block in zip(data.recordings, data.blocks.of, strict=True):
+        trajectory = trajectories.get(r) or predict_recording(
+            fit.model, data.campaign, r, data.outputs, fit.noise.white, data.grids[r]
+        )
+        left = ((data.grids[r].readings - predict(trajectory)) / size) ** 2
+        # a block without a reading says nothing: it must not decide between the sizes
+        for b in (b for b in np.unique(block) if has_reading(data, b)):
+            here = left[block == b]
+            errors[b] = np.nanmean(here) if np.isfinite(here).any() else RAN_AWAY
+    return np.where(np.isfinite(errors), errors, RAN_AWAY)

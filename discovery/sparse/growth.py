@@ -20,6 +20,8 @@ from discovery.sparse.ratedata import RateData, rough_noise
 from discovery.sparse.rates import around, extended_bic, linearised, refit, regress, without
 from discovery.sparse.search import Terms
 
+_PACE = 2  # terms whose mean gain says whether growth comes near its goal
+_WORSE = 2.0  # times the cost of one set: another one of that size is not better
 _ALIKE = 1e-4  # of the cost: two fits that differ by less ended at the same place
 
 
@@ -30,19 +32,21 @@ class Growth:
 
     A baseline that lacks something large is bent by its fit; so each fit also starts from the values
     `restart` that the baseline had before, and the better one counts, until both have ended alike twice.
+    Growth ends where it would not reach the cost `goal` at the pace of its last terms.
     """
 
     entered: tuple[str, ...] = ()
     always: tuple[str, ...] = ()  # of these, those that stay
     most: int = 15
     restart: Mapping[str, float] = field(default_factory=dict)
+    goal: float = np.inf
 
 
 def grown(
     data: RateData, model: Model, labels: Mapping[str, str], growth: Growth, options: SparseOptions
 ) -> tuple[Model, dict[str, str]]:
     """The baseline with the candidates that its residual supports, one at a time; each time everything is
-    fitted again.
+    fitted again, until one does not lower the cost.
 
     A candidate enters by its score: what its column, filtered through the present model, takes off the cost
     when all fitted parameters may follow. Growth ends where the extended criterion does not pay for the next
@@ -50,14 +54,21 @@ def grown(
     """
     entered = list(growth.entered)
     noise = rough_noise(data)
-    before = False
-    for _ in range(growth.most + 1):
+    before, course = False, [np.inf]
+    for left in range(growth.most, -1, -1):
         try:
-            model, fit, alike = _fitted_with(data, model, labels, entered, growth, noise)
+            larger, fit, alike = _fitted_with(data, model, labels, entered, growth, noise)
         except RunsAwayError:
             if len(entered) == len(growth.entered):
                 raise
             entered.pop()
+            break
+        if fit.cost >= course[-1]:  # what the linearised fit promised did not come
+            entered.pop()
+            break
+        model = larger
+        course.append(fit.cost)
+        if fit.cost - left * (course[-1 - _PACE :][0] - fit.cost) / _PACE > growth.goal:
             break
         if alike and before:  # the bend is gone
             growth = replace(growth, restart={})
@@ -99,7 +110,7 @@ def _exchanged(
         if set(other) == set(entered):
             break
         try:
-            tried, its, _ = _fitted_with(data, model, labels, other, growth, noise)
+            tried, its, _ = _fitted_with(data, model, labels, other, growth, noise, _WORSE * fit.cost)
         except RunsAwayError:
             break
         dispersion = max(2 * min(fit.cost, its.cost) / seen.count, 1.0)
@@ -120,20 +131,25 @@ def _fitted_with(
     entered: Sequence[str],
     growth: Growth,
     noise: Noise,
+    most: float = np.inf,
 ) -> tuple[Model, Fit, bool]:
     """The model with all candidates, those that entered fitted and the others zero; that fit, and whether the
     fits from all starts ended alike.
+
+    Args:
+        most: a cost that is of no use: a fit that would not fall below it ends early.
 
     Raises:
         RunsAwayError: the model stays finite from none of the starts.
     """
     small = without(model, [name for name in labels if name not in entered])
     starts = [{}, growth.restart] if growth.restart else [{}]
-    fits = []
+    fits: list[Fit] = []
     for start in starts:
+        goal = min([most, *((1 + _ALIKE) * one.cost for one in fits)])
         with suppress(RunsAwayError):
             fits.append(
-                refit(small, data.campaign, data.recordings, data.outputs, start, data.grids, noise, 40)
+                refit(small, data.campaign, data.recordings, data.outputs, start, data.grids, noise, 40, goal)
             )
     if not fits:
         raise RunsAwayError(f"no fit of {', '.join(entered)} stays finite")

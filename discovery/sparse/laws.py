@@ -18,20 +18,26 @@ LAWS = {
     "sqrt": "sqrt(max({0}, 0))",
     "abs": "abs({0})",
     "drag": "{0}*abs({0})",
-    "sign": "sign({0})",
+    "sign": "tanh({0}/{1:.3g})",  # dry friction: over the width that readings cannot show
 }
 BELOW = 0.05  # share of its range by which noise may take a variable below zero that is never negative
 QUANTILES = (0.5, 0.7, 0.85, 0.97)  # of a variable, where a threshold may stand
 
 
 def laws(
-    words: Sequence[str], variable: str, seen: NDArray[np.float64] | None = None, hidden: bool = False
+    words: Sequence[str],
+    variable: str,
+    seen: NDArray[np.float64] | None = None,
+    hidden: bool = False,
+    width: float = 1.0,
 ) -> list[str]:
     """Expressions of a variable by the words of a library.
 
     Args:
         seen: (N,) values of the variable, where they are known: thresholds stand at their quantiles, and a
-            root is offered to what is nowhere negative but for noise.
+            root is offered to what is nowhere negative but for noise; sign, abs and drag to what is on both
+            sides of zero.
+        width: of the step of a sign, over which it is a tanh: a system with dry friction comes to rest.
         hidden: nothing says where the variable counts from: a root begins at its least value.
 
     >>> laws(["linear", "cubic"], "y")
@@ -42,8 +48,12 @@ def laws(
     ['sqrt(max(h, 0))']
     """
     least = 0.0 if seen is None else float(np.min(seen))
-    negative = seen is not None and least < -BELOW * float(np.ptp(seen))
-    found = [LAWS[w].format(variable) for w in words if w in LAWS and not (w == "sqrt" and negative)]
+    wide = 0.0 if seen is None else BELOW * float(np.ptp(seen))
+    negative = seen is not None and least < -wide
+    one_sided = seen is not None and (not negative or float(np.max(seen)) < wide)
+    idle = {"sqrt"} if negative else set()
+    idle |= {"abs", "drag", "sign"} if one_sided else set()  # as y, its square and 1
+    found = [LAWS[w].format(variable, width) for w in words if w in LAWS and w not in idle]
     found += [LAWS["sqrt"].format(f"{variable} - {least:.3g}")] * ("sqrt" in words and negative and hidden)
     if "threshold" in words and seen is not None:
         levels = dict.fromkeys(float(f"{q:.3g}") for q in np.quantile(seen, QUANTILES))

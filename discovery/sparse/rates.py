@@ -279,10 +279,12 @@ def refit(
     grids: Mapping[str, Grid],
     noise: Noise | None = None,
     max_rounds: int = 25,
+    goal: float = np.inf,
 ) -> Fit:
     """Fit from values that are already near; a given noise is kept, else it is estimated.
 
     It ends where sizes are compared, not where the last digit stands: the chosen model is fitted once more.
+    It ends early where it would not reach the cost `goal`.
     """
     inside = {
         name: float(np.clip(value, model.parameters[name].min, model.parameters[name].max))
@@ -298,4 +300,5 @@ def refit(
         grids=grids,
         max_rounds=max_rounds,
         tolerance=_ENOUGH,
+        goal=goal,
     )

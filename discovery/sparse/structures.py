@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.fitting.noise import roughness
 from discovery.models import Model, Parameter, State
 from discovery.models.model import TIME_UNITS
 from discovery.sparse.laws import LAWS, laws, products
@@ -26,9 +27,10 @@ from discovery.terms import Number, Term, evaluate, names, parse
 Array = NDArray[np.float64]
 
 FLOWS = ("linear", "sqrt")  # laws from which a chain of two bodies begins
-WORDS = ("linear", "square", "cubic", "drag", "sqrt")
+WORDS = ("linear", "square", "cubic", "drag", "sqrt", "sign", "abs")
 FREE, UP, DOWN = (-np.inf, np.inf), (0.0, np.inf), (-np.inf, 0.0)
 FINER = 10.0  # times the distance of two readings: quicker rates look like steps
+_FINEST, _FINE = 1e-3, 0.02  # width of a step, as a share of the spread of its variable
 REST = 0.1  # spread of the start of a hidden state, as a share of its size
 
 
@@ -50,10 +52,9 @@ def own(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str,
     found = []
     for y in outputs:
         others = [o for o in outputs if o != y and "coupling" in words]
-        seen = _seen(data, y)
         found += _driven(data, y, outputs, words)
-        found += [Candidate(y, parse(one)) for o in others for one in laws(words, o, _seen(data, o))]
-        found += [_law(y, y, one, stable) for one in laws(words, y, seen)]
+        found += [Candidate(y, parse(one)) for o in others for one in _laws(data, words, o)]
+        found += [_law(y, y, one, stable) for one in _laws(data, words, y)]
         found += [Candidate(y, parse(one)) for one in products(words, [y, *others, *inputs])]
         found += _expressions(words, y, {"y": y})
     return Structure("own", Model("own", {}, states, (), {}, unit), tuple(found))
@@ -67,14 +68,16 @@ def rate(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str
     rates = {y: f"{y}_rate" for y in outputs}
     states, terms, found = {}, [], []
     for y, v in rates.items():
+        speed = _moving(data, y) / per or 1.0
         states[y] = _measured(data, y, unit)
-        speed = float(np.nanstd(np.diff(_seen(data, y)))) or 1.0
-        states[v] = State(v, f"{states[y].unit}/{unit}", None, Number(0.0), REST * speed, per)
+        # a recording may begin in the middle of a motion
+        states[v] = State(v, f"{states[y].unit}/{unit}", None, Number(0.0), speed, per)
         terms.append(Term(f"{v} moves {y}", y, parse(v)))
         found += _driven(data, v, outputs, words)
-        found += [_law(v, y, one, stable) for one in laws(words, y, _seen(data, y))]
+        found += [_law(v, y, one, stable) for one in _laws(data, words, y)]
         found += [
-            _law(v, v, one, stable) for one in laws([w for w in words if w not in ("sqrt", "square")], v)
+            _law(v, v, one, stable)
+            for one in laws([w for w in words if w not in ("sqrt", "square")], v, width=_FINE * speed)
         ]
         others = [o for o in outputs if o != y and "coupling" in words]
         for o in others:
@@ -105,6 +108,7 @@ def upstream(
     wide = float(np.ptp(known))  # where no reading shows the start, it is near its values
     low, high = float(known.min()) - wide, float(known.max()) + wide
     parameters = {start: Parameter(float(known[0]), measured.unit, low, high)}
+    words = [word for word in words if word != "sign"]  # what flows out of a body does not jump
     found = _driven(data, h, [output], words)
     most = quickest(data, unit)
     found += [_flow(output, one, most, h) for one in laws(words, h, level, hidden=True)]
@@ -178,6 +182,31 @@ def _measured(data: RateData, output: str, unit: str) -> State:
 
 def _inputs(data: RateData, outputs: Sequence[str]) -> list[str]:
     return [name for name in next(iter(data.grids.values())).samples if name not in outputs]
+
+
+def _laws(data: RateData, words: Sequence[str], output: str) -> list[str]:
+    """Laws of an output; a step in one is as wide as the readings cannot show."""
+    column, seen = data.outputs.index(output), _seen(data, output)
+    rough = roughness([data.grids[r].readings[:, column] for r in data.recordings])
+    width = float(np.clip(rough, _FINEST * np.std(seen), _FINE * np.std(seen))) or 1.0
+    return laws(words, output, seen, width=width)
+
+
+def _moving(data: RateData, output: str) -> float:
+    """How fast [1/s] an output moves: the largest rms of its differences over 1, 2, 4, ... readings, less
+    their noise, over the time between them.
+    """
+    column = data.outputs.index(output)
+    grids = [data.grids[r] for r in data.recordings]
+    noise = 2 * roughness([g.readings[:, column] for g in grids]) ** 2
+    found = 0.0
+    for g in grids:
+        known = np.isfinite(g.readings[:, column])
+        time, y = g.time[g.read][known], g.readings[known, column]
+        for lag in 2 ** np.arange(max(len(y), 1).bit_length() - 1):
+            moved = float(np.mean((y[lag:] - y[:-lag]) ** 2)) - noise
+            found = max(found, moved / float(np.mean(time[lag:] - time[:-lag])) ** 2)
+    return float(np.sqrt(found))
 
 
 def _seen(data: RateData, output: str) -> Array:

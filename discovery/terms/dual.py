@@ -316,11 +316,18 @@ def _slope_below(x: Any, y: Any) -> Any:
 
 
 def _power(x: Any, p: Any) -> Any:
-    return np.power(x, p)
+    # numpy's power takes ten times as long as the products
+    return x * x if _is(p, 2.0) else x * x * x if _is(p, 3.0) else np.power(x, p)
+
+
+def _is(p: Any, number: float) -> bool:
+    return np.ndim(p) == 0 and p == number
 
 
 def _power_slope(x: Any, p: Any) -> Any:
     # 0**p has no slope to speak of for 0 < p < 1; a finite one keeps Newton steps finite.
+    if _is(p, 2.0) or _is(p, 3.0):
+        return p * _power(x, p - 1.0)
     floor = np.where(np.abs(x) < 1e-9, 1e-9, x)
     return p * np.power(floor, p - 1.0)
 

@@ -194,3 +194,80 @@ def battery(seed: int) -> pd.DataFrame:
         {"I": current, "T_room": room, "U": table[:, 0], "T": table[:, 1]},
         index=10.0 * np.arange(len(current)),
     )
+
+
+def axis(seed: int) -> pd.DataFrame:
+    """Speed [rad/s] of an axis under a torque [Nm]: it is slowed by oil and by dry friction, and sticks."""
+    rng = np.random.default_rng(seed)
+    torque = np.repeat(rng.choice([-3.0, -1.5, -0.3, 0.0, 0.3, 1.5, 3.0], 20), 40)
+    speed, read = 0.0, []
+    for m in torque:
+        read.append(speed)
+        for _ in range(50):
+            drive = 50.0 * m - 0.5 * speed
+            if speed == 0.0 and abs(drive) <= 20.0:
+                continue
+            after = speed + 0.0002 * (drive - 20.0 * np.sign(speed or drive))
+            speed = 0.0 if speed * after < 0 else after
+    speeds = np.array(read) + 0.2 * rng.standard_normal(len(torque))
+    return pd.DataFrame({"M": torque, "w": speeds}, index=0.01 * np.arange(len(torque)))
+
+
+def test_dry_friction_is_a_sign_and_no_polynomial() -> None:
+    channels = {"M": {"role": "other input", "unit": "N*m"}, "w": {"role": "other output", "unit": "rad/s"}}
+    campaign = campaign_from_frames({"a": axis(0), "b": axis(1)}, channels)
+    found = discover(campaign, ["a", "b"], ["w"], SparseOptions(bootstraps=0))
+    law = {re.sub(r"tanh\(w/.*\)", "sign", label): n for label, n in _coefficients(found).items()}
+    assert set(law) == {"w: M", "w: w", "w: sign"}
+    values = [found.model.parameters[law[label]].value for label in ("w: M", "w: w", "w: sign")]
+    np.testing.assert_allclose(values, [50.0, -0.5, -20.0], rtol=0.05)
+
+
+def swinging(seed: int) -> pd.DataFrame:
+    """Place [mm] of a mass that swings out on a spring that is stiffer the further it is out."""
+    rng = np.random.default_rng(seed)
+    x, v, read = float(rng.uniform(1, 2)), float(rng.uniform(-2, 2)), []
+    for _ in range(1000):
+        read.append(x)
+        for _ in range(20):
+            v += 0.001 * (-x - 0.5 * x**3 - 0.3 * v)
+            x += 0.001 * v
+    return pd.DataFrame(
+        {"x": np.array(read) + 0.005 * rng.standard_normal(1000)}, index=0.02 * np.arange(1000)
+    )
+
+
+def test_a_recording_may_begin_in_the_middle_of_a_motion() -> None:
+    channels = {"x": {"role": "other output", "unit": "mm"}}
+    campaign = campaign_from_frames({"a": swinging(0), "b": swinging(1)}, channels)
+    found = discover(campaign, ["a", "b"], ["x"], SparseOptions(bootstraps=0))
+    law = {label: found.model.parameters[n].value for label, n in _coefficients(found).items()}
+    assert set(law) == {"x_rate: x", "x_rate: x**3", "x_rate: x_rate"}
+    np.testing.assert_allclose(
+        [law["x_rate: x"], law["x_rate: x**3"], law["x_rate: x_rate"]], [-1.0, -0.5, -0.3], rtol=0.03
+    )
+
+
+def cell(seed: int) -> pd.DataFrame:
+    """Voltage of a cell of 10 mOhm, and 5 mOhm more after 30 s, under currents that change every few seconds;
+    its open-circuit voltage is a curve of its charge.
+    """
+    rng = np.random.default_rng(seed)
+    current = np.repeat(rng.choice([0.0, 2.0, 5.0, 12.0, -6.0], 400), 10)
+    charge, slow, read = 0.9, 0.0, []
+    for i in current:
+        read.append(3.0 + charge - 0.1 * np.sin(5 * charge) - 0.4 * np.exp(-10 * charge) - 0.010 * i - slow)
+        slow += (0.005 * i - slow) / 30
+        charge -= i / 20_000
+    volts = np.array(read) + 0.002 * rng.standard_normal(len(current))
+    return pd.DataFrame({"I": current, "U": volts}, index=1.0 * np.arange(len(current)))
+
+
+def test_the_resistance_of_a_cell_is_found_under_a_curve_that_the_model_lacks() -> None:
+    channels = {"I": {"role": "other input", "unit": "A"}, "U": {"role": "other output", "unit": "V"}}
+    campaign = campaign_from_frames({name: cell(k) for k, name in enumerate("abc")}, channels)
+    options = SparseOptions(bootstraps=0, form="masses")
+    found = discover(campaign, ["a", "b", "c"], ["U"], options)
+    kept = found.report["groups"][0]["kept"]
+    direct = found.model.parameters[f"U_gain{kept.index('I')}"].value
+    assert direct == pytest.approx(-0.010, rel=0.1)
