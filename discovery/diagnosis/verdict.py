@@ -71,9 +71,8 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
             key=lambda n: -_added(found, answer, n.hypothesis),
         )
     )
-    if gain < thresholds.MATTERS:
-        return _nothing(context, found, answer, candidates)
-    probable = [n for n in candidates if n.probability >= thresholds.NAMED]
+    matters = gain >= thresholds.MATTERS
+    probable = [n for n in candidates if matters and n.probability >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
     sure = _needed(context, found, answer, [n for n in probable if n.hypothesis.key not in refused])
     named, idle = _proved(context, found, answer, sure)
@@ -81,7 +80,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     # what changes no free run outside the fit is not lacking either
     rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
     best = max(rest, key=lambda m: m.evidence)
-    short = best.evidence - _alone(context, found, answer, named)
+    short = best.evidence - (_alone(context, found, answer, named) if matters else answer.evidence)
     # names hold next to effects that are not sure, but not next to heat that no effect explains
     if (best.forced or not named) and short > by_chance(found.gain):
         if best.forced:

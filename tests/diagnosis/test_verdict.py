@@ -206,6 +206,13 @@ def test_what_does_not_matter_in_free_runs_is_no_mismatch(by: float, word: str) 
     assert said(WET, {"fluid_convection": 0.95}, gain=thresholds.MATTERS + by).word == word
 
 
+def test_heat_that_no_effect_explains_counts_though_the_effects_change_no_free_run() -> None:
+    found = Tried([Model((FLUID,), 12.0), Model((), 0.0)])
+    for more, word in ((SHORT - 0.1, "no mismatch"), (SHORT + 0.1, "unexplained")):
+        unknown = Model((FLUID,), 12.0 + more, forced="bed")
+        assert said(found, {"fluid_convection": 0.9}, unknown=unknown, gain=0.0).word == word
+
+
 def test_a_sure_effect_is_named_next_to_one_that_is_not_sure() -> None:
     """Friction adds 80, yet other effects may do the same: the fluid is part of every likely answer."""
     both = pair(FLUID, FRICTION, 180.0, 100.0, 30.0)
