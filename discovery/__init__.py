@@ -14,7 +14,7 @@ it needs.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 if TYPE_CHECKING:
     from discovery.diagnosis import diagnose
