@@ -240,7 +240,7 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
         return verdict
     sizes = ", ".join(f"{printed(rms[r])} on {r} ({printed(proof[r].expected)} expected)" for r in missed)
     reason = (
-        "whatever they start from, free runs on held-out recordings miss more than noise and the fit explain: "
+        "from any start, free runs on held-out recordings miss more than noise and the fit explain: "
         f"rms {sizes} {unit}; something acts there that the recordings to fit do not show"
     )
     word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
