@@ -69,6 +69,7 @@ class Context:
     outliers: tuple[Outlier, ...]  # set aside
     form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
     laws: int  # of these, the first, that are of laws and not of edges
+    sizes: Sizes  # prior of amplitudes, along the baseline; the same under every reading noise
 
     @property
     def white(self) -> Noise:
@@ -95,13 +96,9 @@ class Context:
         """Every effect at every place of the model where it can act."""
         return candidates(self.model, self.effects, self.scene)
 
-    @cached_property
-    def _usual_sizes(self) -> Sizes:
-        return Sizes(self.model, self.baseline.trajectories, self.white)
-
     def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:
         """Prior of the size of each amplitude."""
-        return self._usual_sizes.slab(hypotheses)
+        return self.sizes.slab(hypotheses)
 
 
 def make_context(
@@ -145,21 +142,24 @@ def make_context(
     spreads = fit.problem.start_spreads()
     own = {n: replace(s, start_sd=spreads.get(n, s.start_sd)) for n, s in model.states.items()}
     scene = make_scene(campaign, model, recordings, outputs, after)
+    model = replace(model, states=own)  # how far states begin from their starts is found once
+    noises = settings(white, floor, process_prior(), any(g.unsure for g in grids.values()))
     return Context(
         campaign,
-        replace(model, states=own),  # how far states begin from their starts is found once
+        model,
         tuple(recordings),
         tuple(outputs),
         grids,
         tuple(shown_by(grids, effects)),
         scene,
         fit,
-        settings(white, floor, process_prior(), any(g.unsure for g in grids.values())),
+        noises,
         floor,
         belief,
         tuple(outliers),
         tuple(form),
         laws,
+        Sizes(model, fit.trajectories, noises[0].noise),
     )
 
 

@@ -44,9 +44,9 @@ class Improvement:
     `unsure` is what the uncertainty of the parameters adds on a recording that no fit has seen. `low` and
     `high` bound the improvement of the rms (before - after) by block bootstrap, 95 %; `outputs` has the plain
     rms of each output before and after, in its unit. `after` is infinite where the repaired model runs away.
-    `started`: the rms before and after from the starts that all readings of a recording show. What a body
-    that no sensor reads begins with is no merit of a model; whatever is decided is decided by these two, and
-    `low` and `high` are theirs.
+    `started`: the rms before and after, and the upper bound of the improvement, from the starts that all
+    readings of a recording show. What a body that no sensor reads begins with is no merit of a model;
+    whatever is decided is decided by these.
     """
 
     before: float
@@ -56,12 +56,12 @@ class Improvement:
     high: float
     outputs: Mapping[str, tuple[float, float]]
     unsure: float = 0.0
-    started: tuple[float, float] | None = None  # None: as before and after
+    started: tuple[float, float, float] | None = None  # None: as before, after and high
 
     @property
     def judged(self) -> tuple[float, float]:
         """The rms before and after that decide."""
-        return self.started or (self.before, self.after)
+        return self.started[:2] if self.started else (self.before, self.after)
 
     @property
     def expected(self) -> float:
@@ -78,7 +78,7 @@ class Improvement:
     @property
     def contradicts(self) -> bool:
         """Whether the recording is predicted worse than without the repair, beyond chance."""
-        return self.high < 0
+        return (self.started[2] if self.started else self.high) < 0
 
 
 @dataclass(frozen=True)
@@ -159,11 +159,6 @@ def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement
     floor, unsure = (
         _rms(np.array(sizes)) for sizes in zip(*((r.floor, r.unsure) for r in runs), strict=True)
     )
-    sums = [_block_sums(b, b if a is None else a) for b, a in judged]
-    old, new, count = (np.concatenate(column) for column in zip(*sums, strict=True))
-    draw = np.random.default_rng(0).integers(0, len(old), (DRAWS, len(old)))
-    total = np.maximum(count[draw].sum(axis=1), 1)
-    gain = np.sqrt(old[draw].sum(axis=1) / total) - np.sqrt(new[draw].sum(axis=1) / total)
     unit = runs[0].unit
     each = {
         name: (_rms(before[:, y] * unit[y]), inf if lost else _rms(after[:, y] * unit[y]))
@@ -171,10 +166,22 @@ def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement
     }
     started = _rms(np.concatenate([b for b, _ in judged]))
     if lost:
-        return Improvement(_rms(before), inf, floor, -inf, -inf, each, unsure, (started, inf))
-    low, high = (float(np.quantile(gain, q)) for q in (0.025, 0.975))
-    ended = _rms(np.concatenate([a for _, a in judged if a is not None]))
-    return Improvement(_rms(before), _rms(after), floor, low, high, each, unsure, (started, ended))
+        return Improvement(_rms(before), inf, floor, -inf, -inf, each, unsure, (started, inf, -inf))
+    low, high = _bounds([(r.before, r.after) for r in runs if r.after is not None])
+    sure = [(b, a) for b, a in judged if a is not None]
+    ended = _rms(np.concatenate([a for _, a in sure]))
+    decided = (started, ended, _bounds(sure)[1])
+    return Improvement(_rms(before), _rms(after), floor, low, high, each, unsure, decided)
+
+
+def _bounds(pairs: Sequence[tuple[Array, Array]]) -> tuple[float, float]:
+    """Bounds of the fall of the rms, 95 %, by bootstrap of blocks of time."""
+    sums = [_block_sums(before, after) for before, after in pairs]
+    old, new, count = (np.concatenate(column) for column in zip(*sums, strict=True))
+    draw = np.random.default_rng(0).integers(0, len(old), (DRAWS, len(old)))
+    total = np.maximum(count[draw].sum(axis=1), 1)
+    gain = np.sqrt(old[draw].sum(axis=1) / total) - np.sqrt(new[draw].sum(axis=1) / total)
+    return float(np.quantile(gain, 0.025)), float(np.quantile(gain, 0.975))
 
 
 def unit_of(campaign: Campaign, outputs: Sequence[str]) -> str:
