@@ -257,6 +257,7 @@ def _gain(i: Improvement) -> Gain:
         gain_low=number(i.low),
         gain_high=number(i.high),
         outputs=dict(each),
+        from_known_starts=(number(i.judged[0]), number(i.judged[1])),
         runs_away=True if np.isinf(i.after) else None,
     )
 

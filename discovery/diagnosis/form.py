@@ -105,6 +105,10 @@ class Gain(Strict):
     outputs: dict[str, tuple[Number, Number]] = Field(
         default_factory=dict, description="rms of each output before and after, in its unit"
     )
+    from_known_starts: tuple[Number, Number] | None = Field(
+        default=None,
+        description="rms before and after from the starts that all readings show: these decide",
+    )
     runs_away: bool | None = None
 
 
@@ -115,7 +119,7 @@ class ImprovementDocument(Strict):
     fit: Gain
     held_out: dict[str, Gain]
     contradicted_by: list[str]
-    explained: Number
+    explained: Number = Field(description="share of the closable mismatch, of the rms from known starts")
 
 
 class WrongReading(Strict):

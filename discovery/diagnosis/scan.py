@@ -93,7 +93,7 @@ def attempt(
     h = claim.hypothesis
     sizes: dict[str, float] = {}
     if h.effect.amplitude.fixed is None:
-        low = 0.0 if h.effect.amplitude.sign > 0 else -h.effect.amplitude.most
+        low, _ = h.effect.amplitude.ends
         sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
     chosen = (*others, h)
     noises = _noises(context, current)

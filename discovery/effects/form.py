@@ -93,6 +93,11 @@ class Amplitude:
     fixed: float | None = None
     most: float = inf
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Between which a size stays."""
+        return 0.0 if self.sign > 0 else -self.most, 0.0 if self.sign < 0 else self.most
+
 
 @dataclass(frozen=True)
 class Shape:

@@ -87,8 +87,7 @@ class Hypothesis:
             else 0.1 * amplitude.plausible * (amplitude.sign or 1)
         )
         parameters: dict[str, Parameter] = {}
-        low = 0.0 if amplitude.sign > 0 else -amplitude.most
-        high = 0.0 if amplitude.sign < 0 else amplitude.most
+        low, high = amplitude.ends
         for name in self.amplitudes:
             value, fixed = start.get(name, usual), amplitude.fixed is not None
             parameters[name] = Parameter(value, self._unit(name), low, high, fixed)

@@ -251,11 +251,7 @@ class _Seen:
             name: float(value * np.exp(p.sd * move)) if p.is_log else float(value + p.sd * move)
             for (name, value), p, move in zip(h.shapes.items(), self.priors, moves, strict=True)
         }
-        amplitude = h.effect.amplitude
-        low, high = (
-            (0.0 if amplitude.sign > 0 else -amplitude.most),
-            (0.0 if amplitude.sign < 0 else amplitude.most),
-        )
+        low, high = h.effect.amplitude.ends
         sizes = np.clip(self.point.sizes + step[count:], low, high) if self.point.free else self.point.sizes
         return Point(h.at(shapes), sizes), far
 
