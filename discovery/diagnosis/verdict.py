@@ -270,12 +270,19 @@ def _coarse(found: Search) -> tuple[str, ...]:
 
 
 def _apart(found: Search, answer: Scored, rest: Sequence[Named]) -> tuple[str, ...]:
-    """A sentence for each effect of the answer that is not sure enough to be named."""
-    return tuple(
-        f"{n.hypothesis.effect.word} at {n.hypothesis.where} is possible but not sure enough to be named "
-        f"(probability {n.probability:.2f}, log evidence {_added(found, answer, n.hypothesis):.0f})"
-        for n in rest
-    )
+    """A sentence for each effect of the answer that is not sure enough to be named, with its rival."""
+    sentences = []
+    for n in rest:
+        added = _added(found, answer, n.hypothesis)
+        sentence = (
+            f"{n.hypothesis.effect.word} at {n.hypothesis.where} is possible but not sure enough to be named "
+            f"(probability {n.probability:.2f}, log evidence {added:.0f})"
+        )
+        if n.rivals and n.rivals[0].below < added:
+            other, below = n.rivals[0].hypothesis, n.rivals[0].below
+            sentence += f"; {other.effect.word} at {other.where} instead has {below:.1f} less"
+        sentences.append(sentence)
+    return tuple(sentences)
 
 
 def _added(found: Search, answer: Scored, h: Hypothesis) -> float:

@@ -155,9 +155,12 @@ def _start_slopes(
 
     if free:
         settle(free)
-    follow = starts_follow(system) if starts else np.zeros((0, 0))
-    for k, name in enumerate(starts):
-        start[:, len(parameters) + k] += follow[:, system.states.index(name)]
-    if starts and (late := memories(system, free)):
-        settle(late)
+    if starts:
+        by = np.zeros_like(start)
+        for k, name in enumerate(starts, len(parameters)):
+            by[:, k] = starts_follow(system)[:, system.states.index(name)]
+        start += by
+        if late := memories(system, free):
+            settle(late)
+            start[late] += by[late]
     return start

@@ -24,8 +24,8 @@ def start_values(
     """Start values (n,): an expression at the first instant, or the balance of the state's terms there.
 
     Args:
-        moved: shifts of start values by name. States whose starts follow move along, and memories are
-            settled anew.
+        moved: shifts of start values by name. States whose starts follow move along. Memories are settled
+            anew, and shifted from there.
     """
     known: dict[str, float] = {**system.grid.first, **values}
     out = np.zeros(len(system.states))
@@ -43,8 +43,11 @@ def start_values(
     free = balanced(system)
     out = _balanced(system, values, out, free)
     if moved:
-        out += starts_follow(system) @ np.array([moved.get(name, 0.0) for name in system.states])
-    return _balanced(system, values, out, memories(system, free)) if moved else out
+        by = starts_follow(system) @ np.array([moved.get(name, 0.0) for name in system.states])
+        late = memories(system, free)
+        out = _balanced(system, values, out + by, late)
+        out[late] += by[late]
+    return out
 
 
 def starts_follow(system: System) -> Array:

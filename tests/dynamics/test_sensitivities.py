@@ -100,13 +100,14 @@ def test_parameters_and_starts(name: str, campaign: Campaign) -> None:
     values = model.values()
     start = start_values(system, values)
     free = list(values)
-    found = sensitivities(simulate(system, values, start), free, ["a", "b"])[:, 0, :]
+    moving = ["a", "b", *(s for s in system.states if system.model.states[s].memory)]
+    found = sensitivities(simulate(system, values, start), free, moving)[:, 0, :]
     for k, parameter in enumerate(free):
         step = 1e-3 * abs(values[parameter]) if parameter != "d" else 20.0  # a delay moves by whole samples
         up = run(system, values | {parameter: values[parameter] + step}, start)
         down = run(system, values | {parameter: values[parameter] - step}, start)
         assert _alike(found[:, k], (up - down) / (2 * step))
-    for k, state in enumerate(("a", "b")):
+    for k, state in enumerate(moving):
         up, down = (run(system, values, start_values(system, values, {state: by})) for by in (1e-3, -1e-3))
         assert _alike(found[:, len(free) + k], (up - down) / 2e-3)
 
