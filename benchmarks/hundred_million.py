@@ -53,23 +53,23 @@ def main() -> None:
         (folder / "campaign.toml").write_text(CAMPAIGN + 'a = { file = "a.parquet" }\n')
         (folder / "model.toml").write_text(MODEL)
 
-        def told(what: str, began: float) -> None:
+        def said(what: str, began: float) -> None:
             memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
             print(
                 f"{rows:.0e} rows, {what}: {time.process_time() - began:.1f} s CPU, {memory:.0f} MB",
                 flush=True,
             )
 
-        told("written", 0.0)
+        said("written", 0.0)
         from discovery.fitting import fit_model
         from discovery.models import read_model
         from discovery.recordings import load_campaign
 
         began = time.process_time()
         campaign = load_campaign(folder)
-        told(f"read, {len(campaign.recordings['a'].time)} rows kept", began)
+        said(f"read, {len(campaign.recordings['a'].time)} rows kept", began)
         fit = fit_model(read_model(folder / "model.toml"), campaign, ["a"], ["E_Y", "T_b"])
-        told("read and fitted", began)
+        said("read and fitted", began)
         for one in ("G", "loss", "k"):
             p = fit.model.parameters[one]
             assert p.low is not None

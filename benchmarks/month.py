@@ -222,7 +222,7 @@ class Result:
     rows: list[float]  # stamps of the output
     revisions: int
     probes: int
-    told: Counter[str] = field(default_factory=Counter)
+    counted: Counter[str] = field(default_factory=Counter)
 
 
 def live(
@@ -400,7 +400,7 @@ def compare(
         "ticks": int(on.sum()),
         "rows": len(found.rows),
         "rows out of order or twice": int(np.sum(gaps <= 0.0)),
-        "events": dict(found.told),
+        "events": dict(found.counted),
         "revision": found.revisions,
         "probes": found.probes,
         "states": dict(Counter(found.states)),
@@ -413,8 +413,8 @@ def compare(
     if known:
         (folder / "known").mkdir()
         left = 1.0 - 0.01 * true_world.times / DAY  # the losses are shares of this power
-        told = {**true_world.inputs, "P_drive": true_world.inputs["P_drive"] * left}
-        best = live(exported, replace(true_world, inputs=told), plan, folder / "known", faults=True)
+        counted = {**true_world.inputs, "P_drive": true_world.inputs["P_drive"] * left}
+        best = live(exported, replace(true_world, inputs=counted), plan, folder / "known", faults=True)
         figures["with known wear, last week, um"] = rms(best.left[quiet & last])
         figures["with known wear, by readings, um"] = rms((best.left + read)[quiet & last])
     figures["said"] = found.events

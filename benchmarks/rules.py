@@ -36,7 +36,7 @@ RESOLUTION = {  # finer gives the same answer in more time
     "diagnosis/thresholds.py": "DRAWS BLOCKS",
 }
 SHOWN = {  # what is shown with an answer, not the answer
-    "evidence/late.py": "TOLD SMALL",
+    "evidence/late.py": "SAID SMALL",
     "diagnosis/description.py": "MOST_TERMS LAGS",
     "diagnosis/document.py": "CONSIDERED WRONG_READINGS",
     "diagnosis/location.py": "*",
@@ -161,9 +161,9 @@ def main() -> None:
     print(f"{len(deciding)} constants decide (aim {AIM_CONSTANTS}), of {len(every)}:")
     for c in deciding:
         print(f"  {c.file}: {c.name} = {c.value}")
-    told = rules()
-    print(f"{len(told)} rules decide (aim {AIM_RULES}):")
-    for rule in told:
+    found = rules()
+    print(f"{len(found)} rules decide (aim {AIM_RULES}):")
+    for rule in found:
         print(f"  {rule}")
 
 

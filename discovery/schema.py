@@ -52,12 +52,12 @@ def sentences(schema: type[BaseModel], data: Any, error: ValidationError) -> lis
     union that all complain about one value, only the first is reported.
     """
     details = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
-    told: dict[tuple[Key, str | int | None], tuple[Key, str]] = {}
+    mistakes: dict[tuple[Key, str | int | None], tuple[Key, str]] = {}
     for mistake in details:
         key = _real_key(data, mistake["loc"])
         missing = mistake["loc"][-1] if mistake["type"] == "missing" else None
-        told.setdefault((key, missing), (key, _explain(schema, mistake, key)))
-    return list(told.values())
+        mistakes.setdefault((key, missing), (key, _explain(schema, mistake, key)))
+    return list(mistakes.values())
 
 
 def _real_key(data: Any, place: Key) -> Key:

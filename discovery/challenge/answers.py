@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from discovery.challenge.document import said, told
+from discovery.challenge.document import said, truth_of
 from discovery.challenge.lines import LINES, with_interval
 from discovery.challenge.prepare import read_keys
 from discovery.challenge.scoring import Answer
@@ -73,7 +73,7 @@ def score_answers(cases: Path, answers: Path) -> list[str]:
 
 def _line(s: Scored) -> str:
     answer = said(s) if s.answer else "no answer"
-    return f"{s.case}  {s.judgement.points:+.2f}  {s.judgement.word}; truth {told(s.key)}, said {answer}"
+    return f"{s.case}  {s.judgement.points:+.2f}  {s.judgement.word}; truth {truth_of(s.key)}, said {answer}"
 
 
 def _read(folder: Path, case: str) -> Answer | None:

@@ -59,7 +59,7 @@ def _case(s: Scored) -> dict[str, Any]:
     return {
         "case": s.case,
         "kind": s.key["kind"],
-        "truth": told(s.key),
+        "truth": truth_of(s.key),
         "size": s.key.get("rms_over_noise"),
         "verdict": s.verdict,
         "named": [
@@ -73,10 +73,10 @@ def _case(s: Scored) -> dict[str, Any]:
     }
 
 
-def told(key: Mapping[str, Any]) -> str:
+def truth_of(key: Mapping[str, Any]) -> str:
     """A key in words."""
     if "effects" in key:
-        return " and ".join(told(e) for e in key["effects"])
+        return " and ".join(truth_of(e) for e in key["effects"])
     if key["effect"] is None:
         return "no effect"
     place = " and ".join([*key["states"], *([key["output"]] if "output" in key else [])])
@@ -179,6 +179,6 @@ def _table(cells: Sequence[Sequence[str]]) -> str:
 def summary(tallies: Mapping[str, Tally]) -> list[str]:
     """What the terminal shows below the table: every wrong answer."""
     return [
-        f"{s.case}: {s.judgement.word}; truth {told(s.key)}, said {said(s)}"
+        f"{s.case}: {s.judgement.word}; truth {truth_of(s.key)}, said {said(s)}"
         for s in wrong(tallies[WORKBENCH])
     ]

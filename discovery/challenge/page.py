@@ -7,7 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from discovery import __version__
-from discovery.challenge.document import CHOSEN, family_rows, power_rows, reliability_rows, said, told, wrong
+from discovery.challenge.document import (
+    CHOSEN,
+    family_rows,
+    power_rows,
+    reliability_rows,
+    said,
+    truth_of,
+    wrong,
+)
 from discovery.challenge.figures import KINDS, all_figures
 from discovery.challenge.lines import LINES, behind, rows
 from discovery.challenge.methods import WORKBENCH
@@ -81,7 +89,7 @@ def _row(s: Scored) -> dict[str, Any]:
     return {
         "case": s.case,
         "kind": KINDS.get(str(s.key["kind"]), s.key["kind"]),
-        "truth": told(s.key),
+        "truth": truth_of(s.key),
         "size": f"{s.key['rms_over_noise']:.2f}" if "rms_over_noise" in s.key else "",
         "said": said(s),
         "rivals": ", ".join(f"{a['effect']}@{'+'.join(a['states'])}" for a in rivals),

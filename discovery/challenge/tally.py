@@ -127,9 +127,9 @@ def tally(scored: Sequence[Scored]) -> Tally:
     quiet = [s for s in scored if s.key["effect"] is None]
     outside = [s for s in scored if s.key["kind"] == "outside"]
     inside = [s for s in scored if s.key["kind"] in ("one", "input", "two", "measuring")]
-    told = [s for s in inside if s.verdict in NAMING]
+    answered = [s for s in inside if s.verdict in NAMING]
     large = [s for s in scored if s.large]
-    large_told = [s for s in large if s.verdict in NAMING]
+    large_answered = [s for s in large if s.verdict in NAMING]
     two = [(t, s) for s in scored if s.key["kind"] == "two" for t in truths(s.key)]
     confidences = _confidences(scored)
     reliability = by_confidence(confidences)
@@ -156,14 +156,14 @@ def tally(scored: Sequence[Scored]) -> Tally:
         false_alarms_coloured=share([s.alarms for s in quiet if s.key.get("coloured")]),
         outside_named=share([s.judgement.word in (WRONG, WRONG_KIND) for s in outside]),
         large_named=share([s.verdict in NAMING for s in large]),
-        large_right=share([s.judgement.word == RIGHT for s in large_told]),
-        named_right=share([s.judgement.word == RIGHT for s in told]),
-        stated=share([in_stated_set(t, s.answer) for s in told if s.answer for t in truths(s.key)]),
+        large_right=share([s.judgement.word == RIGHT for s in large_answered]),
+        named_right=share([s.judgement.word == RIGHT for s in answered]),
+        stated=share([in_stated_set(t, s.answer) for s in answered if s.answer for t in truths(s.key)]),
         measuring_right=share(
             [s.judgement.word in (RIGHT, ELSEWHERE) for s in inside if s.key["kind"] == "measuring"]
         ),
         two_found=share([any(stands(t, f) for f in s.named) for t, s in two]),
-        extra=share([_has_extra(s) for s in told]),
+        extra=share([_has_extra(s) for s in answered]),
         body_first=share(
             [
                 _first_body(s) in places(s.key)
@@ -248,9 +248,11 @@ def _power(scored: Sequence[Scored]) -> list[Bin]:
         low = (SIZES[k - 1] * size) ** 0.5 if k else 0.0
         high = (SIZES[k + 1] * size) ** 0.5 if k + 1 < len(SIZES) else float("inf")
         here = [s for s in scored if low <= s.key["rms_over_noise"] < high]
-        told = [s for s in here if s.verdict in NAMING]
+        answered = [s for s in here if s.verdict in NAMING]
         detected = sum(s.verdict not in ("no mismatch", "failed") for s in here)
-        out.append(Bin(size, len(here), detected, len(told), sum(s.judgement.word == RIGHT for s in told)))
+        out.append(
+            Bin(size, len(here), detected, len(answered), sum(s.judgement.word == RIGHT for s in answered))
+        )
     return out
 
 

@@ -86,14 +86,16 @@ def next_experiment(
     every = length / READINGS
     times = ceil(DECISIVE / max(float(gained[-1]), 1e-9))
     if times > HOPELESS:
-        sentence = f"no input pattern of {_told(length)} {purpose.does} with these outputs alone"
+        sentence = f"no input pattern of {_duration(length)} {purpose.does} with these outputs alone"
     elif times > 1:
-        often = f"{times} recordings of {_told(length)}, readings every {_told(every)}"
+        often = f"{times} recordings of {_duration(length)}, readings every {_duration(every)}"
         sentence = f"{text}: {purpose.does} with {often}"
     else:
         instants = a.system.grid.time[a.system.grid.read]
         soon = max(float(instants[np.argmax(gained >= DECISIVE)]), every)
-        sentence = f"{text}: {purpose.does} within about {_told(soon)} of readings every {_told(every)}"
+        sentence = (
+            f"{text}: {purpose.does} within about {_duration(soon)} of readings every {_duration(every)}"
+        )
     if sensor and spread[sensor] > 0.02:
         apart = f"{purpose.differ} by {spread[sensor]:.2f} K rms"
         sentence += f"; a temperature sensor on {sensor} helps most ({apart})"
@@ -106,7 +108,7 @@ def _read(context: Context) -> set[str]:
     return {y.id for y in shown.values() if isinstance(y, Name)}
 
 
-def _told(seconds: float) -> str:
+def _duration(seconds: float) -> str:
     """A duration as one says it."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds >= size:
@@ -151,7 +153,7 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
     names = called("rotation speed", "speed"), called("heat load", "load")
     moving = " and ".join(name for name, there in zip(names, (speed, load), strict=True) if there)
     dry, still = ", dry" if pump else "", "stand still" if speed else "leave everything off"
-    half, two, hour = (_told(length / n) for n in (2, 6, 12))
+    half, two, hour = (_duration(length / n) for n in (2, 6, 12))
     wanted: dict[str, Mapping[str, Array]] = {}
     if pump:
         wanted[f"switch the pump every {two} at standstill with warm fluid"] = build(zero, zero, sixth, True)

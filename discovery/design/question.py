@@ -10,7 +10,7 @@ from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import RIVAL
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, Verdict
-from discovery.diagnosis.when import instants, told
+from discovery.diagnosis.when import in_words, instants
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Score
 from discovery.models import Model
@@ -83,7 +83,7 @@ def _happened(context: Context, h: Hypothesis) -> str:
     """Heat and jumps have their hours; a loss that is another in a whole recording was changed before it."""
     if h.effect.is_physics and not instants(context.campaign, h):
         return f"what was changed at {h.where} before {h.recording}"
-    return f"what happened {told(context.campaign, h)}"
+    return f"what happened {in_words(context.campaign, h)}"
 
 
 def _called(shown: Sequence[Hypothesis]) -> str:
@@ -113,7 +113,7 @@ def _smallest(found: Search) -> str:
         "second_thermal_mass",
     ):
         claims = [c for c in scanned if c.hypothesis.effect.word == word]
-        seen = [c for c in claims if _size_is_told(c)]
+        seen = [c for c in claims if _size_is_known(c)]
         if not seen:
             continue
         size, c = max(((4.5 * abs(c.size[0] / c.t), c) for c in seen), key=lambda item: item[0])
@@ -132,7 +132,7 @@ def _smallest(found: Search) -> str:
     )
 
 
-def _size_is_told(claim: Score) -> bool:
+def _size_is_known(claim: Score) -> bool:
     h = claim.hypothesis
     is_size = h.effect.amplitude.fixed is None and h.recording is None
     return is_size and claim.t != 0 and claim.share > INVISIBLE

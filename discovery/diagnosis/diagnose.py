@@ -36,7 +36,7 @@ from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis
 from discovery.effects.not_offered import not_offered
 from discovery.errors import RunsAwayError, UserError
-from discovery.evidence.late import told
+from discovery.evidence.late import sentences
 from discovery.evidence.latent_force import Force, latent_forces
 from discovery.fitting import Fit, fit_model
 from discovery.models import Model
@@ -298,4 +298,4 @@ def _reasons(
     if lost := ", ".join(r for r in read if r not in proof):
         said.append(f"the free run of the model diverges on {lost}, so the repair cannot be tested there")
     said += not_offered(context.model, context.scene, effects)
-    return [*said, *told(verdict.answer.fit)]
+    return [*said, *sentences(verdict.answer.fit)]

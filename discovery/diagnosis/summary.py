@@ -19,7 +19,7 @@ def lines_of(d: dict[str, Any]) -> list[str]:
     """Lines for the terminal about the content of a diagnosis.json."""
     lines = [f"{d['verdict']} in '{d['model']}'"]
     for p in d["physics"]:
-        sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_told(q, p))
+        sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_known(q, p))
         said = f"  {p['effect']} {_place(p)}, probability {p['probability']:.2f}"
         lines.append(f"{said}: {sizes}" if sizes else said)
     near = [a for a in d["alternatives"] if a["log_evidence_below_best"] <= RIVAL]
@@ -70,7 +70,7 @@ def _place(claim: dict[str, Any]) -> str:
     return " ".join([*places, *([f"in {claim['recording']}"] if claim.get("recording") else [])])
 
 
-def _is_told(q: dict[str, Any], claim: dict[str, Any]) -> bool:
+def _is_known(q: dict[str, Any], claim: dict[str, Any]) -> bool:
     """Whether a parameter is printed: not a switch that is fixed at 1, nor a jump that may be zero."""
     if claim.get("moved") and q.get("output", claim["moved"][0]) not in claim["moved"]:
         return False

@@ -19,7 +19,7 @@ def instants(campaign: Campaign, h: Hypothesis) -> tuple[float, ...]:
     return tuple(recording.start + min(max(h.shapes[name], first), last) for name in h.spans)
 
 
-def told(campaign: Campaign, h: Hypothesis) -> str:
+def in_words(campaign: Campaign, h: Hypothesis) -> str:
     """Place, recording and hours of an event: "at head in wed from 17.6 to 23.3 h"."""
     at = f"at {', '.join(h.places)} " if h.places else ""
     times = instants(campaign, h)

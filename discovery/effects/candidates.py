@@ -84,7 +84,7 @@ def _claims(effect: Effect, model: Model, scene: Scene) -> Iterator[Hypothesis]:
     any_input = () if effect.place in ("input temperature", "inputs of a recording") else (INPUT, LEVEL, RATE)
     wanted = [variable for variable in (*ROLE_OF, *any_input) if variable in used]
     choices = [_choices(variable, effect, model, scene) for variable in wanted]
-    told = [v in (INPUT, LEVEL) or len(choice) > 1 for v, choice in zip(wanted, choices, strict=True)]
+    in_name = [v in (INPUT, LEVEL) or len(choice) > 1 for v, choice in zip(wanted, choices, strict=True)]
     runs: tuple[str | None, ...] = (None,) if effect.acts == "always" else scene.recordings
     if effect.acts == "from a recording on" and effect.place != "input temperature":
         runs = scene.recordings[1:]  # what is common to all recordings is the model's own parameter
@@ -96,7 +96,7 @@ def _claims(effect: Effect, model: Model, scene: Scene) -> Iterator[Hypothesis]:
             if {INPUT, LEVEL} & set(wanted) and _stands(chosen[-1], spot, model, effect):
                 continue
             for run in runs:
-                named = tuple(c for c, one in zip(chosen, told, strict=True) if one)
+                named = tuple(c for c, one in zip(chosen, in_name, strict=True) if one)
                 yield _claim(effect, model, spot, run, named, binding, scene)
 
 

@@ -22,7 +22,7 @@ from discovery.fitting import Fit
 
 FAST = 10.0  # intervals of an input within which a body answers, for a late stamp to matter
 OFTEN = 2.0  # intervals of an input between readings that still show it
-TOLD = 3.0  # standard errors beyond which what was found is told
+SAID = 3.0  # standard errors beyond which what was found is said
 SMALL = 0.25  # of an interval, below which it is not
 
 
@@ -67,11 +67,11 @@ def _fastest(trajectory: Trajectory) -> float:
     return float(1.0 / max(decay.max(initial=0.0), 1e-300))
 
 
-def told(fit: Fit) -> list[str]:
+def sentences(fit: Fit) -> list[str]:
     """A sentence for each input that is logged late or early."""
     found: dict[str, list[str]] = {}
     for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
-        if u.is_late and u.prior and abs(value) > max(TOLD * error, SMALL * u.prior[1]):
+        if u.is_late and u.prior and abs(value) > max(SAID * error, SMALL * u.prior[1]):
             late = f"{abs(value):.0f} s {'late' if value > 0 else 'early'} in {u.recording}"
             found.setdefault(u.name, []).append(late)
     return [f"{name} is logged {', '.join(runs)}; the fit allows for it" for name, runs in found.items()]

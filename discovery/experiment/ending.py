@@ -107,11 +107,11 @@ class Ending:
         return f"verdict: {self.verdict}{effects}{but}"
 
     def _doubts(self) -> str:
-        told = []
+        worst_first = []
         if self.findings:
             worst = self.findings[0]
             rest = f" (and {len(self.findings) - 1} more: discovery check)" if self.findings[1:] else ""
-            told.append(f"{worst}{rest}")
+            worst_first.append(f"{worst}{rest}")
         if self.guesses:
             named = [
                 f"{name} ({self.hangs_on_guesses[name]:.0%} of the prediction)"
@@ -119,11 +119,13 @@ class Ending:
                 else name
                 for name in sorted(self.guesses, key=lambda n: -self.hangs_on_guesses.get(n, 0.0))
             ]
-            told.append(
+            worst_first.append(
                 f"the guesses for {', '.join(named[:4])} are not confirmed (if right, delete `guessed` "
                 "in the campaign file)"
             )
-        return f"doubts: {'; '.join(told)}" if told else "doubts: none; the recordings are sound"
+        return (
+            f"doubts: {'; '.join(worst_first)}" if worst_first else "doubts: none; the recordings are sound"
+        )
 
 
 def ending(folder: Path) -> Ending:

@@ -50,8 +50,8 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
         refit = _refit(fit, report) if isinstance(entry, SparseOptions) else None
         fitted = judged(experiment, name, entry.kind, model, fit, report, seconds, progress, refit)
     also = [recording for recording in experiment.fit if recording not in common]
-    told = [f"also fitted to {', '.join(also)}"] if also else []
-    return replace(fitted, notes=(*told, *fitted.notes), seconds=clock.perf_counter() - began)
+    also_fitted = [f"also fitted to {', '.join(also)}"] if also else []
+    return replace(fitted, notes=(*also_fitted, *fitted.notes), seconds=clock.perf_counter() - began)
 
 
 def _fitting(report: Mapping[str, Any]) -> Callable[..., Fit]:

@@ -33,9 +33,9 @@ def refuse(findings: Sequence[Finding]) -> None:
         return
     lines = [line.removeprefix("error: ") for line in folded(errors)]
     rest = f"\n  and {len(lines) - _SHOWN} more" if len(lines) > _SHOWN else ""
-    told = "".join(f"\n  {line}" for line in lines[:_SHOWN])
+    listed = "".join(f"\n  {line}" for line in lines[:_SHOWN])
     raise UserError(
-        f"the recordings cannot be used; correct them, or say --force to use them anyway:{told}{rest}"
+        f"the recordings cannot be used; correct them, or say --force to use them anyway:{listed}{rest}"
     )
 
 

@@ -273,9 +273,9 @@ def compressed(gram: Array, scale: Array) -> Array:
     one for each direction of which the readings say anything.
     """
     size, axes = np.linalg.eigh(gram)
-    told = size > SEEN
+    clear = size > SEEN
     inverse = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
-    return np.asarray(np.sqrt(size[told])[:, None] * axes[:, told].T * inverse)
+    return np.asarray(np.sqrt(size[clear])[:, None] * axes[:, clear].T * inverse)
 
 
 def _read(campaign: Campaign, recordings: Collection[str], name: str) -> bool:

@@ -98,10 +98,10 @@ class Evidence:
         keys = {key for pair, of in _ROLES.items() if of == role for key in pair} or {"other", "state", "fan"}
         if role == OTHER:
             keys |= {"current", "voltage", "torque", "position"}
-        told = [
+        scored = [
             (max((v for k, v in says.items() if k in keys), default=0.0), why) for why, says in self.reasons
         ]
-        best = sorted((one for one in told if one[0] > 0.9), key=lambda one: -one[0])[:2]
+        best = sorted((one for one in scored if one[0] > 0.9), key=lambda one: -one[0])[:2]
         return ", ".join(why for _, why in best) or "nothing says what it is"
 
 

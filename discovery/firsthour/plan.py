@@ -138,11 +138,11 @@ def _decided(
     if not scores:
         return _unchosen(title, names, outputs, lines, files)
     helping = [one.name for one in scores if one.helps]
-    told = [f"{one.name} {one.ratio:.0%}" for one in scores]
+    shares = [f"{one.name} {one.ratio:.0%}" for one in scores]
     how = "parts of it" if len(fit) == 1 else "recordings"
     remarks = [
         f"Chosen on {how} left out of the fit. rms there, relative to no model:",
-        f"{', '.join(told)}.",
+        f"{', '.join(shares)}.",
     ]
     mismatch = next((name for name in HAND_BUILT if name in helping), None)
     if helping:
@@ -151,14 +151,14 @@ def _decided(
         chosen = list(dict.fromkeys([*best, *references]))
         said = [
             f"first model: {helping[0]}; on {how} left out of its fit, its rms is {scores[0].ratio:.0%} of "
-            f"the rms without a model ({', '.join(told[1:])})",
+            f"the rms without a model ({', '.join(shares[1:])})",
             f"  {helping[0]}: {FIRST_MODELS[helping[0]]}; `discovery list models` explains the others",
         ]
     else:
         chosen = [next(iter(lines))]
         remarks.append("None is better than no model: record more before you use one.")
         said = [
-            f"no model is better than none on {how} left out ({', '.join(told)})",
+            f"no model is better than none on {how} left out ({', '.join(shares)})",
             *missing(campaign, fit, outputs, guesses),
         ]
     models = {name: lines[name].replace(", bootstraps = 0", "") for name in chosen}

@@ -129,7 +129,7 @@ def experiment_text(
     width = max(map(len, models))
     lines = [f"{model:{width}} = {entry}" for model, entry in models.items()]
     meant = [f"# {model}: {FIRST_MODELS[model]}" for model in models if model in FIRST_MODELS]
-    told = "\n".join(f"# {line}" for line in remarks)
+    remarked = "\n".join(f"# {line}" for line in remarks)
     why = "# The diagnosis asks what this model lacks. It is the simplest one that predicts."
     diagnosed = f'\n{why}\n[mismatch]\nmodel = "{mismatch}"\n' if mismatch else ""
     return f"""# Written by `discovery new`. Fits use only the recordings under fit.
@@ -139,7 +139,7 @@ outputs  = [{listed(outputs)}]
 fit      = [{listed(names[:-1])}]
 held_out = [{listed(names[-1:])}]
 
-{told}
+{remarked}
 [models]
 {chr(10).join([*meant, *lines])}
 {diagnosed}"""

@@ -56,7 +56,7 @@ def warm_start(model: Model, campaign: Campaign, recordings: Sequence[str], outp
         ]
         if mine:
             found |= _best(model, mine, banks, y, taus)
-    model = _poles_that_can_be_told(model, parts, float(taus[-1]), float(taus[0]))
+    model = _poles_within_reach(model, parts, float(taus[-1]), float(taus[0]))
     inside = {
         name: min(max(value, model.parameters[name].min), model.parameters[name].max)
         for name, value in found.items()
@@ -64,9 +64,7 @@ def warm_start(model: Model, campaign: Campaign, recordings: Sequence[str], outp
     return model.with_values(inside)
 
 
-def _poles_that_can_be_told(
-    model: Model, parts: Mapping[str, _Part], slowest: float, fastest: float
-) -> Model:
+def _poles_within_reach(model: Model, parts: Mapping[str, _Part], slowest: float, fastest: float) -> Model:
     """The model with no time constant beyond `slowest` or below `fastest` [s]. Beyond, an influence only adds
     up its input, fits every trend of these recordings and runs away in others; below, it follows its input
     within the distance of readings, however fast, and no controller can integrate it.

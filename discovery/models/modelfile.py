@@ -217,14 +217,14 @@ def _term(i: int, entry: TermForm, states: Mapping[str, State], at: Callable[...
 def model_document(model: Model) -> dict[str, Any]:
     """The model as the nested mapping that its file holds."""
     model = in_time_unit(model)
-    told_apart = zip(_told_apart([term.name for term in model.terms]), model.terms, strict=True)
+    distinct = zip(_distinct([term.name for term in model.terms]), model.terms, strict=True)
     return {
         "name": model.name,
         "time_unit": model.time_unit,
         **({"guessed": True} if model.guessed else {}),
         "parameters": {name: _parameter_entry(p) for name, p in model.parameters.items()},
         "states": {name: _state_entry(state) for name, state in model.states.items()},
-        "terms": [_term_entry(name, term) for name, term in told_apart],
+        "terms": [_term_entry(name, term) for name, term in distinct],
         "outputs": {name: text(expression) for name, expression in model.outputs.items()},
     }
 
@@ -272,10 +272,10 @@ def _finite(entries: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _told_apart(names: list[str]) -> list[str]:
+def _distinct(names: list[str]) -> list[str]:
     """Names with a number behind those that came before: an effect may be found twice at one body.
 
-    >>> _told_apart(["air", "radiation", "air"])
+    >>> _distinct(["air", "radiation", "air"])
     ['air', 'radiation', 'air (2)']
     """
     found: list[str] = []

@@ -42,8 +42,8 @@ class _Troubles:
             self.cells[kind] = Finding("error", self.file, line, what, do)
 
     def all(self) -> list[Finding]:
-        told = [replace(one, what=one.what + more(self.counts[kind])) for kind, one in self.cells.items()]
-        return self.found + told
+        counted = [replace(one, what=one.what + more(self.counts[kind])) for kind, one in self.cells.items()]
+        return self.found + counted
 
 
 def read_careful_csv(

@@ -77,15 +77,15 @@ def _line(group: Sequence[Finding]) -> str:
         dict.fromkeys(one.channel for one in group if one.channel and one.channel != first.channel)
     )
     files = list(dict.fromkeys(one.file.name for one in group if one.file != first.file))
-    told = []
+    notes = []
     if channels:
-        told.append(f"the same of {_listed(channels)}")
+        notes.append(f"the same of {_listed(channels)}")
     if files:
-        told.append(f"also in {_listed(files)}")
-    if len(group) > 1 and not told:
-        told.append(f"{len(group) - 1} more like it")
-    more_of_it = "; ".join(told)
-    return f"{first} ({more_of_it})" if told else str(first)
+        notes.append(f"also in {_listed(files)}")
+    if len(group) > 1 and not notes:
+        notes.append(f"{len(group) - 1} more like it")
+    more_of_it = "; ".join(notes)
+    return f"{first} ({more_of_it})" if notes else str(first)
 
 
 def _listed(names: Sequence[str]) -> str:

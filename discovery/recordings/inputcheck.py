@@ -40,7 +40,7 @@ def input_findings(
             yield Finding("error", file, None, f"the input '{name}' has no value at all", do)
             continue
         gaps = [] if pauses else long_gaps(columns.time, known)
-        yield from _told(file, columns, channels[name], gaps)
+        yield from _findings(file, columns, channels[name], gaps)
         uncovered[name] = inside(gaps, columns.time.size) & ~known
     for name, column in values.items():
         if channels[name].measured:
@@ -74,7 +74,9 @@ def long_gaps(time: Array, known: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return gaps
 
 
-def _told(file: Path, columns: Columns, channel: Channel, gaps: list[tuple[int, int]]) -> Iterator[Finding]:
+def _findings(
+    file: Path, columns: Columns, channel: Channel, gaps: list[tuple[int, int]]
+) -> Iterator[Finding]:
     if not gaps:
         return
     first, last = gaps[0]

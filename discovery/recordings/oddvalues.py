@@ -69,14 +69,14 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         return
     words = _logger_words(read)
     limits = ROLES[channel.role].ranges.get(channel.unit)
-    told = np.zeros(0, dtype=np.intp)  # what lies outside its range has a finding already
+    listed = np.zeros(0, dtype=np.intp)  # what lies outside its range has a finding already
     if limits is not None:
         never = (read < limits.possible[0]) | (read > limits.possible[1])
         unusual = (read < limits.usual[0]) | (read > limits.usual[1])
         left_out = np.isin(np.arange(read.size), impossible_readings(channel, read))
-        told = np.flatnonzero(never | (unusual & ~left_out))
-    words = np.setdiff1d(words, told)
-    yield from _told(
+        listed = np.flatnonzero(never | (unusual & ~left_out))
+    words = np.setdiff1d(words, listed)
+    yield from _findings(
         file,
         lines[known],
         channel,
@@ -90,7 +90,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
     if channel.role not in _SENSORS or known.size < FEW:
         return
     zeros = np.setdiff1d(_zeros(channel, read), words)
-    yield from _told(
+    yield from _findings(
         file,
         lines[known],
         channel,
@@ -102,7 +102,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         weight=4.0,
     )
     away = impossible_readings(channel, read)
-    lone = np.setdiff1d(np.union1d(lone_readings(read), away), [*words, *zeros, *told]).astype(np.intp)
+    lone = np.setdiff1d(np.union1d(lone_readings(read), away), [*words, *zeros, *listed]).astype(np.intp)
     dropped = np.intersect1d(lone, away).size
     if dropped or lone.size >= max(_MANY, _MANY_SHARE * read.size):
         first = last = int(lone[0])
@@ -117,7 +117,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         yield Finding("warning", file, line, what + more(lone.size), do, "outlier", channel.name, 2.0)
     if not channel.measured:  # the air may jump: a door
         return
-    for row in _steps(read, np.unique(np.concatenate((words, zeros, lone, told)))):
+    for row in _steps(read, np.unique(np.concatenate((words, zeros, lone, listed)))):
         what = (
             f"'{channel.name}' jumps from {read[row]:g} to {read[row + 1]:g} {channel.unit} and stays there"
         )
@@ -247,7 +247,7 @@ def _steps(read: Array, wrong: Lines) -> Iterator[int]:
             yield int(kept[row])
 
 
-def _told(
+def _findings(
     file: Path,
     lines: Lines,
     channel: Channel,

@@ -43,10 +43,10 @@ def run_list(runs: Sequence[Run], labels: Sequence[str], page: Path) -> Printed:
             machines := differences(*({"machine": facts[k]["machine"]} for k in (chosen, other)))
         ):
             return _NOT_SHARED, machines[0]  # all else differs, too
-        told = differences(facts[chosen], facts[other]) + _moved(runs[chosen], runs[other])
-        more = len(told) - _MOST_DIFFERENCES
-        told = [*told[:_MOST_DIFFERENCES], f"{more} more"] if more > 1 else told
-        return behind(lead) if lead else _NOT_SHARED, "; ".join(told) or "none"
+        different = differences(facts[chosen], facts[other]) + _moved(runs[chosen], runs[other])
+        more = len(different) - _MOST_DIFFERENCES
+        different = [*different[:_MOST_DIFFERENCES], f"{more} more"] if more > 1 else different
+        return behind(lead) if lead else _NOT_SHARED, "; ".join(different) or "none"
 
     cells_of = tuple(tuple(compared(chosen, other) for other in numbers) for chosen in numbers)
     rows = tuple(

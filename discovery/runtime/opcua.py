@@ -194,14 +194,14 @@ async def _reconnect(link: Link, session: Session) -> None:
 
 async def _first_connection(link: Link, seconds: float | None, asked: Asked, say: Say) -> bool:
     """Connect, and wait for a server that is not there yet; False: stopped, or `seconds` went by."""
-    began, told = time.monotonic(), False
+    began, warned = time.monotonic(), False
     while not asked.stop and (seconds is None or time.monotonic() - began < seconds):
         try:
             await link.connect()
         except UnreachableError as error:
-            if not told:
+            if not warned:
                 say(f"{error}; next attempt every {RETRY_S:g} s")
-            told = True
+            warned = True
             await _until(time.monotonic() + RETRY_S, asked)
         else:
             say(f"connected to {link.form.url}, signed and encrypted")

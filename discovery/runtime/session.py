@@ -76,7 +76,7 @@ class Session:
         self.found: Tick | None = None  # the last tick
         self.events = 0
         self.counts: dict[str, int] = {}  # ticks by state
-        self.told: list[Event] = []  # of the present tick
+        self.events_now: list[Event] = []  # of the present tick
         self.history: History | None = None
         self.lock = Lock(folder) if folder is not None else None
         if folder is not None and model is not None:
@@ -130,7 +130,7 @@ class Session:
         self._tell(Event(time, what, cause, remedy))
 
     def _tell(self, event: Event) -> None:
-        self.told.append(event)
+        self.events_now.append(event)
         self.events += 1
         self.say(str(event))
         if self.history is not None:
@@ -150,7 +150,7 @@ class Session:
         Raises:
             UserError: at the first tick, readings in a wrong unit.
         """
-        self.told = []
+        self.events_now = []
         compensator = self.compensator
         if compensator.origin is None and compensator.heartbeat == 0:
             refuse_wrong_units(compensator.exported.inputs, readings)

@@ -21,7 +21,7 @@ LUMPING = (
     0.6,
 )  # rms over noise that a baseline leaves of its machine without effect; the noise is set by it
 TRIES = 8
-TOLD = 3.0  # log evidence within which readings do not tell two models apart
+APART = 3.0  # log evidence within which readings do not tell two models apart
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class World:
         Only those that the readings can tell: N readings hold at most N rms^2/2 of log evidence about a law.
         """
         sizes = [(lack, self.size(self.machine.as_believed(lack))) for lack in self.machine.lacks]
-        return [(lack, rms) for lack, rms in sizes if len(self.fitted.residual) * rms**2 / 2.0 > TOLD]
+        return [(lack, rms) for lack, rms in sizes if len(self.fitted.residual) * rms**2 / 2.0 > APART]
 
     def visible(self, logs: dict[str, Columns]) -> float:
         """Rms over noise by which the residual of a full refit differs with an effect and without it."""

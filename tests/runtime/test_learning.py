@@ -26,11 +26,11 @@ def test_wear_is_followed_in_the_loop_and_an_unchanged_machine_is_left_alone(
     last = rms(found.left[-1440:])
     if not follows:
         assert active.revision == 1
-        assert found.told["action limit"] == 0
+        assert found.counted["action limit"] == 0
         return
-    assert found.told["action limit"] >= 1
-    assert found.told["shadow run"] >= 1
-    assert found.told["the new model takes over"] >= 1
+    assert found.counted["action limit"] >= 1
+    assert found.counted["shadow run"] >= 1
+    assert found.counted["the new model takes over"] >= 1
     assert active.revision >= 2
     require_trusted(active.seal, public_key(tmp_path / "key.pem.pub"), "active")
     alone = tmp_path / "alone"

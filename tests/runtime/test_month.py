@@ -42,12 +42,12 @@ def test_three_days_with_everything_end_active_and_exact(exported: Exported, tmp
     on = [state != "no power" for state in found.states]
     assert len(found.rows) == sum(on)  # no row lost, none twice
     assert np.all(np.diff(found.rows) > 0.0)
-    assert found.told["clock"] == 2
-    assert found.told["DEGRADED -> FAULT"] == 1
-    assert found.told["FAULT -> WARM"] == 1
+    assert found.counted["clock"] == 2
+    assert found.counted["DEGRADED -> FAULT"] == 1
+    assert found.counted["FAULT -> WARM"] == 1
     # the door, there and back; the step of the chiller arrives through the tank, without a jump
-    assert found.told["step accepted"] == 2
-    assert found.told["output failing"] == found.told["output written again"] == 1
-    assert found.told["state failing"] <= 1
-    assert found.told["restart"] == 3  # two kills and a power cut
-    assert found.told.total() == len(found.events)  # the history holds what was said, each once
+    assert found.counted["step accepted"] == 2
+    assert found.counted["output failing"] == found.counted["output written again"] == 1
+    assert found.counted["state failing"] <= 1
+    assert found.counted["restart"] == 3  # two kills and a power cut
+    assert found.counted.total() == len(found.events)  # the history holds what was said, each once

@@ -120,8 +120,8 @@ def test_the_running_loop_takes_an_input_in(exported: Exported, tmp_path: Path) 
     active = read_document(tmp_path / "memory" / "active.json")
     assert "fan" in {i.name for i in active.inputs}
     require_trusted(active.seal, public_key(tmp_path / "key.pem.pub"), "active")
-    assert found.told["shadow run"] >= 1
-    assert found.told["the new model takes over"] >= 1
+    assert found.counted["shadow run"] >= 1
+    assert found.counted["the new model takes over"] >= 1
     alone = tmp_path / "alone"
     alone.mkdir()
     left_alone = live(exported, happening, plan, alone, faults=False, save_every_s=3600.0)
