@@ -221,6 +221,7 @@ def _run(fit: Fit, campaign: Campaign, run: str) -> Trajectory | None:
             fit.problem.outputs,
             fit.noise.white,
             known=fit.offset_in(run),
+            zeros=fit.zeros,
         )
         predict(trajectory)
     except RunsAwayError:

@@ -39,7 +39,8 @@ class Grid:
     read: Ints  # (R,) nodes at which at least one output was read
     readings: Array  # (R, Y), NaN where an output was not read
     spread: Mapping[str, float] = field(default_factory=dict)  # of channels known only within one
-    offset: Mapping[str, float] = field(default_factory=dict)  # what `ends` and `nodes` have on the samples
+    # what `ends` and `nodes` have on the samples, and readings of an output on what a model shows
+    offset: Mapping[str, float] = field(default_factory=dict)
     unsure: Mapping[str, float] = field(default_factory=dict)  # s, of held channels perhaps logged late
     late: Mapping[str, float] = field(default_factory=dict)  # s, which `ends` has them earlier than stamped
     instants: int = 0  # nodes that there were before it was coarsened; 0: it was not
@@ -93,15 +94,16 @@ class Grid:
         return {**self._moved(values), "time": self.time}
 
     def _moved(self, values: dict[str, Array]) -> dict[str, Array]:
-        return values | {name: values[name] + by for name, by in self.offset.items()}
+        return values | {name: values[name] + by for name, by in self.offset.items() if name in values}
 
     @cached_property
     def first(self) -> dict[str, float]:
-        """Channels at the first instant, outputs at their first reading."""
+        """Channels at the first instant, outputs at their first reading, counted from their zero."""
         found = {name: float(series[0]) for name, series in self.nodes.items()}
         for i, name in enumerate(self.outputs):
             if (there := self.measured[:, i]).any():
-                found[name] = float(self.readings[np.argmax(there), i])
+                read = float(self.readings[np.argmax(there), i])
+                found[name] = read - self.offset.get(name, 0.0)
         return found
 
     @property
@@ -201,7 +203,7 @@ def make_grid(
     stamps[[0, -1]] = True
     rows = np.flatnonzero(stamps)
     logged = {n: float(np.median(np.diff(s.time))) for n, s in samples.items() if len(s.time) > 1}
-    spread = {name: s for name in samples if (s := campaign.channels[name].spread) > 0}
+    spread = {name: s for name in (*samples, *outputs) if (s := campaign.channels[name].spread) > 0}
     read = np.flatnonzero(taken[rows])
     stamped = Grid(recording, data.time[rows], samples, outputs, read, table[taken], spread, logged=logged)
     if len(rows) > most:

@@ -14,7 +14,10 @@ Ints = NDArray[np.intp]
 
 
 def outputs(trajectory: Trajectory, wrt: frozenset[str] = frozenset()) -> list[Dual]:
-    """Outputs of the grid on all nodes (values (T,)), with derivatives by the names of `wrt`."""
+    """Outputs of the grid on all nodes (values (T,)), with derivatives by the names of `wrt`.
+
+    Each counts from the zero that its readings have in this recording.
+    """
     system = trajectory.system
     env = trajectory.at_nodes()
     found = []
@@ -28,7 +31,8 @@ def outputs(trajectory: Trajectory, wrt: frozenset[str] = frozenset()) -> list[D
             raise UserError(
                 f"model '{system.model.name}' has no output '{name}'; give it one under [outputs]"
             )
-    return found
+    zeros = [system.grid.offset.get(name, 0.0) for name in system.grid.outputs]
+    return [Dual(one.value + zero, one.partials) for one, zero in zip(found, zeros, strict=True)]
 
 
 def predict(trajectory: Trajectory) -> Array:

@@ -49,7 +49,7 @@ def sensitivities(
 
     Args:
         parameters: names of parameters, or of channels that move by a constant (start values declared from
-            them move along).
+            them move along); of an output, its zero moves, and what starts at its first reading with it.
         starts: names of states whose start value moves.
         candidates: forcing pieces of candidate terms.
         count: number of candidate owners; default the largest owner plus one.
@@ -90,8 +90,10 @@ def sensitivities(
         nodes.astype(np.int64),
     )
     dy: Array = np.einsum("ryn,rnm->rym", output_matrix(trajectory, nodes), s)
-    for y, dual in enumerate(outputs(trajectory, frozenset(parameters)) if parameters else []):
-        for name, partial in dual.partials.items():
+    for y, dual in enumerate(outputs(trajectory, _in_terms(trajectory, parameters)) if parameters else []):
+        zero = system.grid.outputs[y]
+        shown = dual.partials | ({zero: 1.0} if zero in parameters else {})
+        for name, partial in shown.items():
             whole = np.broadcast_to(partial, (len(system.grid.time),))
             dy[:, y, parameters.index(name)] += (whole if grown is None else grown * whole)[nodes]
     return system.grid.at_readings(dy)
@@ -119,9 +121,14 @@ def moved_in_time(trajectory: Trajectory, late: Sequence[str]) -> list[Column]:
     return found
 
 
+def _in_terms(trajectory: Trajectory, parameters: Sequence[str]) -> frozenset[str]:
+    """Those of the names that may stand in a term: there, the name of an output is that of a state."""
+    return frozenset(parameters).difference(trajectory.system.grid.outputs)
+
+
 def _moved_terms(trajectory: Trajectory, parameters: Sequence[str]) -> list[Column]:
     """How each term moves with each parameter in it; owners count the parameters."""
-    system, wanted = trajectory.system, frozenset(parameters)
+    system, wanted = trajectory.system, _in_terms(trajectory, parameters)
     env = trajectory.at_ends()
     return [
         Column(parameters.index(name), term.into, np.asarray(partial), term.source)
@@ -141,16 +148,18 @@ def _start_slopes(
         if state.start is not None and not wanted.isdisjoint(names(state.start)):
             known = {**system.grid.first, **trajectory.values}
             for name, slope in evaluate(state.start, known, wanted).partials.items():
-                start[i, parameters.index(name)] = float(np.mean(slope))
+                turn = -1.0 if name in system.grid.outputs else 1.0  # a first reading less its zero
+                start[i, parameters.index(name)] = turn * float(np.mean(slope))
     free = balanced(system)
-    wrt = [*dict.fromkeys((*system.states, *parameters))]
+    inner = _in_terms(trajectory, parameters)
+    wrt = [*dict.fromkeys((*system.states, *inner))]
     slopes = rates_at_start(system, trajectory.values, trajectory.x[0], wrt)[1] if free else np.zeros((0, 0))
 
     def settle(some: Sequence[int]) -> None:
         others = [i for i in range(len(system.states)) if i not in some]
         moved = slopes[np.ix_(some, others)] @ start[others]
-        for k, name in enumerate(parameters):
-            moved[:, k] += slopes[some, wrt.index(name)]
+        for name in inner:
+            moved[:, parameters.index(name)] += slopes[some, wrt.index(name)]
         start[some] = np.linalg.lstsq(slopes[np.ix_(some, some)], -moved, rcond=1e-10)[0]
 
     if free:

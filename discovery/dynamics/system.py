@@ -96,8 +96,7 @@ def inputs_of(model: Model, campaign: Campaign, outputs: Collection[str]) -> lis
 
 
 def uncertain(system: System) -> tuple[str, ...]:
-    """Channels that the model uses and that are known only within a spread."""
+    """Channels that the model uses or shows and that are known only within a spread."""
     model = system.model
-    used = {*model.inputs, *model.start_names}
-    own = {*model.parameters, *model.states}
-    return tuple(name for name in system.grid.spread if name in used - own)
+    used = {*model.inputs, *model.start_names} - {*model.parameters, *model.states}
+    return tuple(name for name in system.grid.spread if name in used.union(system.grid.outputs))

@@ -95,7 +95,9 @@ def _left_over(
         seen = replace(campaign, recordings={name: campaign.recordings[name] for name in kept})
         fit = refit(seen, kept)
         for name in fold.recordings:
-            trajectory = predict_recording(fit.model, campaign, name, outputs, fit.noise.white)
+            trajectory = predict_recording(
+                fit.model, campaign, name, outputs, fit.noise.white, zeros=fit.zeros
+            )
             yield fit.problem.residual(trajectory)
         return
     hidden = {name: masked(campaign.recordings[name], outputs, fold.windows[name]) for name in recordings}

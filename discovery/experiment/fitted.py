@@ -182,6 +182,7 @@ def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
         outputs,
         fit.noise.white,
         known=fit.offset_in(recording),
+        zeros=fit.zeros,
     )
     grid = trajectory.system.grid
     reference = np.zeros(len(outputs))

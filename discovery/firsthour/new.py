@@ -70,7 +70,7 @@ def new(
     if ask is not None:
         guesses = answered(guesses, questions(found.seen, guesses), ask)
     guesses = sensors_as_inputs(guesses)
-    found = from_first_readings(found, guesses)
+    found, zeros = from_first_readings(found, guesses)
     outputs = _outputs(found, guesses)
     if not outputs:
         raise UserError(
@@ -85,7 +85,7 @@ def new(
     with temporary_folder(folder) as temporary:
         for name, table in found.recordings.items():
             write_atomic(temporary / f"{name}.csv", csv_text(table))
-        text = campaign_text(folder.resolve().name, found, guesses, air, about_room, kept)
+        text = campaign_text(folder.resolve().name, found, guesses, air, about_room, kept, zeros)
         write_atomic(temporary / "campaign.toml", text)
         made = plan(temporary, folder.resolve().name, names, progress, quick=quick)
         folder.mkdir(parents=True, exist_ok=True)

@@ -36,11 +36,13 @@ def campaign_text(
     room: Room | None,
     about_room: str,
     kept: Mapping[str, Mapping[str, object]],
+    zeros: Mapping[str, float],
 ) -> str:
     """Text of ``campaign.toml``; what nobody has confirmed says so under `guessed`.
 
     Args:
         kept: channels as a person wrote them before.
+        zeros: spread of each error with a zero of its own in each recording.
     """
     channels: dict[str, dict[str, object]] = {}
     headers = {column.name: column.header for column in found.seen}
@@ -54,6 +56,8 @@ def campaign_text(
         if question := doubt(one):
             entry["guessed"] = question
         channels[name] = dict(kept.get(name, entry))
+        if name in zeros:
+            channels[name].setdefault("spread", zeros[name])
     given: dict[str, dict[str, float]] = {name: {} for name in found.recordings}
     for quantity, (unit, values) in found.constants.items():
         channels[quantity] = {

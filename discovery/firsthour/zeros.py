@@ -12,23 +12,28 @@ from discovery.firsthour.guess import Guess
 from discovery.firsthour.recorded import Recorded
 from discovery.firsthour.table import Array, OwnTable
 from discovery.recordings.campaignfile import CampaignForm
-from discovery.recordings.oddvalues import far_step
+from discovery.recordings.oddvalues import first_reading
 
-_AFTER = 7  # readings that a first one is compared with
 _FAR = 3.0  # times the span: no thermal error starts so far from zero
+_APART = 2.0  # times the largest span: nor do recordings with one zero start so far from each other
 
 Zeros = dict[str, dict[str, float]]  # by recording and error: what its readings are counted from
 
 
-def from_first_readings(found: Recorded, guesses: Mapping[str, Guess]) -> Recorded:
+def from_first_readings(found: Recorded, guesses: Mapping[str, Guess]) -> tuple[Recorded, dict[str, float]]:
     """The recordings with errors counted from their first reading, where the zero of a probe is arbitrary.
 
-    That is so if it starts in any recording further from zero than it then moves, several times over. All
-    recordings are treated alike. Parts of one file keep the zero of that file.
+    That is so if it starts in any recording further from zero than it then moves, several times over, or if
+    recordings start so far from each other. All recordings are treated alike. Parts of one file keep the zero
+    of that file.
+
+    Returns:
+        The recordings, and the spread that each of these errors has in the campaign file.
     """
     errors = [name for name, one in guesses.items() if one.role == "error"]
     read = {name: {error: _values(run, error) for error in errors} for name, run in found.recordings.items()}
-    zeros = _zeros(read, {name: (run.path, run.name) for name, run in found.recordings.items()})
+    files = {name: (run.path, run.name) for name, run in found.recordings.items()}
+    zeros = _zeros(read, files)
 
     def counted(run: OwnTable, zero: Mapping[str, float]) -> OwnTable:
         return replace(
@@ -36,7 +41,8 @@ def from_first_readings(found: Recorded, guesses: Mapping[str, Guess]) -> Record
         )
 
     moved = {name: counted(run, zeros[name]) for name, run in found.recordings.items()}
-    return replace(found, recordings=moved, notes=(*found.notes, *_notes(zeros)))
+    counted_from = replace(found, recordings=moved, notes=(*found.notes, *_notes(zeros)))
+    return counted_from, _spreads(read, zeros, files)
 
 
 def again_from_first_readings(
@@ -48,7 +54,7 @@ def again_from_first_readings(
         names: recordings of the campaign, the last one held out.
 
     Returns:
-        Texts of the CSV files that change, by file, and lines about them.
+        Texts of the CSV files that change, by file, and lines about them, with what the campaign file lacks.
     """
     import pandas as pd
 
@@ -63,7 +69,14 @@ def again_from_first_readings(
         name: {e: pd.to_numeric(frame[e], errors="coerce").to_numpy(float) for e in errors if e in frame}
         for name, frame in frames.items()
     }
-    zeros = _zeros(read, {name: entries[name].note for name in frames})
+    files = {name: entries[name].note for name in frames}
+    zeros = _zeros(read, files)
+    lacking = [
+        f"write spread = {sd:g} into the line of '{error}' in campaign.toml: fits then find the rest of each "
+        "zero"
+        for error, sd in _spreads(read, zeros, files).items()
+        if campaign.channels[error].spread is None
+    ]
     texts = {}
     for name, zero in zeros.items():
         frame = frames[name]
@@ -72,18 +85,22 @@ def again_from_first_readings(
             frame[error] = ["" if np.isnan(one) else f"{one:.10g}" for one in counted]
         if zero:
             texts[entries[name].file] = frame.to_csv(index=False, lineterminator="\n")
-    return texts, _notes(zeros)
+    return texts, [*_notes(zeros), *lacking]
 
 
 def _zeros(read: Mapping[str, Mapping[str, Array]], files: Mapping[str, Hashable]) -> Zeros:
-    """The first readings of all errors of which one starts far from zero in a recording of the fit.
+    """The first readings of all errors that start far from zero, or far from where they start elsewhere, in a
+    recording of the fit.
 
     Args:
         read: readings by recording (the last one is held out) and error. files: of which file each recording
             is a part.
     """
     shifted = dict.fromkeys(
-        error for errors in list(read.values())[:-1] for error, values in errors.items() if _far(values)
+        error
+        for errors in list(read.values())[:-1]
+        for error, values in errors.items()
+        if _far(values) or _apart([one.get(error, np.empty(0)) for one in list(read.values())[:-1]])
     )
     first: dict[tuple[Hashable, str], float] = {}  # the first part of a file comes first
     zeros: Zeros = {name: {} for name in read}
@@ -91,10 +108,27 @@ def _zeros(read: Mapping[str, Mapping[str, Array]], files: Mapping[str, Hashable
         for error in shifted:
             known = _known(errors.get(error, np.empty(0)))
             if known.size:
-                first.setdefault((files[name], error), _first(known))
+                first.setdefault((files[name], error), first_reading(known))
             if (files[name], error) in first:
                 zeros[name][error] = first[files[name], error]
     return zeros
+
+
+def _spreads(
+    read: Mapping[str, Mapping[str, Array]], zeros: Zeros, files: Mapping[str, Hashable]
+) -> dict[str, float]:
+    """How far each of these errors may have come by its first reading: as far as it usually is from there.
+
+    None where all recordings are parts of one file: they have one zero.
+    """
+    if len(set(files.values())) < 2:
+        return {}
+    seen = list(zeros)[:-1]
+    found = {}
+    for error in dict.fromkeys(error for name in seen for error in zeros[name]):
+        moved = [_known(read[name][error]) - zeros[name][error] for name in seen if error in zeros[name]]
+        found[error] = float(f"{np.sqrt(np.mean(np.concatenate(moved) ** 2)):.2g}")
+    return {error: sd for error, sd in found.items() if sd > 0}
 
 
 def _notes(zeros: Zeros) -> list[str]:
@@ -104,8 +138,8 @@ def _notes(zeros: Zeros) -> list[str]:
             notes.setdefault(
                 error,
                 f"'{error}' starts at {first:g} in {name}, far from zero compared with how much it moves: in "
-                "each file it is counted from its first reading. What the machine had moved before is "
-                "unknown: begin all recordings cold, or keep one zero",
+                "each file it is counted from its first reading. Fits can only estimate what the machine had "
+                "moved before: begin all recordings cold, or keep one zero",
             )
     return list(notes.values())
 
@@ -115,10 +149,10 @@ def _far(values: Array) -> bool:
     return bool(known.size and abs(known[0]) > _FAR * np.ptp(known) > 0.0)
 
 
-def _first(known: Array) -> float:
-    """The first of the readings (N,) that those after it do not contradict."""
-    near = np.abs(known - np.median(known[:_AFTER])) <= far_step(np.diff(known))
-    return float(known[np.argmax(near)])
+def _apart(recordings: Sequence[Array]) -> bool:
+    known = [one for values in recordings if (one := _known(values)).size]
+    firsts = [first_reading(one) for one in known]
+    return bool(known and np.ptp(firsts) > _APART * max(np.ptp(one) for one in known) > 0.0)
 
 
 def _known(values: Array) -> Array:

@@ -78,6 +78,23 @@ class Fit:
         """Of each channel known only within a spread: its estimated offset in a recording of the fit."""
         return {name: found[recording][0] for name, found in self.offsets.items() if recording in found}
 
+    @property
+    def zeros(self) -> dict[str, tuple[float, float]]:
+        """Of each output with a zero of its own in each recording: its mean and spread in another one.
+
+        A mixture: recordings of the fit count once each, the stated spread as one part of their number.
+        """
+        found = {}
+        for name in {*self.offsets}.intersection(self.problem.outputs):
+            stated = max(s.grid.spread[name] for s in self.problem.systems)
+            seen = np.array(list(self.offsets[name].values()))
+            count = len(seen)
+            means, squares = np.r_[0.0, seen[:, 0]], np.r_[stated**2, np.nan_to_num(seen[:, 1]) ** 2]
+            weights = np.r_[1 / count, np.ones(count)] / (1 / count + count)
+            mean = float(weights @ means)
+            found[name] = mean, float(np.sqrt(weights @ ((means - mean) ** 2 + squares)))
+        return found
+
     def summary(self) -> str:
         """Return a page of text: parameters with 95 % intervals, rms of the residual of each recording, and
         the parameters that these recordings do not determine.

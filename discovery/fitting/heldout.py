@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ def predict_recording(
     white: Sequence[float] | None = None,
     grid: Grid | None = None,
     known: Mapping[str, float] | None = None,
+    zeros: Mapping[str, tuple[float, float]] | None = None,
 ) -> Trajectory:
     """Free run of a model on a recording, zeroed on its first reading as a controller would be.
 
@@ -46,11 +48,15 @@ def predict_recording(
         white: (Y,) reading noise that weighs the first reading against the declared start; default 1 um each.
         known: offsets of inputs that a fit found in this recording (`Fit.offset_in`); the first reading
             corrects only the others.
+        zeros: mean and spread of the zero of an output in a recording that no fit has seen (`Fit.zeros`).
     """
     model = expanded(model, campaign.channels)
     grid = grid or make_grid(campaign, recording, inputs_of(model, campaign, outputs), outputs)
     known = known or {}
-    system = shifted(make_system(model, grid), known)
+    others = {name: one for name, one in (zeros or {}).items() if name in outputs and name not in known}
+    grid = replace(grid, spread={**grid.spread, **{name: sd for name, (_, sd) in others.items()}})
+    begun = {**known, **{name: mean for name, (mean, _) in others.items()}}
+    system = shifted(make_system(model, grid), begun)
     values = model.values(recording)
     noise = np.array(white) if white is not None else np.ones(len(outputs))
     inputs, spreads = _unsure_starts(system, noise, known)
@@ -60,7 +66,8 @@ def predict_recording(
     residual = grid.readings - predict(trajectory)
     shift = _shift(trajectory, residual[:1], noise, inputs, spreads)[0]
     if inputs:
-        system = shifted(system, dict(zip(inputs, shift[: len(inputs)].tolist(), strict=True)))
+        moved = dict(zip(inputs, shift[: len(inputs)].tolist(), strict=True))
+        system = shifted(system, begun | {name: begun.get(name, 0.0) + by for name, by in moved.items()})
     moved = dict(zip(spreads, shift[len(inputs) :].tolist(), strict=True))
     return simulate(system, values, start_values(system, values, moved), trajectory)
 

@@ -15,7 +15,7 @@ from discovery.recordings.clockcheck import clock_findings
 from discovery.recordings.columns import Columns
 from discovery.recordings.correction import pair_corrections, uncompensated
 from discovery.recordings.longfile import How
-from discovery.recordings.oddvalues import impossible_readings
+from discovery.recordings.oddvalues import first_reading, impossible_readings
 from discovery.recordings.reading import read_columns
 from discovery.recordings.roles import ROLES, Between, is_input
 from discovery.recordings.units import Conversion, UnitError, conversion
@@ -28,7 +28,8 @@ Array = NDArray[np.float64]
 class Channel:
     """`unit` is the canonical one, `noise` (standard deviation of a reading) and `spread` are in it.
 
-    `spread`: standard deviation of the unknown constant by which an input is off in a recording; 0: known.
+    `spread`: standard deviation of the unknown constant by which an input, or the zero of an error, is off in
+    a recording; 0: known.
     """
 
     name: str
@@ -52,7 +53,8 @@ class Channel:
 @dataclass(frozen=True)
 class Recording:
     """`time` (T,): seconds since the first stamp, increasing. `values`: each (T,), NaN: not measured; errors
-    as they were without compensation, whatever correction the machine applied.
+    as they were without compensation, whatever correction the machine applied, and those with a zero of their
+    own in each recording counted from their first reading.
 
     `origin`: ISO 8601 instant of time 0 when the file had instants. `start`: seconds of time 0 on the file's
     clock, so that a stamp in the file is start + time. `counts`: of a recording so long that its readings are
@@ -200,19 +202,23 @@ def _load(
             do = f"{suggest(column, list(columns.header))}; or say set = {{ {channel} = ... }} in {path}"
             raise UserError(f"{file}, line 1: no column '{column}'; {do}")
     values = channel_values(columns, form, channels, conversions)
-    measured = {c: make_channel(c, channels[c], conversions[c]).measured for c in wanted}
+    made = {name: make_channel(name, one, conversions[name]) for name, one in channels.items()}
     for channel, series in values.items():
         if columns.counts:  # taken out row by row
             break
-        made = make_channel(channel, channels[channel], conversions[channel])
         known = np.flatnonzero(np.isfinite(series))
-        series[known[impossible_readings(made, series[known])]] = np.nan  # `check` says so
+        series[known[impossible_readings(made[channel], series[known])]] = np.nan  # `check` says so
+    values = uncompensated(str(file), columns.time, values, channels, pairs)
+    for channel, series in values.items():
+        known = np.isfinite(series)
+        if made[channel].measured and made[channel].spread and known.any():
+            values[channel] = series - first_reading(series[known])
     return Recording(
         name,
         columns.time - columns.time[0],
-        Named("channel", uncompensated(str(file), columns.time, values, channels, pairs)),
+        Named("channel", values),
         form.note,
         columns.origin,
         float(columns.time[0]),
-        {c: columns.counts[to] for c, to in wanted.items() if to in columns.counts and measured[c]},
+        {c: columns.counts[to] for c, to in wanted.items() if to in columns.counts and made[c].measured},
     )

@@ -44,8 +44,8 @@ class ChannelForm(Strict):
     spread: float | None = Field(
         None,
         gt=0,
-        description="of an input: in each recording its values are off by one unknown constant with this "
-        "standard deviation, in the unit (a difference); a fit finds it",
+        description="in each recording the values are off by one unknown constant with this standard "
+        "deviation, in the unit (a difference); a fit finds it. An error then counts from its first reading",
     )
     between: Between | None = Field(None, description="what the value does between stamps")
     column: Annotated[str, AfterValidator(_column_name)] | None = Field(
@@ -78,10 +78,10 @@ class ChannelForm(Strict):
         return self
 
     @model_validator(mode="after")
-    def _inputs_alone_spread(self) -> Self:
-        if self.spread is not None and not is_input(self.role):
+    def _inputs_and_errors_spread(self) -> Self:
+        if self.spread is not None and not (is_input(self.role) or self.role == "error"):
             raise ValueError(
-                f"spread belongs to inputs of models, not to the role '{self.role}'; "
+                f"spread belongs to inputs of models and to errors, not to the role '{self.role}'; "
                 "take it away (the noise of readings is noise)"
             )
         return self

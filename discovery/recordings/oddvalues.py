@@ -52,6 +52,7 @@ _USUAL = 6.0  # times the steps that one in ten exceeds
 _AGREE = 0.3  # of that distance: what the neighbours differ by
 # so far away that nothing but a fault explains it: such a reading is left out on loading
 _IMPOSSIBLE = {"degC": 30.0, "um": 100.0, "um/m": 100.0}
+_AFTER = 7  # readings that a first one is compared with
 _ROW = 3  # such readings in a row
 _TRACE = 3.0  # times the usual steps, or those next to it: a response leaves more behind
 _SOME = 3  # readings that are none: no slip any more
@@ -169,6 +170,12 @@ def lone_readings(read: Array) -> Lines:
     turns = np.sign(steps[:-1]) != np.sign(steps[1:])
     agree = np.abs(read[2:] - read[:-2]) < _AGREE * away
     return np.flatnonzero((away > far) & turns & agree) + 1
+
+
+def first_reading(read: Array) -> float:
+    """The first of the readings (R,) that those after it do not contradict."""
+    near = np.abs(read - np.median(read[:_AFTER])) <= far_step(np.diff(read))
+    return float(read[np.argmax(near)])
 
 
 def far_step(steps: Array, least: float = 0.0) -> float:

@@ -59,7 +59,8 @@ def discover_masses(
     options = matched(options, data.drives.expressions, campaign.path)
     grids = {r: data.grids[r].part(outputs=[output]) for r in recordings}
     readings = [grids[r].readings[:, 0] for r in recordings]
-    stated = campaign.channels[output].noise
+    channel = campaign.channels[output]
+    stated = channel.noise
     library = FilteredInputs(
         ["time", *data.drives.inputs, "read"],
         [d for d in data.drives.expressions if d not in options.forbid],
@@ -67,8 +68,8 @@ def discover_masses(
         data.drives.linear,
         data.drives.settled,
         integrals=[d for d in data.drives.integrals if d not in options.forbid],
-        # how far zeros are apart is known from several recordings alone
-        zeroed=campaign.channels[output].role == "error" and len(recordings) >= WHOLE,
+        # how far zeros are apart is stated, or known from several recordings alone
+        zeroed=channel.spread > 0 or (channel.role == "error" and len(recordings) >= WHOLE),
     )
     most: dict[int, int] = {}
     while True:
@@ -84,7 +85,7 @@ def discover_masses(
             options.bounds,
             (float(library.taus_[0]), float(library.taus_[-1])),
             choice.start_sd,
-            choice.zero_sd if library.zeroed else None,
+            choice.zero_sd if library.zeroed and not channel.spread else None,  # the fit finds a stated one
         )
         # a fit that does not know the noise takes for it what the model leaves
         missed = (stated or choice.fit[choice.row]) / noise

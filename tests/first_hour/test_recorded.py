@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -246,6 +247,20 @@ def test_an_error_far_from_zero_is_counted_from_its_first_reading(tmp_path: Path
     assert "column 'sample' numbers rows or devices: left out" in out
     for recording in ("run0", "run1"):
         assert _read(rig, recording, "dZ") == [-k / 2 for k in range(60)]
+    rms = float(f"{np.sqrt(np.mean((np.arange(60) / 2) ** 2)):.2g}")
+    assert _campaign(rig)["channels"]["dZ"] == {"role": "error", "unit": "um", "spread": rms}
+
+
+def test_errors_that_start_far_from_each_other_have_zeros_of_their_own(tmp_path: Path) -> None:
+    """Neither starts three times as far from zero as it then moves."""
+    _, rig = _made(tmp_path, "time,sample,T_room,T_bed,dZ_um", _probe(70), _probe(-5), _probe(20))
+    assert _campaign(rig)["channels"]["dZ"]["spread"] > 0
+    for recording in ("run0", "run1", "run2"):
+        assert _read(rig, recording, "dZ") == [-k / 2 for k in range(60)]
+    (tmp_path / "near").mkdir()
+    _, rig = _made(tmp_path / "near", "time,sample,T_room,T_bed,dZ_um", _probe(10), _probe(-5), _probe(20))
+    assert "spread" not in _campaign(rig)["channels"]["dZ"]
+    assert _read(rig, "run0", "dZ")[0] == 10
 
 
 def test_a_wrong_first_reading_is_no_zero(tmp_path: Path) -> None:
@@ -264,7 +279,10 @@ def test_an_error_that_a_person_names_later_is_counted_from_its_first_reading(tm
     text = re.sub(r"mcu_pos_z *= .*", 'mcu_pos_z = { role = "error", unit = "um" }', text)
     (rig / "campaign.toml").write_text(text, "utf-8")
     before = _read(rig, "run1", "T_bed")
-    for said in ("'mcu_pos_z' starts at -80532 in run0, far from zero", ""):  # once, and not again
+    for said in (
+        "write spread = 17 into the line of 'mcu_pos_z' in campaign.toml",
+        "",
+    ):  # once, and not again
         again = CliRunner().invoke(app, ["new", str(rig), "--again", "--quick"])
         assert again.exit_code == 0, again.output
         assert said in again.output

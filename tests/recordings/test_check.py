@@ -167,9 +167,14 @@ def test_numbers_are_finite_and_no_texts(write: Write, old: str, new: str, said:
     assert any(line.startswith("error: campaign.toml") and said in line for line in told), told
 
 
-def test_a_spread_belongs_to_inputs(write: Write) -> None:
-    told = found(write(campaign=CAMPAIGN.replace("noise = 0.5", "spread = 0.5")))
-    wanted = "error: campaign.toml, line 6: channels.E_Y0C: spread belongs to inputs of models, not to"
+def test_a_spread_belongs_to_inputs_and_errors(write: Write) -> None:
+    wrong = CAMPAIGN.replace(
+        '"error", unit = "um", noise = 0.5', '"temperature", unit = "degC", spread = 0.5'
+    )
+    told = found(write(campaign=wrong))
+    wanted = (
+        "error: campaign.toml, line 6: channels.E_Y0C: spread belongs to inputs of models and to errors, not"
+    )
     assert any(line.startswith(wanted) and "take it away" in line for line in told), told
 
 

@@ -1,0 +1,143 @@
+"""Errors that have a zero of their own in each recording, in every kind of model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from discovery.dynamics import make_grid, make_system, predict, sensitivities, simulate
+from discovery.dynamics.system import shifted
+from discovery.fitting import Fit, fit_model, predict_recording
+from discovery.fitting.ridge import fit_ridge
+from discovery.fitting.starts import warm_start
+from discovery.models import Model, Parameter, State
+from discovery.models.reduced import reduced
+from discovery.models.superposition import superposition
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.sparse.discover import discover, fitting
+from discovery.sparse.options import SparseOptions
+from discovery.sparse.plain import fit_plain, settings
+from discovery.terms import Term, parse
+
+Array = NDArray[np.float64]
+ZEROS = {"a": 137.2, "b": -5.3, "c": 48.9, "unseen": 83.1}  # um
+WARM = {"a": 0.0, "b": 30.0, "c": 60.0, "unseen": 30.0}  # W: where the fast lag begins
+NOISE = 0.3
+
+CHANNELS = {
+    "load": Channel("load", "heat load", "W", None, "held"),
+    "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+    "E": Channel("E", "error", "um", None, "linear"),
+}
+
+
+def machine(spread: float, zeros: Mapping[str, float]) -> Campaign:
+    """An error of two lags, one of which begins warm, read from a zero of its own in each recording."""
+    recordings = {}
+    for k, name in enumerate(ZEROS):
+        rng = np.random.default_rng(k)
+        time: Array = np.arange(400, dtype=float) * 60.0
+        load = np.repeat(rng.choice([0.0, 100.0, 300.0], 20), 20)
+        room = 21 + 0.5 * k + 1.5 * np.sin(time / 5000 + k)
+        fast, slow = np.full(400, WARM[name]), np.full(400, room[0])
+        for i in range(1, 400):
+            fast[i] = load[i - 1] + (fast[i - 1] - load[i - 1]) * np.exp(-60 / 1800)
+            slow[i] = room[i - 1] + (slow[i - 1] - room[i - 1]) * np.exp(-60 / 7200)
+        error: Array = 0.1 * fast + 3 * (slow - 20) + NOISE * rng.standard_normal(400) + zeros.get(name, 0.0)
+        if spread:
+            error = error - error[0]  # as a campaign is loaded
+        error = np.where(np.arange(400) % 4 > 0, np.nan, error)
+        recordings[name] = Recording(name, time, {"load": load, "room": room, "E": error})
+    return Campaign("zeros", {**CHANNELS, "E": replace(CHANNELS["E"], spread=spread)}, recordings)
+
+
+def gray() -> Model:
+    parameters = {
+        "tf": Parameter(3000.0, "s", 100.0, 40e3),
+        "ts": Parameter(9000.0, "s", 100.0, 40e3),
+        "gf": Parameter(0.2, "um/W"),
+        "gs": Parameter(1.0, "um/K"),
+    }
+    states = {
+        "fast": State("fast", "W", None, parse("0"), None, 1.0),
+        "slow": State("slow", "degC", None, parse("room"), 0.0, 1.0),
+    }
+    terms = (
+        Term("load", "fast", parse("(load - fast)/tf")),
+        Term("room", "slow", parse("(room - slow)/ts")),
+    )
+    return Model("gray", parameters, states, terms, {"E": parse("gf*fast + gs*(slow - 20)")})
+
+
+FIT, INPUTS = ("a", "b", "c"), ("load", "room")
+Fitter = Callable[[Campaign], Fit]
+
+
+def built(build: Callable[..., Model]) -> Fitter:
+    def fit(c: Campaign) -> Fit:
+        return fit_model(warm_start(build(INPUTS, ["E"], c.channels), c, FIT, ["E"]), c, FIT, ["E"])
+
+    return fit
+
+
+def found(c: Campaign) -> Fit:
+    one = discover(c, FIT, ["E"], SparseOptions(kind="sindy"))
+    return fitting(one.report)(one.model, c, FIT, ["E"])
+
+
+KINDS: dict[str, Fitter] = {
+    "gray": lambda c: fit_model(gray(), c, FIT, ["E"]),
+    "reduced": built(reduced),
+    "superposition": built(superposition),
+    "regression": lambda c: fit_ridge(c, FIT, ["E"], INPUTS),
+    "pysindy": lambda c: fit_plain(c, FIT, ["E"], INPUTS, settings("plain"))[0],
+    "discovered": found,
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_zero_of_its_own_costs_no_kind_of_model_much(kind: str) -> None:
+    """Fit and free run on an unseen recording, against the same readings from one zero."""
+
+    def left(c: Campaign) -> tuple[float, float]:
+        fit = KINDS[kind](c)
+        run = predict_recording(fit.model, c, "unseen", ["E"], fit.noise.white, zeros=fit.zeros)
+        seen = np.concatenate([fit.problem.residual(one) for one in fit.trajectories])
+        unseen = run.system.grid.readings - predict(run)
+        return float(np.sqrt(np.nanmean(seen**2))), float(np.sqrt(np.nanmean(unseen**2)))
+
+    seen, unseen = left(machine(0.0, {}))
+    own_seen, own_unseen = left(machine(15.0, ZEROS))
+    assert own_seen < 2 * seen
+    # how warm it begins, nobody can know from a reading whose zero is unknown
+    assert own_unseen < unseen + 0.1 * float(np.ptp(list(WARM.values()))) / 2
+
+
+@pytest.mark.parametrize("build", [reduced, superposition])
+def test_slopes_by_a_zero_are_those_of_differences(build: Callable[..., Model]) -> None:
+    """A state that is the error itself, or begins at its first reading, moves against the zero."""
+    c = machine(15.0, ZEROS)
+    model = build(INPUTS, ["E"], c.channels).with_values({"p1_E": -2.0, "p2_E": 0.1, "p3_E": -20.0})
+    system = make_system(model, make_grid(c, "b", INPUTS, ["E"]))
+
+    def shown(zero: float) -> Array:
+        moved = shifted(system, {"E": zero})
+        return predict(simulate(moved, model.values()))[:, 0]
+
+    run = simulate(shifted(system, {"E": 1.0}), model.values())
+    slopes = sensitivities(run, ["p1_E", "E"])[:, 0, 1]
+    assert slopes == pytest.approx((shown(1.5) - shown(0.5)), abs=1e-8)
+    assert slopes[0] == pytest.approx(0.0, abs=1e-12)
+    assert slopes[-1] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_zeros_that_a_fit_finds_are_those_of_the_recordings() -> None:
+    c = machine(15.0, ZEROS)
+    fit = fit_model(gray(), c, FIT, ["E"])
+    first = {name: 0.1 * WARM[name] + 3 * (c.recordings[name].values["room"][0] - 20) for name in FIT}
+    for name, (zero, error) in fit.offsets["E"].items():
+        assert abs(zero + first[name]) < 3 * error + 3 * NOISE
