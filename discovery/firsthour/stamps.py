@@ -80,7 +80,7 @@ def find_clock(
     """
     named = [k for k, name in enumerate(names) if CLOCKS.search(fold(name))]
     named.sort(key=lambda k: (not CLOCKS.match(fold(names[k])), k))
-    backwards = None
+    backwards = ""
     others = [k for k in range(len(names)) if k not in named]
     others.sort(key=lambda k: not _holds_stamps(sheet, k))  # before numbers of rows
     order_of_columns = [*named, *others]
@@ -88,7 +88,7 @@ def find_clock(
         sure = one.columns[0] in named
         about = f"{one.about}, from column '{names[one.columns[0]]}'"
         about += "" if sure else ", since none is called time"
-        seconds, order, notes = _forward(one.seconds, series)
+        seconds, order, notes = _forward(sheet, one.seconds, series)
         if one.wall and order is None:
             seconds, said = _summer(seconds, one.first)
             notes = [*notes, *said]
@@ -97,12 +97,10 @@ def find_clock(
             if (steps == 0).any() and not sure:
                 continue
             return replace(one, seconds=seconds, about=about, order=order, notes=tuple(notes))
-        if backwards is None and sure and (steps < 0).any():
-            backwards = (sheet.at(int(np.flatnonzero(steps < 0)[0]) + 1), names[one.columns[0]])
+        if not backwards and sure and (steps < 0).any():
+            backwards = _backwards(sheet, seconds, names[one.columns[0]])
     if backwards:
-        raise UserError(
-            f"{backwards[0]}: the time does not run forward in column '{backwards[1]}'; sort the rows"
-        )
+        raise UserError(backwards)
     raise UserError(
         f"{sheet.path}: no column of time was found; call one 'time' (seconds, or instants as "
         "2026-03-01T08:00:00), or add one if the file has none"
@@ -241,10 +239,10 @@ def stated_interval(above: Sequence[str]) -> float | None:
 
 
 def _forward(
-    seconds: Array, series: Sequence[str] | None
+    sheet: Sheet, seconds: Array, series: Sequence[str] | None
 ) -> tuple[Array, NDArray[np.intp] | None, list[str]]:
     """Rows in the order of time: a log with its newest row on top, a clock that was put back in autumn,
-    sensors one after the other.
+    sensors one after the other, rows that were sent again.
     """
     steps = np.diff(seconds)
     if not np.isfinite(seconds).all() or not (steps < 0).any():
@@ -265,7 +263,35 @@ def _forward(
             None,
             ["the clock was put back by an hour (end of summer time): the hour was added again"],
         )
+    kept = np.flatnonzero(~repeated_rows(sheet, seconds))
+    if (np.diff(seconds[kept]) >= 0).all():
+        return seconds[kept], kept, [f"{len(seconds) - len(kept)} rows repeat an earlier row: left out"]
     return seconds, None, []
+
+
+def _backwards(sheet: Sheet, seconds: Array, name: str) -> str:
+    """What is wrong where time does not run forward, even without rows that were sent again."""
+    kept = np.flatnonzero(~repeated_rows(sheet, seconds))
+    row = int(np.flatnonzero(np.diff(seconds[kept]) < 0)[0]) + 1
+    same = np.flatnonzero(seconds[kept[:row]] == seconds[kept[row]])
+    do = "sort the rows"
+    if same.size:
+        first = sheet.lines[kept[same[0]]]
+        do = f"its stamp stands in line {first} already, with other values: delete the wrong rows"
+    return f"{sheet.at(int(kept[row]))}: the time does not run forward in column '{name}'; {do}"
+
+
+def repeated_rows(sheet: Sheet, seconds: Array) -> NDArray[np.bool_]:
+    """Which rows (N,) have the stamp and all cells of a row before them."""
+    _, place, counts = np.unique(seconds, return_inverse=True, return_counts=True)
+    again = np.flatnonzero(counts[place] > 1)
+    found, seen = np.zeros(len(seconds), dtype=bool), set()
+    cells = [sheet.cells(k) for k in range(len(sheet.header))]
+    for k in again.tolist():
+        row = seconds[k], *(column[k] for column in cells)
+        found[k] = row in seen
+        seen.add(row)
+    return found
 
 
 def _summer(seconds: Array, first: str) -> tuple[Array, list[str]]:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from discovery.recordings.columns import Columns
-from discovery.recordings.finding import Finding, more
+from discovery.recordings.finding import Finding, line_of, more
 
 _JUMP = 20.0  # a step of so many usual steps is no irregular stamp any more
 _SHORTEST = 3  # rows
@@ -23,9 +23,13 @@ def clock_findings(file: Path, columns: Columns, *, pauses: bool = False) -> lis
         what = f"only {columns.time.size} row{'s' * (columns.time.size != 1)}"
         findings.append(Finding("error", file, None, what, "too short for any model: record longer"))
     if (back := np.flatnonzero(steps < 0)).size:
+        row = int(back[0]) + 1
         what = f"time runs backwards by {-steps[back[0]]:g} s{more(back.size)}"
         do = "sort the lines, or record with a clock that is not put back (UTC)"
-        findings.append(Finding("error", file, int(columns.lines[back[0] + 1]), what, do))
+        if (same := np.flatnonzero(columns.time[:row] == columns.time[row])).size:
+            what += f", to the stamp of {line_of(file, int(columns.lines[same[0]]))}, with other values"
+            do = "delete the wrong one of each two lines, or record with a clock that is not put back (UTC)"
+        findings.append(Finding("error", file, int(columns.lines[row]), what, do))
     if (twice := np.flatnonzero(steps == 0)).size:
         what = f"the time stamp of the line before is repeated{more(twice.size)}"
         do = "delete one of the two, or write the stamps with more digits"

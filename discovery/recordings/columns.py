@@ -20,7 +20,7 @@ class Columns:
     `values`: the wanted columns, each (T,), NaN where not measured. `lines` (T,): where each row stands.
     `origin`: the instant at which `time` is 0, when the file has instants. Of a long file that was reduced to
     means: `counts`, readings (T,) in each mean by column; `rows` of the file; `left_out`, by column, lone
-    readings that only a fault explains.
+    readings that only a fault explains. `repeated`: rows that were left out because they repeat one before.
     """
 
     header: tuple[str, ...]
@@ -31,6 +31,7 @@ class Columns:
     counts: Mapping[str, Array] = field(default_factory=dict)
     rows: int = 0
     left_out: Mapping[str, int] = field(default_factory=dict)
+    repeated: int = 0
 
     @property
     def runs_forward(self) -> bool:

@@ -31,7 +31,7 @@ class Finding:
         """
         if self.line is None:
             return str(self.file)
-        return f"{self.file}, {'row' if self.file.suffix == '.parquet' else 'line'} {self.line}"
+        return f"{self.file}, {line_of(self.file, self.line)}"
 
     @property
     def sentence(self) -> str:
@@ -39,6 +39,11 @@ class Finding:
 
     def __str__(self) -> str:
         return f"{self.severity}: {self.sentence}"
+
+
+def line_of(file: Path, line: int) -> str:
+    """Where a row stands in a file, in words."""
+    return f"{'row' if file.suffix == '.parquet' else 'line'} {line}"
 
 
 def more(count: int) -> str:

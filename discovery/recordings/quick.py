@@ -15,6 +15,7 @@ from discovery.limits import check_shape
 from discovery.recordings.clock import is_instant, parse_instant, seconds_between
 from discovery.recordings.columns import EMPTY_CELLS, TIME, Array, Columns
 from discovery.recordings.longfile import LONG, PIECE, How, Piece, Reduction
+from discovery.recordings.repeats import Recent
 
 _BLOCK = 2**24  # bytes of a CSV file at a time
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -160,20 +161,21 @@ def _reduced(
     """Columns of the batches of a long file; means where there are too many rows."""
     import pyarrow as pa
 
-    clock, reduction = Clock(), Reduction(how.held, how.only_at)
+    clock, reduction, recent = Clock(), Reduction(how.held, how.only_at), Recent()
     left_out: dict[str, int] = {}
     for batch in batches:
         if not batch.num_rows:
             continue
         table = pa.Table.from_batches([batch])
-        values = {name: _floats(table.column(name)) for name in wanted}
+        columns = {name: _floats(table.column(name)) for name in wanted}
+        time, values = recent.new(clock.seconds(table.column(TIME)), columns)
         if any(np.isinf(column).any() for column in values.values()):
             raise ValueError("a number is infinite")
         for name, column in values.items():
             if count := how.clean(name, column):
                 left_out[name] = left_out.get(name, 0) + count
-        reduction.add(Piece(clock.seconds(table.column(TIME)), values))
-    found = reduction.columns(header, clock.origin, first_line)
+        reduction.add(Piece(time, values))
+    found = replace(reduction.columns(header, clock.origin, first_line), repeated=recent.count)
     return replace(found, left_out=left_out) if found.rows else found
 
 

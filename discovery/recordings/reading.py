@@ -10,6 +10,7 @@ from discovery.recordings.columns import Columns
 from discovery.recordings.finding import Finding
 from discovery.recordings.longfile import How
 from discovery.recordings.quick import read_long_csv, read_parquet, read_quick_csv
+from discovery.recordings.repeats import without_repeats
 
 _READ: dict[tuple[object, ...], Columns] = {}  # what long files were reduced to
 _MOST_READ = 8
@@ -22,6 +23,7 @@ def read_columns(
     """The wanted columns of a CSV (plain or gzip) or Parquet file, and what is wrong with its text.
 
     A wanted column that the file does not have is left out; the columns are None when nothing is readable.
+    Rows that repeat one before them, stamp and all, are left out and counted.
     Files that are no regular files, or larger than a recording (`discovery.limits`), are not read.
 
     Args:
@@ -30,13 +32,25 @@ def read_columns(
     wanted = list(dict.fromkeys(wanted))  # two channels may read one column
     key = (str(path), repr(wanted), repr(how), *_state(path))
     if key in _READ:  # a run looks at its recordings before it uses them
-        return _READ[key], []
+        return _READ[key], _repeated(path, _READ[key])
     columns, findings = _read(path, wanted, how)
-    if columns is not None and columns.counts:
+    if columns is None:
+        return None, findings
+    if columns.counts:
         _READ[key] = columns
         while len(_READ) > _MOST_READ:
             _READ.pop(next(iter(_READ)))
-    return columns, findings
+    else:
+        columns = without_repeats(columns)
+    return columns, findings + _repeated(path, columns)
+
+
+def _repeated(path: Path, columns: Columns) -> list[Finding]:
+    if not columns.repeated:
+        return []
+    rows = "1 row repeats" if columns.repeated == 1 else f"{columns.repeated} rows repeat"
+    do = "they are left out; nothing is lost if a logger sent them again"
+    return [Finding("warning", path, None, f"{rows} an earlier row, stamp and values", do, "repeated")]
 
 
 def _state(path: Path) -> tuple[int, int]:

@@ -225,6 +225,21 @@ def test_rows_that_stand_twice_are_read_once(tmp_path: Path) -> None:
     assert len(fast.time) == 400
 
 
+def test_a_block_of_rows_that_a_logger_sends_again_is_read_once(tmp_path: Path) -> None:
+    rows = [f"{30 * k},{20 + k % 7},{k % 5}" for k in range(100)]
+    for name, again in (("block", rows[:60] + rows[20:40] + rows[60:]), ("end", rows + rows[50:70])):
+        table = read_own(write(tmp_path / f"{name}.csv", "time,T1 [°C],P [W]", *again))
+        assert table.time.tolist() == [30.0 * k for k in range(100)]
+        assert table.columns[0].values.tolist() == [20.0 + k % 7 for k in range(100)]
+        assert "20 rows repeat an earlier row: left out" in table.notes
+    other = [*rows[:60], *rows[20:25], "750,99,0", *rows[60:]]
+    said = (
+        r"line 67: the time does not run forward in column 'time'; its stamp stands in line 27 already, with"
+    )
+    with pytest.raises(UserError, match=said):
+        read_own(write(tmp_path / "other.csv", "time,T1 [°C],P [W]", *other))
+
+
 @pytest.mark.parametrize(
     "header", ["Temp. nave (°C)", "Rumstemperatur (°C)", "Verkstadstemp [°C]", "Temp. taller"]
 )

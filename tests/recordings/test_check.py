@@ -1,8 +1,10 @@
 """`discovery check`: each trouble is found once, at its line, with what to do; whatever the file holds."""
 
 import gzip
+import io
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -189,6 +191,33 @@ def test_instants_that_do_not_fit_together(write: Write, mixed: str, trouble: st
         "2026-03-01T08:01:00Z,20,0,2",
     ]
     assert any(trouble in line for line in found(write(lines)))
+
+
+@pytest.mark.parametrize("name", ["fit.csv", "fit.parquet"])
+def test_rows_that_were_sent_again_are_left_out(write: Write, tmp_path: Path, name: str) -> None:
+    """Once more in a block, out of order; with another value they are an error."""
+    lines = rows()
+
+    def path(lines: list[str]) -> Path:
+        if name == "fit.csv":
+            return write(lines)
+        pd.read_csv(io.StringIO("\n".join(lines))).to_parquet(tmp_path / "made.parquet", index=False)
+        return write((tmp_path / "made.parquet").read_bytes(), name=name)
+
+    again = path([*lines[:40], *lines[21:31], *lines[40:], lines[-1]])
+    said = found(again)
+    assert said == [
+        f"warning: {name}: 11 rows repeat an earlier row, stamp and values; they are left out; nothing is "
+        "lost if a logger sent them again"
+    ]
+    assert load_campaign(again).recordings["fit"].time.tolist() == [60.0 * k for k in range(60)]
+    wrong = path([*lines[:40], *lines[21:25], lines[25].replace(",600,", ",700,"), *lines[40:]])
+    where = "line 45" if name == "fit.csv" else "row 44"
+    line = "line 26" if name == "fit.csv" else "row 25"
+    assert any(
+        f"error: {name}, {where}: time runs backwards" in one and f"stamp of {line}, with other" in one
+        for one in found(wrong)
+    ), found(wrong)
 
 
 def test_a_clock_that_is_put_back(write: Write) -> None:

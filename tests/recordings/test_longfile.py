@@ -81,6 +81,24 @@ def test_nothing_of_a_long_file_is_lost(tmp_path: Path, frame: pd.DataFrame, fil
     assert one.values["E_Z"][seen] == pytest.approx(frame["E_Z"].to_numpy()[rare])
 
 
+@pytest.mark.parametrize("file", ["a.parquet", "a.csv", "a.csv.gz"])
+def test_rows_of_a_long_file_that_come_again_count_once(
+    tmp_path: Path, frame: pd.DataFrame, file: str
+) -> None:
+    one = loaded(tmp_path, frame, file)
+    again = pd.concat([frame[:20_000], frame[19_000:19_500], frame[20_000:]])
+    (tmp_path / "again").mkdir()
+    other = loaded(tmp_path / "again", again, file)
+    assert other.time == pytest.approx(one.time, abs=1e-9)
+    for name, values in one.values.items():
+        assert other.values[name] == pytest.approx(values, abs=1e-9, nan_ok=True)
+    said = [str(finding) for finding in check_campaign(tmp_path / "again")]
+    assert any("500 rows repeat an earlier row, stamp and values; they are left out" in line for line in said)
+    again.iloc[20_100, 1] = 99.0
+    with pytest.raises(UserError, match="time"):
+        loaded(tmp_path / "again", again, file)
+
+
 @pytest.mark.parametrize("name", ["P", "pump"])
 def test_held_channels_keep_their_integral(tmp_path: Path, frame: pd.DataFrame, name: str) -> None:
     one = loaded(tmp_path, frame, "a.parquet")
