@@ -138,6 +138,8 @@ def unit_in(header: str) -> tuple[str, str] | None:
     (('Bed temp', '°F'), ('T1', 'degC'), ('主軸温度', '℃'), None)
     >>> unit_in("F_N"), unit_in("Heater_A"), unit_in("v_x_m_min"), unit_in("T1_min")
     (('F', 'N'), None, ('v_x', 'm/min'), None)
+    >>> unit_in("oil_C"), unit_in("coolant_flow_C"), unit_in("hall_A")
+    (('oil', 'C'), None, None)
     """
     for form in _WITH_UNIT:
         found = form.fullmatch(header)
@@ -166,15 +168,17 @@ def _is_symbol(name: str, unit: str) -> bool:
 
 
 def _belongs(name: str, unit: str) -> bool:
-    """Whether a word behind a name is its unit: T1_C is a temperature, Heater A is one of two, `Data/ora`
-    and `Fecha y hora` are the date and the time of day.
+    """Whether a word behind a name is its unit: T1_C and oil_C are temperatures, Heater A is one of two,
+    `Data/ora` and `Fecha y hora` are the date and the time of day.
     """
     if time_unit(unit) and (is_dated(name) or not CLOCKS.search(fold(name))):
         return False
     if len(unit) > 1 or unit in "%°":
         return True
     has = dimension_of(known_unit(unit) or "")
-    says = {quantity for word in words_of(name) for quantity, odds in word.says.items() if odds > 1.5}
+    says = {key for word in words_of(name) for key, odds in word.says.items() if odds > 1.5}
+    if "temperature" in has and says and says <= {"air", "fluid", "coolant"}:  # nothing but where it is
+        return True
     return bool(has.keys() & says) or (time_unit(unit) is not None and bool(CLOCKS.search(fold(name))))
 
 

@@ -22,7 +22,7 @@ from discovery.firsthour.guess import (
     guess,
     guessed,
 )
-from discovery.firsthour.measures import DEGREES
+from discovery.firsthour.measures import DEGREES, unit_in
 from discovery.firsthour.odds import likely, probabilities
 from discovery.firsthour.shapes import HELD, shape
 from discovery.firsthour.table import Column
@@ -35,7 +35,6 @@ Array = NDArray[np.float64]
 Hints = Mapping[str, Sequence[tuple[str, Mapping[str, float]]]]
 
 _ONE_OF_SEVERAL = re.compile(r"\d+|(?<![^\W\d_])(d ?)?[xyz](?![^\W\d_])")
-_BRACKETS = re.compile(r"[\[(（][^\])）]*[\])）]")
 MOSTLY = 0.3  # share of a fluid temperature that loads and flows explain where they warm it
 _PUSHES = ("torque", "current", "signal", "flow", "power", "speed")
 _MOVED = ("rotation speed", "fluid flow")  # may be set, or answer to what is
@@ -231,8 +230,8 @@ def _air(column: Column) -> tuple[float, int]:
     says = max((word.says.get("air", 0.0) for word in words), default=0.0)
     more = sum("air" not in word.says and word.gloss != "temp" for word in words)
     named = sum(len(word.said) for word in words)
-    bare = _BRACKETS.sub("", column.header)  # a unit in brackets is no further word
-    rest = max(0, len(re.sub(r"[\W\d_]", "", fold(bare))) - named)
+    header, _ = unit_in(column.header) or (column.header, "")  # a unit is no further word
+    rest = max(0, len(re.sub(r"[\W\d_]", "", fold(header))) - named)
     return -says, more + (rest > 0)
 
 

@@ -6,6 +6,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from discovery.errors import UserError
@@ -325,7 +326,10 @@ def test_what_a_logger_writes_above_and_between(tmp_path: Path) -> None:
     ("lines", "said"),
     [
         (["time,T1", *(f"{k},{k}" for k in range(12)), "12,x"], r"line 14, column 'T1': 'x' is not a number"),
-        (["time,T1", *(f"{k},{k}" for k in range(12)), "5,5"], r"line 14: the time does not run forward"),
+        (
+            ["time,T1", *(f"{k},{k}" for k in range(12)), "5,6"],
+            r"line 14: the time does not run forward.*line 7 already",
+        ),
         (["time,T1", *(f"{k},{k}" for k in range(12)), "12,5,6"], r"line 14: 3 cells where the header has 2"),
         (["T1,T2", *("1,2" for _ in range(12))], "no column of time was found.* or add one"),
         ([f"{k},0,{299.5 + k}" for k in range(12)], r"line 1: numbers where the names .* line of 3 names"),
@@ -413,3 +417,35 @@ def test_what_never_holds_its_value_is_an_output_where_nothing_thermal_is_measur
     assert [one.role for one in guess_all(columns).values()] == ["other output", "other input"]
     warm = Column("T bearing", "T_bearing", "degC", 20 + answer)
     assert guess_all([*columns, warm, Column("P", "P", "W", set_by_hand)])["U"].role == "other input"
+
+
+@pytest.mark.parametrize(
+    ("header", "role", "unit"),
+    [
+        ("room_degC", "ambient temperature", "degC"),
+        ("T_room_degC", "ambient temperature", "degC"),
+        ("hall_C", "ambient temperature", "degC"),
+        ("coolant_C", "coolant temperature", "degC"),
+        ("spindle_um", "error", "um"),
+        ("load_kW", "heat load", "kW"),
+    ],
+)
+def test_a_unit_behind_a_name_is_no_doubt(tmp_path: Path, header: str, role: str, unit: str) -> None:
+    """A table of a room, a bed, an error and a load; one of its headers is the one that is asked for."""
+    k = np.arange(200)
+    slow = np.cumsum(np.sin(k / 15)) / 30
+    load = np.repeat(np.tile([0.0, 2.5, 5.0, 1.0], 10), 5)
+    columns = {"room_degC": 21 + slow, "bed_degC": 25 + 3 * slow, "dz_um": 9 * slow, "load_kW": load}
+    alike = {
+        "ambient temperature": "room_degC",
+        "coolant temperature": "",
+        "error": "dz_um",
+        "heat load": "load_kW",
+    }
+    series = columns.pop(alike[role], 20 + slow)
+    columns = {header: series, **columns}
+    path = tmp_path / "own.csv"
+    pd.DataFrame({"time_s": 60 * k, **columns}).to_csv(path, index=False)
+    table = read_own(path)
+    one = guess_all(table.columns)[table.columns[0].name]
+    assert (one.role, one.unit, one.sure) == (role, unit, True)
