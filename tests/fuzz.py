@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import gzip
+import hashlib
 import io
 import json
 import random
@@ -22,10 +23,16 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from benchmarks.tables import keep
 from discovery.errors import UsageError, UserError
+
+if TYPE_CHECKING:
+    from discovery.export.document import Exported
+    from discovery.runtime.guards import Reading
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "build" / "fuzz"
@@ -139,6 +146,62 @@ def _results() -> bytes:
     ).encode()
 
 
+@cache
+def _exported() -> Exported:
+    """The model of this page, fitted to its table and exported."""
+    from discovery.export.document import from_document, render
+    from discovery.export.makedocument import make_document
+    from discovery.export.seal import open_seal
+    from discovery.fitting import fit_model
+    from discovery.models import read_model
+    from discovery.recordings import load_campaign
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, data in (("fit.csv", TABLE), ("campaign.toml", CAMPAIGN), ("model.toml", MODEL)):
+            (folder / file).write_bytes(data)
+        campaign = load_campaign(folder)
+        found = fit_model(read_model(folder / "model.toml"), campaign, ["fit"]).model
+        data = render(make_document(found, campaign, ["fit"]))
+    return from_document(*open_seal(data, "fuzz"), "fuzz")
+
+
+def _document() -> bytes:
+    return json.dumps(_exported().document, indent=1).encode()
+
+
+def _readings(now: float) -> dict[str, Reading]:
+    from discovery.runtime.guards import Reading
+
+    return {i.name: Reading(i.range.low, now) for i in _exported().inputs}
+
+
+def _state() -> bytes:
+    from discovery.runtime.compensator import Compensator
+    from discovery.runtime.persistence import NAMES, save
+
+    at_work = Compensator(_exported())
+    for k in range(9):
+        at_work.tick(_readings(60.0 * k), 60.0 * k)
+    with tempfile.TemporaryDirectory() as name:
+        save(at_work, Path(name))
+        body: str = json.loads((Path(name) / NAMES[0]).read_bytes())["body"]
+    return body.encode()
+
+
+def _learning() -> bytes:
+    from discovery.runtime.compensator import Compensator
+    from discovery.runtime.guards import Reading
+    from discovery.runtime.learning import KEPT, Learner
+
+    learner, at_work = Learner(None), Compensator(_exported())
+    for k in range(2000):
+        at_work.tick(_readings(60.0 * k), 60.0 * k)
+        learner.observe(at_work, _readings(60.0 * k) | {"E_Y0C": Reading(0.1, 60.0 * k)}, 60.0 * k)
+    kept = {name: getattr(learner, name) for name in KEPT}
+    return json.dumps(kept | {"model": _exported().seal.sha256}).encode()
+
+
 def read_own(path: Path) -> None:
     """What `discovery new` does with a table before it fits."""
     from discovery.firsthour.recorded import recorded
@@ -165,6 +228,39 @@ def experiment(path: Path) -> None:
     load_experiment(path)
 
 
+def document(path: Path) -> None:
+    """An exported model of which somebody renewed the seal, since an old seal refuses every change."""
+    from discovery.export.document import read_document
+    from discovery.export.seal import seal_bytes
+
+    path.write_bytes(seal_bytes(path.read_bytes()))
+    read_document(path)
+
+
+def state(path: Path) -> None:
+    """A saved state, its checksum renewed: what does not fit is left aside."""
+    from discovery.runtime.compensator import Compensator
+    from discovery.runtime.persistence import peek, restore
+
+    body = path.read_text("utf-8", errors="replace")
+    said = {"sha256": hashlib.sha256(body.encode()).hexdigest(), "body": body}
+    path.write_text(json.dumps(said), "utf-8")
+    compensator = Compensator(_exported())
+    if peek(compensator, path.parent) is None or restore(compensator, path.parent) is None:
+        raise UserError("left aside")
+
+
+def learning(path: Path) -> None:
+    from discovery.runtime.compensator import Compensator
+    from discovery.runtime.learning import Learner
+
+    learner = Learner(None)
+    learner.load(Compensator(_exported()), path.parent)
+    if not learner.times:
+        raise UserError("left aside")
+    learner.campaign(Compensator(_exported()))
+
+
 def results(path: Path) -> None:
     from discovery.runfolder import read_results
 
@@ -184,6 +280,9 @@ KINDS: dict[str, Kind] = {
     "model": ("model.toml", lambda: MODEL, model),
     "experiment": ("experiment.toml", lambda: EXPERIMENT, experiment),
     "results": ("results.json", _results, results),
+    "exported model": ("model.json", _document, document),
+    "saved state": ("state.json", _state, state),
+    "what was learnt": ("learning.json", _learning, learning),
 }
 DEARER = {"workbook": 20, "parquet of one's own": 5, "recording csv": 5}  # tried so much less often
 

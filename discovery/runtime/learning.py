@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from pydantic import BaseModel
 
 from discovery.errors import UserError
 from discovery.export.document import Exported
@@ -68,6 +69,31 @@ def answer(question: Question) -> Answer:
     found = compare(begun(exported, begin), campaign, ["running"], choose=True, named=False)
     revised = revision_of(exported, campaign, found, begin=begin)
     return found, None if revised is None else revised[0]
+
+
+class _Kept(BaseModel):
+    """The file of what was seen, see `Learner`."""
+
+    model: str
+    times: list[float]
+    inputs: list[list[float]]
+    others: list[dict[str, float]]
+    errors: list[dict[str, float]]
+    marks: list[tuple[int, dict[str, float]]]
+    left: list[float]
+    counted: dict[str, float]
+    new: int
+    compared: float
+    advice: str
+
+    def fits(self, inputs: int) -> bool:
+        """Whether its rows belong together, for a model of so many inputs."""
+        rows = len(self.times)
+        return (
+            len(self.inputs) == len(self.others) == len(self.errors) == rows
+            and all(len(one) == inputs for one in self.inputs)
+            and all(0 <= row < rows for row, _ in self.marks)
+        )
 
 
 @dataclass
@@ -218,13 +244,12 @@ class Learner:
     def load(self, compensator: Compensator, folder: Path) -> None:
         """Go on with what was seen before a restart, if it is of the same model."""
         try:
-            kept = json.loads((folder / FILE).read_text())
-            if kept["model"] != compensator.exported.seal.sha256:
-                return
-            for name in KEPT:
-                setattr(self, name, kept[name])
-        except (OSError, ValueError, KeyError):
+            kept = _Kept.model_validate_json((folder / FILE).read_text())
+        except (OSError, ValueError):
             return
+        if kept.model == compensator.exported.seal.sha256 and kept.fits(len(compensator.exported.inputs)):
+            for name in KEPT:
+                setattr(self, name, getattr(kept, name))
 
     def question(self, compensator: Compensator, now: float) -> Question:
         """What was seen, for `answer`."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.export.stepper import Snapshot
@@ -204,9 +205,10 @@ def _read(path: Path) -> dict[str, Any] | None:
         if hashlib.sha256(data["body"].encode()).hexdigest() != data["sha256"]:
             return None
         content: dict[str, Any] = json.loads(data["body"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        whole = isinstance(content["model"], str) and math.isfinite(_saved(content).time)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
-    return content
+    return content if whole else None
 
 
 def _apply(c: Compensator, content: dict[str, Any]) -> None:
@@ -218,15 +220,35 @@ def _apply(c: Compensator, content: dict[str, Any]) -> None:
     numbers = [*content["offsets"], *content["bump"], *snapshot.x]
     if not all(math.isfinite(value) for value in numbers) or len(content["offsets"]) != len(c.places):
         raise ValueError("not finite")
-    c.stepper.restore(snapshot)
-    c.last, c.origin = content["time"], content["origin"]
-    c.state, c.since = State[content["state"]], content["since"]
-    c.settling, c.started_at = State[content["settling"]], content["started_at"]
-    c.offsets, c.bump = [float(v) for v in content["offsets"]], [float(v) for v in content["bump"]]
-    c.predicted = None if content["predicted"] is None else np.array(content["predicted"])
-    c.inputs = None if content["inputs"] is None else np.array(content["inputs"])
-    for guard, kept in zip(c.guards, content["held"], strict=True):
-        for name, value in zip(KEPT, kept, strict=True):
+    found = {
+        "last": float(content["time"]),
+        "origin": _number(content["origin"]),
+        "state": State[content["state"]],
+        "since": float(content["since"]),
+        "settling": State[content["settling"]],
+        "started_at": float(content["started_at"]),
+        "offsets": [float(v) for v in content["offsets"]],
+        "bump": [float(v) for v in content["bump"]],
+        "predicted": _numbers(content["predicted"], len(c.exported.outputs)),
+        "inputs": _numbers(content["inputs"], len(c.exported.inputs)),
+        "good_since": _number(content["good_since"]),
+        "gain": float(content["gain"]),
+        "heartbeat": 1,
+    }
+    held = [dict(zip(KEPT, kept, strict=True)) for kept in content["held"]]
+    pairs = list(zip(c.guards, held, strict=True))
+    c.stepper.restore(snapshot)  # nothing is changed by a copy that does not fit
+    for name, value in found.items():
+        setattr(c, name, value)
+    for guard, kept in pairs:
+        for name, value in kept.items():
             setattr(guard, name, value)
-    c.good_since, c.gain = content["good_since"], float(content["gain"])
-    c.heartbeat = 1
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None else float(value)
+
+
+def _numbers(values: Any, count: int) -> NDArray[np.float64] | None:
+    """An array (count,) of numbers. Raises ValueError: another shape."""
+    return None if values is None else np.array(values, dtype=float).reshape(count)
