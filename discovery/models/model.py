@@ -253,7 +253,7 @@ def _short(apply: Apply) -> Expression | None:
 
 
 def expanded(model: Model, channels: Collection[str] = ()) -> Model:
-    """The model with every lag(e, tau) written out as a hidden state: tau ds/dt = e - s. It begins near e.
+    """The model with every lag(e, tau) written out as a hidden state: tau ds/dt = e - s, settled at first.
 
     One mechanism then serves its dynamics, its sensitivities to e and to tau, its report and its export.
     Equal lags share one state.
@@ -280,21 +280,20 @@ def expanded(model: Model, channels: Collection[str] = ()) -> Model:
     states, extra = dict(model.states), []
     for apply, name in found.items():
         inner, tau = apply.arguments
-        # its balance is what it is fed with: a memory starts near it
-        states[name] = State(name, "", memory=True)
+        # its balance is what it is fed with: a memory starts settled
+        states[name] = State(name, "", start_sd=0.0, memory=True)
         extra.append(Term(f"{name} follows", name, Apply("/", (Apply("-", (inner, Name(name))), tau))))
     return replace(model, states=states, terms=terms + tuple(extra), outputs=outputs)
 
 
 def with_settled_memories(model: Model) -> Model:
     """An expanded model whose memories start with what they are fed with, as expressions: what has no solver
-    for balances (a controller) starts there, too, exactly where no fit found how near.
+    for balances (a controller) starts there, too.
     """
     states, fed = dict(model.states), _fed_with(model)
     for name in [n for n in states if n in fed and states[n].start is None]:
         starts = {s: state.start for s, state in states.items() if state.start is not None}
-        start, sd = rewrite(substitute(fed[name], starts), _settled), states[name].start_sd or 0.0
-        states[name] = replace(states[name], start=start, start_sd=sd)
+        states[name] = replace(states[name], start=rewrite(substitute(fed[name], starts), _settled))
     return replace(model, states=states)
 
 

@@ -3,7 +3,7 @@
     t_bed T_bed' = T_env - T_bed,   q = G_bed (T_bed - T)    [W]
 
 G_bed in W/K, 2 to 20; t_bed of 20 to 60 h. Source: Bryan's thermal memory; the bed as one follower of the
-room. Limits: the bed begins near the room of the first instant; a recording shorter than a day
+room. Limits: the bed starts settled in the room of the first instant; a recording shorter than a day
 shows little more than a drift, which `sensor_drift` follows as well.
 """
 

@@ -3,7 +3,7 @@
     t_sump T_mix' = T_fluid - T_mix;  T_mix replaces T_fluid in every wet term of the model
 
 t_sump in s: C/UA of the fluid on the machine, 0.3 to 6 h. Source: heat balance of a stirred volume.
-Limits: begins near what it follows; heat that comes back from the bodies is not part of it.
+Limits: settled at the first instant; heat that comes back from the bodies is not part of it.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape

@@ -4,7 +4,7 @@
 
 k in the unit of the error at the largest value that was recorded, of either sign; t_path: whatever the
 recordings can show. Source: sums of first-order responses, eq. (8) of Mayr et al. 2015. Limits: one time
-constant; begins near what it follows.
+constant; settled at the first instant.
 """
 
 from discovery.effects.form import DRIVING, Amplitude, Effect, Example, Shape

@@ -4,7 +4,7 @@
 
 k in um/K, of either sign: a part that grows with that temperature, as a frame with its heated bed; t_path:
 whatever the recordings can show. Source: sums of first-order responses, eq. (8) of Mayr et al. 2015. Limits:
-one time constant; begins near what it follows; the error is counted from the first instant.
+one time constant; settled at the first instant, from which the error is counted.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape

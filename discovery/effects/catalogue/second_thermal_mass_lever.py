@@ -4,7 +4,7 @@
 
 k_j in um/K, of either sign, one for each error: a part that a body heats, too small to cool it, but long
 enough to be seen; t_m: whatever the recordings can show. Source: as `second_thermal_mass`. Limits: takes no
-heat from the body; begins near what it follows.
+heat from the body; settled at the first instant.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape

@@ -3,8 +3,8 @@
     error shown = y + k (lag(y, t_m) - y)    [um]
 
 k: share of the error, of either sign; t_m: whatever the recordings can show. Source: as
-`second_thermal_mass`, for models whose states are the errors themselves. Limits: begins near what it
-follows.
+`second_thermal_mass`, for models whose states are the errors themselves. Limits: settled at the first
+instant.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape

@@ -3,7 +3,7 @@
     t_lag s' = y - s,   s is shown instead of y
 
 t_lag in s: 30 to 300 s behind a wall or in a housing. Source: first-order sensor. Limits: visible only
-where readings come faster than t_lag; begins near what it follows.
+where readings come faster than t_lag; settled at the first instant.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape
