@@ -97,7 +97,7 @@ def bookkeeping(name: str, unit: str, values: Array, seconds: Array, role: str) 
     if (
         len(values) < _FEWEST
         or np.ptp(values) == 0.0
-        or (unit and unit not in _COUNTER_UNITS and time_unit(unit) is None)
+        or (is_unit(unit) and unit not in _COUNTER_UNITS and time_unit(unit) is None)
     ):
         return ""
     steps = np.diff(values)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from discovery.errors import UserError
 from discovery.firsthour.cells import holds_word, is_empty, is_number, is_stamp, is_switch
-from discovery.firsthour.measures import known_unit, time_unit, unit_in
+from discovery.firsthour.measures import is_unit, known_unit, steps_in, time_unit
 
 Row = tuple[int, list[str]]
 """Number of the line, and its cells."""
+
+_A_RUN = 10  # rows of readings that follow each other: settings above a table have fewer
 
 
 def find_header(
@@ -45,17 +47,57 @@ def find_header(
     if first is None:  # nothing can be read as data: the fullest row is the header
         at = max(full, key=lambda one: (sum(map(bool, one[1])), -one[0]))[0]
         return at, [""] * width, [""] * width
+    block = [(k, _without_labels(cells)) for k, cells in full]
     units = [""] * width
-    at, names = full[-1]
-    others = [one for one in full[:-1] if one[0] >= at - 3]
-    if others and _are_units(names):
-        units, (at, names) = names, others[-1]
-        others = others[:-1]
-    elif others and _are_units(others[-1][1]):
-        units, others = others[-1][1], others[:-1]
-    above = others[-1][1] if others and others[-1][0] == at - 1 else [""] * width
-    groups = _spread_out(above) if sum(map(bool, above)) > 1 else [""] * width
+    like = max(block, key=lambda one: (_units(one[1]), one[0]))
+    if len(block) > 1 and _units(like[1]) >= 0.5:
+        units, block = like[1], [one for one in block if one is not like]
+    at = max(block, key=lambda one: (_said(one[1]), one[0]))[0]
+    above = max(_touching(block, at), key=_said, default=[""] * width)
+    groups = _spread_out(above) if _said(above) > 1 else [""] * width
     return at, [u if u == "-" or not is_empty(u) else "" for u in units], groups
+
+
+def begin(rows: Sequence[list[str]], widths: Sequence[int]) -> int | None:
+    """The first of the rows that is data, None: none is.
+
+    Settings over a table may look like readings: they are a few rows, and another header stands below them.
+    """
+    like = [len(cells) in widths and is_data(cells) for cells in rows]
+    starts = [k for k, one in enumerate(like) if one and not (k and like[k - 1])]
+    for k, after in zip(starts, [*starts, len(rows)][1:], strict=True):
+        length = like.index(False, k) - k if False in like[k:] else len(rows) - k
+        headers = [cells for cells in rows[k + length : after] if _is_header(cells)]
+        if length >= _A_RUN or after == len(rows) or all(cells in rows[:k] for cells in headers):
+            return k
+    return None
+
+
+def _is_header(cells: Sequence[str]) -> bool:
+    """Whether a row holds words alone, and more than one."""
+    known = [cell for cell in cells if cell]
+    return len(known) > 1 and all(holds_word(cell) and not is_stamp(cell) for cell in known)
+
+
+def _touching(rows: Sequence[tuple[int, list[str]]], at: int) -> Iterator[list[str]]:
+    """The rows directly above the one at a place, without a gap."""
+    for k, cells in [one for one in rows if one[0] < at][::-1]:
+        at -= 1
+        if k != at:
+            return
+        yield cells
+
+
+def _said(cells: Sequence[str]) -> int:
+    """How many different words a row has: names differ, settings are often the same."""
+    return len({cell for cell in cells if holds_word(cell) and not is_stamp(cell)})
+
+
+def _without_labels(cells: list[str]) -> list[str]:
+    """A row without the word that stands before each of its values: Unit, degC, Unit, um."""
+    labels = set(cells[::2])
+    paired = len(cells) > 3 and len(cells) % 2 == 0 and len(labels) == 1 and labels != {""}
+    return [cell if k % 2 else "" for k, cell in enumerate(cells)] if paired else cells
 
 
 def _fitted(cells: list[str], width: int) -> list[str] | None:
@@ -65,11 +107,12 @@ def _fitted(cells: list[str], width: int) -> list[str] | None:
     return cells[:width] if len(cells) == width + 1 and not cells[-1] else None
 
 
-def _are_units(cells: Sequence[str]) -> bool:
-    """Return whether a row holds units: most of its cells are units or a "-"."""
-    known = [cell for cell in cells if cell]
-    named = [known_unit(cell) or time_unit(cell) or unit_in(f"x [{cell.strip('[]()')}]") for cell in known]
-    return sum(map(bool, named)) >= max(1, len(known) / 2)
+def _units(cells: Sequence[str]) -> float:
+    """Share of the cells of a row that are units; one that only a list of all units has counts half: t, P."""
+    known = [cell.strip("[]()") for cell in cells if cell]
+    usual = sum(bool(known_unit(cell) or time_unit(cell) or steps_in(cell)) for cell in known)
+    any_unit = sum(is_unit(cell) or bool(time_unit(cell) or steps_in(cell)) for cell in known)
+    return (usual + any_unit) / 2 / max(1, len(known))
 
 
 def _spread_out(cells: Sequence[str]) -> list[str]:

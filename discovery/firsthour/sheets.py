@@ -19,7 +19,7 @@ import numpy as np
 from discovery.errors import UserError
 from discovery.firsthour.cells import holds_word, is_empty, is_number, is_stamp, is_switch
 from discovery.firsthour.encodings import decode
-from discovery.firsthour.header import Row, explained, find_header, is_data
+from discovery.firsthour.header import Row, begin, explained, find_header, is_data
 from discovery.firsthour.instants import is_time_of_day
 from discovery.firsthour.workbooks import is_workbook, read_workbook
 from discovery.limits import check_shape, read_table
@@ -173,7 +173,7 @@ def _sheet(
     head = list(lines.cut(0, _HEAD))
     middle = list(lines.cut(len(lines) // 2, len(lines) // 2 + _HEAD))
     width, spare = _width(head, middle)
-    first = next((k for k, (_, c) in enumerate(head) if len(c) in (width, spare) and is_data(c)), None)
+    first = begin([cells for _, cells in head], (width, spare))
     at, units, groups = find_header(path, head, first, width)
     body = first if first is not None else at + 1
     columns, numbers, left = _body(path, lines, body, width, spare, head[at][1])

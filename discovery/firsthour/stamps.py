@@ -33,16 +33,24 @@ from discovery.recordings.timeunit import time_odds
 Array = NDArray[np.float64]
 
 _FEWEST = 5  # different stamps
-_EPOCH = (6e8, 4.2e9)  # s since 1970: 1989 to 2103
-_YEAR = 366.0  # d
-_SERIAL = (30000.0, 80000.0)  # days since 1900, as spreadsheets count: 1982 to 2119
+_EPOCH = (7e8, 4.2e9)  # s since 1970: 1992 to 2103
+# what programs count since a day of their own -> unit [s], that day in s since 1970
+_COUNTED_SINCE = {
+    "100 ns since 1601": (1e-7, -11644473600.0),  # the file time of Windows
+    "100 ns since the year 1": (1e-7, -62135596800.0),  # the ticks of .NET
+    "days as spreadsheets count them": (86400.0, -25569 * 86400.0),
+    "days since the year 0": (86400.0, -719529 * 86400.0),  # the date numbers of MATLAB
+}
+_YEAR = 366.0 * 86400.0  # s
 _HOUR = 3600.0
 _STOPWATCHES = {
     "minutes and seconds": r"m{1,2}:s{1,2}|min:s(ec)?",
     "hours and minutes": r"h{1,2}:m{1,2}|h:min",
 }
 _INTERVAL = re.compile(
-    r"(?:interval|abtast|sampling|sample|rate|takt|scan|cycle|周期|間隔|间隔)\D{0,20}?(\d+(?:[.,]\d+)?)\s*([^\W\d]{1,12})",
+    r"(?:interval|abtast|sampling|sample|rate|takt|scan|cycle|周期|間隔|间隔)[^\d\[]{0,20}?"
+    r"(?:\[(?P<before>[^\W\d]{1,12})\]\D{0,5}(?P<value>\d+(?:[.,]\d+)?)"
+    r"|(?P<number>\d+(?:[.,]\d+)?)\s*(?P<unit>[^\W\d]{1,12}))",
     re.IGNORECASE,
 )
 
@@ -208,9 +216,15 @@ def _counted(at: int, cells: Sequence[str], values: Array, name: str, unit: str)
         return Clock((at,), (values - first) * TIME_UNITS[since], f"counted in {since} since 1970")
     if given:
         return Clock((at,), (values - first) * TIME_UNITS[given], f"counted in {given}")
-    days = _SERIAL[0] < first < _SERIAL[1] and values[-1] - first < _YEAR and np.any(np.mod(values, 1.0))
-    if days:
-        return Clock((at,), (values - first) * TIME_UNITS["d"], "days as spreadsheets count them")
+    for about, (unit_s, day) in _COUNTED_SINCE.items():
+        lasts = (values[-1] - first) * unit_s
+        in_days = unit_s == TIME_UNITS["d"]
+        if (
+            _EPOCH[0] < first * unit_s + day < _EPOCH[1]
+            and lasts < _YEAR
+            and (not in_days or np.any(np.mod(values, 1.0)))
+        ):
+            return Clock((at,), (values - first) * unit_s, about if in_days else f"counted in {about}")
     return Clock((at,), values - first, "counted", counted=True)
 
 
@@ -233,8 +247,8 @@ def named_time_unit(name: str) -> str | None:
 def stated_interval(above: Sequence[str]) -> float | None:
     """The interval of the logger [s] that stands over the table."""
     for line in above:
-        if (found := _INTERVAL.search(line)) and (unit := time_unit(found[2])):
-            return float(found[1].replace(",", ".")) * TIME_UNITS[unit]
+        if (found := _INTERVAL.search(line)) and (unit := time_unit(found["before"] or found["unit"])):
+            return float((found["value"] or found["number"]).replace(",", ".")) * TIME_UNITS[unit]
     return None
 
 

@@ -25,6 +25,7 @@ from discovery.recordings.units import multiple
 Array = NDArray[np.float64]
 
 _SAMPLE = 2000  # cells of a column that show how decimals are written
+_NOTED = re.compile(r"(.+?)\s*\(([^()]*:[^()]*)\)")  # Temp, °C (LGR S/N: 123, LBL: bed)
 _UMLAUTS = str.maketrans(
     {
         "ä": "ae",
@@ -115,7 +116,7 @@ def read_tables(path: Path) -> list[OwnTable]:
 
 
 def _table(sheet: Sheet) -> OwnTable:
-    parts = [unit_in(name) or (name, "") for name in sheet.header]
+    parts = _names(sheet.header)
     names, units = [p[0] for p in parts], [u or p[1] for p, u in zip(parts, sheet.units, strict=True)]
     comma = comma_is_decimal(
         cell for column in sheet.columns for cell in column.slice(0, _SAMPLE).to_pylist() if is_number(cell)
@@ -158,6 +159,19 @@ def _table(sheet: Sheet) -> OwnTable:
         sheet.above,
         sheet.name,
     )
+
+
+def _names(header: Sequence[str]) -> list[tuple[str, str]]:
+    """Name and unit (or "") of each column. Of notes behind them a name keeps what not all notes say."""
+    noted = [None if unit_in(name) else _NOTED.fullmatch(name) for name in header]
+    said = [re.split(r"[\s,:]+", one[2]) for one in noted if one]
+    usual = set.intersection(*map(set, said)) if said else set()
+    found = []
+    for name, one in zip(header, noted, strict=True):
+        plain, unit = unit_in(one[1] if one else name) or (one[1] if one else name, "")
+        own = [word for word in re.split(r"[\s,:]+", one[2]) if word not in usual] if one else []
+        found.append((" ".join([plain, *own]), unit))
+    return found
 
 
 def _whole_units(columns: Sequence[Column]) -> tuple[list[Column], list[str]]:

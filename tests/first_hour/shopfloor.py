@@ -63,8 +63,8 @@ def german(folder: Path) -> Floor:
             cells = [_comma(row[c]) for c in ("heater1", "heater2", "T1", "T2")]
             lines.append(";".join([f"{at:%d.%m.%Y;%H:%M:%S}", *cells]))
         files.append(_write(folder / f"Versuch_{k + 1}.csv", header, lines, "cp1252"))
-    roles = _heaters("Heizung_1", "Heizung_2", "Temp_Fuehler_1", "Temp_Fuehler_2")
-    return Floor(_from(files), roles, 2.138)
+    roles = heaters("Heizung_1", "Heizung_2", "Temp_Fuehler_1", "Temp_Fuehler_2")
+    return Floor(from_files(files), roles, 2.138)
 
 
 def japanese(folder: Path) -> Floor:
@@ -77,7 +77,7 @@ def japanese(folder: Path) -> Floor:
             for row in rows("tclab", name, 3)
         ]
         files.append(_write(folder / f"試験{k + 1}.csv", header, lines, "shift_jis"))
-    return Floor(_from(files), _heaters("heat_1", "heat_2", "temp_1", "temp_2"), 2.138)
+    return Floor(from_files(files), heaters("heat_1", "heat_2", "temp_1", "temp_2"), 2.138)
 
 
 def american(folder: Path) -> Floor:
@@ -94,7 +94,9 @@ def american(folder: Path) -> Floor:
         files.append(_write(folder / f"run {k + 1}.csv", header, lines))
     loads = dict.fromkeys(("Htr_1_Pwr", "Htr_2_Pwr"), ("heat load", "W"))
     return Floor(
-        _from(files), loads | dict.fromkeys(("Plate_1_Temp", "Plate_2_Temp"), ("temperature", "degF")), 2.138
+        from_files(files),
+        loads | dict.fromkeys(("Plate_1_Temp", "Plate_2_Temp"), ("temperature", "degF")),
+        2.138,
     )
 
 
@@ -125,7 +127,7 @@ def lathe(folder: Path) -> Floor:
         "Disp_X": ("error", "um"),
         "Disp_Z": ("error", "um"),
     }
-    return Floor(_from(files), roles, 72.0)
+    return Floor(from_files(files), roles, 72.0)
 
 
 def two_loggers(folder: Path) -> Floor:
@@ -150,16 +152,16 @@ def two_loggers(folder: Path) -> Floor:
             for row in rows("tclab", name, 4)
         ]
         fast.append(_write(folder / f"drives_{k + 1}.csv", "Zeit;Heater 1 [%];Heater 2 [%]", lines))
-    command = _from(slow) + tuple(word for path in fast for word in ("--join", str(path)))
-    return Floor(command, _heaters("Heater_1", "Heater_2", "T_plate_1", "T_plate_2"), 2.138)
+    command = from_files(slow) + tuple(word for path in fast for word in ("--join", str(path)))
+    return Floor(command, heaters("Heater_1", "Heater_2", "T_plate_1", "T_plate_2"), 2.138)
 
 
-def _heaters(first: str, second: str, one: str, other: str) -> dict[str, tuple[str, str]]:
+def heaters(first: str, second: str, one: str, other: str) -> dict[str, tuple[str, str]]:
     loads = dict.fromkeys((first, second), ("heat load", "percent"))
     return loads | dict.fromkeys((one, other), ("temperature", "degC"))
 
 
-def _from(files: Sequence[Path]) -> tuple[str, ...]:
+def from_files(files: Sequence[Path]) -> tuple[str, ...]:
     return tuple(word for path in files for word in ("--from", str(path)))
 
 
