@@ -137,10 +137,10 @@ def hobo(folder: Path) -> Floor:
     texts = []
     for k, (begin, run) in enumerate(_runs()):
         serial = "(LGR S/N: 10345678, SEN S/N: 1034567{}, LBL: {})"
-        names = ["Output, % ", "Output, % ", "Temp, °C ", "Temp, °C "]
+        said = ["Output, % ", "Output, % ", "Temp, °C ", "Temp, °C "]
         labels = ["Heater 1", "Heater 2", "Plate 1", "Plate 2"]
         header = [
-            f'"{n}{serial.format(i, label)}"' for i, (n, label) in enumerate(zip(names, labels, strict=True))
+            f'"{n}{serial.format(i, label)}"' for i, (n, label) in enumerate(zip(said, labels, strict=True))
         ]
         lines = [
             f'"Plot Title: run {k + 1}"',
