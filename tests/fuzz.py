@@ -192,14 +192,13 @@ def _state() -> bytes:
 def _learning() -> bytes:
     from discovery.runtime.compensator import Compensator
     from discovery.runtime.guards import Reading
-    from discovery.runtime.learning import KEPT, Learner
+    from discovery.runtime.learning import Learner
 
     learner, at_work = Learner(None), Compensator(_exported())
     for k in range(2000):
         at_work.tick(_readings(60.0 * k), 60.0 * k)
         learner.observe(at_work, _readings(60.0 * k) | {"E_Y0C": Reading(0.1, 60.0 * k)}, 60.0 * k)
-    kept = {name: getattr(learner, name) for name in KEPT}
-    return json.dumps(kept | {"model": _exported().seal.sha256}).encode()
+    return learner.kept(at_work)
 
 
 def read_own(path: Path) -> None:
@@ -256,9 +255,9 @@ def learning(path: Path) -> None:
 
     learner = Learner(None)
     learner.load(Compensator(_exported()), path.parent)
-    if not learner.times:
+    if not learner.seen.times:
         raise UserError("left aside")
-    learner.campaign(Compensator(_exported()))
+    learner.seen.campaign(_exported())
 
 
 def results(path: Path) -> None:

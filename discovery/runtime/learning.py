@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import BaseModel
@@ -23,27 +23,27 @@ from pydantic import BaseModel
 from discovery.errors import UserError
 from discovery.export.document import Exported
 from discovery.files import write_atomic
-from discovery.recordings import Campaign, Channel, Recording
+from discovery.recordings import Campaign
 from discovery.runtime.compensator import Compensator, State
 from discovery.runtime.guards import Reading, number
 from discovery.runtime.hypotheses import Comparison, begun, compare
+from discovery.runtime.recorder import Recorder
 from discovery.runtime.shadow import predictions
 from discovery.runtime.update import revision_of
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-ROW_S = 300.0  # between two rows of the recording that an update learns from
 ACTION = 1.6  # rms of the last errors left, in units of the residual of the fit: measure
 RECENT = 32  # errors that the action limit looks at
 FILE = "learning.json"
-KEPT = ("times", "inputs", "others", "errors", "marks", "left", "counted", "new", "compared", "advice")
+ROWS = ("times", "inputs", "others", "errors", "marks")
+OWN = ("left", "counted", "new", "compared", "advice")
 LEAST = 6  # new errors of at least one output before hypotheses are compared
 EVERY_S = 6 * 3600.0  # between two comparisons where the action limit is kept ...
 SOON_S = 4 * 3600.0  # ... and where it is not
 GAP_S = 3600.0  # after a longer gap the recording begins anew
 SAVE_S = 3600.0  # between two copies on disk
-LONGEST_S = 8 * 24 * 3600.0  # of the recording; the older half is forgotten then
 
 
 @dataclass(frozen=True)
@@ -106,14 +106,9 @@ class Learner:
     key: Ed25519PrivateKey | None
     advice: str = ""
     said: tuple[str, str] = ("", "")  # the last verdict, and of what
-    times: list[float] = field(default_factory=list)
-    inputs: list[list[float]] = field(default_factory=list)
-    others: list[dict[str, float]] = field(default_factory=list)  # readings that the model does not use
-    errors: list[dict[str, float]] = field(default_factory=list)
-    marks: list[tuple[int, dict[str, float]]] = field(default_factory=list)  # row, states of the model there
+    seen: Recorder = field(default_factory=Recorder)
     left: list[float] = field(default_factory=list)  # errors left, in units of the residual of the fit
     counted: dict[str, float] = field(default_factory=dict)  # instant of the last reading of each error
-    merged: int = 1  # ticks in the last row
     new: int = 0  # rows with errors since the last comparison
     compared: float = -1e30
     saved: float = -math.inf
@@ -123,47 +118,33 @@ class Learner:
         """Forget everything: another model is at work."""
         known = compensator.exported.document.get("knowledge", {})
         self.levels = {n: r for n, r in known.get("residual", {}).items() if r is not None}
-        for rows in (self.times, self.inputs, self.others, self.errors, self.marks, self.left):
-            rows.clear()
+        self.seen.clear()
+        self.left.clear()
         self.new, self.advice = 0, ""
 
     def follow(self, compensator: Compensator, since: float | None) -> None:
         """Another model is at work that knows what was seen until `since`: keep what was seen afterwards."""
-        kept = {name: list(getattr(self, name)) for name in ("times", "inputs", "others", "errors", "marks")}
+        seen, self.seen = self.seen, Recorder()
         self.begin(compensator)
-        marks = [k for k, (row, _) in enumerate(kept["marks"]) if since and kept["times"][row] <= since]
-        if not marks or len(kept["inputs"][0]) != len(compensator.exported.inputs):
+        marks = [k for k, (row, _) in enumerate(seen.marks) if since and seen.times[row] <= since]
+        if not marks or len(seen.inputs[0]) != len(compensator.exported.inputs):
             return
-        for name, rows in kept.items():
-            setattr(self, name, rows)
-        self._forget_before(marks[-1])
-        self.new = sum(1 for row in self.errors if row)
+        seen.begin_at(marks[-1])
+        self.seen = seen
+        self.new = sum(1 for row in seen.errors if row)
 
     def observe(self, compensator: Compensator, readings: Mapping[str, Reading], now: float) -> bool:
         """Take in a tick; whether hypotheses should be compared now.
 
         What the model works with while inputs are missing is a guess, so only ACTIVE ticks are learnt from.
         """
-        if self.times and now - self.times[-1] > GAP_S:
+        if self.seen.times and now - self.seen.times[-1] > GAP_S:
             self.begin(compensator)
         found = self._errors(compensator, readings)
         if compensator.inputs is None or compensator.state is not State.ACTIVE:
             return False
-        if not self.times or now - self.times[-1] >= ROW_S - 1e-6 or found:
-            if not self.marks or now - self.times[self.marks[-1][0]] >= EVERY_S:
-                self.marks.append((len(self.times), compensator.states()))
-            if self.times and now <= self.times[-1]:
-                return False
-            self.times.append(now)
-            self.inputs.append(compensator.inputs.tolist())
-            self.others.append(_others(compensator, readings))
-            self.merged = 1
-            self.errors.append(found)
-            self._forget(now)
-        else:
-            self._merge(compensator)
+        self.new += self.seen.add(compensator, now, _others(compensator, readings), found)
         if found:
-            self.new += 1
             predicted = predictions(compensator)
             for name, value in found.items():
                 if name in self.levels:
@@ -173,15 +154,6 @@ class Learner:
         self.advice = "measure the errors every half hour for the next 8 h" if beyond else ""
         wait = SOON_S if beyond else EVERY_S
         return self.new >= LEAST and now - self.compared >= wait
-
-    def _merge(self, compensator: Compensator) -> None:
-        """An input that switches stands in a row by its mean until the next one."""
-        assert compensator.inputs is not None
-        self.merged += 1
-        row = self.inputs[-1]
-        for k, spec in enumerate(compensator.exported.inputs):
-            if spec.between == "held":
-                row[k] += (float(compensator.inputs[k]) - row[k]) / self.merged
 
     def beyond(self) -> bool:
         """Whether the errors left are beyond the action limit."""
@@ -201,45 +173,18 @@ class Learner:
                 found[name] = value
         return found
 
-    def _forget(self, now: float) -> None:
-        if now - self.times[0] > LONGEST_S and len(self.marks) >= 3:
-            self._forget_before(len(self.marks) // 2)
-
-    def _forget_before(self, mark: int) -> None:
-        """Let the recording begin at a mark."""
-        first = self.marks[mark][0]
-        for rows in (self.times, self.inputs, self.others, self.errors):
-            del rows[:first]
-        self.marks = [(row - first, states) for row, states in self.marks[mark:]]
-
-    def campaign(self, compensator: Compensator) -> Campaign:
-        """What was seen since the last revision, as a campaign of one recording."""
-        exported = compensator.exported
-        time = np.array(self.times) - self.times[0]
-        values = dict(zip(exported.compiled.inputs, np.array(self.inputs).T, strict=True))
-        for name in compensator.names:
-            values[name] = np.array([row.get(name, math.nan) for row in self.errors])
-        channels = {
-            i.name: Channel(i.name, i.role, i.unit, None, _between(i.between)) for i in exported.inputs
-        }
-        channels |= {
-            o.name: Channel(o.name, "error", o.unit, None, "held")
-            for o in exported.outputs
-            if o.role == "error"
-        }
-        for name in sorted(set().union(*self.others)):
-            values[name] = np.array([row.get(name, math.nan) for row in self.others])
-            channels[name] = Channel(name, "other input", "1", None, "linear")
-        return Campaign("running", channels, {"running": Recording("running", time, values)}, Path("running"))
-
     def save(self, compensator: Compensator, folder: Path, now: float) -> None:
         """Keep what was seen on disk, once an hour; a disk that fails costs what was learnt since."""
         if 0.0 <= now - self.saved < SAVE_S:
             return
         self.saved = now
-        kept = {name: getattr(self, name) for name in KEPT} | {"model": compensator.exported.seal.sha256}
         with suppress(OSError):
-            write_atomic(folder / FILE, json.dumps(kept).encode())
+            write_atomic(folder / FILE, self.kept(compensator))
+
+    def kept(self, compensator: Compensator) -> bytes:
+        """The file of what was seen."""
+        kept = {name: getattr(self.seen, name) for name in ROWS} | {name: getattr(self, name) for name in OWN}
+        return json.dumps(kept | {"model": compensator.exported.seal.sha256}).encode()
 
     def load(self, compensator: Compensator, folder: Path) -> None:
         """Go on with what was seen before a restart, if it is of the same model."""
@@ -248,15 +193,17 @@ class Learner:
         except (OSError, ValueError):
             return
         if kept.model == compensator.exported.seal.sha256 and kept.fits(len(compensator.exported.inputs)):
-            for name in KEPT:
+            for name in OWN:
                 setattr(self, name, getattr(kept, name))
+            self.seen = Recorder(**{name: getattr(kept, name) for name in ROWS})
+            self.seen.resume()
 
     def question(self, compensator: Compensator, now: float) -> Question:
         """What was seen, for `answer`."""
         self.compared, self.new = now, 0
-        question = Question(compensator.exported, self.campaign(compensator), dict(self.marks[0][1]))
-        if self.marks[-1][0] < len(self.times) - 1:
-            self.marks.append((len(self.times) - 1, compensator.states()))
+        campaign = self.seen.campaign(compensator.exported)
+        question = Question(compensator.exported, campaign, dict(self.seen.marks[0][1]))
+        self.seen.mark(compensator)
         return question
 
 
@@ -268,10 +215,6 @@ def _others(compensator: Compensator, readings: Mapping[str, Reading]) -> dict[s
     known |= {f"{name}_applied" for name in compensator.names}
     found = {n: number(r.value) for n, r in readings.items() if n not in known and r.good}
     return {n: value for n, value in found.items() if math.isfinite(value)}
-
-
-def _between(word: str) -> Literal["linear", "held"]:
-    return "linear" if word == "linear" else "held"
 
 
 def learner(key: Path) -> Learner:

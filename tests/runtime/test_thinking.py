@@ -96,8 +96,9 @@ def test_what_an_input_was_held_for_is_not_learnt_from(
     session, _, _ = work
     hours(session, minutes, 0, 20, lost=(14, 16))
     assert session.learn is not None
-    assert session.learn.times[0] >= 16 * HOUR  # after two hours without an input the recording begins anew
-    assert len(session.learn.times) == len(session.learn.errors)
+    seen = session.learn.seen
+    assert seen.times[0] >= 16 * HOUR  # after two hours without an input the recording begins anew
+    assert len(seen.times) == len(seen.errors)
 
 
 def test_after_a_take_over_only_what_the_new_model_has_not_seen_is_kept(
@@ -107,14 +108,15 @@ def test_after_a_take_over_only_what_the_new_model_has_not_seen_is_kept(
     hours(session, minutes, 0, 20)
     learn = session.learn
     assert learn is not None
-    seen, marks = list(learn.times), [(learn.times[row], states) for row, states in learn.marks]
+    times = list(learn.seen.times)
+    marks = [(times[row], states) for row, states in learn.seen.marks]
     since = marks[1][0] + 30.0
     learn.follow(session.compensator, since)
-    assert learn.times == [t for t in seen if t >= marks[1][0]]
-    assert learn.marks[0] == (0, marks[1][1])
-    assert learn.new == sum(1 for row in learn.errors if row)
+    assert learn.seen.times == [t for t in times if t >= marks[1][0]]
+    assert learn.seen.marks[0] == (0, marks[1][1])
+    assert learn.new == sum(1 for row in learn.seen.errors if row)
     learn.follow(session.compensator, None)
-    assert learn.times == []
+    assert learn.seen.times == []
 
 
 def test_another_process_gives_the_same_answer(
