@@ -413,8 +413,8 @@ def compare(
     if known:
         (folder / "known").mkdir()
         left = 1.0 - 0.01 * true_world.times / DAY  # the losses are shares of this power
-        counted = {**true_world.inputs, "P_drive": true_world.inputs["P_drive"] * left}
-        best = live(exported, replace(true_world, inputs=counted), plan, folder / "known", faults=True)
+        worn_inputs = {**true_world.inputs, "P_drive": true_world.inputs["P_drive"] * left}
+        best = live(exported, replace(true_world, inputs=worn_inputs), plan, folder / "known", faults=True)
         figures["with known wear, last week, um"] = rms(best.left[quiet & last])
         figures["with known wear, by readings, um"] = rms((best.left + read)[quiet & last])
     figures["said"] = found.events

@@ -14,13 +14,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.diagnosis.thresholds import NAMED, ODDS, RIVAL, SHORT, SUREST, UNKNOWN_HEAT, UNKNOWN_SHARES
-from discovery.diagnosis.verdict import by_chance
+from discovery.diagnosis.thresholds import UNKNOWN_HEAT, UNKNOWN_SHARES
 from discovery.errors import UserError
 from discovery.evidence.bayes import Score
 from discovery.export.document import Exported
@@ -33,33 +31,31 @@ from discovery.recordings import Campaign
 from discovery.runtime.changes import Change, Seen, Table, make_table
 from discovery.runtime.newphysics import new_physics
 from discovery.runtime.unused import Path, path_columns, paths, taken_in
+from discovery.runtime.verdict import (
+    NOTHING,
+    RARE,
+    SOMETHING_ELSE,
+    WEAR,
+    Explanation,
+    Verdict,
+    before,
+    explains_all,
+    probability,
+    verdict_of,
+)
 from discovery.runtime.wear import ageing, uses, usual_wear, wears
 from discovery.terms import Apply, Expression, Name, names, parse
 from discovery.threads import one_thread
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
-Verdict = Literal[
-    "nothing",
-    "wear",
-    "wear goes on",
-    "input sensor",
-    "unused input",
-    "idle input",
-    "new physics",
-    "something else",
-    "undecided",
-]
-
 # Chosen on seeds set aside for it and confirmed on others, see benchmarks/runtime.md
 OTHER = (0.1, 0.4)  # relative change of a parameter that cannot age: something else changed
 OFFSET = (0.5, 2.0)  # K, of the sensor of an input
 ACTS = (1.0, 4.0)  # residuals of the fit that an unused input shows
-LEAST_ODDS = 2.5  # log of the odds against `nothing`, below which nothing has changed
 MEMORY_S = 24 * 3600.0  # in which a residual counts less and less: wear goes on meanwhile
-RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
 START_SD = 0.5  # K, um: of states that are known where a recording begins
-OTHERS = ("something else", "exchange with ")  # what may have changed together with wear or a sensor
+OTHERS = ("something else", "exchange with")  # what may have changed together with wear or a sensor
 TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
 
 
@@ -133,31 +129,36 @@ def compare(
     worn = wears(exported, table)
     usual = usual_wear(exported, table, known.worn)
     seen = table.seen(usual.change if usual else None)
-    offered = {"wear": [one.change for one in worn]}
+    offered = {WEAR: [one.change for one in worn]}
     for name in channels:
-        offered[f"sensor of {name}"] = [Change(table.at[name], np.array([[size]])) for size in OFFSET]
+        offered[Explanation("sensor of", name)] = [
+            Change(table.at[name], np.array([[size]])) for size in OFFSET
+        ]
     for name, path in ways.items():
-        offered.setdefault(f"input {path.channel}", []).extend(_acting(path, table.at[name], levels))
+        alike = offered.setdefault(Explanation("input", path.channel), [])
+        alike.extend(_acting(path, table.at[name], levels))
     for name in channels:
         if exchanges := _exchanges(exported, table, name):
-            offered[f"exchange with {name}"] = exchanges
-    offered["something else"] = _heats(exported.model, table, known.floor)
-    evidence = {name: _mean([seen.log_odds(one) for one in alike]) for name, alike in offered.items()}
+            offered[Explanation("exchange with", name)] = exchanges
+    offered[SOMETHING_ELSE] = _heats(exported.model, table, known.floor)
+    evidence = {one: _mean([seen.log_odds(c) for c in alike]) for one, alike in offered.items()}
     for channel, gains in idle.items():
         by = np.array([-exported.model.parameters[n].value for n in gains])
-        evidence[f"no input {channel}"] = seen.log_odds_of(table.at[channel], by)
-    odds = {"nothing": 0.0} | {n: value + _before(n, list(evidence)) for n, value in evidence.items()}
+        evidence[Explanation("no input", channel)] = seen.log_odds_of(table.at[channel], by)
+    odds = {NOTHING: 0.0} | {one: value + before(one, evidence) for one, value in evidence.items()}
     physics = new_physics(exported, known, campaign, recordings, outputs) if named else {}
-    odds |= {n: one.odds for n, one in physics.items()}
-    verdict, what = _verdict(odds, evidence, physics)
+    odds |= {Explanation("effect", n, one.hypothesis.effect.word): one.odds for n, one in physics.items()}
+    verdict, what = verdict_of(odds, evidence)
     alone = table.seen()
     if usual and verdict == "nothing":
         verdict = "wear goes on"
     if verdict in ("wear", "input sensor"):
-        best = max(offered[f"sensor of {what}" if what else verdict], key=seen.log_odds)
-        others = [one for n, alike in offered.items() if n.startswith(OTHERS) for one in alike]
+        explained = offered[WEAR if verdict == "wear" else Explanation("sensor of", what)]
+        best = max(explained, key=seen.log_odds)
+        others = [one for e, alike in offered.items() if e.kind in OTHERS for one in alike]
         also = _mean([seen.log_odds(best.and_also(other)) for other in others])
-        verdict, what = _alone(verdict, what, also - seen.log_odds(best) - RARE)
+        verdict, what = explains_all(verdict, what, also - seen.log_odds(best) - RARE)
+    new = next((one for one in odds if str(one) == what), None) if verdict == "new physics" else None
     most = max([*worn, usual] if usual else worn, key=lambda one: alone.log_odds(one.change))
     followed = table.followed(usual if usual and verdict == "wear goes on" else most)
     pairs = zip(followed.by.tolist(), followed.sd.tolist(), strict=True)
@@ -170,15 +171,15 @@ def compare(
         count,
         verdict,
         what,
-        odds,
+        {str(one): value for one, value in odds.items()},
         rms,
         lately,
         change,
         followed.rows,
         chosen,
         physics,
-        _probability(odds, physics, what) if verdict == "new physics" else None,
-        _share(seen, offered[what]) if verdict == "new physics" and what in offered else None,
+        probability(odds, new) if new else None,
+        _share(seen, offered[new]) if new in offered else None,
     )
 
 
@@ -188,18 +189,6 @@ def residual_lately(exported: Exported, campaign: Campaign, recordings: Sequence
     levels = {n: r for n, r in residual.items() if r is not None}
     outputs = [n for n in levels if any(_read(campaign, r, n) for r in recordings)]
     return _rms(problem_of(exported.model, campaign, recordings, outputs), levels, outputs, MEMORY_S)
-
-
-def _before(name: str, asked: Sequence[str]) -> float:
-    """Log of the odds of a hypothesis against `nothing` before any reading: that one of the sensors is off is
-    as likely as that one of the other inputs acts, or that something else changed; another exchange is as
-    likely as any effect of the catalogue.
-    """
-    if name == "wear":
-        return 0.0
-    kind = name.rpartition(" ")[0]
-    alike = [other for other in asked if other.rpartition(" ")[0] == kind]
-    return (float(np.log(ODDS)) if kind == "exchange with" else -RARE) - float(np.log(len(alike)))
 
 
 def _exchanges(exported: Exported, table: Table, channel: str) -> list[Change]:
@@ -265,67 +254,6 @@ def _heats(model: Model, table: Table, floor: Mapping[str, float]) -> list[Chang
 def _read(campaign: Campaign, recording: str, name: str) -> bool:
     values = campaign.recordings[recording].values
     return name in values and bool(np.isfinite(values[name]).any())
-
-
-def _verdict(
-    odds: Mapping[str, float], evidence: Mapping[str, float], physics: Mapping[str, Score]
-) -> tuple[Verdict, str]:
-    """The best hypothesis, if it beats `nothing` and its rivals clearly. A sensor or an input needs the
-    evidence of a name in a diagnosis. So does an effect of the catalogue, or another exchange with a
-    temperature, over all that explains the readings without it.
-    """
-    effects = {*physics, *(name for name in evidence if name.startswith("exchange with "))}
-    best, second, *_ = sorted(evidence.keys() - effects, key=lambda name: -odds[name])
-    effect = max(effects, key=lambda name: odds[name], default="")
-    if effect and odds[effect] - max(odds[best], 0.0) >= by_chance(odds[effect]):
-        if _probability(odds, physics, effect) >= NAMED:
-            return "new physics", effect
-        others = _without(odds, physics, effect)
-        return "undecided", f"{effect} or {max(others, key=lambda name: others[name])}"
-    if odds[best] < LEAST_ODDS:
-        return "nothing", ""
-    if odds[best] - odds[second] < RIVAL:
-        return "undecided", f"{best} or {second}"
-    if best == "wear":
-        return "wear", ""
-    if best == "something else":
-        return "something else", ""
-    if evidence[best] < SHORT:
-        return "undecided", f"{best} or something else"
-    if best.startswith("no input "):
-        return "idle input", best.removeprefix("no input ")
-    if best.startswith("input "):
-        return "unused input", best.removeprefix("input ")
-    return "input sensor", best.removeprefix("sensor of ")
-
-
-def _alone(verdict: Verdict, what: str, also: float) -> tuple[Verdict, str]:
-    """Whether wear, or the sensor of an input, explains all. A sensor is off by a constant, so it leaves
-    nothing else to explain: that is what distinguishes it from heat that it explains in part.
-
-    Args:
-        also: log of the odds that something else changed, too.
-    """
-    if verdict == "wear" and also >= LEAST_ODDS:
-        return "something else", "wear does not explain all of it"
-    if verdict == "input sensor" and also > -RIVAL:
-        return "undecided", f"sensor of {what} or something else"
-    return verdict, what
-
-
-def _probability(odds: Mapping[str, float], physics: Mapping[str, Score], name: str) -> float:
-    """Probability that an effect began, at any place: the best answer with it against the best one without,
-    as in a diagnosis.
-    """
-    ahead = odds[name] - max(_without(odds, physics, name).values())
-    return min(SUREST, float(1.0 / (1.0 + np.exp(-np.clip(ahead, -500.0, 500.0)))))
-
-
-def _without(odds: Mapping[str, float], physics: Mapping[str, Score], name: str) -> dict[str, float]:
-    """Hypotheses under which an effect did not begin anywhere."""
-    word = physics[name].hypothesis.effect.word if name in physics else ""
-    same = {name, *(n for n, one in physics.items() if one.hypothesis.effect.word == word)}
-    return {n: value for n, value in odds.items() if n not in same}
 
 
 def _share(seen: Seen, changes: Sequence[Change]) -> float:

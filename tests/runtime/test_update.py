@@ -11,17 +11,23 @@ from typer.testing import CliRunner
 
 from benchmarks.update_exact import read_with
 from discovery.cli import app
-from discovery.effects.catalogue import catalogue
-from discovery.effects.hypothesis import Hypothesis
 from discovery.errors import UserError
-from discovery.evidence.bayes import Score
 from discovery.export.document import Exported, read_document, write_document
 from discovery.export.knowledge import read_knowledge
 from discovery.recordings import Campaign, Recording
 from discovery.runtime.changes import Change, Table, Wear
-from discovery.runtime.hypotheses import Comparison, _alone, _probability, _verdict, compare
+from discovery.runtime.hypotheses import Comparison, compare
 from discovery.runtime.newphysics import Point, Task
 from discovery.runtime.update import Update, next_name, update_file
+from discovery.runtime.verdict import (
+    NOTHING,
+    SOMETHING_ELSE,
+    WEAR,
+    Explanation,
+    explains_all,
+    probability,
+    verdict_of,
+)
 from discovery.runtime.wear import ageing
 from discovery.virtual.machine import Machine
 from discovery.virtual.nmv5000.plant import five_axis
@@ -267,52 +273,47 @@ def test_the_command(machine: Campaign, at_work: Path) -> None:
 
 
 def test_what_readings_do_not_distinguish_is_not_signed() -> None:
-    evidence = {"wear": 12.0, "sensor of T": 14.5, "something else": 4.0}
-    odds = {"nothing": 0.0, "wear": 12.0, "sensor of T": 11.5, "something else": 2.0}
-    assert _verdict(odds, evidence, {}) == ("undecided", "wear or sensor of T")
-    assert _verdict({**odds, "sensor of T": 1.0}, evidence, {}) == ("wear", "")
-    assert _verdict({**odds, "wear": 2.0, "sensor of T": 1.0}, evidence, {}) == ("nothing", "")
-    assert _verdict({**odds, "wear": 5.0}, evidence, {}) == ("input sensor", "T")
-    weak = _verdict({**odds, "wear": -1.0, "sensor of T": 6.0}, {**evidence, "sensor of T": 9.0}, {})
+    sensor = Explanation("sensor of", "T")
+    evidence = {WEAR: 12.0, sensor: 14.5, SOMETHING_ELSE: 4.0}
+    odds = {NOTHING: 0.0, WEAR: 12.0, sensor: 11.5, SOMETHING_ELSE: 2.0}
+    assert verdict_of(odds, evidence) == ("undecided", "wear or sensor of T")
+    assert verdict_of({**odds, sensor: 1.0}, evidence) == ("wear", "")
+    assert verdict_of({**odds, WEAR: 2.0, sensor: 1.0}, evidence) == ("nothing", "")
+    assert verdict_of({**odds, WEAR: 5.0}, evidence) == ("input sensor", "T")
+    assert verdict_of({**odds, SOMETHING_ELSE: 20.0}, evidence) == ("something else", "")
+    weak = verdict_of({**odds, WEAR: -1.0, sensor: 6.0}, {**evidence, sensor: 9.0})
     assert weak == ("undecided", "sensor of T or something else")
-    said = Comparison(("a",), 9, "undecided", "wear or sensor of T", odds, 1.4, 1.4, {}, np.zeros((0, 1)))
+    acts, idle = Explanation("input", "fan"), Explanation("no input", "fan")
+    for one, verdict in ((acts, "unused input"), (idle, "idle input")):
+        assert verdict_of({**odds, one: 30.0}, {**evidence, one: 32.0}) == (verdict, "fan")
+    said = Comparison(("a",), 9, "undecided", "wear or sensor of T", {}, 1.4, 1.4, {}, np.zeros((0, 1)))
     assert "measure more often, wet and dry" in Update(said).lines()[-1]
 
 
 def test_an_effect_is_named_only_where_it_is_sure() -> None:
     """Its evidence and its probability are those that a name needs in a diagnosis."""
-
-    def claim(word: str) -> Score:
-        return Score(Hypothesis(catalogue()[word], ("a", "b"), ("G",)), 0.0, 0.0, (1.0,), 1.0, 0)
-
-    physics = {"gap": claim("flooded_gap"), "path": claim("conduction_path"), "gap 2": claim("flooded_gap")}
-    evidence = {"wear": 4.0, "something else": 4.0}
-    odds = {"nothing": 0.0, "wear": 4.0, "something else": 3.9, "gap": 20.0, "path": 18.5, "gap 2": 19.9}
-    assert _verdict(odds, evidence, physics) == ("new physics", "gap")
-    assert _probability(odds, physics, "gap") == pytest.approx(1 / (1 + np.exp(-1.5)))
-    assert _probability({**odds, "path": -50.0}, physics, "gap") == 0.98
-    assert _verdict({**odds, "path": 19.5}, evidence, physics) == ("undecided", "gap or path")
-    assert _verdict({**odds, "gap": 12.0, "path": 1.0, "gap 2": 1.0}, evidence, physics)[0] == "undecided"
-    assert _verdict({**odds, "wear": 10.0}, evidence, physics) == ("wear", "")  # an effect adds too little
-    fan = {**odds, "exchange with T": 19.5}  # one effect more
-    assert _verdict(fan, {**evidence, "exchange with T": 23.0}, physics) == (
-        "undecided",
-        "gap or exchange with T",
-    )
-    assert _verdict({**fan, "exchange with T": 30.0}, {**evidence, "exchange with T": 34.0}, physics) == (
-        "new physics",
-        "exchange with T",
-    )
-    small = {"nothing": 0.0, "wear": -1.0, "something else": -2.0, "gap": 10.0}
-    assert _verdict(small, evidence, {"gap": physics["gap"]}) == ("nothing", "")
+    gap, again = (Explanation("effect", what, "flooded_gap") for what in ("gap", "gap 2"))
+    path, fan = Explanation("effect", "path", "conduction_path"), Explanation("exchange with", "T")
+    evidence = {WEAR: 4.0, SOMETHING_ELSE: 4.0}
+    odds = {NOTHING: 0.0, WEAR: 4.0, SOMETHING_ELSE: 3.9, gap: 20.0, path: 18.5, again: 19.9}
+    assert verdict_of(odds, evidence) == ("new physics", "gap")
+    assert probability(odds, gap) == pytest.approx(1 / (1 + np.exp(-1.5)))
+    assert probability({**odds, path: -50.0}, gap) == 0.98
+    assert verdict_of({**odds, path: 19.5}, evidence) == ("undecided", "gap or path")
+    assert verdict_of({**odds, gap: 12.0, path: 1.0, again: 1.0}, evidence)[0] == "undecided"
+    assert verdict_of({**odds, WEAR: 10.0}, evidence) == ("wear", "")  # an effect adds too little
+    assert verdict_of({**odds, fan: 19.5}, {**evidence, fan: 23.0}) == ("undecided", "gap or exchange with T")
+    assert verdict_of({**odds, fan: 30.0}, {**evidence, fan: 34.0}) == ("new physics", "exchange with T")
+    small = {NOTHING: 0.0, WEAR: -1.0, SOMETHING_ELSE: -2.0, gap: 10.0}
+    assert verdict_of(small, evidence) == ("nothing", "")
 
 
 def test_a_sensor_explains_all_or_is_not_named() -> None:
     """Heat that an offset of a sensor explains in part leaves something else to explain."""
-    assert _alone("input sensor", "T_env", -4.0) == ("input sensor", "T_env")
-    assert _alone("input sensor", "T_env", -0.3) == ("undecided", "sensor of T_env or something else")
-    assert _alone("wear", "", 2.0) == ("wear", "")
-    assert _alone("wear", "", 3.0)[0] == "something else"
+    assert explains_all("input sensor", "T_env", -4.0) == ("input sensor", "T_env")
+    assert explains_all("input sensor", "T_env", -0.3) == ("undecided", "sensor of T_env or something else")
+    assert explains_all("wear", "", 2.0) == ("wear", "")
+    assert explains_all("wear", "", 3.0)[0] == "something else"
 
 
 def test_a_path_of_heat_is_not_taken_for_a_sensor(machine: Campaign, at_work: Path) -> None:
