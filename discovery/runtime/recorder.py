@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,8 @@ Array = NDArray[np.float64]
 
 ROW_S = 60.0  # of a row. The mean of a longer one lies between operating points, where no fit knows its laws
 EARLY_S = 1e-6  # by which a tick may come too early
+UNKNOWN_S = 300.0  # after which an input may have switched meanwhile
+LATELY_S = 3600.0  # over which the mean of such an input is taken
 MARK_S = 6 * 3600.0  # between two rows where the states of the model are kept
 LONGEST_S = 8 * 24 * 3600.0  # of the recording; the older half is forgotten then
 
@@ -71,16 +74,23 @@ class Recorder:
 
     def _integrate(self, compensator: Compensator, now: float) -> None:
         """Bring the means of the last row to this tick. A held input keeps its value from tick to tick,
-        another one runs straight.
+        another one runs straight. Where it is not known for minutes, its mean of the last hour holds.
         """
         assert compensator.inputs is not None
         before, self.last = self.last, (now, compensator.inputs.copy())
         if before is None or not self.times:
             return
         held = np.array([spec.between == "held" for spec in compensator.exported.inputs])
-        passed, old = now - before[0], before[1]
-        self.integral = self.integral + passed * np.where(held, old, 0.5 * (old + compensator.inputs))
+        passed, straight = now - before[0], 0.5 * (before[1] + compensator.inputs)
+        kept = before[1] if passed <= UNKNOWN_S else self._lately()
+        self.integral = self.integral + passed * np.where(held, kept, straight)
         self.inputs[-1] = np.asarray(self.integral / (now - self.times[-1])).tolist()
+
+    def _lately(self) -> Array:
+        """Mean inputs (U,) over the rows of the last hour."""
+        first = bisect_left(self.times, self.times[-1] - LATELY_S)
+        length = np.diff([*self.times[first:], self.times[-1] + ROW_S])
+        return np.asarray(np.average(self.inputs[first:], axis=0, weights=length))
 
     def mark(self, compensator: Compensator) -> None:
         """Keep the states of the model at the last row."""
@@ -95,7 +105,7 @@ class Recorder:
         self.marks = [(row - first, states) for row, states in self.marks[mark:]]
 
     def resume(self) -> None:
-        """Go on with rows that were kept on disk: the last one holds until the next tick."""
+        """Go on with rows that were kept on disk: the time until the next tick is a gap."""
         if self.times:
             self.last = self.times[-1], np.array(self.inputs[-1])
 

@@ -54,3 +54,22 @@ def test_a_row_holds_what_came_between_the_rows(exported: Exported, minutes: np.
     for j in range(len(outputs)):
         there = np.interp(np.array(seen.times)[settled], ticks[:, 0], ticks[:, 1 + j])
         assert np.abs(again[settled, j] - there).max() < 0.05 * spread[j]
+
+
+def test_inputs_that_are_not_known_for_minutes_have_their_usual_mean(
+    exported: Exported, minutes: np.ndarray
+) -> None:
+    """A kill loses the rows since the last copy; the last minute says little of them."""
+    names = list(exported.compiled.inputs)
+    compensator, learner = Compensator(exported, Settings(tick_s=60.0, settle_s=0.0)), Learner(None)
+    learner.begin(compensator)
+    power = names.index("P_drive")
+    for k in [*range(120), *range(160, 170)]:
+        values = minutes[k].copy()
+        values[power] = 900.0 * (k % 3 == 2)  # 900 W in the last minute before the gap
+        readings = {n: Reading(v, 60.0 * k) for n, v in zip(names, values.tolist(), strict=True)}
+        compensator.tick(readings, 60.0 * k)
+        learner.observe(compensator, readings, 60.0 * k)
+    rows = dict(zip(learner.seen.times, learner.seen.inputs, strict=True))
+    assert rows[60.0 * 118][power] == 0.0
+    assert rows[60.0 * 119][power] == pytest.approx(300.0, rel=0.1)
