@@ -43,7 +43,7 @@ LEAST = 6  # new errors of at least one output before hypotheses are compared
 EVERY_S = 6 * 3600.0  # between two comparisons where the action limit is kept ...
 SOON_S = 4 * 3600.0  # ... and where it is not
 GAP_S = 3600.0  # after a longer gap the recording begins anew
-SAVE_S = 3600.0  # between two copies on disk
+SAVE_S = 600.0  # between two copies on disk; what comes after the last one is lost with a kill
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class Learner:
         return found
 
     def save(self, compensator: Compensator, folder: Path, now: float) -> None:
-        """Keep what was seen on disk, once an hour; a disk that fails costs what was learnt since."""
+        """Keep what was seen on disk, every ten minutes; a disk that fails costs what was learnt since."""
         if 0.0 <= now - self.saved < SAVE_S:
             return
         self.saved = now
