@@ -109,7 +109,8 @@ def bookkeeping(name: str, unit: str, values: Array, seconds: Array, role: str) 
         return ""
     whole = bool((values == np.round(values)).all())
     one_by_one = bool(np.isin(steps, (0.0, 1.0)).all())
-    if not unit and whole and (_ID.fullmatch(words) or (one_by_one and re.fullmatch(_THINGS, words))):
+    named = _ID.fullmatch(words) or (one_by_one and re.fullmatch(_THINGS, words))
+    if not is_unit(unit) and whole and (named or (steps == 1.0).all()):
         return "numbers rows or devices"
     clock = time_unit(unit) is not None or _says_time(words)
     steady = float(np.corrcoef(values, seconds)[0, 1])

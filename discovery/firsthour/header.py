@@ -53,8 +53,9 @@ def find_header(
     if len(block) > 1 and _units(like[1]) >= 0.5:
         units, block = like[1], [one for one in block if one is not like]
     at = max(block, key=lambda one: (_said(one[1]), one[0]))[0]
-    above = max(_touching(block, at), key=_said, default=[""] * width)
-    groups = _spread_out(above) if _said(above) > 1 else [""] * width
+    near = [*_touching(block, at), *(cells for k, cells in block if k > at)]
+    words = max(near, key=_said, default=[""] * width)
+    groups = _spread_out(words) if _said(words) > 1 else [""] * width
     return at, [u if u == "-" or not is_empty(u) else "" for u in units], groups
 
 

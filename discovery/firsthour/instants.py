@@ -53,6 +53,7 @@ _OF_DAY = re.compile(
     r"\s*(?P<half>[ap]\.?\s?m\.?)?",
     re.IGNORECASE,
 )
+_DOTTED_TIME = re.compile(r"\d{1,2}\.\d{2}\.\d{2}([.,]\d+)?")
 _ORDERS = ("DMY", "MDY", "YMD", "YDM")  # of 13.6.21 the first is the usual one
 _LONGEST = 60  # letters of a stamp
 _NAMED = re.compile(r"[^\W\d]{3}|[./-]\s")  # a month, or marks with a blank behind
@@ -169,9 +170,13 @@ def is_instant(cell: str) -> bool:
     return _parts(cell) is not None
 
 
-def is_time_of_day(cell: str) -> bool:
-    """Whether a cell is a time of day without a date."""
-    return bool(_OF_DAY.fullmatch(cell))
+def is_time_of_day(cell: str, dated: bool = False) -> bool:
+    """Whether a cell is a time of day without a date.
+
+    Args:
+        dated: the date stands in another column, so 06.12.30 is none.
+    """
+    return bool(_OF_DAY.fullmatch(cell) or (dated and _DOTTED_TIME.fullmatch(cell)))
 
 
 def unevenness(seconds: Array) -> float:

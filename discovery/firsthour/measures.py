@@ -140,6 +140,8 @@ def unit_in(header: str) -> tuple[str, str] | None:
     (('F', 'N'), None, ('v_x', 'm/min'), None)
     >>> unit_in("oil_C"), unit_in("coolant_flow_C"), unit_in("hall_A")
     (('oil', 'C'), None, None)
+    >>> unit_in("oil_in"), unit_in("T_in"), unit_in("Disp X in"), unit_in("x [in]")
+    (None, None, ('Disp X', 'in'), ('x', 'in'))
     """
     for form in _WITH_UNIT:
         found = form.fullmatch(header)
@@ -173,7 +175,7 @@ def _belongs(name: str, unit: str) -> bool:
     """
     if time_unit(unit) and (is_dated(name) or not CLOCKS.search(fold(name))):
         return False
-    if len(unit) > 1 or unit in "%°":
+    if (len(unit) > 1 and unit.casefold() != "in") or unit in "%°":  # an inlet is more common than an inch
         return True
     has = dimension_of(known_unit(unit) or "")
     says = {key for word in words_of(name) for key, odds in word.says.items() if odds > 1.5}

@@ -154,7 +154,7 @@ def _stamped(
     fine = next(
         (k for k, name in enumerate(names) if k != at and _are_milliseconds(sheet, k, name, units[k])), None
     )
-    others = [k for k in range(len(names)) if k != at and is_time_of_day(sheet.columns[k][0].as_py())]
+    others = [k for k in range(len(names)) if k != at and is_time_of_day(sheet.columns[k][0].as_py(), True)]
     pairs: list[tuple[tuple[int, ...], list[str]]] = [((at,), cells)]
     if is_date(cells[0]) and others:
         time = sheet.cells(others[0])

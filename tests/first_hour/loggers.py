@@ -279,6 +279,26 @@ def grafana(folder: Path) -> Floor:
     return Floor(_written(folder, "csv", texts), heaters("heater_1", "heater_2", "plate_1", "plate_2"), 2.138)
 
 
+def keyence(folder: Path) -> Floor:
+    """Keyence NR: units below the names, what the channels are below the units, date and time apart."""
+    texts = []
+    for begin, run in _runs():
+        lines = [
+            "TITLE,NR-600",
+            f"DATE,{begin:%Y/%m/%d}",
+            "No.,Date,Time,(1)HA08 CH1,(1)HA08 CH2,(2)TH08 CH1,(2)TH08 CH2",
+            ",,,%,%,degC,degC",
+            ",,,heater 1,heater 2,plate 1,plate 2",
+        ]
+        for k, row in enumerate(run):
+            at = begin + timedelta(seconds=_number(row, "time"))
+            cells = [f"{_number(row, c):.3f}" for c in VALUES]
+            lines.append(",".join([str(k), f"{at:%Y/%m/%d,%H:%M:%S.%f}", *cells]))
+        texts.append("\r\n".join(lines) + "\r\n")
+    names = ("x_1_HA08_CH1", "x_1_HA08_CH2", "x_2_TH08_CH1", "x_2_TH08_CH2")
+    return Floor(_written(folder, "csv", texts, "shift_jis"), heaters(*names), 2.138)
+
+
 def influx(folder: Path) -> Floor:
     """InfluxDB: rows of annotations, one reading a row."""
     texts = []
@@ -311,5 +331,6 @@ LOGGERS: dict[str, Callable[[Path], Floor]] = {
     "filetime": filetime,
     "picolog": picolog,
     "grafana": grafana,
+    "keyence": keyence,
     "influx": influx,
 }

@@ -5,10 +5,12 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
+from discovery.firsthour.clocks import bookkeeping
 from discovery.firsthour.header import begin
 from discovery.firsthour.stamps import stated_interval
 from discovery.firsthour.table import read_own
@@ -68,3 +70,21 @@ def test_settings_that_look_like_readings_are_none() -> None:
 def test_an_interval_with_its_unit_in_front() -> None:
     assert stated_interval(["SampleTime[ms]  3000  SampleTime[ms]  3000"]) == 3.0
     assert stated_interval(["Sampling interval,3s"]) == 3.0
+
+
+def test_a_time_with_dots_stands_next_to_its_date(tmp_path: Path) -> None:
+    """An Italian logger; the date alone would be one stamp for all rows."""
+    lines = [f"05/03/2026;6.{k:02d}.30;{20 + k / 10:.1f}".replace(".5;", ",5;") for k in range(40)]
+    (tmp_path / "run.csv").write_text("Data;Ora;Temp. olio\n" + "\n".join(lines) + "\n", "utf-8")
+    table = read_own(tmp_path / "run.csv")
+    assert table.time[-1] == 39 * 60.0
+    assert table.first == "2026-03-05T06:00:30"
+
+
+def test_rows_that_are_counted_are_no_input() -> None:
+    """Whatever the word for it, and where rows are not evenly spaced; with a unit it is a ramp."""
+    rows_, uneven = np.arange(1.0, 60.0), np.cumsum(1.0 + np.arange(59.0) ** 2)
+    assert bookkeeping("序号", "", rows_, uneven, "other input")
+    assert bookkeeping("序号", "NO.", rows_, uneven, "other input")
+    assert not bookkeeping("bed", "degC", rows_, uneven, "other input")
+    assert not bookkeeping("序号", "", rows_ + 0.5 * (rows_ > 30), uneven, "other input")
