@@ -173,9 +173,14 @@ class Learner:
                 found[name] = value
         return found
 
-    def save(self, compensator: Compensator, folder: Path, now: float) -> None:
-        """Keep what was seen on disk, every ten minutes; a disk that fails costs what was learnt since."""
-        if 0.0 <= now - self.saved < SAVE_S:
+    def save(self, compensator: Compensator, folder: Path, now: float, *, last: bool = False) -> None:
+        """Keep what was seen on disk, every ten minutes and at the end; a disk that fails costs what was
+        learnt since.
+
+        Args:
+            last: the program ends.
+        """
+        if not last and 0.0 <= now - self.saved < SAVE_S:
             return
         self.saved = now
         with suppress(OSError):

@@ -315,9 +315,11 @@ class Session:
             self._hear(now)
 
     def close(self, now: float) -> None:
-        """Write the state a last time, and wait until it stands on the disk."""
+        """Write the state and what was learnt a last time, and wait until they stand on the disk."""
         self._hear(now)
         self.save(now)
+        if self.learn is not None and self.folder is not None and self.learn.seen.times:
+            self.learn.save(self.compensator, self.folder, now, last=True)
         self._hear(now)
         if self.output is not None:
             self.output.close()

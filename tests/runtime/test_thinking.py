@@ -119,6 +119,21 @@ def test_after_a_take_over_only_what_the_new_model_has_not_seen_is_kept(
     assert learn.seen.times == []
 
 
+def test_a_planned_stop_loses_nothing_of_what_was_learnt(
+    work: tuple[Session, Slow, list[str]], minutes: np.ndarray
+) -> None:
+    session, _, _ = work
+    hours(session, minutes, 0, 12)
+    assert session.learn is not None
+    assert len(session.learn.seen.times) > 60
+    session.close(12 * HOUR)
+    assert session.folder is not None
+    again = Learner(session.learn.key)
+    again.load(session.compensator, session.folder)
+    assert again.seen.times == session.learn.seen.times
+    assert again.seen.inputs == session.learn.seen.inputs
+
+
 def test_another_process_gives_the_same_answer(
     work: tuple[Session, Slow, list[str]], minutes: np.ndarray
 ) -> None:
