@@ -82,14 +82,17 @@ class Fit:
     def zeros(self) -> dict[str, tuple[float, float]]:
         """Of each output with a zero of its own in each recording: its mean and spread in another one.
 
-        A mixture: recordings of the fit count once each, the stated spread as one part of their number.
+        A mixture: recordings of the fit count once each, the spread that they show as one part of their
+        number.
         """
         found = {}
         for name in {*self.offsets}.intersection(self.problem.outputs):
-            stated = max(s.grid.spread[name] for s in self.problem.systems)
+            shown = max(
+                u.prior[1] for u in self.problem.unknowns if u.is_offset and u.name == name and u.prior
+            )
             seen = np.array(list(self.offsets[name].values()))
             count = len(seen)
-            means, squares = np.r_[0.0, seen[:, 0]], np.r_[stated**2, np.nan_to_num(seen[:, 1]) ** 2]
+            means, squares = np.r_[0.0, seen[:, 0]], np.r_[shown**2, np.nan_to_num(seen[:, 1]) ** 2]
             weights = np.r_[1 / count, np.ones(count)] / (1 / count + count)
             mean = float(weights @ means)
             found[name] = mean, float(np.sqrt(weights @ ((means - mean) ** 2 + squares)))
@@ -316,7 +319,7 @@ def _first_spreads(problem: Problem, theta: Array) -> dict[str, float]:
     """A first guess of how far states begin from their start that are neither read nor given a spread: a
     share of what they move.
     """
-    asked = [u for u in problem.unknowns if u.spread == "fitted"]
+    asked = [u for u in problem.unknowns if u.spread == "fitted" and u.is_start]
     runs = [problem.run(s, theta) for s in problem.systems] if asked else []
     moved: dict[str, float] = {}
     for run in runs:
@@ -329,7 +332,8 @@ def _first_spreads(problem: Problem, theta: Array) -> dict[str, float]:
 def _found_spreads(
     problem: Problem, jacobian: Array, theta: Array, together: float
 ) -> dict[str, tuple[float, float]]:
-    """By state: the spread of its starts that makes them most likely, and the one before.
+    """By state: the spread of its starts that makes them most likely, and the one before. By output with a
+    zero of its own in each recording: the same of its zeros.
 
     One step of expectation maximisation over the recordings, with the one before as `FORMER` of them.
     """
@@ -339,12 +343,36 @@ def _found_spreads(
     covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
     found = {}
     for name in asked:
-        mine = [i for i, u in enumerate(problem.unknowns) if u.name == name and u.is_start]
+        mine = [i for i, u in enumerate(problem.unknowns) if u.name == name and u.spread == "fitted"]
         before = problem.unknowns[mine[0]].prior
         assert before is not None
+        if problem.unknowns[mine[0]].is_offset:
+            grid = problem.systems[0].grid
+            known = np.linalg.pinv(covariance[np.ix_(mine, mine)], hermitian=True) / together
+            found[name] = likeliest_spread(theta[mine], known, before[1], grid.spread[name]), before[1]
+            continue
         squares = sum(theta[i] ** 2 + together * covariance[i, i] for i in mine)
         found[name] = (float(np.sqrt((FORMER * before[1] ** 2 + squares) / (FORMER + len(mine)))), before[1])
     return found
+
+
+def likeliest_spread(zeros: Array, precision: Array, before: float, stated: float) -> float:
+    """Spread of the zeros (K,) that makes the readings most likely, at most about the stated one.
+
+    With all other unknowns integrated out, the readings say b'z - z'Lz/2 of the zeros z. Then
+    log p(s) = b'(L + 1/s^2)^-1 b/2 - log det(1 + s^2 L)/2 - (s/stated)^2/2. A constant that all zeros share
+    with the model says nothing of their spread.
+
+    Args:
+        precision: (K, K) of the zeros under the spread `before`.
+    """
+    b = precision @ zeros
+    values, vectors = np.linalg.eigh(precision - np.eye(len(zeros)) / before**2)
+    values, b = np.maximum(values, 0.0), vectors.T @ b
+    tried = stated * np.geomspace(0.02, 2.0, 60)
+    squares = tried[:, None] ** 2
+    log_p = 0.5 * np.sum(b**2 * squares / (1 + squares * values) - np.log1p(squares * values), axis=1)
+    return float(tried[np.argmax(log_p - 0.5 * (tried / stated) ** 2)])
 
 
 def _excess(problem: Problem, solution: Solution) -> float:

@@ -120,7 +120,7 @@ class Problem:
 
     def start_spreads(self) -> dict[str, float]:
         """By state: the spread of its starts, where the fit has found it."""
-        return {u.name: u.prior[1] for u in self.unknowns if u.spread == "fitted" and u.prior}
+        return {u.name: u.prior[1] for u in self.unknowns if u.is_start and u.spread == "fitted" and u.prior}
 
     def prior_rows(self, theta: Array, together: float = 1.0) -> tuple[Array, Array]:
         """What priors and beliefs add to the least squares: residual (K,) and its derivative (K, U).
@@ -250,9 +250,12 @@ def _unknowns(
             if sd > 0
         ]
         unknowns += [
-            Unknown(n, system.grid.recording, False, 0.0, -np.inf, np.inf, (0.0, sd), is_offset=True)
+            Unknown(
+                n, system.grid.recording, False, 0.0, -np.inf, np.inf, (0.0, sd), spread=how, is_offset=True
+            )
             for n in uncertain(system)
             if (sd := system.grid.spread[n])
+            for how in _zero_spread(n in system.grid.outputs)
         ]
         unknowns += [
             Unknown(n, system.grid.recording, False, 0.0, -MOST * sd, MOST * sd, (0.0, sd), is_late=True)
@@ -272,6 +275,11 @@ def _parameter(
     reach = FARTHEST * abs(start) or np.inf
     low, high = max(low, -reach), min(p.max, reach)
     return Unknown(name, recording, False, start, low, high, known, is_log, belief)
+
+
+def _zero_spread(is_output: bool) -> list[Literal["given", "fitted"]]:
+    """How the spread of an offset is known: that of an output's zeros is at most the stated one."""
+    return ["fitted"] if is_output else ["given"]
 
 
 def _start_spread(state: State) -> tuple[float, Literal["given", "read", "fitted"]]:

@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import multivariate_normal
 
 from discovery.dynamics import make_grid, make_system, predict, sensitivities, simulate
 from discovery.dynamics.system import shifted
 from discovery.fitting import Fit, fit_model, predict_recording
+from discovery.fitting.fit import likeliest_spread
 from discovery.fitting.ridge import fit_ridge
 from discovery.fitting.starts import warm_start
 from discovery.models import Model, Parameter, State
@@ -141,3 +143,33 @@ def test_the_zeros_that_a_fit_finds_are_those_of_the_recordings() -> None:
     first = {name: 0.1 * WARM[name] + 3 * (c.recordings[name].values["room"][0] - 20) for name in FIT}
     for name, (zero, error) in fit.offsets["E"].items():
         assert abs(zero + first[name]) < 3 * error + 3 * NOISE
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_the_spread_of_zeros_is_the_one_that_makes_the_readings_most_likely(shared: bool) -> None:
+    """Against the density of the estimates themselves, by scipy, over a grid of spreads."""
+    rng = np.random.default_rng(4)
+    zeros, noise, stated, before = rng.normal(0.0, 2.0, 6), 0.5, 12.0, 9.0
+    read = zeros + noise * rng.standard_normal(6)
+    every = np.eye(6) - shared * np.full((6, 6), 1 / 6)  # a constant of the model takes what all share
+    says = every / noise**2
+    precision = says + np.eye(6) / before**2
+    found = likeliest_spread(np.linalg.solve(precision, says @ read), precision, before, stated)
+
+    basis = np.linalg.svd(every)[0][:, : 6 - shared]  # what the readings show
+    spreads = np.geomspace(0.3, 20.0, 2000)
+    log_p = [
+        multivariate_normal(cov=(s**2 + noise**2) * np.eye(6 - shared)).logpdf(basis.T @ read)
+        - 0.5 * (s / stated) ** 2
+        for s in spreads
+    ]
+    assert found == pytest.approx(spreads[int(np.argmax(log_p))], rel=0.05)
+
+
+def test_the_stated_spread_of_a_zero_is_a_limit_and_no_estimate() -> None:
+    c = machine(40.0, ZEROS)
+    fit = fit_model(gray(), c, FIT, ["E"])
+    spreads = {u.prior[1] for u in fit.problem.unknowns if u.is_offset and u.prior}
+    true = [0.1 * WARM[name] + 3 * (c.recordings[name].values["room"][0] - 20) for name in FIT]
+    assert spreads.pop() == pytest.approx(np.sqrt(np.mean(np.square(true))), rel=0.5)
+    assert not spreads
