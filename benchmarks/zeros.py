@@ -5,9 +5,9 @@
 Each seed draws a machine of the next family, three recordings of 24 h to fit and two held out. They all begin
 cold (at rest for 30 h) or all warm (at work for 30 h). All readings count from the first one of their
 recording, because no zero is known. Models are fitted in three ways: to these readings; with a zero of its
-own in each recording; and, to compare with, to readings from the true zero. A line for each case has the rms of
-held-out free runs in um, pooled over the errors, of each way. At the end stands the mean of the logarithm of
-own zero over first reading, by kind of model and start, with its standard error over the machines.
+own in each recording; and, to compare with, to readings from the true zero. A line for each case has the rms
+of held-out free runs in um, pooled over the errors, of each way. At the end stands the mean of the logarithm
+of own zero over first reading, by kind of model and start, with its standard error over the machines.
 """
 
 from __future__ import annotations
