@@ -33,7 +33,7 @@ class Refit:
     systems: tuple[System, ...]
     model: Model
     sigma: Array  # (Y,)
-    theta: Array  # (U,): parameters, then start values recording by recording
+    theta: Array  # (U,): parameters over their nominal values, then start values recording by recording
     residual: Array  # (R,)
     slopes: Array  # (R, U)
 
@@ -72,7 +72,13 @@ def refit(
     problem = _Problem(systems, model, sigma)
     start = problem.start if begin is None else begin.theta
     found = least_squares(
-        problem.residual, start, problem.jacobian, method="trf", x_scale="jac", max_nfev=60, ftol=1e-5
+        problem.residual,
+        start,
+        problem.jacobian,
+        bounds=(problem.lowest, np.inf),
+        x_scale="jac",
+        max_nfev=60,
+        ftol=1e-5,
     )
     return Refit(systems, model, sigma, found.x, found.fun, np.asarray(found.jac))
 
@@ -101,20 +107,29 @@ class _Problem:
 
     def __init__(self, systems: Sequence[System], model: Model, sigma: Array) -> None:
         self.systems, self.model, self.sigma = systems, model, sigma
-        self.free = {name: model.parameters[name].min >= 0.0 for name in model.free}  # these as logarithms
+        values = model.values()
+        self.size = {name: abs(values[name]) or 1.0 for name in model.free}
         self.states = [name for name, state in model.states.items() if not state.memory]
         self.latest: tuple[Array, Array, Array] | None = None
 
     @property
     def start(self) -> Array:
         values = self.model.values()
-        free = [np.log(values[p]) if logged else values[p] for p, logged in self.free.items()]
+        free = [values[name] / size for name, size in self.size.items()]
         return np.array(free + [0.0] * (len(self.states) * len(self.systems)))
+
+    @property
+    def lowest(self) -> Array:
+        """The least value (U,) of each unknown. A size that cannot be negative may come down to zero and
+        leave it again; its logarithm would not.
+        """
+        free = [self.model.parameters[name].min / size for name, size in self.size.items()]
+        return np.array(free + [-np.inf] * (len(self.states) * len(self.systems)))
 
     def values(self, theta: Array) -> dict[str, float]:
         """Parameters by name."""
-        pairs = zip(self.free.items(), theta.tolist(), strict=False)
-        return {name: float(np.exp(min(z, 50.0))) if logged else z for (name, logged), z in pairs}
+        pairs = zip(self.size.items(), theta.tolist(), strict=False)
+        return {name: x * size for (name, size), x in pairs}
 
     def residual(self, theta: Array) -> Array:
         return self._run(theta)[0]
@@ -125,10 +140,10 @@ class _Problem:
     def _run(self, theta: Array) -> tuple[Array, Array]:
         if self.latest is not None and np.array_equal(self.latest[2], theta):
             return self.latest[0], self.latest[1]
-        P, S = len(self.free), len(self.states)
+        P, S = len(self.size), len(self.states)
         own_values = self.values(theta)
         values = self.model.values() | own_values
-        inner = np.array([own_values[p] if logged else 1.0 for p, logged in self.free.items()])
+        inner = np.array(list(self.size.values()))
         residuals, slopes = [], []
         for k, system in enumerate(self.systems):
             own = slice(P + k * S, P + (k + 1) * S)
@@ -139,7 +154,7 @@ class _Problem:
             try:
                 trajectory = simulate(system, values, start)
                 residuals.append(((predict(trajectory) - system.grid.readings) / self.sigma).ravel())
-                dy = sensitivities(trajectory, list(self.free), self.states) / self.sigma[:, None]
+                dy = sensitivities(trajectory, list(self.size), self.states) / self.sigma[:, None]
                 wide[:, :P] = dy[:, :, :P].reshape(rows, P) * inner
                 wide[:, own] = dy[:, :, P:].reshape(rows, S)
             except RunsAwayError:
