@@ -118,6 +118,7 @@ def _physics(d: Diagnosis, n: Named) -> Physics:
         title=h.effect.title,
         moved=moved or None,
         probability=round(n.probability, 4),
+        together=round(n.together, 4) if n.together > n.probability else None,
         expression=expressions[0],
         expressions=expressions if len(expressions) > 1 else None,
         parameters=sizes,

@@ -34,6 +34,10 @@ class Physics(Claim):
     title: str
     moved: list[str] | None = Field(None, description="outputs that it moves beyond the interval of each")
     probability: float
+    together: float | None = Field(
+        None,
+        description="probability that it acts, or an alternative less than 3 below, where one is as near",
+    )
     expression: str
     expressions: list[str] | None = Field(None, description="all, where it has several")
     parameters: dict[str, Size]

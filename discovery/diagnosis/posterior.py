@@ -8,7 +8,7 @@ rest is algebra on their normal equations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,10 +58,10 @@ class Posterior:
         odds = self.evidence[true].max(axis=0) - self.evidence[~true].max(axis=0)
         return float(np.mean(1.0 / (1.0 + np.exp(-np.clip(odds, -500, 500)))))
 
-    def of_claim(self, h: Hypothesis) -> float:
-        """Probability that an effect acts at any place, in the recordings of a hypothesis."""
-        claim = (h.effect.word, h.recording)
-        return self.of(lambda m: any((o.effect.word, o.recording) == claim for o in m.hypotheses))
+    def of_claims(self, several: Iterable[Hypothesis]) -> float:
+        """Probability that one of several effects acts at any place, in the recordings of its hypothesis."""
+        claims = {(h.effect.word, h.recording) for h in several}
+        return self.of(lambda m: any((o.effect.word, o.recording) in claims for o in m.hypotheses))
 
     @property
     def nothing(self) -> float:

@@ -21,6 +21,8 @@ def lines_of(d: dict[str, Any]) -> list[str]:
     for p in d["physics"]:
         sizes = ", ".join(_size(name, q) for name, q in p["parameters"].items() if _is_known(q, p))
         said = f"  {p['effect']} {_place(p)}, probability {p['probability']:.2f}"
+        if p.get("together"):
+            said += f" ({p['together']:.2f} that it or what it could also be acts)"
         lines.append(f"{said}: {sizes}" if sizes else said)
     near = [a for a in d["alternatives"] if a["log_evidence_below_best"] <= RIVAL]
     lines += [f"  could also be {a['effect']} {_place(a)}" for a in near]

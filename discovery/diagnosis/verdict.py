@@ -44,6 +44,7 @@ class Named:
 
     hypothesis: Hypothesis
     probability: float
+    together: float  # probability that it acts, or a rival that is nearly as likely
     rivals: tuple[Rival, ...]
 
 
@@ -72,7 +73,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
         )
     )
     matters = gain >= thresholds.MATTERS
-    probable = [n for n in candidates if matters and n.probability >= thresholds.NAMED]
+    probable = [n for n in candidates if matters and n.together >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
     sure = _needed(context, found, answer, [n for n in probable if n.hypothesis.key not in refused])
     named, idle = _proved(context, found, answer, sure)
@@ -81,8 +82,10 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
     best = max(rest, key=lambda m: m.evidence)
     short = best.evidence - (_alone(context, found, answer, named) if matters else answer.evidence)
-    # names hold next to effects that are not sure, but not next to heat that no effect explains
-    if (best.forced or not named) and short > by_chance(found.gain):
+    # names hold next to effects that are not sure, but not next to heat that no effect explains; without
+    # names, something is missing only if an effect improves free runs outside the fit
+    much = short > by_chance(found.gain)
+    if much and (best.forced or not (named or _idle_all(context, found, answer, candidates))):
         if best.forced:
             reasons.append(f"heat of unknown cause at {best.forced} explains more than effects do")
         reasons.append(f"the surest effects explain too little (log evidence {short:.0f} below the best)")
@@ -111,6 +114,12 @@ def _proved(
         idle |= more
         kept = tuple(n for n in kept if n.hypothesis.key not in more)
     return kept, idle
+
+
+def _idle_all(context: Context, found: Search, answer: Scored, candidates: Sequence[Named]) -> bool:
+    """Whether no effect of the answer, sure or not, improves free runs outside the fit."""
+    kept, _ = _proved(context, found, answer, candidates)
+    return not kept
 
 
 def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None:
@@ -305,4 +314,6 @@ def _named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis) -
         if label != (h.effect.word, h.places) and (label not in below or gap < below[label].below):
             below[label] = Rival(rival, gap)
     rivals = tuple(sorted(below.values(), key=lambda r: r.below))
-    return Named(h, min(posterior.of_claim(h), thresholds.SUREST), rivals)
+    near = [r.hypothesis for r in rivals if r.below <= thresholds.RIVAL]
+    own, together = posterior.of_claims([h]), posterior.of_claims([h, *near])
+    return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals)

@@ -232,8 +232,9 @@ def _better(run: Run) -> list[str]:
 
 
 def _effect(one: Mapping[str, Any]) -> str:
-    sure = one.get("probability")
-    return _placed(one) + (f" ({percent(sure)} sure)" if sure is not None else "")
+    sure, together = one.get("probability"), one.get("together")
+    said = f"{percent(sure)} sure" + (f", {percent(together)} that it or a rival acts" if together else "")
+    return _placed(one) + (f" ({said})" if sure is not None else "")
 
 
 def _grouped(found: Sequence[Mapping[str, Any]]) -> str:

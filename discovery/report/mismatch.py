@@ -119,7 +119,8 @@ def _physics(d: Mapping[str, Any]) -> Printed:
         cells = (
             words(one["effect"]),
             _place(one),
-            percent(one.get("probability")),
+            percent(one.get("probability"))
+            + (f" ({percent(one['together'])} with its rivals)" if one.get("together") else ""),
             "; ".join(one.get("expressions") or [one.get("expression") or ""]),
             "; ".join(sizes(one)),
         )

@@ -54,19 +54,19 @@ def sigmoid(x: float) -> float:
 def test_a_claim_is_as_likely_as_its_odds_say_on_average_over_draws() -> None:
     found = known(Known((FLUID,)), Known(()), draws=np.array([[4.0, 2.0, -1.0], [1.0, 2.0, 1.0]]))
     expected = np.mean([sigmoid(3.0), sigmoid(0.0), sigmoid(-2.0)])
-    assert found.of_claim(FLUID) == pytest.approx(expected)
+    assert found.of_claims([FLUID]) == pytest.approx(expected)
     assert found.nothing == pytest.approx(1 - expected)
 
 
 def test_how_many_models_were_tried_says_nothing() -> None:
     few = known(Known((FLUID,), 5.0), Known((), 3.0))
     many = known(Known((FLUID,), 5.0), *(Known((FLUID, LAG), 4.0 - k) for k in range(20)), Known((), 3.0))
-    assert many.of_claim(FLUID) == pytest.approx(few.of_claim(FLUID)) == pytest.approx(sigmoid(2.0))
+    assert many.of_claims([FLUID]) == pytest.approx(few.of_claims([FLUID])) == pytest.approx(sigmoid(2.0))
 
 
 def test_what_all_models_claim_or_none_is_certain() -> None:
     found = known(Known((FLUID,), 5.0), Known((FLUID, LAG), 3.0))
-    assert found.of_claim(FLUID) == 1.0
+    assert found.of_claims([FLUID]) == 1.0
     assert found.nothing == 0.0
 
 
@@ -111,4 +111,4 @@ def test_each_block_once_is_what_was_scored() -> None:
 def test_the_same_models_give_the_same_posterior() -> None:
     first, again = (posterior(dry(), [bare(), wetted()]) for _ in range(2))
     assert np.array_equal(first.evidence, again.evidence)
-    assert first.of_claim(wetted().hypotheses[0]) > 0.95
+    assert first.of_claims([wetted().hypotheses[0]]) > 0.95

@@ -96,8 +96,8 @@ class Believed:
     def best(self) -> Model:
         return max(self.models, key=lambda m: m.evidence)
 
-    def of_claim(self, h: Hypothesis) -> float:
-        return self.words[h.effect.word]
+    def of_claims(self, several: Sequence[Hypothesis]) -> float:
+        return sum(self.words[word] for word in {h.effect.word for h in several})
 
 
 @dataclass(frozen=True)
@@ -245,13 +245,44 @@ def test_rivals_stand_in_the_place_of_one_effect() -> None:
         Model((FRICTION,), 60.0),
         Model((), 0.0),
     ]
-    found = said(Tried(models), {"fluid_convection": 0.95, "friction_speed": 0.95})
+    found = said(Tried(models), {"fluid_convection": 0.9, "film_drag": 0.05, "friction_speed": 0.95})
     rivals = {n.hypothesis.effect.word: n.rivals for n in found.named}
     assert [(r.hypothesis.effect.word, r.below) for r in rivals["fluid_convection"]] == [
         ("film_drag", 2.0),
         ("unmeasured_heat", 10.0),
     ]
     assert rivals["friction_speed"] == ()
+
+
+@pytest.mark.parametrize(
+    ("below", "other", "word"),
+    [(2.9, 0.4, "missing physics"), (3.1, 0.4, "unexplained"), (2.9, 0.2, "unexplained")],
+)
+def test_one_of_several_rivals_acts(below: float, other: float, word: str) -> None:
+    """Neither is sure enough alone: the likelier one is named with its own probability, the other one as
+    its rival, with the probability that one of the two acts.
+    """
+    drag = claim("film_drag", "table")
+    found = said(
+        Tried([Model((FLUID,), 100.0), Model((drag,), 100.0 - below), Model((), 0.0)]),
+        {"fluid_convection": 0.45, "film_drag": other},
+    )
+    assert found.word == word
+    if found.named:
+        (one,) = found.named
+        assert (one.probability, one.together) == pytest.approx((0.45, 0.85))
+        assert [r.hypothesis for r in one.rivals] == [drag]
+
+
+def test_what_is_not_sure_is_missing_only_if_it_improves_free_runs_outside_the_fit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for after, word in ((1.0, "no mismatch"), (0.5, "unexplained")):
+        proof = Improvement(1.0, after, 0.5, -1.0, 1.0, {})
+        monkeypatch.setattr(verdict, "left_out", lambda _, __, chosen, p=proof: {h.key: p for h in chosen})
+        found = said(WET, {"fluid_convection": 0.5})
+        assert (found.word, found.named) == (word, ())
+        assert any("is possible but not sure enough" in text for text in found.reasons)
 
 
 def test_what_changes_no_free_run_is_not_lacking(monkeypatch: pytest.MonkeyPatch) -> None:
