@@ -108,7 +108,9 @@ clean:
 	"$(PYTHON)" -m venv .venv
 	@touch $@
 
+# The lock names every package, so pip resolves nothing: with an extra (coverage[toml]) it would take a newer release, without a hash
 $(STAMP): .venv/created.stamp requirements.lock pyproject.toml
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m pip check --disable-pip-version-check
 	@touch $@
