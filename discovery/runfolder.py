@@ -25,8 +25,12 @@ _KEYS: dict[str, dict[str, type]] = {
 
 
 def default_folder(experiment: str) -> Path:
-    """Where results go unless the user says otherwise."""
-    return Path("runs") / experiment
+    """Where results go unless the user says otherwise: what cannot be part of a folder's name becomes "_".
+
+    >>> default_folder("mill, X axis: 3/4").name
+    'mill_ X axis_ 3_4'
+    """
+    return Path("runs") / re.sub(r"[^\w .+-]+", "_", experiment).lstrip(" ._+-")[:100].rstrip()
 
 
 def read_results(folder: Path) -> dict[str, Any]:

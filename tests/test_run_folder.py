@@ -22,6 +22,7 @@ from discovery.experiment.inputfiles import input_files
 from discovery.experiment.summary import summary
 from discovery.export import export_run, replay
 from discovery.report.run import load_run
+from discovery.runfolder import default_folder
 from discovery.targets import TARGETS
 from tests.small import CAMPAIGN, EXPERIMENT, write_small
 
@@ -266,3 +267,12 @@ def test_a_broken_file_is_one_sentence_whoever_reads_it(
     [sentence] = sentences
     assert str(tmp_path / name) in sentence
     assert "make the run again" in sentence
+
+
+@pytest.mark.parametrize("name", ["../small", "/etc/x", "mill, X axis: 3/4", "  .hidden", "Fräse #3", "a" * 300])
+def test_the_folder_of_any_name_stands_in_runs(name: str) -> None:
+    folder = default_folder(name)
+    assert folder.parent == Path("runs")
+    assert folder.name
+    assert not folder.name.startswith(".")
+    assert len(folder.name) <= 100

@@ -1,9 +1,10 @@
 """The probability of an answer: the bagged posterior over all models that the search tried.
 
 The posterior of approximate models is too narrow: with a little more data, other priors or one recording
-less, another model is the most likely one. Therefore it is averaged over resampled blocks of time and over
-wider and narrower priors (Huggins & Miller, Bayesian Analysis 18, 2023). The models are not fitted again; the
-rest is algebra on their normal equations.
+less, another model is the most likely one. Therefore it is averaged over resampled blocks of time (Huggins &
+Miller, Bayesian Analysis 18, 2023). How wide the priors are is not known either: the evidence of each model
+is integrated over wider and narrower ones, so that a width which the readings contradict has no say. The
+models are not fitted again; the rest is algebra on their normal equations.
 """
 
 from __future__ import annotations
@@ -70,25 +71,24 @@ class Posterior:
 
 
 def posterior(context: Context, models: Collection[Scored], seed: int = 0) -> Posterior:
-    """The posterior of models over bootstrap draws of blocks and over prior widths."""
+    """The posterior of models over bootstrap draws of blocks, prior widths integrated out."""
     best = max(m.evidence for m in models)
     taking = sorted((m for m in models if m.evidence > best - FAR), key=lambda m: -m.evidence)[:MOST]
-    draws, widths = _draws(len(context.recordings), context.blocks, seed)
-    return Posterior(tuple(taking), np.array([_evidence(m, draws, widths) for m in taking]))
+    draws = _draws(len(context.recordings), context.blocks, seed)
+    return Posterior(tuple(taking), np.array([_evidence(m, draws) for m in taking]))
 
 
-def _draws(recordings: int, blocks: int, seed: int) -> tuple[Array, Array]:
-    """Count of each block (D, B) in each draw, with the same number of blocks in each recording; width of
-    priors (D,).
-    """
+def _draws(recordings: int, blocks: int, seed: int) -> Array:
+    """Count of each block (D, B) in each draw, with the same number of blocks in each recording."""
     rng = np.random.default_rng(seed)
     count = thresholds.DRAWS
     one = [rng.multinomial(blocks, np.full(blocks, 1 / blocks), count) for _ in range(recordings)]
-    return np.concatenate(one, axis=1).astype(float), rng.choice(WIDTHS, count)
+    return np.concatenate(one, axis=1).astype(float)
 
 
-def _evidence(model: Scored, draws: Array, widths: Array) -> Array:
-    """Log evidence (D,) of a model on each draw."""
+def _evidence(model: Scored, draws: Array) -> Array:
+    """Log evidence (D,) of a model on each draw, over noise settings and prior widths."""
     order = np.argsort(-model.levels)[:SETTINGS]
     near = [int(k) for k in order if model.levels[k] > model.levels[order[0]] - IN_PLAY]
-    return np.asarray(log_sum_exp(np.array([model.drawn(k, draws, widths) for k in near]))) + model.prior
+    pieces = [model.drawn(k, draws, np.full(len(draws), wide)) for k in near for wide in WIDTHS]
+    return np.asarray(log_sum_exp(np.array(pieces))) - float(np.log(len(WIDTHS))) + model.prior

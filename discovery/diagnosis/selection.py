@@ -25,6 +25,7 @@ REFITS = 5  # claims that are refitted at each step
 RIVALS = 3  # ... in the place of another one
 HOPE = 4.0  # log odds below those of the model without it from which a claim is not refitted
 HALF = 0.6  # of the best log odds: claims that reach it are refitted
+NEAR = 10.0  # log evidence within which an effect may replace another one that it has replaced before
 FAR = 40.0  # log evidence below the best from which a model is not scored again, and refits end early
 
 Keys = frozenset[Key]
@@ -106,13 +107,23 @@ class Search:
     def _grown(self, current: Scored) -> Scored:
         """Add the best candidate, or let an effect act at more places, as long as the posterior grows."""
         while len(current.hypotheses) < MOST:
-            best = self._refitted(current, current.hypotheses, hopeful(self.scanned(current).claims, REFITS))
-            best = max(best, self._widened(current), key=lambda one: one.evidence)
+            best = max(self._added(current), self._widened(current), key=lambda one: one.evidence)
             if best.evidence <= current.evidence:
                 break
             current = best
             self.tell(f"{best.hypotheses[-1].effect.title}, {best.hypotheses[-1].where}")
         return current
+
+    def _added(self, current: Scored) -> Scored:
+        """The best refit with one of the best candidates; `current` if none is better. Candidates that run
+        away or press against zero give way to the next.
+        """
+        own, claims = current.keys, self.scanned(current).claims
+        while True:
+            left = [c for c in claims if own | {c.hypothesis.key} not in self.lost]
+            before, best = len(self.lost), self._refitted(current, current.hypotheses, hopeful(left, REFITS))
+            if best is not current or len(self.lost) == before:
+                return best
 
     def _widened(self, current: Scored) -> Scored:
         """The best refit with an effect at its places and more; `current` if none is better."""
@@ -137,10 +148,28 @@ class Search:
             # an infinite gain: what is left has a size of the wrong sign, so that nothing is reached
             reached = own if own < inf else -inf
             pool = hopeful(scan.without[h.key], RIVALS, reached)
-            best = self._refitted(without, others, [*pool, *_alike(h, scan.without[h.key])])
+            pool = [*pool, *_alike(h, scan.without[h.key]), *self._in_its_place(h, current)]
+            best = self._refitted(without, others, pool)
             if max(best.evidence, without.evidence) > current.evidence:
                 return self._questioned(max(best, without, key=lambda a: a.evidence))
         return current
+
+    def _in_its_place(self, h: Hypothesis, current: Scored) -> list[Score]:
+        """Effects that stood in the place of an effect of a model, next to fewer others, and were about as
+        likely. The scan sees a large effect only to first order; these were refitted.
+        """
+        found = {}
+        for keys, one in self.tried.items():
+            others = keys & (current.keys - {h.key})
+            other = self.tried.get(others | {h.key})
+            if other is None or len(keys) != len(others) + 1 or keys <= current.keys:
+                continue
+            if other.evidence - one.evidence < NEAR:
+                rival = next(o for o in one.hypotheses if o.key not in others)
+                values = one.fit.model.parameters
+                sizes = tuple(values[name].value for name in rival.amplitudes)
+                found[rival.key] = Score(rival, 0.0, 0.0, sizes, 1.0, 0)
+        return list(found.values())
 
     def _refitted(self, start: Scored, others: Sequence[Hypothesis], pool: Sequence[Score]) -> Scored:
         """The best refit with one of some candidates added; `start` if none is better."""

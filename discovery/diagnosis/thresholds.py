@@ -40,5 +40,5 @@ CHANCE = 1.5  # standard deviations of all log evidence that a name has to add: 
 MISSED = 2.0  # times the rms that is expected of a free run: from here on the model lacks something
 RIVAL = 3.0  # log evidence within which another answer may as well be right
 RIVALS_SHOWN = 12  # other answers in the document
-DRAWS = 100  # bootstrap draws over blocks and priors
+DRAWS = 50  # bootstrap draws over blocks
 BLOCKS = 36  # of time, over all recordings

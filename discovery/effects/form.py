@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import ceil, exp, inf, log, sqrt
+from math import ceil, erf, exp, inf, log, pi, sqrt
 from typing import Literal
 
 Group = Literal[
@@ -75,6 +75,23 @@ DRIVING = (  # roles of the inputs that an error may follow by a law of its own
 
 _RATIO = 3.0  # between neighbouring values of a shape in a search: signatures of both are much alike
 _REACH = 2.0  # standard deviations of a prior that a search covers
+_HALVES = 6  # cells on either side of zero, each half as wide as the next: down to a thirtieth of the spread
+
+
+def _around_zero() -> tuple[tuple[float, float], ...]:
+    """Values of a normal of either sign, and the weight of each: the means of cells that become smaller
+    towards zero. An effect without a size (a clock that is wrong) is as small as its shape.
+    """
+    edges = [_REACH * 0.5**k for k in range(_HALVES)]
+    cells = [*zip(edges[1:], edges, strict=False), (0.0, edges[-1])]
+    mass = [(erf(high / sqrt(2)) - erf(low / sqrt(2))) / 2 for low, high in cells]
+    moment = [(exp(-0.5 * low**2) - exp(-0.5 * high**2)) / sqrt(2 * pi) for low, high in cells]
+    total = 2 * sum(mass)
+    pairs = [(m / w, w / total) for m, w in zip(moment, mass, strict=True)]
+    return (*((-z, w) for z, w in pairs), *((z, w) for z, w in reversed(pairs)))
+
+
+_AROUND_ZERO = _around_zero()
 
 
 @dataclass(frozen=True)
@@ -127,15 +144,14 @@ class Shape:
         """Values to integrate over, and the logarithm of the weight of each."""
         if self.instant or self.middle is None:
             return ((self.middle or 0.0, 0.0),)
-        count = 8  # of either sign, without the zero at which nothing acts
-        if self.factor:
-            count = max(3, ceil(2 * _REACH * log(self.factor) / log(_RATIO)) + 1)
+        if not self.factor:
+            return tuple((self.middle + self.spread * z, log(w)) for z, w in _AROUND_ZERO)
+        count = max(3, ceil(2 * _REACH * log(self.factor) / log(_RATIO)) + 1)
         steps = [-_REACH + 2 * _REACH * k / (count - 1) for k in range(count)]
         weights = [exp(-0.5 * z * z) for z in steps]
         total = log(sum(weights))
         return tuple(
-            (self.middle * self.factor**z if self.factor else self.middle + self.spread * z, log(w) - total)
-            for z, w in zip(steps, weights, strict=True)
+            (self.middle * self.factor**z, log(w) - total) for z, w in zip(steps, weights, strict=True)
         )
 
     @property

@@ -15,6 +15,7 @@ part does not average out over a long recording (Kennedy & O'Hagan, J. R. Stat. 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,11 +167,14 @@ def _stacked(trajectories: Sequence[Trajectory], columns: Sequence[Array], white
 
 
 def effect_form(trajectories: Sequence[Trajectory], hypotheses: Sequence[Hypothesis]) -> list[Array]:
-    """By recording, what the readings (R, Y, M) show more where the flow of each effect is off by its own
-    size, once for each psi; and where a sensor is not quite what an effect without a size makes of it.
+    """By recording, what the readings (R, Y, M) show more where each effect is off by its own size, once for
+    each psi: its flow, or what it adds to the outputs; and where a sensor is not quite what an effect without
+    a size makes of it.
     """
     scales = scales_of(trajectories)
-    lasting = [h for h in hypotheses if h.terms and not h.effect.is_event and h.effect.is_physics]
+    lasting = [h for h in hypotheses if not h.effect.is_event and h.effect.is_physics]
+    paths = [h for h in lasting if h.shown and h.effect.amplitude.fixed is None]
+    lasting = [h for h in lasting if h.terms]
     sensors = [h for h in hypotheses if h.shown and not h.recording and h.effect.amplitude.fixed is not None]
     found = []
     for k, run in enumerate(trajectories):
@@ -181,8 +185,22 @@ def effect_form(trajectories: Sequence[Trajectory], hypotheses: Sequence[Hypothe
                 pieces += _pieces(run, term, points, count)
             count += len(points)
         flows = sensitivities(run, (), (), pieces, count=count)
-        found.append(np.concatenate([flows, signatures(run, sensors)], axis=2))
+        shown = [_shown_beyond(run, h, scales, k, len(trajectories)) for h in paths]
+        found.append(np.concatenate([flows, *shown, signatures(run, sensors)], axis=2))
     return found
+
+
+def _shown_beyond(
+    run: Trajectory, h: Hypothesis, scales: Mapping[str, tuple[float, float]], index: int, count: int
+) -> Array:
+    """What an effect adds to the outputs, times each psi, (R, Y, M)."""
+    env, read = run.at_ends(), run.system.grid.read
+    sizes = {n: float(np.ravel(env[n])[0]) for n in (*h.amplitudes, *h.shapes)}
+    here = replace(h, shapes={n: sizes[n] for n in h.shapes})
+    added = signatures(run, [here]) @ np.array([sizes[n] for n in h.amplitudes])
+    points = _points(run, scales, h.states[0] if h.states else "", index, count)
+    at_readings = [p[np.minimum(2 * read, len(p) - 1)] for p in points]
+    return np.stack([added * p[:, None] for p in at_readings], axis=2)
 
 
 def _pieces(run: Trajectory, term: Term, points: Sequence[Array], first: int) -> list[Column]:

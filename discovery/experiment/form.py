@@ -23,6 +23,12 @@ def _file_name(name: str) -> str:
     return name
 
 
+def _one_line(name: str) -> str:
+    if not (name.isprintable() and re.search(r"[^\W_]", name)):
+        raise ValueError(f"{name!r}: write a name of one line, with letters or digits")
+    return name
+
+
 _BUILT = [
     "reduced",
     "superposition",
@@ -196,7 +202,7 @@ class PaperForm(Strict):
 class ExperimentForm(Strict):
     """The whole file."""
 
-    name: Annotated[str, AfterValidator(_file_name)]
+    name: Annotated[str, AfterValidator(_one_line)]
     campaign: str = Field(description="campaign file or its folder, relative to the experiment file")
     outputs: list[str] | None = Field(
         None,
