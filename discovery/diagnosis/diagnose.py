@@ -19,7 +19,7 @@ from discovery.diagnosis.posterior import Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, size_of, unit_of
 from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
-from discovery.diagnosis.scored import Scored, with_force
+from discovery.diagnosis.scored import Scored, with_change, with_force
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import (
     NO_MISMATCH,
@@ -207,7 +207,9 @@ def diagnose(
     tell("locating")
     setting = found.baseline.settings[found.baseline.best]
     forces = latent_forces(found.baseline.seen, setting, context.floor)
-    unexplained = verdict.word == UNEXPLAINED and bool(forces)
+    # what changes an output only has no curve of heat
+    shown = [] if chances.best.forced and not chances.best.forced_state else forces
+    unexplained = verdict.word == UNEXPLAINED and bool(shown)
     return Diagnosis(
         context=context,
         search=found,
@@ -216,12 +218,12 @@ def diagnose(
         alone=alone,
         before=before,
         after=after,
-        location=locate(context, found.baseline, verdict, chances, forces),
+        location=locate(context, found.baseline, verdict, chances, shown),
         forces=tuple(forces),
         fit=fitting,
         held_out=proof,
-        description=describe(context, found.baseline, forces[0]) if unexplained else None,
-        curves=tuple(curves(found.baseline, forces[0])) if forces and verdict.word != NO_MISMATCH else (),
+        description=describe(context, found.baseline, shown[0]) if unexplained else None,
+        curves=tuple(curves(found.baseline, shown[0])) if shown and verdict.word != NO_MISMATCH else (),
         question=ask(context, found, verdict),
         seconds=clock.perf_counter() - began,
     )
@@ -239,13 +241,14 @@ def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]
 
 
 def _unknown(context: Context, found: Search) -> list[Scored]:
-    """A latent force at each state: alone, and with the best answer."""
+    """Something of unknown cause at each state and in each output: alone, and with the best answer."""
     models = list({one.keys: one for one in (found.baseline, found.best)}.values())
 
-    def at_each_state(one: Scored) -> list[Scored]:  # what it has whitened is kept from one state to the next
-        return [with_force(context, one, state) for state in context.floor]
+    def at_each_place(one: Scored) -> list[Scored]:  # what it has whitened is kept from one place to the next
+        heat = [with_force(context, one, state) for state in context.floor]
+        return [*heat, *(with_change(context, one, output) for output in context.outputs)]
 
-    return [forced for each in side_by_side(at_each_state, models) for forced in each]
+    return [forced for each in side_by_side(at_each_place, models) for forced in each]
 
 
 def _repaired(

@@ -82,7 +82,7 @@ def _states(posterior: Posterior, forces: Sequence[Force]) -> dict[str, float]:
     weight: dict[str, float] = {f.state: 0.0 for f in forces}
     for model, p in zip(posterior.models, posterior.shares, strict=True):
         places = [h.states for h in model.hypotheses if h.states]
-        places += [(model.forced,)] if model.forced else []
+        places += [(model.forced_state,)] if model.forced_state else []
         for states in places:
             for state in states:
                 weight[state] = weight.get(state, 0.0) + float(p) / len(states) / len(places)

@@ -16,7 +16,14 @@ from discovery.diagnosis.proof import Known
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import effect_form
-from discovery.evidence.process_noise import Setting, UnknownHeat, neighbours, unknown_heat
+from discovery.evidence.process_noise import (
+    Setting,
+    UnknownChange,
+    UnknownHeat,
+    neighbours,
+    unknown_change,
+    unknown_heat,
+)
 from discovery.evidence.whitening import Grams, Whitened, log_sum_exp
 from discovery.fitting import Fit, Noise
 from discovery.fitting.covariance import Z95
@@ -43,7 +50,8 @@ class Scored:
     slab: Slab
     sizes: NDArray[np.intp]
     at: Array  # (A,) the amplitudes where the fit stands
-    forced: str = ""  # state at which a latent force acts, too
+    forced: str = ""  # what of unknown cause acts, too
+    forced_state: str = ""  # the state that it heats
     log_odds_force: float = 0.0
 
     @property
@@ -177,12 +185,12 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     return _over_noise(context, bare)
 
 
-def _over_noise(context: Context, bare: Scored, forces: Sequence[UnknownHeat] = ()) -> Scored:
+def _over_noise(context: Context, bare: Scored, forces: Sequence[UnknownHeat | UnknownChange] = ()) -> Scored:
     """The score over the noise settings that matter, from the one of the fit on: a setting is asked for its
     neighbours until those that are kept have all been asked.
 
     Args:
-        forces: what heat of unknown cause at a state may be like; all of it is integrated over, too.
+        forces: what something of unknown cause may be like; all of it is integrated over, too.
     """
     # a force on top of form error that is larger than usual would be the same noise once more
     usual = {k for k, s in enumerate(context.settings) if not forces or is_usual(s)}
@@ -236,9 +244,21 @@ def off_by(setting: Setting) -> float:
 
 def with_force(context: Context, one: Scored, state: str) -> Scored:
     """The same fit with heat of unknown cause at a state, of any size."""
-    odds = float(np.log(thresholds.ODDS) - np.log(len(context.floor)))
     forces = unknown_heat(state, context.floor[state], thresholds.UNKNOWN_HEAT, thresholds.UNKNOWN_SHARES)
-    return _over_noise(context, replace(one, forced=state, log_odds_force=odds), forces)
+    named = replace(one, forced=f"heat of unknown cause at {state}", forced_state=state)
+    return _over_noise(context, replace(named, log_odds_force=_odds_of_force(context)), forces)
+
+
+def with_change(context: Context, one: Scored, output: str) -> Scored:
+    """The same fit with a slow change of an output, of unknown cause and any size that noise may have."""
+    changes = unknown_change(output, [size for size in thresholds.SLOW if size >= 1.0])
+    named = replace(one, forced=f"a slow change of {output} of unknown cause")
+    return _over_noise(context, replace(named, log_odds_force=_odds_of_force(context)), changes)
+
+
+def _odds_of_force(context: Context) -> float:
+    """Log prior odds of something of unknown cause, shared by the states and outputs."""
+    return float(np.log(thresholds.ODDS) - np.log(len(context.floor) + len(context.outputs)))
 
 
 def light(one: Scored) -> Scored:

@@ -87,7 +87,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     much = short > by_chance(found.gain)
     if much and (best.forced or not (named or _idle_all(context, found, answer, candidates))):
         if best.forced:
-            reasons.append(f"heat of unknown cause at {best.forced} explains more than effects do")
+            reasons.append(f"{best.forced} explains more than effects do")
         reasons.append(f"the surest effects explain too little (log evidence {short:.0f} below the best)")
         named = ()
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]

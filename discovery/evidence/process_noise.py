@@ -56,6 +56,30 @@ class UnknownHeat:
 
 
 @dataclass(frozen=True)
+class UnknownChange:
+    """A slow change of one output, of unknown cause, instead of its slow noise: "none of these" where nothing
+    heats a body (a joint that snaps, a plate that buckles, a probe that creeps).
+    """
+
+    output: str
+    times: float  # its standard deviation, in reading noises
+    log_weight: float
+    place: tuple[int, int]
+
+    def on_top_of(self, setting: Setting) -> Setting:
+        """A noise setting with it."""
+        noise = setting.noise
+        slow = list(noise.slow or (0.0,) * len(noise.white))
+        y = noise.outputs.index(self.output)
+        slow[y] = max(slow[y], self.times * noise.white[y])
+        return replace(
+            setting,
+            noise=replace(noise, slow=tuple(slow)),
+            log_weight=setting.log_weight + self.log_weight,
+        )
+
+
+@dataclass(frozen=True)
 class Prior:
     """Priors of process noise and slow noise (`thresholds.py`)."""
 
@@ -155,6 +179,12 @@ def unknown_heat(
         for i, size in enumerate(times)
         for j, share in enumerate(shares)
     )
+
+
+def unknown_change(output: str, times: Sequence[float]) -> tuple[UnknownChange, ...]:
+    """A slow change of an output, of unknown cause; every size (in reading noises) is equally likely."""
+    weight = -float(np.log(len(times)))
+    return tuple(UnknownChange(output, size, weight, (i, 0)) for i, size in enumerate(times))
 
 
 def _noise(
