@@ -269,7 +269,9 @@ def test_a_broken_file_is_one_sentence_whoever_reads_it(
     assert "make the run again" in sentence
 
 
-@pytest.mark.parametrize("name", ["../small", "/etc/x", "mill, X axis: 3/4", "  .hidden", "Fräse #3", "a" * 300])
+@pytest.mark.parametrize(
+    "name", ["../small", "/etc/x", "mill, X axis: 3/4", "  .hidden", "Fräse #3", "a" * 300]
+)
 def test_the_folder_of_any_name_stands_in_runs(name: str) -> None:
     folder = default_folder(name)
     assert folder.parent == Path("runs")

@@ -24,6 +24,7 @@ Place = Literal[
     "link",  # two bodies that the model links
     "driven and another",  # a driven body and any other one; heat enters the driven one alone
     "fluid terms",  # terms in which the fluid temperature stands
+    "coolant terms",  # terms in which the coolant temperature stands
     "cooling terms",  # terms in which the cooling power stands
     "current terms",  # terms in which an electric current stands
     "loss terms",  # terms in which a heat load stands, or a law of the speed
@@ -40,6 +41,7 @@ Place = Literal[
 ]
 TERM_PLACES = (
     "fluid terms",
+    "coolant terms",
     "cooling terms",
     "current terms",
     "loss terms",

@@ -17,6 +17,7 @@ _FED = {  # roles of which a place needs one: of bodies or terms that the model 
     "loss terms": ("heat load", "rotation speed"),
     "air body": ("ambient temperature",),
     "air terms": ("ambient temperature",),
+    "coolant terms": ("coolant temperature",),
     "cooling terms": ("cooling power",),
 }
 

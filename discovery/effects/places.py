@@ -93,7 +93,7 @@ def spots(
         case "current terms":
             currents = {n for n, c in channels.items() if same_dimension(c.unit, "A")}
             yield from _of(effect, tuple(t for t in parts.own if names(t.expression) & currents))
-        case "fluid terms" | "cooling terms" | "loss terms" | "air terms":
+        case "fluid terms" | "coolant terms" | "cooling terms" | "loss terms" | "air terms":
             yield from _of_terms(effect, model, parts, role)
         case "input temperature":
             yield from _of_inputs(model, parts, channels)
@@ -140,9 +140,11 @@ def _driven(effect: Effect, parts: Layout) -> tuple[str, ...]:
 
 
 def _group(effect: Effect, parts: Layout, alone: tuple[str, ...]) -> tuple[str, ...]:
-    """Bodies on which a law of a fluid, or of the air, acts together where it can act at any."""
+    """Bodies on which a law of a fluid, of the drive, or of the air acts together where it can act at any."""
     if effect.place != "body":
         return alone
+    if effect.group == "drive and cooling":
+        return _driven(effect, parts)
     return parts.wet if effect.group == "cutting fluid" else parts.aired
 
 
@@ -150,6 +152,7 @@ def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, st
     """Terms of a kind."""
     wanted = {
         "fluid terms": "fluid temperature",
+        "coolant terms": "coolant temperature",
         "cooling terms": "cooling power",
         "loss terms": "heat load",
         "air terms": "ambient temperature",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -33,13 +34,14 @@ class Known:
     per_block: Array = field(default_factory=lambda: np.zeros(24))
     forced: str = ""
     prior: float = 0.0
+    at_width: Mapping[float, float] = field(default_factory=dict)  # what a width of the priors adds
 
     @property
     def levels(self) -> Array:
         return np.array([self.evidence - self.prior])
 
-    def drawn(self, _: int, draws: Array, __: Array) -> Array:
-        return np.asarray(draws @ self.per_block)
+    def drawn(self, _: int, draws: Array, widths: Array) -> Array:
+        return np.asarray(draws @ self.per_block + [self.at_width.get(float(w), 0.0) for w in widths])
 
 
 def known(*models: Known, draws: Array | None = None) -> Posterior:
@@ -91,6 +93,17 @@ def test_draws_keep_the_number_of_blocks_of_each_recording() -> None:
         2.0, abs=0.6
     )  # multinomial: mean one, variance 11/12
     assert by_word["sensor_lag"].std() == pytest.approx(2.0 * np.sqrt(11 / 12), rel=0.25)
+
+
+def test_a_width_of_priors_that_the_readings_contradict_has_no_say() -> None:
+    """The evidence of each model is its mean over the widths. Beliefs three times as narrow rule out what the
+    first model moves; another model, which moves nothing, must not win for that.
+    """
+    context = cast(Context, type("One", (), {"recordings": ("a",), "blocks": BLOCKS}))
+    moves = Known((FLUID,), 20.0, np.full(12, 20.0 / 12), at_width={1 / 3: -40.0, 3.0: -1.0})
+    found = posterior(context, cast(list[Scored], [moves, Known((), 0.0, np.zeros(12))]))
+    mean = np.log((np.exp(-40.0) + np.exp(0.0) + np.exp(-1.0)) / 3)
+    assert found.of_claims([FLUID]) == pytest.approx(sigmoid(20.0 + mean))
 
 
 def test_models_that_are_far_off_take_no_part() -> None:

@@ -12,8 +12,9 @@ from discovery.diagnosis import thresholds
 from discovery.diagnosis.crossvalidation import left_out
 from discovery.diagnosis.refit import MOVED, refit, score
 from discovery.diagnosis.scan import scan_model
-from discovery.diagnosis.scored import is_usual, scored, with_force
-from tests.diagnosis.parts import bare, claim_of, dry, scored_of, wetted
+from discovery.diagnosis.scored import is_usual, scored, with_change, with_force
+from tests.diagnosis.parts import bare, claim_of, context_of, dry, scored_of, wetted
+from tests.machine import NOISE, campaign, changed, model, simulated
 
 
 def test_the_effect_that_is_there_makes_the_readings_more_likely() -> None:
@@ -72,8 +73,24 @@ def test_a_latent_force_explains_what_is_missing_and_nothing_else() -> None:
     lacking = with_force(dry(), bare(), "table")
     assert lacking.evidence > bare().evidence + 10.0
     assert with_force(dry(), wetted(), "table").evidence < wetted().evidence
-    odds = np.log(thresholds.ODDS / len(dry().floor))
+    odds = np.log(thresholds.ODDS / (len(dry().floor) + len(dry().outputs)))
     assert lacking.prior - bare().prior == pytest.approx(odds)
+    assert lacking.forced_state == "table"
+
+
+def test_an_output_may_change_for_a_cause_that_no_body_shows() -> None:
+    """A joint that snaps twice a day is no heat: a slow change of this output explains it better than heat at
+    any body, and than a slow change of another output.
+    """
+    runs = [simulated(1), simulated(2)]
+    snaps = [changed(r, E_Z=r.values["E_Z"] + 5.0 * NOISE * (np.sin(r.time / 6000.0) > 0.3)) for r in runs]
+    context = context_of(campaign(*snaps), model())
+    one = score(context, (), context.usual)
+    assert one is not None
+    at = {output: with_change(context, one, output).evidence for output in context.outputs}
+    assert max(at, key=lambda output: at[output]) == "E_Z"
+    assert at["E_Z"] > one.evidence + thresholds.SHORT
+    assert at["E_Z"] > max(with_force(context, one, state).evidence for state in context.floor)
 
 
 def test_heat_of_unknown_cause_may_have_any_size(monkeypatch: pytest.MonkeyPatch) -> None:

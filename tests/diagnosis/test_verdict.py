@@ -195,7 +195,11 @@ def test_a_fault_is_told_from_physics() -> None:
 )
 def test_heat_that_no_effect_explains_refutes_names(gain: float, unknown: float, word: str) -> None:
     found = Tried([Model((FLUID,), gain), Model((), 0.0)])
-    verdict = said(found, {"fluid_convection": 0.9}, unknown=Model((FLUID,), unknown, forced="bed"))
+    verdict = said(
+        found,
+        {"fluid_convection": 0.9},
+        unknown=Model((FLUID,), unknown, forced="heat of unknown cause at bed"),
+    )
     assert verdict.word == word
     if word == "unexplained":
         assert verdict.reasons[0] == "heat of unknown cause at bed explains more than effects do"
@@ -209,7 +213,7 @@ def test_what_does_not_matter_in_free_runs_is_no_mismatch(by: float, word: str) 
 def test_heat_that_no_effect_explains_counts_though_the_effects_change_no_free_run() -> None:
     found = Tried([Model((FLUID,), 12.0), Model((), 0.0)])
     for more, word in ((SHORT - 0.1, "no mismatch"), (SHORT + 0.1, "unexplained")):
-        unknown = Model((FLUID,), 12.0 + more, forced="bed")
+        unknown = Model((FLUID,), 12.0 + more, forced="heat of unknown cause at bed")
         assert said(found, {"fluid_convection": 0.9}, unknown=unknown, gain=0.0).word == word
 
 

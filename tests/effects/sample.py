@@ -45,8 +45,18 @@ TERMS = (
     Term("bearing", "table", parse("P_b*(rpm/1000)**1.5")),
     Term("fluid", "table", parse("hF*pump*(emulsion - table)")),
     Term("winding", "motor", parse("R_w*servo**2")),
+    Term("water", "bed", parse("h_w*(water - bed)")),
 )
-UNITS = {"G_mt": "W/K", "loss": "1", "cold": "1", "P_b": "W", "hA": "W/K", "hF": "W/K", "R_w": "W/A**2"}
+UNITS = {
+    "G_mt": "W/K",
+    "loss": "1",
+    "cold": "1",
+    "P_b": "W",
+    "hA": "W/K",
+    "hF": "W/K",
+    "R_w": "W/A**2",
+    "h_w": "W/K",
+}
 RUNS = ("one", "two")
 HIGH = {
     "pump": 4.0,

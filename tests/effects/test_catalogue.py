@@ -147,6 +147,14 @@ def test_values_of_a_shape_integrate_its_prior() -> None:
         assert isclose(np.sqrt(w @ z**2), cut.std(), rel_tol=0.2)
 
 
+def test_a_shift_may_be_small() -> None:
+    """An effect without a size is as small as its shape: values down to a thirtieth of its spread."""
+    values = [value for value, _ in Shape("t_shift", "s", 0.0, spread=1800.0).values if value > 0]
+    assert min(values) < 1800.0 / 30
+    assert max(np.diff(np.log(values))) < np.log(3.1)
+    assert max(values) > 1800.0
+
+
 def test_a_time_without_a_middle_is_any_that_the_recordings_show() -> None:
     shape = Shape("t_m", "s", None).within(30.0, 86400.0)
     values = [value for value, _ in shape.values]

@@ -19,9 +19,9 @@ from discovery.models import Model, read_model, write_model
 from discovery.terms import Term, evaluate, names, parse, substitute
 from tests.effects.sample import EVENT_ODDS, ODDS, claims, expand, inside, sample, scene, trajectory
 
-DRIVEN = ("friction_speed", "viscosity_temperature", "thermal_preload", "windage")
+DRIVEN = ("viscosity_temperature", "thermal_preload", "windage")
 REPLACING = (*TERM_PLACES, "inputs of a recording")
-INPUTS = ("drive", "chiller", "emulsion", "pump", "room", "rpm", "servo")
+INPUTS = ("drive", "chiller", "emulsion", "pump", "room", "rpm", "servo", "water")
 DELAYS = {"drive": 120.0, "chiller": 90.0, "emulsion": 60.0}  # s, of what its author wrote as late
 
 
@@ -71,6 +71,11 @@ def test_losses_come_of_a_recorded_heat_or_of_a_law_of_the_speed(file: str) -> N
     single = {h.states for h in expand(effect) if len(h.states) == 1}
     assert single == {("motor",), ("table",)}
     assert {h.states for h in expand(effect, without={"heat load"})} == {("table",)}
+
+
+def test_friction_may_act_where_the_model_has_no_loss_but_is_shared_by_driven_bodies() -> None:
+    states = {h.states for h in expand(catalogue()["friction_speed"])}
+    assert states == {("motor",), ("table",), ("bed",), ("motor", "table")}
 
 
 def test_a_bearing_lies_beside_either_of_them() -> None:

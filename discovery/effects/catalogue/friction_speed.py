@@ -3,8 +3,9 @@
     q = P_f (n/1000)^m_loss    [W]
 
 P_f in W at 1000 rpm, 20 to 400; m_loss of 1 to 2.5. Source: Palmgren (M_c + M_v n^(2/3)) n, seals n^2.
-Limits: one power law for both parts; with measured drive power as an input most of it is inside the model
-already.
+At any body: a bearing or a seal may stand where the model has no drive loss; several driven bodies may share
+one law. Limits: one power law for both parts; with measured drive power as an input most of it is inside the
+model already.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape
@@ -13,7 +14,7 @@ EFFECT = Effect(
     word="friction_speed",
     title="Friction that follows the speed",
     group="drive and cooling",
-    place="driven body",
+    place="body",
     formula="P_f*(speed/1000)**m_loss",
     amplitude=Amplitude("P_f", "W", 150.0),
     shapes=(Shape("m_loss", "1", 1.6, factor=1.4),),
