@@ -125,13 +125,14 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
         for n in context.grids[context.recordings[0]].samples
     }
     roles = {n: channels[n].role for n in series}
+    wet = {"fluid flow", "fluid temperature"} <= set(roles.values())  # else what flows is a coolant
 
     def build(speed: Array, load: Array, pump: Array, warm: bool) -> dict[str, Array]:
         share = {
             "rotation speed": speed,
             "heat load": load,
             "cooling power": load,
-            "fluid flow": pump,
+            "fluid flow": pump if wet else np.ones(len(time)),
             "fluid temperature": np.ones(len(time)) if warm else None,
         }
         out = {}
@@ -152,12 +153,12 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
 
     names = called("rotation speed", "speed"), called("heat load", "load")
     moving = " and ".join(name for name, there in zip(names, (speed, load), strict=True) if there)
-    dry, still = ", dry" if pump else "", "stand still" if speed else "leave everything off"
+    dry, still = ", dry" if pump and wet else "", "stand still" if speed else "leave everything off"
     half, two, hour = (_duration(length / n) for n in (2, 6, 12))
     wanted: dict[str, Mapping[str, Array]] = {}
-    if pump:
+    if pump and wet:
         wanted[f"switch the pump every {two} at standstill with warm fluid"] = build(zero, zero, sixth, True)
-    if pump and moving:
+    if pump and wet and moving:
         wanted[f"switch the pump every {two} at full {moving}"] = build(one, one, sixth, False)
         wanted[f"step {moving} every {hour} with the pump running"] = build(twelfth, twelfth, one, False)
     if moving:
@@ -168,7 +169,8 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
     if speed and load:
         wanted[f"run at half {names[0]} and full {names[1]}{dry}"] = build(0.5 * one, one, zero, False)
     wanted[f"{still} and follow the room"] = build(zero, zero, zero, False)
-    for n in (n for n, role in roles.items() if role == "other input"):
+    stepped = ("other input",) if wet else ("other input", "fluid flow")  # a coolant never stays off
+    for n in (n for n, role in roles.items() if role in stepped):
         low, high = np.quantile(series[n], (0.05, 0.95))
         if high > low:
             wanted[f"step {n} every {hour}{dry}"] = {

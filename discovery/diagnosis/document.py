@@ -30,9 +30,10 @@ from discovery.diagnosis.thresholds import RIVALS_SHOWN
 from discovery.diagnosis.verdict import FAULT, UNEXPLAINED, Named
 from discovery.diagnosis.when import instants
 from discovery.effects.catalogue import catalogue
+from discovery.effects.form import LEVEL
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.latent_force import alike, heat_over_time
-from discovery.terms import text
+from discovery.terms import names, parse, text
 
 if TYPE_CHECKING:
     from discovery.diagnosis.diagnose import Diagnosis
@@ -90,6 +91,15 @@ def _claim(h: Hypothesis) -> _Claimed:
     return {"effect": h.effect.word, "states": list(h.places), "recording": h.recording}
 
 
+def _stated_at(d: Diagnosis, h: Hypothesis) -> str | None:
+    """What an amplitude is a size at: a speed, or the largest recorded value of an input."""
+    if h.effect.at or LEVEL not in names(parse(h.effect.formula)):
+        return h.effect.at or None
+    channel = h.channels[0]
+    unit = d.context.campaign.channels[channel].unit
+    return f"{channel} = {d.context.scene.largest[channel]:.3g} {'' if unit == '1' else unit}".rstrip()
+
+
 def _physics(d: Diagnosis, n: Named) -> Physics:
     h, after = n.hypothesis, d.after
     assert after is not None
@@ -104,7 +114,7 @@ def _physics(d: Diagnosis, n: Named) -> Physics:
             low=number(p.value if p.fixed and name not in h.spans else low),
             high=number(p.value if p.fixed and name not in h.spans else high),
             unit=p.unit,
-            at=h.effect.at or None if name in h.amplitudes else None,
+            at=_stated_at(d, h) if name in h.amplitudes else None,
             output=output.get(name),
         )
     beyond = [s for s in sizes.values() if s.output and s.low is not None and s.high is not None]

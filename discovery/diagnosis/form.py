@@ -16,7 +16,7 @@ class Size(Strict):
     low: Number = Field(description="95 % interval")
     high: Number
     unit: str
-    at: str | None = Field(None, description="speed that it is a size at")
+    at: str | None = Field(None, description="speed, or value of an input, that it is a size at")
     output: str | None = Field(None, description="output that it is a size of, where each has its own")
 
 

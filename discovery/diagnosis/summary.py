@@ -9,6 +9,8 @@ from discovery.diagnosis.thresholds import RIVAL
 from discovery.printed import printed
 from discovery.runfolder import read_diagnosis
 
+_NOISE = "reading noise and heat that nobody records:"
+
 
 def summary(folder: Path) -> list[str]:
     """Lines for the terminal about the diagnosis.json of a folder."""
@@ -33,7 +35,7 @@ def lines_of(d: dict[str, Any]) -> list[str]:
     worse, unit = d["improvement"]["contradicted_by"], _unit(d["improvement"])
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
         after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
-        rms = f"rms {printed(i['rms_before'])} -> {after}{unit} (noise {printed(i['noise_floor'])})"
+        rms = f"rms {printed(i['rms_before'])} -> {after}{unit} ({_NOISE} {printed(i['noise_floor'])})"
         lines.append(f"  held-out recording {run}: {rms}{', worse than without' if run in worse else ''}")
     if not d["physics"]:
         lines += _left(d["improvement"])
@@ -52,8 +54,7 @@ def _left(improvement: dict[str, Any]) -> list[str]:
     }
     unit = _unit(improvement)
     return [
-        f"  {which}: rms {printed(i['rms_before'])}{unit} "
-        f"(reading noise and heat that nobody records: {printed(i['noise_floor'])})"
+        f"  {which}: rms {printed(i['rms_before'])}{unit} ({_NOISE} {printed(i['noise_floor'])})"
         for which, i in runs.items()
         if i["rms_before"] is not None
     ]

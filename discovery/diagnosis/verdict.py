@@ -88,7 +88,10 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     if much and (best.forced or not (named or _idle_all(context, found, answer, candidates))):
         if best.forced:
             reasons.append(f"{best.forced} explains more than effects do")
-        reasons.append(f"the surest effects explain too little (log evidence {short:.0f} below the best)")
+        reasons.append(
+            "the effects that are sure enough explain too little: the best model of all has "
+            f"{short:.0f} more log evidence"
+        )
         named = ()
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
     every = (*reasons, *_apart(found, answer, unsure))

@@ -224,3 +224,23 @@ def test_patterns_move_what_the_machine_has() -> None:
     still = found["stand still and follow the room"]
     assert not still["speed"].any()
     assert not still["pump"].any()
+
+
+def test_a_coolant_is_stepped_but_never_stays_off() -> None:
+    """A flow without a cutting fluid cools the machine: no pattern runs it dry."""
+    seen = campaign(simulated(1))
+    channels = {n: c for n, c in seen.channels.items() if n != "T_fluid"}
+    inputs = [n for n in machine.INPUTS if n != "T_fluid"]
+    where = cast(
+        Context,
+        SimpleNamespace(
+            campaign=replace(seen, channels=channels),
+            grids={"r1": make_grid(seen, "r1", inputs, list(SEEN))},
+            recordings=("r1",),
+        ),
+    )
+    found = _designs(where, 43200.0)
+    assert "step pump every 1 h" in found
+    assert not [words for words in found if "dry" in words or "switch" in words]
+    kept = [inputs["pump"] for words, inputs in found.items() if "step pump" not in words]
+    assert all((flow > 0).all() for flow in kept)

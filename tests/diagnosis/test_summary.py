@@ -74,7 +74,7 @@ def test_the_proof_has_a_unit_or_is_in_noises_and_a_jump_that_may_be_none_is_not
         )
         assert summary(tmp_path)[1:-1] == [
             "  rezero at dZ in fri, probability 0.98: zero_dZ = 2.1 um (2 to 2.2), t_zero = 60 s (50 to 70)",
-            f"  held-out recording sun: rms {said}noise 0.421)",
+            f"  held-out recording sun: rms {said}reading noise and heat that nobody records: 0.421)",
         ]
 
 
