@@ -194,13 +194,12 @@ def _step(x: Array, gram: Array, gradient: Array, damping: float, low: Array, hi
 
 
 def _solved(matrix: Array, vector: Array) -> Array:
-    from scipy.linalg import LinAlgError, cho_factor, cho_solve
-
     if not np.isfinite(matrix).all():  # sensitivities that overflow: no step from here
         return np.zeros(len(vector))
     try:
-        return np.asarray(cho_solve(cho_factor(matrix), vector))
-    except LinAlgError:
+        root = np.linalg.cholesky(matrix)
+        return np.asarray(np.linalg.solve(root.T, np.linalg.solve(root, vector)))
+    except np.linalg.LinAlgError:
         return np.asarray(np.linalg.lstsq(matrix, vector, rcond=1e-12)[0])
 
 
