@@ -5,20 +5,17 @@ file.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.tree import Tree, grown
 from discovery.dynamics import Trajectory
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.latent_force import Force
 from discovery.models import Model
 from discovery.terms import evaluate
-
-if TYPE_CHECKING:
-    from sklearn.tree import DecisionTreeRegressor
 
 Array = NDArray[np.float64]
 
@@ -118,12 +115,8 @@ def heat_of(best: Scored, trajectory: Trajectory, h: Hypothesis, body: str = "")
     return heat
 
 
-def _tree(x: Array, target: Array, least: int, depth: int = 2) -> DecisionTreeRegressor:
-    from sklearn.tree import DecisionTreeRegressor
-
-    return DecisionTreeRegressor(max_depth=depth, min_samples_leaf=max(least, 1), random_state=0).fit(
-        x, target
-    )
+def _tree(x: Array, target: Array, least: int, depth: int = 2) -> Tree:
+    return grown(x, target, max(least, 1), depth)
 
 
 def _switches(x: Array, names: Sequence[str]) -> set[str]:
@@ -131,25 +124,23 @@ def _switches(x: Array, names: Sequence[str]) -> set[str]:
     return {name for name, column in zip(names, x.T, strict=True) if np.isin(column, (0.0, 1.0)).all()}
 
 
-def _path(tree: DecisionTreeRegressor, names: Sequence[str]) -> Bounds:
+def _path(tree: Tree, names: Sequence[str]) -> Bounds:
     """The path to the leaf with most heat: for each variable the tightest bounds."""
-    t = tree.tree_
     best = 0.0
     bounds: Bounds = {}
 
-    def walk(node: int, path: Bounds) -> None:
+    def walk(node: Tree, path: Bounds) -> None:
         nonlocal best, bounds
-        if t.children_left[node] < 0:
-            value = abs(float(t.value[node].ravel()[0]))
-            if value > best:
-                best, bounds = value, path
+        if node.below is None or node.above is None:
+            if abs(node.value) > best:
+                best, bounds = abs(node.value), path
             return
-        name, edge = names[t.feature[node]], float(t.threshold[node])
+        name, edge = names[node.feature], node.edge
         low, high = path.get(name, (-np.inf, np.inf))
-        walk(t.children_left[node], {**path, name: (low, min(high, edge))})
-        walk(t.children_right[node], {**path, name: (max(low, edge), high)})
+        walk(node.below, {**path, name: (low, min(high, edge))})
+        walk(node.above, {**path, name: (max(low, edge), high)})
 
-    walk(0, {})
+    walk(tree, {})
     return bounds
 
 

@@ -114,17 +114,24 @@ class Scored:
         return float(self.drawn(k)[0])
 
     def _forms(self, k: int) -> tuple[Grams, ...]:
-        """Form errors of the effects: each law is wrong by a share that depends on the operating point."""
-        spread = self.seen.spread[sum(self.seen.form) :]
+        """Without and with form errors of the effects."""
+        spread = self._own_forms
         return (self.grams[k].without(spread), self.grams[k]) if len(spread) else (self.grams[k],)
+
+    @property
+    def _own_forms(self) -> Array:
+        """Spreads of the form errors of the effects: each law is wrong by a share that depends on the
+        operating point.
+        """
+        return self.seen.spread[sum(self.seen.form) :]
 
     def drawn(self, k: int, weights: Array | None = None, widths: Array | None = None) -> Array:
         """(D,) `level` under a noise setting for many draws at once; arguments as in `Grams.marginal`."""
         if (self.sizes < 0).any():  # what presses against zero does not act
             return np.full(1 if weights is None else len(weights), -inf)
-        forms, found = self._forms(k), []
-        for gram in forms:
-            level, step, covariance = gram.marginal(self.sizes, weights, widths)
+        found = []
+        forms = self.grams[k].marginals(self.sizes, self._own_forms, weights, widths)
+        for level, step, covariance in forms:
             level = level + self.settings[k].log_weight - float(np.log(len(forms)))
             for j in range(len(self.sizes)):
                 one = self.slab.take(np.full(len(level), j))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.dynamics import series
 from discovery.recordings.blocks import block_means
 
 Array = NDArray[np.float64]
@@ -99,8 +100,6 @@ def independent(counts: Array, single: Array) -> Array:
     s^2 / (2 pi^2) sum exp(-4 pi^2 k^2 d^2 / s^2) / k^2 (Widrow & Kollar, Quantization Noise, 2008, ch. 16).
     What it does not keep is seen from one reading to the next, and says how large d is.
     """
-    from scipy.optimize import brentq
-
     out = counts.copy()
     for y, column in enumerate(single.T):
         read = column[np.isfinite(column)]
@@ -109,14 +108,20 @@ def independent(counts: Array, single: Array) -> Array:
         if not len(steps) or len(read) < 3:
             continue
         seen = float(np.mean(np.diff(read, 2) ** 2)) / 6.0 / float(steps.min()) ** 2
-
-        def lost(noise: float, seen: float = seen) -> float:
-            return noise**2 + 1 / 12 - _kept(noise) - seen
-
-        noise = brentq(lost, 0.0, np.sqrt(seen) + 1.0) if seen > 1e-6 else 0.0
+        noise = _noise_seen(seen) if seen > 1e-6 else 0.0
         share = min(_kept(noise) / (noise**2 + 1 / 12), 1.0)
         out[:, y] = counts[:, y] / (1.0 + np.maximum(counts[:, y] - 1.0, 0.0) * share)
     return out
+
+
+def _noise_seen(seen: float) -> float:
+    """The noise with which so much of the variance of a reading is seen from one to the next, all in steps;
+    what is seen grows with it.
+    """
+    low, high = 0.0, float(np.sqrt(seen)) + 1.0
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if middle**2 + 1 / 12 - _kept(middle) < seen else (low, middle)
+    return middle
 
 
 def _kept(noise: float) -> float:
@@ -138,14 +143,11 @@ def as_readings_show(nodes: Array, integral: Array, index: Ints, shown: Array, n
         shown: (R,) means of the integral over the stamps of the readings.
         neighbours: (2, R) weights of the nodes before and behind.
     """
-    from scipy.linalg import solve_banded
-
-    bands = np.zeros((3, len(nodes)))
-    bands[1] = 1.0
-    bands[1, index] = 1.0 - neighbours.sum(axis=0)
+    below, own, above = np.zeros(len(nodes)), np.ones(len(nodes)), np.zeros(len(nodes))
+    own[index] = 1.0 - neighbours.sum(axis=0)
     left, right = neighbours[0] != 0, neighbours[1] != 0
-    bands[2, index[left] - 1] = neighbours[0, left]
-    bands[0, index[right] + 1] = neighbours[1, right]
+    below[index[left]] = neighbours[0, left]
+    above[index[right]] = neighbours[1, right]
     wanted = integral.copy()
     wanted[index] = shown
-    return np.asarray(solve_banded((1, 1), bands, wanted))
+    return np.asarray(series.tridiagonal(below, own, above, wanted))

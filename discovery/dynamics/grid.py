@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from discovery.recordings.blocks import block_means
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
+T = TypeVar("T")
 
 MOST_NODES = 30_000  # of a recording; with more, it is coarsened
 COARSE_NODES = 8_000  # of a coarsened one, about; as many at most for its inputs' switches
@@ -46,6 +48,7 @@ class Grid:
     instants: int = 0  # nodes that there were before it was coarsened; 0: it was not
     logged: Mapping[str, float] = field(default_factory=dict)  # s, median distance of the stamps of a channel
     means: Means | None = None  # where readings are means of several
+    known: dict[str, tuple[Any, ...]] = field(default_factory=dict, repr=False, compare=False)
 
     def shifted(self, offset: Mapping[str, float], late: Mapping[str, float] | None = None) -> Grid:
         """The grid with channels moved by constants from what was recorded, in value and, held ones, in time
@@ -68,7 +71,7 @@ class Grid:
     def between(self, begin: int, end: int) -> Grid:
         """The grid from one node to another, both of them in it, without readings."""
         time = self.time[begin : end + 1]
-        return replace(self, time=time, read=self.read[:0], readings=self.readings[:0], means=None)
+        return replace(self, time=time, read=self.read[:0], readings=self.readings[:0], means=None, known={})
 
     @cached_property
     def step(self) -> Array:
@@ -78,20 +81,27 @@ class Grid:
     @cached_property
     def ends(self) -> dict[str, Array]:
         """Channels and `time` at the interval ends, each (2(T - 1),)."""
-        left, right = self.time[:-1], self.time[1:]
-        values = {
-            name: np.repeat(s.means(self.time + self.late[name]), 2)
-            if name in self.late
-            else interleaved(s.at(left), s.at(right, "left"))
-            for name, s in self.samples.items()
+        late = {
+            name: np.repeat(self.samples[name].means(self.time + by), 2)
+            for name, by in self.late.items()
+            if name in self.samples
         }
-        return {**self._moved(values), "time": interleaved(left, right)}
+        return self._moved(self._once("ends", _at_ends, self.time, self.samples) | late)
 
     @cached_property
     def nodes(self) -> dict[str, Array]:
         """Channels and `time` at the nodes, each (T,)."""
-        values = {name: s.at(self.time) for name, s in self.samples.items()}
-        return {**self._moved(values), "time": self.time}
+        return self._moved(self._once("nodes", _at_nodes, self.time, self.samples))
+
+    def _once(self, what: str, make: Callable[..., T], *given: Any) -> T:
+        """What is made of some parts of a grid, once for all grids that share them: those that are `shifted`
+        from one.
+        """
+        found = self.known.get(what)
+        if found is None or any(a is not b for a, b in zip(found[0], given, strict=True)):
+            found = self.known[what] = (given, make(*given))
+        made: T = found[1]
+        return made
 
     def _moved(self, values: dict[str, Array]) -> dict[str, Array]:
         return values | {name: values[name] + by for name, by in self.offset.items() if name in values}
@@ -127,16 +137,14 @@ class Grid:
         """Nodes (N,) that the readings show something of, ascending."""
         if self.means is None:
             return self.read
-        last = len(self.time) - 1
-        return np.unique(np.concatenate([np.clip(self.read + k, 0, last) for k in (-1, 0, 1)]))
+        return self._once("looked at", _looked_at, self.time, self.read)[0]
 
     def at_readings(self, shown: Array) -> Array:
         """Outputs at the readings, (R, Y, ...), of what they are at the nodes `looked_at`, (N, Y, ...)."""
         if self.means is None:
             return shown
-        last = len(self.time) - 1
         before, here, behind = (
-            shown[np.searchsorted(self.looked_at, np.clip(self.read + k, 0, last))] for k in (-1, 0, 1)
+            shown[place] for place in self._once("looked at", _looked_at, self.time, self.read)[1]
         )
         left, right = self.means.neighbours.reshape(2, *here.shape[:2], *[1] * (here.ndim - 2))
         return np.asarray(here + left * (before - here) + right * (behind - here))
@@ -147,10 +155,30 @@ class Grid:
         return np.isfinite(self.readings)
 
 
+def _at_ends(time: Array, samples: Mapping[str, Samples]) -> dict[str, Array]:
+    left, right = time[:-1], time[1:]
+    values = {name: interleaved(s.at(left), s.at(right, "left")) for name, s in samples.items()}
+    return {**values, "time": interleaved(left, right)}
+
+
+def _at_nodes(time: Array, samples: Mapping[str, Samples]) -> dict[str, Array]:
+    return {**{name: s.at(time) for name, s in samples.items()}, "time": time}
+
+
+def _looked_at(time: Array, read: Ints) -> tuple[Ints, list[Ints]]:
+    """Nodes that means of readings show something of, ascending, and where among them stand those before, of
+    and behind each reading.
+    """
+    three = [np.clip(read + k, 0, len(time) - 1) for k in (-1, 0, 1)]
+    nodes = np.unique(np.concatenate(three))
+    return nodes, [np.searchsorted(nodes, some) for some in three]
+
+
 def first_interval(grid: Grid) -> Grid:
     """The grid cut down to its first interval, for what is asked of the first instant alone."""
     none = np.full((0, len(grid.outputs)), np.nan)
-    return replace(grid, time=grid.time[:2], read=np.zeros(0, dtype=np.intp), readings=none, means=None)
+    read = np.zeros(0, dtype=np.intp)
+    return replace(grid, time=grid.time[:2], read=read, readings=none, means=None, known={})
 
 
 def interleaved(left: Array, right: Array) -> Array:

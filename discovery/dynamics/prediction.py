@@ -57,11 +57,15 @@ def predict(trajectory: Trajectory) -> Array:
 
 
 def output_matrix(trajectory: Trajectory, nodes: Ints | None = None) -> Array:
-    """dy/dx at the reading instants, or other nodes (R,): (R, Y, n)."""
+    """dy/dx at the reading instants, or other nodes (R,): (R, Y, n). The last are kept."""
     system = trajectory.system
     read, count = system.grid.read if nodes is None else nodes, len(system.grid.time)
+    kind = "read" if read is system.grid.read else "nodes"
+    if (known := trajectory.shown.get(kind)) is not None and known[0] is read:
+        return known[1]
     out = np.zeros((len(read), len(system.grid.outputs), len(system.states)))
     for y, dual in enumerate(outputs(trajectory, frozenset(system.states))):
         for name, partial in dual.partials.items():
             out[:, y, system.states.index(name)] = np.broadcast_to(partial, (count,))[read]
+    trajectory.shown[kind] = (read, out)
     return out

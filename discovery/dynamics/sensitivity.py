@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from discovery.dynamics import kernel
 from discovery.dynamics.grid import interleaved
 from discovery.dynamics.prediction import output_matrix, outputs
-from discovery.dynamics.starts import balanced, memories, rates_at_start, starts_follow
+from discovery.dynamics.starts import balanced, memories, rates_at_start, settled, starts_follow
 from discovery.dynamics.system import shifted
 from discovery.dynamics.trajectory import Trajectory
-from discovery.terms import evaluate, names
+from discovery.terms import Name, evaluate, names
+from discovery.terms.dual import Value
 
 Array = NDArray[np.float64]
 
@@ -90,13 +91,22 @@ def sensitivities(
         nodes.astype(np.int64),
     )
     dy: Array = np.einsum("ryn,rnm->rym", output_matrix(trajectory, nodes), s)
-    for y, dual in enumerate(outputs(trajectory, _in_terms(trajectory, parameters)) if parameters else []):
+    for y, partials in enumerate(_shown_by_outputs(trajectory, parameters)):
         zero = system.grid.outputs[y]
-        shown = dual.partials | ({zero: 1.0} if zero in parameters else {})
+        shown = partials | ({zero: 1.0} if zero in parameters else {})
         for name, partial in shown.items():
             whole = np.broadcast_to(partial, (len(system.grid.time),))
             dy[:, y, parameters.index(name)] += (whole if grown is None else grown * whole)[nodes]
     return system.grid.at_readings(dy)
+
+
+def _shown_by_outputs(trajectory: Trajectory, parameters: Sequence[str]) -> list[dict[str, Value]]:
+    """How each output moves with each parameter that stands in its expression."""
+    system, wanted = trajectory.system, _in_terms(trajectory, parameters)
+    shown = {name: system.model.outputs.get(name, Name(name)) for name in system.grid.outputs}
+    if all(wanted.isdisjoint(names(expression)) for expression in shown.values()):
+        return [{} for _ in shown]
+    return [dual.partials for dual in outputs(trajectory, wanted)]
 
 
 def moved_in_time(trajectory: Trajectory, late: Sequence[str]) -> list[Column]:
@@ -153,21 +163,22 @@ def _start_slopes(
     free = balanced(system)
     inner = _in_terms(trajectory, parameters)
     wrt = [*dict.fromkeys((*system.states, *inner))]
-    slopes = rates_at_start(system, trajectory.values, trajectory.x[0], wrt)[1] if free else np.zeros((0, 0))
+    slopes = rates_at_start(system, trajectory.values, trajectory.x[0], wrt, free)[1] if free else start[:0]
 
     def settle(some: Sequence[int]) -> None:
+        mine = slopes[[free.index(i) for i in some]]
         others = [i for i in range(len(system.states)) if i not in some]
-        moved = slopes[np.ix_(some, others)] @ start[others]
+        moved = mine[:, others] @ start[others]
         for name in inner:
-            moved[:, parameters.index(name)] += slopes[some, wrt.index(name)]
-        start[some] = np.linalg.lstsq(slopes[np.ix_(some, some)], -moved, rcond=1e-10)[0]
+            moved[:, parameters.index(name)] += mine[:, wrt.index(name)]
+        start[some] = settled(mine[:, list(some)], moved)
 
     if free:
         settle(free)
     if starts:
-        by = np.zeros_like(start)
+        by, follow = np.zeros_like(start), starts_follow(system)
         for k, name in enumerate(starts, len(parameters)):
-            by[:, k] = starts_follow(system)[:, system.states.index(name)]
+            by[:, k] = follow[:, system.states.index(name)]
         start += by
         if late := memories(system, free):
             settle(late)

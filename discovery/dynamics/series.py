@@ -23,6 +23,35 @@ def moved(values, base, far):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def tridiagonal(below, own, above, wanted):  # type: ignore[no-untyped-def]
+    """Solution (T,) of equations with three diagonals (T,), each in the place of its row, by elimination with
+    exchanged rows where the next one is larger.
+    """
+    count = len(own)
+    d, u, x = own.copy(), above.copy(), wanted.copy()
+    far = np.zeros(count)  # the diagonal that exchanges make
+    for k in range(count - 1):
+        if abs(below[k + 1]) > abs(d[k]):
+            factor = d[k] / below[k + 1]
+            d[k], own_next, above_next = below[k + 1], d[k + 1], u[k + 1]
+            d[k + 1] = u[k] - factor * own_next
+            u[k], far[k] = own_next, above_next
+            u[k + 1] = -factor * above_next
+            x[k], x[k + 1] = x[k + 1], x[k] - factor * x[k + 1]
+        else:
+            factor = below[k + 1] / d[k]
+            d[k + 1] -= factor * u[k]
+            x[k + 1] -= factor * x[k]
+    for k in range(count - 1, -1, -1):
+        if k + 1 < count:
+            x[k] -= u[k] * x[k + 1]
+        if k + 2 < count:
+            x[k] -= far[k] * x[k + 2]
+        x[k] /= d[k]
+    return x
+
+
+@njit(cache=True, nogil=True)
 def play(series, width):  # type: ignore[no-untyped-def]
     """Play operator y = max(x - w, min(x + w, y_before)), starting at rest in the middle.
 

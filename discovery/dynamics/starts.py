@@ -15,6 +15,7 @@ from discovery.terms.dual import Value
 Array = NDArray[np.float64]
 
 _ROUNDS = 30  # of Newton on the balance
+_CUT = 1e-10  # of the largest slope, below which a rate does not move with a state
 _TOLERANCE = 1e-8  # largest change of a state in its unit, relative to 1 + its size
 
 
@@ -70,21 +71,39 @@ def memories(system: System, free: Sequence[int]) -> list[int]:
 
 
 def rates_at_start(
-    system: System, values: Mapping[str, float], start: Array, wrt: Sequence[str]
+    system: System, values: Mapping[str, float], start: Array, wrt: Sequence[str], states: Sequence[int]
 ) -> tuple[Array, Array]:
-    """Rates (n,) of the states at the first instant, and their derivatives (n, M) by the names of `wrt`."""
-    rates, slopes = np.zeros(len(system.states)), np.zeros((len(system.states), len(wrt)))
+    """Rates (S,) of some states at the first instant, and their derivatives (S, M) by the names of `wrt`."""
+    rates, slopes = np.zeros(len(states)), np.zeros((len(states), len(wrt)))
+    place = {i: k for k, i in enumerate(states)}
+    into, source = system.into.tolist(), system.source.tolist()
+    acting = tuple(
+        t for t, ends in enumerate(zip(into, source, strict=True)) if not place.keys().isdisjoint(ends)
+    )
     ends, memory = system.first
     env = {**ends, **values, **dict(zip(system.states, start.tolist(), strict=True))}
     column = {name: k for k, name in enumerate(wrt)}
-    for dual, i, j in zip(system.rates(env, frozenset(wrt), memory), system.into, system.source, strict=True):
+    for t, dual in zip(acting, system.rates(env, frozenset(wrt), memory, acting), strict=True):
         partials = [(column[name], _first(partial)) for name, partial in dual.partials.items()]
-        for k, sign in ((i, 1.0), (j, -1.0)):
-            if k >= 0:
-                rates[k] += sign * system.scale[k] * _first(dual.value)
+        for state, sign in ((into[t], 1.0), (source[t], -1.0)):
+            if state in place:
+                factor = sign * system.scale[state]
+                rates[place[state]] += factor * _first(dual.value)
                 for name, partial in partials:
-                    slopes[k, name] += sign * system.scale[k] * partial
+                    slopes[place[state], name] += factor * partial
     return rates, slopes
+
+
+def settled(slopes: Array, rates: Array) -> Array:
+    """Change (S, ...) that takes some rates (S, ...) away, given their slopes (S, S): a state whose rate does
+    not move with it (the integral of its input) keeps its start.
+    """
+    own = np.diag(slopes)
+    if np.count_nonzero(slopes) > np.count_nonzero(own):
+        return np.asarray(np.linalg.lstsq(slopes, -rates, rcond=_CUT)[0])
+    moves = np.abs(own) > _CUT * np.abs(own).max(initial=0.0)  # memories know nothing of each other
+    inverse = np.where(moves, 1.0, 0.0) / np.where(moves, own, 1.0)
+    return np.asarray(-(rates.T * inverse).T)
 
 
 def _first(value: Value) -> float:
@@ -97,14 +116,13 @@ def _balanced(system: System, values: Mapping[str, float], start: Array, free: S
     names = [system.states[i] for i in free]
     before = 1.0
     for _ in range((1 if system.affine else _ROUNDS) if free else 0):
-        rates, slopes = rates_at_start(system, values, start, names)
+        rates, slopes = rates_at_start(system, values, start, names, free)
         if not (np.isfinite(rates).all() and np.isfinite(slopes).all()):
             raise RunsAwayError(
                 f"model '{system.model.name}' has no finite rate at the start of recording "
                 f"'{system.grid.recording}'; check its parameters and start values"
             )
-        # a state that cannot balance (the integral of its input) keeps its start
-        change = np.linalg.lstsq(slopes[free], -rates[free], rcond=1e-10)[0]
+        change = settled(slopes, rates)
         if not np.all(np.isfinite(change)):
             break
         start[free] += change

@@ -33,13 +33,23 @@ class System:
     scale: Array  # (states,)
     ends: Memory
     nodes: Memory
-    programs: dict[frozenset[str], Program] = field(default_factory=dict, repr=False, compare=False)
+    programs: dict[tuple[frozenset[str], tuple[int, ...] | None], Program] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
-    def rates(self, values: Mapping[str, Value], wrt: frozenset[str], memory: Memory) -> list[Dual]:
-        """Rate of each term, with derivatives by some names."""
-        if wrt not in self.programs:
-            self.programs[wrt] = compiled(tuple(t.expression for t in self.model.terms), wrt)
-        return self.programs[wrt].run(values, memory)
+    def rates(
+        self,
+        values: Mapping[str, Value],
+        wrt: frozenset[str],
+        memory: Memory,
+        some: tuple[int, ...] | None = None,
+    ) -> list[Dual]:
+        """Rate of each term, or of some by index, with derivatives by some names."""
+        if (wrt, some) not in self.programs:
+            terms = self.model.terms
+            taken = terms if some is None else [terms[k] for k in some]
+            self.programs[wrt, some] = compiled(tuple(t.expression for t in taken), wrt)
+        return self.programs[wrt, some].run(values, memory)
 
     @cached_property
     def first(self) -> tuple[dict[str, Value], Memory]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,8 @@ class Trajectory:
     e: Array
     w0: Array
     w1: Array
+    # how outputs depend on states: of which nodes, and (N, Y, n)
+    shown: dict[str, tuple[Any, Array]] = field(default_factory=dict, repr=False, compare=False)
 
     def at_ends(self) -> dict[str, Array | float]:
         """States, channels and parameters at the interval ends, ready for `evaluate`."""

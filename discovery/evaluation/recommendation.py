@@ -60,8 +60,6 @@ def recommend(output: str, left: Mapping[str, Sequence[Array]]) -> Recommendatio
         left: by model, for each recording: readings minus free run (R,), NaN where nothing was read. A model
             that lacks a recording (it ran away) is left out.
     """
-    from scipy.stats import t
-
     count = max((len(rows) for rows in left.values()), default=0)
     names = [name for name, rows in left.items() if len(rows) == count and count]
     if len(names) < 2:
@@ -75,7 +73,7 @@ def recommend(output: str, left: Mapping[str, Sequence[Array]]) -> Recommendatio
     floor = 1e-300
     rest = np.log(np.maximum(total[:, None] - squares, floor)) / 2  # (models, B), each piece left out
     count = len(readings)
-    wide = float(t.ppf(0.975, max(count - 1, 1)))
+    wide = student95(max(count - 1, 1))
     others = []
     for k in np.argsort(total):
         if k == best:
@@ -87,6 +85,31 @@ def recommend(output: str, left: Mapping[str, Sequence[Array]]) -> Recommendatio
         rms = float(np.sqrt(total[k] / readings.sum()))
         others.append(Against(names[k], rms, float(ratio), float(ends[0]), float(ends[1])))
     return Recommendation(output, names[best], float(np.sqrt(total[best] / readings.sum())), tuple(others))
+
+
+def student95(freedom: int) -> float:
+    """The 97.5 % quantile of Student's distribution with so many degrees of freedom (Abramowitz & Stegun,
+    Handbook of Mathematical Functions, 1964, 26.7.3 and 26.7.4).
+
+    >>> round(student95(1), 4), round(student95(7), 4)
+    (12.7062, 2.3646)
+    """
+    odd = freedom % 2
+    orders = np.arange(2 + odd, freedom - 1, 2)
+    factors = np.cumprod(np.concatenate([[1.0], (orders - 1) / orders]))
+
+    def inside(angle: float) -> float:
+        """Probability that the magnitude is below tan(angle) times the root of the freedom."""
+        powers = np.cos(angle) ** (2 * np.arange(len(factors)))
+        total = float(np.sin(angle) * (factors @ powers))
+        if not odd:
+            return total
+        return 2 / np.pi * (angle + (float(np.cos(angle)) * total if freedom > 1 else 0.0))
+
+    low, high = 0.0, float(np.pi / 2)
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if inside(middle) < 0.95 else (low, middle)
+    return float(np.tan(middle) * np.sqrt(freedom))
 
 
 def _pieces(rows: Sequence[Array]) -> tuple[Array, Array]:

@@ -29,6 +29,7 @@ Ints = NDArray[np.intp]
 _AT_BOUND = 1e-6
 _UNSEEN = 1e-20  # of the largest entry of the normal equations
 _ROUNDING = 1e-10  # of the diagonal, added to it: no factor fails in the last digits
+_TOGETHER = 16  # draws at a time: so many normal equations stay near the processor
 _REMEMBERED = 8  # normal equations of the last noises; they differ in form errors next, and are large
 
 
@@ -46,6 +47,7 @@ class Grams:
     prior: Array
     constant: float
     scale: Array
+    sums: Array | None = field(default=None, repr=False)  # (1 + U, 1 + U) of the blocks, where it is known
 
     def level(self) -> float:
         """Log-likelihood with all unknowns integrated out."""
@@ -65,6 +67,11 @@ class Grams:
         _, step, covariance = self.solved()
         return 0.5 * float(step @ np.linalg.solve(covariance, step)) if len(step) else 0.0
 
+    @cached_property
+    def whole(self) -> Array:
+        """The normal equations (1 + U, 1 + U) of all blocks, without priors, before `scale`."""
+        return self.sums if self.sums is not None else self.blocks.sum(axis=0)
+
     def without(self, extra: Array) -> Grams:
         """The same without the last columns, whose coefficients have the spreads `extra` (E,)."""
         kept = self.prior.shape[0] - len(extra)
@@ -76,6 +83,7 @@ class Grams:
             self.prior[:kept, :kept],
             constant,
             self.scale[:kept],
+            self.whole[:kept, :kept],
         )
 
     def marginal(
@@ -84,37 +92,74 @@ class Grams:
         """Log-likelihoods (D,) with all unknowns integrated out, for several draws at once; the step (D, A)
         of some unknowns from where the fit stands to the optimum, and their covariance (D, A, A) there.
 
-        With the columns in the order of the other unknowns, `sizes`, residual, one Cholesky factor holds
-        everything: its last row is the slope along the others and what is left of the residual, and the
-        corner before it is the root of the precision of the sizes after a refit of the others.
-
         Args:
             sizes: (A,) indices of the unknowns.
             weights: (D, B) how often each block counts; default each once.
             widths: (D,) of the priors, relative to what they are.
         """
-        count, few = self.prior.shape[0], len(sizes)
+        return self.marginals(sizes, np.zeros(0), weights, widths)[-1]
+
+    def marginals(
+        self, sizes: Ints, extra: Array, weights: Array | None = None, widths: Array | None = None
+    ) -> list[tuple[Array, Array, Array]]:
+        """As `marginal`: without the last columns, whose coefficients have the spreads `extra` (E,), and with
+        them; once, where there are none.
+
+        With the columns in the order of the other unknowns, the last columns, `sizes`, residual, one Cholesky
+        factor holds everything: its last row is the slope along the others and what is left of the residual,
+        and the corner before it is the root of the precision of the sizes after a refit of the others.
+        """
+        count, few, more = self.prior.shape[0], len(sizes), len(extra)
+        last = np.arange(count - 1 - more, count - 1)
+        others = np.setdiff1d(np.arange(count - 1 - more), sizes)
+        order = np.concatenate([1 + others, 1 + last, 1 + np.asarray(sizes, dtype=np.intp), [0]])
+        first = len(others)
         draws = next((len(one) for one in (weights, widths) if one is not None), 1)
-        w = np.ones((draws, len(self.logdet))) if weights is None else weights
         wide = np.ones(draws) if widths is None else widths
-        order = np.concatenate([1 + np.setdiff1d(np.arange(count - 1), sizes), 1 + np.asarray(sizes), [0]])
-        total = (w @ self.blocks.reshape(len(self.logdet), -1)).reshape(-1, count, count)
-        total *= np.outer(self.scale, self.scale)
-        total += self.prior / wide[:, None, None] ** 2
-        total = total[:, order[:, None], order]
-        scale = _scale(np.einsum("dii->di", total))
-        total /= scale[:, :, None] * scale[:, None, :]
-        total[:, np.arange(count), np.arange(count)] += _ROUNDING
-        chol = np.linalg.cholesky(total)
-        size, left, first = np.einsum("dii->di", chol), scale[:, -1], count - 1 - few
-        corner, along = chol[:, first:-1, first:-1], chol[:, -1, first:-1]
-        root = np.linalg.inv(corner) / scale[:, None, first:-1]
-        step = left[:, None] * np.einsum("dji,dj->di", root, along)
-        quadratic = (left * size[:, -1]) ** 2
-        volume = np.sum(np.log(size[:, :-1]) + np.log(scale[:, :-1]), axis=1)
+        volume, corner = np.empty(draws), np.empty((draws, count - first, count - first))
+        placed, outer = np.ix_(order, order), np.outer(self.scale[order], self.scale[order])
+        prior = self.prior[placed]
+        whole = (self.whole if weights is None else self.blocks)[..., placed[0], placed[1]] * outer
+        diagonal = np.arange(count)
+        for begin in range(0, draws, _TOGETHER):
+            some = slice(begin, begin + _TOGETHER)
+            total = prior / wide[some, None, None] ** 2
+            total += (
+                whole
+                if weights is None
+                else (weights[some] @ whole.reshape(len(whole), -1)).reshape(-1, count, count)
+            )
+            scale = _scales(np.einsum("dii->di", total))
+            total /= scale[:, :, None]
+            total /= scale[:, None, :]
+            total[:, diagonal, diagonal] += _ROUNDING
+            chol = np.linalg.cholesky(total)
+            sizes_of = np.einsum("dii->di", chol) * scale
+            volume[some] = np.sum(np.log(sizes_of[:, :first]), axis=1)
+            corner[some] = scale[:, first:, None] * chol[:, first:, first:]
+        dets = -float(self.logdet.sum()) if weights is None else -weights @ self.logdet
+        found = []
+        if more:
+            beside = corner[:, more:]
+            bare = np.linalg.cholesky(beside @ beside.transpose(0, 2, 1))
+            widened = np.count_nonzero(np.diag(self.prior)[1:-more]) * np.log(wide)
+            constant = self.constant + float(np.sum(np.log(extra)))
+            found.append(_concluded(bare, few, dets - volume + constant - widened))
+        volume = volume + np.sum(np.log(np.einsum("dii->di", corner[:, :more, :more])), axis=1)
         widened = np.count_nonzero(np.diag(self.prior)[1:]) * np.log(wide)
-        level = -w @ self.logdet - 0.5 * quadratic - volume + self.constant - widened
-        return level, step, np.einsum("dji,djk->dik", root, root)
+        found.append(_concluded(corner[:, more:, more:], few, dets - volume + self.constant - widened))
+        return found
+
+
+def _concluded(corner: Array, few: int, level: Array) -> tuple[Array, Array, Array]:
+    """Level, step and covariance of `marginal` from the corner (D, A + 1, A + 1) of the factor, and the level
+    without what the corner adds.
+    """
+    own, along = corner[:, :few, :few], corner[:, few, :few]
+    root = np.linalg.inv(own)
+    step = np.einsum("dji,dj->di", root, along)
+    level = level - np.sum(np.log(np.einsum("dii->di", own)), axis=1) - 0.5 * corner[:, few, few] ** 2
+    return level, step, np.einsum("dji,djk->dik", root, root)
 
 
 @dataclass(frozen=True)
@@ -320,6 +365,12 @@ def _unit(noise: Noise) -> Noise:
 def _scale(diagonal: Array) -> Array:
     """What makes the diagonal of normal equations one; what no reading sees is kept from dividing by zero."""
     return np.asarray(np.sqrt(np.maximum(diagonal, _UNSEEN * diagonal.max(initial=1e-300))))
+
+
+def _scales(diagonals: Array) -> Array:
+    """As `_scale`, of several (D, U)."""
+    least = _UNSEEN * diagonals.max(axis=1, initial=1e-300)
+    return np.asarray(np.sqrt(np.maximum(diagonals, least[:, None])))
 
 
 def log_sum_exp(values: Array, axis: int = 0) -> Array:

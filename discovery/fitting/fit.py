@@ -183,10 +183,11 @@ def fit_model(
     rounds = _ROUNDS if noise is None or nuisance else 1
     unknown = noise is None and any(stated[name] is None for name in problem.outputs)
     settled = False
+    solution: Solution | None = None
     for k in range(_MOST):
         last = (k >= rounds - 1 and not unknown) or settled or k == _MOST - 1
         most = max_rounds if last or (k == 0 and not unknown) else min(_ROUGH, max_rounds)
-        solution = solve(problem, theta, current, loss, most, tolerance, together, goal)
+        solution = solve(problem, theta, current, loss, most, tolerance, together, goal, solution)
         theta = solution.theta
         if not np.isfinite(solution.jacobian).all():
             raise RunsAwayError(f"the sensitivities of model '{model.name}' to its parameters are not finite")
@@ -209,6 +210,7 @@ def fit_model(
             problem = problem.spread(current, {name: new for name, (new, _) in spreads.items()})
         if settled and solution.converged:
             break
+    assert solution is not None
     excess = _excess(problem, solution) if noise is None and loss == "linear" else 1.0
     covariance, lost = _covariance(problem, solution, together, excess)
     return Fit(

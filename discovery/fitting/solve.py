@@ -42,6 +42,7 @@ class Solution:
     cost: float  # half the sum of their squares
     converged: bool = True  # no step helps any more; else the rounds were used up
     ended_early: bool = False  # it would not have come near its goal
+    slopes: tuple[Array, ...] = ()  # by recording (R, Y, U): sensitivities of the outputs, not whitened
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,7 @@ def solve(
     tolerance: float,
     together: float = 1.0,
     goal: float = inf,
+    last: Solution | None = None,
 ) -> Solution:
     """Find the unknowns (U,) of the smallest cost under a noise, from `theta` (U,).
 
@@ -77,17 +79,20 @@ def solve(
         together: readings that count as one against the priors (`Problem.prior_rows`).
         goal: the cost that is good enough to matter: a search that would not reach it at the pace of its last
             steps ends.
+        last: where the same problem ended under another noise or other priors; what stands there is used.
 
     Raises:
         RunsAwayError: the model does not stay finite where the search begins.
     """
     low, high = problem.bounds
     x = np.clip(theta, low, high)
-    runs = _trajectories(problem, x, None)
+    known = last if last is not None and np.array_equal(last.theta, x) else None
+    runs = known.trajectories if known else _trajectories(problem, x, None)
     filters = _filters(runs, noise)
     now = _whitened(problem, x, noise, together, runs, filters)
     cost, damping = _cost(now.residual, loss), _DAMPING
-    jacobian = _jacobian(problem, x, noise, together, now, filters)
+    slopes = known.slopes if known else _slopes(problem, runs)
+    jacobian = _jacobian(problem, x, noise, together, now, filters, slopes)
     course, done, late = [cost], len(x) == 0, False
     for left in range(max_rounds if len(x) else 0, 0, -1):
         weight, slope = _weights(now.residual, loss)
@@ -123,12 +128,14 @@ def solve(
             filters = _filters(now.trajectories, noise)
             now = _whitened(problem, x, noise, together, now.trajectories, filters)
         cost = _cost(now.residual, loss)
-        jacobian = _jacobian(problem, x, noise, together, now, filters)
+        slopes = _slopes(problem, now.trajectories)
+        jacobian = _jacobian(problem, x, noise, together, now, filters, slopes)
         course.append(cost)
         late = len(course) > _PACE and cost - left * (course[-1 - _PACE] - cost) / _PACE > goal
         if done or late:
             break
-    return Solution(x, now.trajectories, jacobian, 0.5 * float(now.residual @ now.residual), done, late)
+    square = float(now.residual @ now.residual)
+    return Solution(x, now.trajectories, jacobian, 0.5 * square, done, late, slopes)
 
 
 def cost_under(problem: Problem, theta: Array, trajectories: Sequence[Trajectory], noise: Noise) -> float:
@@ -163,12 +170,22 @@ def _whitened(
     return _Run(trajectories, np.concatenate([*parts, problem.prior_rows(x, together)[0]]))
 
 
+def _slopes(problem: Problem, trajectories: tuple[Trajectory, ...]) -> tuple[Array, ...]:
+    return tuple(problem.jacobian(t) for t in trajectories)
+
+
 def _jacobian(
-    problem: Problem, x: Array, noise: Noise, together: float, run: _Run, filters: Filters
+    problem: Problem,
+    x: Array,
+    noise: Noise,
+    together: float,
+    run: _Run,
+    filters: Filters,
+    slopes: tuple[Array, ...],
 ) -> Array:
     parts = [
-        whiten(t, noise, -problem.jacobian(t), part)
-        for t, part in zip(run.trajectories, filters, strict=True)
+        whiten(t, noise, -slope, part)
+        for t, slope, part in zip(run.trajectories, slopes, filters, strict=True)
     ]
     return np.concatenate([*parts, problem.prior_rows(x, together)[1]])
 
@@ -194,13 +211,12 @@ def _step(x: Array, gram: Array, gradient: Array, damping: float, low: Array, hi
 
 
 def _solved(matrix: Array, vector: Array) -> Array:
-    from scipy.linalg import LinAlgError, cho_factor, cho_solve
-
     if not np.isfinite(matrix).all():  # sensitivities that overflow: no step from here
         return np.zeros(len(vector))
     try:
-        return np.asarray(cho_solve(cho_factor(matrix), vector))
-    except LinAlgError:
+        root = np.linalg.cholesky(matrix)
+        return np.asarray(np.linalg.solve(root.T, np.linalg.solve(root, vector)))
+    except np.linalg.LinAlgError:
         return np.asarray(np.linalg.lstsq(matrix, vector, rcond=1e-12)[0])
 
 

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
+from discovery.recordings.commonunits import FACTS, SIZE, parts
 from discovery.recordings.units import parse_unit
 
 # Exponents of the base quantities, and the decimal logarithm of the unit in SI; None: a wildcard.
 Dimension = Mapping[str, float] | None
-SIZE = "size"
 _TURNS = ("revolutions_per_minute", "revolution", "turn", "radian", "degree")
 _CLOSE = 1e-6
 # Units that a sentence begins with
@@ -46,8 +46,10 @@ def dimension(unit: str) -> Dimension:
 
 def known(unit: str) -> bool:
     """Whether a unit has a meaning; an empty one is a wildcard."""
+    if parts(unit or "1") is not None:
+        return True
     try:
-        parse_unit(unit or "1")
+        parse_unit(unit)
     except ValueError:
         return False
     return True
@@ -55,13 +57,17 @@ def known(unit: str) -> bool:
 
 def atoms(unit: str) -> dict[str, float]:
     """The units that a known unit is made of, by pint's names, with their exponents."""
-    parts: Mapping[str, Any] = parse_unit(unit)._units
-    return {str(name): float(power) for name, power in parts.items()}
+    if (common := parts(unit)) is not None:
+        return common
+    of: Mapping[str, Any] = parse_unit(unit)._units
+    return {str(name): float(power) for name, power in of.items()}
 
 
 @lru_cache(maxsize=512)
 def of_atom(atom: str) -> dict[str, float]:
     """Dimension and size of one of the units that `atoms` gives."""
+    if atom in FACTS:
+        return times(FACTS[atom], 1.0)
     difference = f"delta_{atom}" if atom in ("degree_Celsius", "degree_Fahrenheit") else atom
     parsed: Any = parse_unit(difference)
     found = {str(base): float(n) for base, n in parsed.dimensionality.items()}

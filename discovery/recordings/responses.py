@@ -40,15 +40,16 @@ def filtered(values: Array, step: float, tau: float, *, rest: bool = False) -> A
 
     It begins in the balance of the first value, or at zero (`rest`).
     """
-    from scipy.linalg import solve_banded  # a recursion is a matrix of two diagonals
-
     if tau <= 0.0:
         return values
     keep = float(np.exp(-step / tau))
     drive = (1.0 - keep) * values
     drive[0] += 0.0 if rest else keep * values[0]
-    two = np.array([np.ones(len(values)), np.full(len(values), -keep)])
-    return np.asarray(solve_banded((1, 0), two, drive, True, True, check_finite=False))
+    reach = 1  # of what has been added up; each round doubles it
+    while reach < len(drive) and keep > 0.0:
+        drive[reach:] += keep * drive[:-reach]
+        reach, keep = 2 * reach, keep * keep
+    return drive
 
 
 def even_grid(time: Array, points: int = POINTS) -> Array:

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+from discovery.recordings.commonunits import parts
 from discovery.recordings.roles import ROLES
 
 if TYPE_CHECKING:
     import pint
 
-# What needs no look into pint's tables, which take a third of a second to load.
-_COMMON = frozenset({"1", "percent", "degC", "K", "W", "rpm", "mm", "um", "um/m", "l/min", "s", "A", "V"})
 # Names, products, quotients and powers of one digit (and a fraction): pint would compute 9**9**9**9 for as
 # long as it takes.
 _POWER = r"(\*\*|\^)\s?-?\d(\.\d{1,6})?(?!\s*(\*\*|\^|[\d.]))"
@@ -59,7 +58,7 @@ def conversion(unit: str, role: str) -> Conversion:
         one = conversion(steps[1], role)
         return Conversion(one.unit, steps[0] * one.factor, one.offset)
     facts = ROLES[role]
-    if unit in facts.units or (unit in _COMMON and not facts.units):
+    if unit in facts.units or (not facts.units and parts(unit) is not None):
         return Conversion(unit)
     if facts.plain and unit in ("1", "percent", "%"):
         return Conversion("1" if unit == "1" else "percent")

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import t
 
-from discovery.evaluation.recommendation import recommend
+from discovery.evaluation.recommendation import recommend, student95
 
 Array = NDArray[np.float64]
 
@@ -60,3 +61,8 @@ def test_what_was_not_read_counts_for_nothing() -> None:
     found = recommend("E", gaps)
     assert found is not None
     assert found.rms == pytest.approx(float(np.sqrt(np.mean(rows["a"][1::2] ** 2))))
+
+
+@pytest.mark.parametrize("freedom", [1, 2, 3, 4, 7, 8, 29, 100])
+def test_the_quantile_of_student_is_that_of_scipy(freedom: int) -> None:
+    assert student95(freedom) == pytest.approx(t.ppf(0.975, freedom), rel=1e-12)

@@ -217,6 +217,18 @@ def test_columns_that_are_taken_out_leave_the_model_without_them() -> None:
     )
 
 
+def test_one_factor_gives_what_a_model_is_without_its_last_columns_and_with_them() -> None:
+    rows, spread, block = rows_of(9)
+    whole, sizes = grams_of(rows, spread, block), np.array([0])
+    draws = np.random.default_rng(0).multinomial(6, np.full(6, 1 / 6), 40).astype(float)
+    widths = np.random.default_rng(1).choice([0.5, 2.0], 40)
+    both = whole.marginals(sizes, spread[1:], draws, widths)
+    alone = [one.marginal(sizes, draws, widths) for one in (whole.without(spread[1:]), whole)]
+    for found, expected in zip(both, alone, strict=True):
+        for a, b in zip(found, expected, strict=True):
+            assert a == pytest.approx(b, rel=1e-7)
+
+
 def test_form_errors_of_any_share_are_the_same_blocks() -> None:
     """A column scaled by a share, with a coefficient of about one, is the column with one of that share."""
     rows, spread, block = rows_of(7)

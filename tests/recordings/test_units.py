@@ -1,11 +1,13 @@
 """Units, against figures from the definitions."""
 
 import math
+from typing import Any
 
 import pytest
 
+from discovery.recordings.commonunits import FACTS, SIZE, SPELT, parts
 from discovery.recordings.roles import ROLES
-from discovery.recordings.units import UnitError, conversion
+from discovery.recordings.units import UnitError, conversion, parse_unit
 
 
 @pytest.mark.parametrize(
@@ -74,3 +76,35 @@ def test_canonical_units_are_their_own() -> None:
             assert (conversion(unit, role).factor, conversion(unit, role).offset) == (1.0, 0.0)
         for unit in facts.ranges:
             assert conversion(unit, role).unit == unit
+
+
+def of_pint(unit: str) -> dict[str, float]:
+    parsed: Any = parse_unit(unit)
+    return {str(name): float(power) for name, power in parsed._units.items()}
+
+
+@pytest.mark.parametrize("unit", [*SPELT, *(f"{a}/{b}" for a in ("W", "um", "J") for b in ("K", "m", "s"))])
+def test_common_units_are_those_of_pint(unit: str) -> None:
+    assert parts(unit) == of_pint(unit)
+
+
+@pytest.mark.parametrize("unit", ["W/m**2/K", "1/min", "s/s", "1*W", "1/1", "K/1/s", "J/kg/K", "W/K**2"])
+def test_products_of_common_units_are_those_of_pint(unit: str) -> None:
+    assert parts(unit) == of_pint(unit)
+
+
+@pytest.mark.parametrize("name", FACTS)
+def test_common_units_have_the_dimension_and_size_of_pint(name: str) -> None:
+    given: Any = parse_unit(f"delta_{name}" if name == "degree_Celsius" else name)
+    turns = {"[angle]": 1.0} if name == "revolutions_per_minute" else {}  # pint holds turns for pure numbers
+    expected = {str(base): float(n) for base, n in given.dimensionality.items()} | turns
+    assert {base: n for base, n in FACTS[name].items() if base != SIZE} == expected
+    in_si = (1.0 * given).to_base_units()
+    assert FACTS[name][SIZE] == pytest.approx(math.log10(in_si.magnitude), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "unit", ["W/degC", "kWh", "", "W K", "W//K", "2*W", "W**1.5", "(W)", "W**10", "/K", "*K", "W*", "W/"]
+)
+def test_what_is_not_common_is_left_to_pint(unit: str) -> None:
+    assert parts(unit) is None
