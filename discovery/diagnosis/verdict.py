@@ -158,11 +158,11 @@ def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Na
     return kept
 
 
-def by_chance(gain: float) -> float:
+def by_chance(gain: float, least: float = thresholds.SHORT) -> float:
     """Log evidence that may come by chance. A log evidence of G varies by sqrt(2 G) from one set of readings
     to another: it is half of the square of a distance known within one standard deviation.
     """
-    return max(thresholds.SHORT, thresholds.CHANCE * sqrt(2 * max(gain, 0.0)))
+    return max(least, thresholds.CHANCE * sqrt(2 * max(gain, 0.0)))
 
 
 def _alone(

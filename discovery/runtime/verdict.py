@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from discovery.diagnosis.thresholds import NAMED, ODDS, RIVAL, SHORT, SUREST
+from discovery.diagnosis.thresholds import NAMED, ODDS, RIVAL, SUREST
 from discovery.diagnosis.verdict import by_chance
 
 Verdict = Literal[
@@ -28,6 +28,7 @@ Kind = Literal[
 
 # Chosen on seeds set aside for it and confirmed on others, see benchmarks/runtime.md
 LEAST_ODDS = 2.5  # log of the odds against `nothing`, below which nothing has changed
+SURE = 11.0  # log evidence of something new; a diagnosis, which knows no earlier fit, asks for more
 RARE = 2.0  # log of how much less often a sensor fails, or something else changes, than a machine wears
 
 
@@ -79,7 +80,7 @@ def verdict_of(odds: Odds, evidence: Odds) -> tuple[Verdict, str]:
     effects = [one for one in odds if one.is_new_physics]
     best, second, *_ = sorted((e for e in evidence if not e.is_new_physics), key=lambda one: -odds[one])
     effect = max(effects, key=lambda one: odds[one], default=None)
-    if effect and odds[effect] - max(odds[best], 0.0) >= by_chance(odds[effect]):
+    if effect and odds[effect] - max(odds[best], 0.0) >= by_chance(odds[effect], SURE):
         if probability(odds, effect) >= NAMED:
             return "new physics", str(effect)
         others = _without(odds, effect)
@@ -90,7 +91,7 @@ def verdict_of(odds: Odds, evidence: Odds) -> tuple[Verdict, str]:
         return "undecided", f"{best} or {second}"
     if best.kind == "wear" or best.kind == "something else":
         return best.kind, ""
-    if evidence[best] < SHORT:
+    if evidence[best] < SURE:
         return "undecided", f"{best} or {SOMETHING_ELSE}"
     if best.kind == "no input":
         return "idle input", best.what
