@@ -245,13 +245,13 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
     """The fit with its model in another form: same readings and parameters, nothing is fitted.
 
     Args:
-        model: has no unknown that the fit has not.
+        model: has no unknown that the fit has not; what is one number in the fit may be one of each recording.
         campaign: of the recordings.
     """
     grids = {s.grid.recording: s.grid for s in fit.problem.systems}
     problem = make_problem(model, campaign, list(grids), fit.problem.outputs, grids)
     place = {u.key: i for i, u in enumerate(fit.problem.unknowns)}
-    index = [place[u.key] for u in problem.unknowns]
+    index = [place[u.key if u.key in place else replace(u, recording=None).key] for u in problem.unknowns]
     theta = fit.theta[index]
     return replace(
         fit,

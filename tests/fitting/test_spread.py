@@ -185,6 +185,19 @@ def test_a_fit_written_another_way_keeps_its_numbers() -> None:
         assert a.x == pytest.approx(b.x)
 
 
+def test_what_is_one_number_in_a_fit_may_be_written_for_each_recording() -> None:
+    """A clock that is ahead in one recording is a number of that recording in the repaired model."""
+    seen = campaign(*(cold(np.random.default_rng(seed), f"r{seed}") for seed in (9, 10)))
+    fit = fit_model(model(), seen, ["r9", "r10"])
+    name = fit.model.free[0]
+    found = fit.model.parameters[name]
+    each = replace(found, per_recording=True, values=dict.fromkeys(["r9", "r10"], found.value))
+    again = written_with(fit, replace(fit.model, parameters={**fit.model.parameters, name: each}), seen)
+    assert again.model.parameters[name].values == pytest.approx({"r9": found.value, "r10": found.value})
+    for a, b in zip(again.trajectories, fit.trajectories, strict=True):
+        assert a.x == pytest.approx(b.x)
+
+
 def test_masses_that_are_warm_together_share_a_first_reading() -> None:
     """The start is the mean of two normal masses given their sum with noise, in closed form."""
     states = {
