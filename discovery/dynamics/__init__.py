@@ -2,10 +2,13 @@
 
 from discovery.dynamics.grid import Grid, make_grid
 from discovery.dynamics.prediction import outputs, predict
+from discovery.dynamics.room import keep_room
 from discovery.dynamics.sensitivity import Column, sensitivities
 from discovery.dynamics.starts import start_values
 from discovery.dynamics.system import System, make_system
 from discovery.dynamics.trajectory import Trajectory, simulate
+
+keep_room()
 
 __all__ = [
     "Column",

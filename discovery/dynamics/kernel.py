@@ -23,6 +23,7 @@ Ints = NDArray[np.int64]
 
 # 1/(i + 2)! of the series of phi2; what follows m^12 is below rounding for a scaled norm of 1/2
 _TAYLOR = np.array([1.0 / factorial(i + 2) for i in range(13)])
+_ROOM = 256  # distinct transitions that there is room for at first
 _LOOKBACK = 12  # recent transitions looked through before a new one is computed
 
 
@@ -105,6 +106,14 @@ def _equal(a, j, k):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def _wider(some, room):  # type: ignore[no-untyped-def]
+    """Matrices (U, n, n) with room for more of them."""
+    out = np.empty((room, some.shape[1], some.shape[2]))
+    out[: some.shape[0]] = some
+    return out
+
+
+@njit(cache=True, nogil=True)
 def transitions(a, h):  # type: ignore[no-untyped-def]
     """Transition matrices of all intervals, each distinct one computed once.
 
@@ -117,9 +126,8 @@ def transitions(a, h):  # type: ignore[no-untyped-def]
     """
     count, n = a.shape[0], a.shape[1]
     which = np.empty(count, np.int64)
-    e = np.empty((count, n, n))
-    w0 = np.empty((count, n, n))
-    w1 = np.empty((count, n, n))
+    room = min(count, _ROOM)
+    e, w0, w1 = np.empty((room, n, n)), np.empty((room, n, n)), np.empty((room, n, n))
     first = np.empty(count, np.int64)
     used = 0
     for k in range(count):
@@ -129,6 +137,9 @@ def transitions(a, h):  # type: ignore[no-untyped-def]
             if h[j] == h[k] and _equal(a, j, k):
                 found = u
                 break
+        if found < 0 and used == room:
+            room = min(count, 4 * room)
+            e, w0, w1 = _wider(e, room), _wider(w0, room), _wider(w1, room)
         if found < 0:
             _exponential(a[k], h[k], e[used], w0[used], w1[used])
             first[used] = k

@@ -193,17 +193,36 @@ def _change(old: Array, new: Array) -> float:
 
 
 def _linearise(system: System, values: Mapping[str, float], x: Array) -> tuple[Array, Array, Array]:
-    """State matrices (K, n, n) around a trajectory, forcing left over at both interval ends (K, n) each."""
-    a = np.zeros((len(system.grid.step), *2 * (len(system.states),)))
-    found = _term_rates(system, values, x, frozenset(system.states))
-    for dual, i, j in zip(found, system.into, system.source, strict=True):
+    """State matrices (K, n, n) around a trajectory, forcing left over at both interval ends (K, n) each.
+
+    Those of an affine system are the same around any trajectory. It is asked at zero, where all is left over.
+    """
+    count, n = len(system.grid.step), len(system.states)
+    wanted = frozenset(system.states)
+    if system.affine:
+        zero = dict.fromkeys(system.states, 0.0)
+        found = system.rates({**system.grid.ends, **values, **zero}, wanted, system.ends)
+    else:
+        found = _term_rates(system, values, x, wanted)
+    entries: dict[tuple[int, int], Value] = {}
+    means: dict[int, Value] = {}  # of each derivative, which several terms may share
+    ends = zip(system.into.tolist(), system.source.tolist(), strict=True)
+    for dual, (i, j) in zip(found, ends, strict=True):
         for name, partial in dual.partials.items():
             s = system.states.index(name)
-            mean = _interval_means(partial)
-            a[:, i, s] += system.scale[i] * mean
+            if id(partial) not in means:
+                means[id(partial)] = _interval_means(partial)
+            mean = means[id(partial)]
+            entries[i, s] = entries.get((i, s), 0.0) + system.scale[i] * mean
             if j >= 0:
-                a[:, j, s] -= system.scale[j] * mean
-    return a, *kernel.left_over(_state_rates(system, found), a, x)
+                entries[j, s] = entries.get((j, s), 0.0) - system.scale[j] * mean
+    a = np.zeros((count, n, n))
+    for (i, s), entry in entries.items():
+        a[:, i, s] = entry
+    rates = _state_rates(system, found)
+    if system.affine:
+        return a, np.ascontiguousarray(rates[0::2]), np.ascontiguousarray(rates[1::2])
+    return a, *kernel.left_over(rates, a, x)
 
 
 def _term_rates(
@@ -215,11 +234,15 @@ def _term_rates(
 
 def _state_rates(system: System, found: Sequence[Dual]) -> Array:
     """Rate of each state at both ends of each interval (2K, n): the sum of its terms."""
-    rates = np.zeros((2 * len(system.grid.step), len(system.states)))
-    for dual, i, j in zip(found, system.into, system.source, strict=True):
-        rates[:, i] += system.scale[i] * dual.value
+    sums: list[Value] = [0.0] * len(system.states)
+    ends = zip(system.into.tolist(), system.source.tolist(), strict=True)
+    for dual, (i, j) in zip(found, ends, strict=True):
+        sums[i] = sums[i] + system.scale[i] * dual.value
         if j >= 0:
-            rates[:, j] -= system.scale[j] * dual.value
+            sums[j] = sums[j] - system.scale[j] * dual.value
+    rates = np.empty((2 * len(system.grid.step), len(sums)))
+    for i, one in enumerate(sums):
+        rates[:, i] = one
     return rates
 
 

@@ -37,9 +37,10 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
         values = h.values(run)
         for term in h.terms:
             series = evaluate(term.expression, {**ends, **values}, memory=system.ends).value
-            mine = owner + next(
-                (k for k, name in enumerate(h.amplitudes) if name in names(term.expression)), 0
-            )
+            mine = owner
+            if len(h.amplitudes) > 1:
+                used = names(term.expression)
+                mine += next((k for k, name in enumerate(h.amplitudes) if name in used), 0)
             columns.append(Column(mine, term.into, np.asarray(series, dtype=float), term.source))
         if h.shown:
             for k, (name, expression) in enumerate(h.shows(system.model).items()):

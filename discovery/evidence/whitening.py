@@ -322,7 +322,10 @@ class Whitened:
             own = slice(first, first + self.blocks)
             edges = np.searchsorted(self.block[here], np.arange(first, first + self.blocks + 1)).tolist()
             products = np.array([rows[a:b].T @ rows[a:b] for a, b in pairwise(edges)])
-            pieces[own, columns[:, None], columns] = products
+            runs = _runs(columns)
+            for from_row, to_row in runs:
+                for from_column, to_column in runs:
+                    pieces[own, to_row, to_column] = products[:, from_row, from_column]
             dets[own] = [log[a:b].sum() for a, b in pairwise(edges)]
         return pieces, dets
 
@@ -355,6 +358,15 @@ def absorbed(rows: Array, prior: Array) -> Absorbed:
     quadratic = float(rows[:, 0] @ rows[:, 0]) + float(prior[0, 0]) - float(slope @ slope)
     volume = 0.5 * float(np.sum(np.log(size))) + float(np.sum(np.log(scale)))
     return Absorbed(rows[:, 0], rows[:, 1:] @ root, slope, -0.5 * quadratic - volume)
+
+
+def _runs(columns: Ints) -> list[tuple[slice, slice]]:
+    """Ascending columns (C,) as runs without a gap: where each stands among them, and in all. Slices are
+    copied ten times as fast as what an index picks.
+    """
+    ends = np.flatnonzero(np.diff(columns) > 1) + 1
+    edges = [0, *ends.tolist(), len(columns)]
+    return [(slice(a, b), slice(int(columns[a]), int(columns[b - 1]) + 1)) for a, b in pairwise(edges)]
 
 
 def _unit(noise: Noise) -> Noise:
