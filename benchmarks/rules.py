@@ -25,14 +25,15 @@ RESOLUTION = {  # finer gives the same answer in more time
     "evidence/form_error.py": "LAWS PLACES INNER DEPTH",
     "evidence/latent_force.py": "BLOCKS SIZES MEMORY_BLOCKS",
     "evidence/process_noise.py": "_TRIED _BLOCKS JITTER",
-    "evidence/whitening.py": "_AT_BOUND _UNSEEN _ROUNDING _REMEMBERED",
+    "evidence/whitening.py": "_AT_BOUND _UNSEEN _ROUNDING _REMEMBERED _TOGETHER",
     "diagnosis/context.py": "MOST_READINGS NODES",
     "diagnosis/diagnose.py": "ANOTHER_NOISE",
     "diagnosis/posterior.py": "FAR MOST IN_PLAY SETTINGS",
     "diagnosis/proof.py": "DRAWS BLOCKS",
     "diagnosis/refit.py": "ENOUGH ROUNDS MOVED",
     "diagnosis/scored.py": "KEPT",
-    "diagnosis/selection.py": "MOST REFITS RIVALS HOPE HALF FAR",
+    "diagnosis/selection.py": "MOST REFITS RIVALS HOPE HALF NEAR FAR",
+    "diagnosis/tree.py": "_SAME",
     "diagnosis/thresholds.py": "DRAWS BLOCKS",
 }
 SHOWN = {  # what is shown with an answer, not the answer

@@ -189,8 +189,8 @@ def test_a_fault_is_told_from_physics() -> None:
     [
         (200.0, 229.9, "missing physics"),  # as much as chance may add: 1.5 sqrt(2 * 200)
         (200.0, 230.1, "unexplained"),
-        (12.0, 11.9 + SHORT, "missing physics"),  # or so much
-        (12.0, 12.1 + SHORT, "unexplained"),
+        (20.0, 19.9 + SHORT, "missing physics"),  # or so much
+        (20.0, 20.1 + SHORT, "unexplained"),
     ],
 )
 def test_heat_that_no_effect_explains_refutes_names(gain: float, unknown: float, word: str) -> None:
