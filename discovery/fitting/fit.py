@@ -245,7 +245,7 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
     """The fit with its model in another form: same readings and parameters, nothing is fitted.
 
     Args:
-        model: has no unknown that the fit has not; what is one number in the fit may be one of each recording.
+        model: has no unknown that the fit has not; one number in the fit may be one of each recording here.
         campaign: of the recordings.
     """
     grids = {s.grid.recording: s.grid for s in fit.problem.systems}
