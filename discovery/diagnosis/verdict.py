@@ -81,11 +81,13 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     # what changes no free run outside the fit is not lacking either
     rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
     best = max(rest, key=lambda m: m.evidence)
+    effects = max(m.evidence for m in rest if not m.forced)
     short = best.evidence - (_alone(context, found, answer, named) if matters else answer.evidence)
-    # names hold next to effects that are not sure, but not next to heat that no effect explains; without
-    # names, something is missing only if an effect improves free runs outside the fit
-    much = short > by_chance(found.gain)
-    if much and (best.forced or not (named or _idle_all(context, found, answer, candidates))):
+    # names hold next to effects that are not sure, but not next to something that no effect explains; without
+    # names, something is missing only if it is of unknown cause, or an effect improves free runs outside the fit
+    bar = by_chance(found.gain)
+    unknown = best.evidence - effects > bar if named else bool(best.forced)
+    if short > bar and (unknown or not (named or _idle_all(context, found, answer, candidates))):
         if best.forced:
             reasons.append(f"{best.forced} explains more than effects do")
         reasons.append(
