@@ -85,9 +85,8 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     short = best.evidence - (_alone(context, found, answer, named) if matters else answer.evidence)
     # names hold next to effects that are not sure, but not next to something that no effect explains; without
     # names, something is missing only if it is of unknown cause, or an effect improves free runs outside the fit
-    bar = by_chance(found.gain)
-    unknown = best.evidence - effects > bar if named else bool(best.forced)
-    if short > bar and (unknown or not (named or _idle_all(context, found, answer, candidates))):
+    unknown = best.evidence - effects > thresholds.SHORT if named else bool(best.forced)
+    if short > by_chance(found.gain) and (unknown or not (named or _idle_all(context, found, answer, candidates))):
         if best.forced:
             reasons.append(f"{best.forced} explains more than effects do")
         reasons.append(

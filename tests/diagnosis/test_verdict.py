@@ -187,9 +187,9 @@ def test_a_fault_is_told_from_physics() -> None:
 @pytest.mark.parametrize(
     ("gain", "unknown", "word"),
     [
-        (200.0, 229.9, "missing physics"),  # as much as chance may add: 1.5 sqrt(2 * 200)
+        (200.0, 229.9, "missing physics"),  # what the names lack may come by chance: 1.5 sqrt(2 * 200)
         (200.0, 230.1, "unexplained"),
-        (20.0, 19.9 + SHORT, "missing physics"),  # or so much
+        (20.0, 19.9 + SHORT, "missing physics"),  # or it is less than a name would add
         (20.0, 20.1 + SHORT, "unexplained"),
     ],
 )
@@ -203,6 +203,17 @@ def test_heat_that_no_effect_explains_refutes_names(gain: float, unknown: float,
     assert verdict.word == word
     if word == "unexplained":
         assert verdict.reasons[0] == "heat of unknown cause at bed explains more than effects do"
+
+
+@pytest.mark.parametrize(("more", "word"), [(-0.1, "missing physics"), (0.1, "unexplained")])
+def test_names_hold_next_to_unsure_effects_that_explain_as_much_as_an_unknown_cause(
+    more: float, word: str
+) -> None:
+    """The friction is not sure, but it explains what the fluid leaves nearly as well as unknown heat does."""
+    both = pair(FLUID, FRICTION, 200.0, 120.0, 30.0)
+    unknown = Model((FLUID,), 200.0 + SHORT + more, forced="heat of unknown cause at bed")
+    found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.5}, unknown=unknown)
+    assert found.word == word
 
 
 @pytest.mark.parametrize(("by", "word"), [(-0.01, "no mismatch"), (0.01, "missing physics")])
