@@ -81,17 +81,18 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     # what changes no free run outside the fit is not lacking either
     rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
     best = max(rest, key=lambda m: m.evidence)
-    effects = max(m.evidence for m in rest if not m.forced)
-    short = best.evidence - (_alone(context, found, answer, named) if matters else answer.evidence)
+    alone = _alone(context, found, answer, named) if matters else answer.evidence
     # names hold next to effects that are not sure, but not next to something that no effect explains; without
     # names, something is missing only if it is of unknown cause, or an effect improves free runs outside the fit
-    unknown = best.evidence - effects > thresholds.SHORT if named else bool(best.forced)
-    if short > by_chance(found.gain) and (unknown or not (named or _idle_all(context, found, answer, candidates))):
+    without = max(m.evidence for m in rest if not m.forced) if named else alone
+    if best.evidence - without > thresholds.SHORT and (
+        named or best.forced or not _idle_all(context, found, answer, candidates)
+    ):
         if best.forced:
             reasons.append(f"{best.forced} explains more than effects do")
         reasons.append(
             "the effects that are sure enough explain too little: the best model of all has "
-            f"{short:.0f} more log evidence"
+            f"{best.evidence - alone:.0f} more log evidence"
         )
         named = ()
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]

@@ -187,9 +187,8 @@ def test_a_fault_is_told_from_physics() -> None:
 @pytest.mark.parametrize(
     ("gain", "unknown", "word"),
     [
-        (200.0, 229.9, "missing physics"),  # what the names lack may come by chance: 1.5 sqrt(2 * 200)
-        (200.0, 230.1, "unexplained"),
-        (20.0, 19.9 + SHORT, "missing physics"),  # or it is less than a name would add
+        (200.0, 199.9 + SHORT, "missing physics"),  # less than a name would have to add
+        (200.0, 200.1 + SHORT, "unexplained"),
         (20.0, 20.1 + SHORT, "unexplained"),
     ],
 )
