@@ -167,7 +167,8 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     (
         SET_POINT,
         {},
-        "setpoint setpoints set_point set_points set target targets soll ~sollwert ~sollwerte sp ~設定 ~设定 "
+        "setpoint setpoints set_point set_points set target targets ~soll ~sollwert ~sollwerte "
+        "sp ~設定 ~设定 "
         "~目標 ~目标 ~설정 consigne consigna",
     ),
     # places
