@@ -110,7 +110,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     ),
     (
         "load",
-        {"power": 3, "torque": 1.5},
+        {"power": 3, "current": 2, "torque": 2},
         "load drive motor ~antrieb ~負荷 ~负载 ~負載 ~モータ ~电机 last spindellast motorlast ~auslastung",
     ),
     (

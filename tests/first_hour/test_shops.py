@@ -136,6 +136,21 @@ def test_of_two_voltages_the_one_that_follows_is_the_output() -> None:
     assert not found["液位(V)"].sure
 
 
+@pytest.mark.parametrize("name", ["motor_A", "Load", "S-load"])
+def test_what_a_motor_takes_is_asked(name: str) -> None:
+    """Percent, amperes or a temperature: nothing but jumps from 0 to 40."""
+    assert not roles((name, "", 40.0 * STEPS), ("T1", "degC", SLOW))[name].sure
+
+
+@pytest.mark.parametrize("zero", [0.0, 0.012, -0.2, 152.3], ids=["at zero", "near", "below", "of a probe"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_displacements_of_a_lathe_without_units(zero: float, sign: float) -> None:
+    """`X1-1, Z1` in mm, next to temperatures without units."""
+    moved = zero + sign * 0.03 * (1 - np.exp(-np.arange(ROWS) / 120.0))
+    found = roles(("T1", "", SLOW), ("T2", "", SLOW + 3.0), ("X1-1", "", moved), ("Z1", "", 0.5 * moved))
+    assert [(found[n].role, found[n].unit) for n in ("X1-1", "Z1")] == [("error", "mm")] * 2
+
+
 def lathe(tmp_path: Path, *, zero: bool, warm: bool) -> dict[str, float]:
     """Errors that may have own zeros, of three runs of a lathe that start at other rooms."""
     for k in range(3):
