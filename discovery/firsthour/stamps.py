@@ -89,8 +89,7 @@ def find_clock(
         UserError: no column is, or the one that should be does not run forward.
     """
     named = [k for k, name in enumerate(names) if CLOCKS.search(fold(name))]
-    stated = [bool(time_unit(units[k])) or _holds_stamps(sheet, k) for k in range(len(names))]
-    named.sort(key=lambda k: (not stated[k], not CLOCKS.match(fold(names[k])), k))
+    named.sort(key=lambda k: (not _stated(sheet, k, names[k], units[k]), not CLOCKS.match(fold(names[k])), k))
     backwards = ""
     others = [k for k in range(len(names)) if k not in named]
     others.sort(key=lambda k: not _holds_stamps(sheet, k))  # before numbers of rows
@@ -116,6 +115,12 @@ def find_clock(
         f"{sheet.path}: no column of time was found; call one 'time' (seconds, or instants as "
         "2026-03-01T08:00:00), or add one if the file has none"
     )
+
+
+def _stated(sheet: Sheet, column: int, name: str, unit: str) -> bool:
+    """Whether a column says that it is a clock by more than one of its words: `Data_Point` does not."""
+    alone = bool(CLOCKS.fullmatch(fold(name)))
+    return alone or time_unit(unit) is not None or _holds_stamps(sheet, column)
 
 
 def _holds_stamps(sheet: Sheet, column: int) -> bool:

@@ -31,6 +31,7 @@ _LOWER = 0.97  # of what the other recordings reach
 _MINUTES = 360.0  # s
 _APART = 2.0  # times the usual spread: another level
 _DIGITS = 2.0  # times its last digit: what an input should move by while it stays at one value
+_KEEPS = 0.8  # of the readings after one at that value have it, too
 _STILL, _LINE = 0.1, 0.8  # of the recording; correlation elsewhere
 _NEAR, _HELD = 0.02, 0.01  # of the range elsewhere; of the readings elsewhere: a value that was held there
 _RELATED = 0.5  # of what a channel moves: what a straight line of its sibling leaves
@@ -310,7 +311,7 @@ def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Fi
                 goes_on = float(np.std(x[known])) / (float(np.std(x)) or 1.0) if known.any() else 0.0
                 usual = max((_goes_on(o) for o in others), default=0.0)
                 moves = _answer(others) * float(np.std(x[known])) if known.any() else 0.0
-                seen = moves > _DIGITS * _step(np.concatenate([o[1] for o in others]))
+                seen = moves > _DIGITS * _step(np.concatenate([o[1] for o in others])) and _lasts(still)
                 if known.mean() > _STILL and goes_on > 0.4 and usual < 0.5 * goes_on and seen:
                     what = (
                         f"'{b.name}' stays at {value:.4g} in {still.mean():.0%} of the recording "
@@ -329,6 +330,12 @@ def _occurs(values: Array, elsewhere: Array) -> NDArray[np.bool_]:
         ordered, values - width, "left"
     )
     return near >= _HELD * ordered.size
+
+
+def _lasts(still: NDArray[np.bool_]) -> bool:
+    """Whether a channel (N,) keeps its value once it has it; one with noise and few digits comes and goes."""
+    before = still[:-1]
+    return bool(before.any() and np.mean(still[1:][before]) > _KEEPS)
 
 
 def _answer(others: Sequence[Array]) -> float:
