@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 Progress = Callable[[str], None]  # called with what begins
 
-_TOO_SOON = 5.0  # s, before which nothing is said of the time left
+TOO_SOON = 5.0  # s: of less nothing is said
 
 
 def silent(what: str) -> None:
@@ -24,12 +24,12 @@ def time_left(done: int, count: int, passed: float) -> str:
     >>> time_left(2, 10, 60.0), time_left(0, 10, 60.0), time_left(1, 10, 2.0)
     (', about 4 min left', '', '')
     """
-    if not 0 < done < count or passed < _TOO_SOON:
+    if not 0 < done < count or passed < TOO_SOON:
         return ""
-    return f", about {_duration(passed / done * (count - done))} left"
+    return f", about {rough(passed / done * (count - done))} left"
 
 
-def _duration(seconds: float) -> str:
+def rough(seconds: float) -> str:
     """A time that is roughly known."""
     if seconds >= 5400:
         return f"{seconds / 3600:.1f} h"

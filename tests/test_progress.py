@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -39,4 +40,22 @@ def test_a_run_counts_its_models_and_promises_no_time(
     run(tmp_path / "experiment.toml", tmp_path / "out", said.append)
     assert any("0 of 3 models done" in what for what in said), said
     assert any("1 of 3 models done" in what for what in said), said
+    assert not [what for what in said if "left" in what]
+
+
+def test_a_second_run_says_what_is_left_of_the_time_of_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_small(tmp_path)
+    run(tmp_path / "experiment.toml", tmp_path / "out")
+    results = tmp_path / "out" / "results.json"
+    content = json.loads(results.read_text())
+    results.write_text(json.dumps({**content, "seconds": 600.0}))
+    said: list[str] = []
+    monkeypatch.setattr("time.perf_counter", lambda: 0.0)
+    run(tmp_path / "experiment.toml", tmp_path / "out", said.append)
+    assert any(what.endswith(", about 10 min left if this takes as long as the last run") for what in said)
+    results.write_text(json.dumps({**content, "seconds": 600.0, "fit": ["another"]}))
+    said.clear()
+    run(tmp_path / "experiment.toml", tmp_path / "out", said.append)
     assert not [what for what in said if "left" in what]

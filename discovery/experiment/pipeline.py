@@ -17,6 +17,7 @@ from discovery.experiment.form import (
     ModelEntry,
 )
 from discovery.experiment.joining import check_joins, join
+from discovery.experiment.lasttime import with_time_left
 from discovery.experiment.modelfits import fit_entry
 from discovery.experiment.quality import quality, refuse
 from discovery.experiment.results import results_document, write_run
@@ -70,6 +71,7 @@ def run(
     folder = out or default_folder(experiment.name)
     if experiment.form.export:
         check_targets(experiment.form.export.to)
+    progress = with_time_left(progress, folder, experiment, began)
     with staged(folder) as temporary:
         begun = begin_roles(experiment)
         fitted = fit_all(experiment, progress)

@@ -18,8 +18,7 @@ from discovery.evaluation.crossvalidation import Fold, folds, masked
 from discovery.experiment import Experiment
 from discovery.experiment.form import ModelEntry
 from discovery.experiment.modelfits import fit_of
-from discovery.fitting import predict_recording
-from discovery.models import Model
+from discovery.fitting import Fit, predict_recording
 from discovery.progress import Progress, silent
 from discovery.recordings import Campaign, Recording
 from discovery.sparse.ratedata import time_scale
@@ -124,9 +123,7 @@ def _left_out(experiment: Experiment, name: str, entry: ModelEntry, fold: Fold) 
     reference = np.array([_spread(whole, r, outputs, fold) for r in fold.recordings or kept])
     try:
         fit = fit_of(inner, name, entry, max_rounds=_ROUNDS)[2]
-        left = np.array(
-            [_residual(fit.model, whole, r, outputs, fit.noise.white, fold) for r in fold.recordings or kept]
-        )
+        left = np.array([_residual(fit, whole, r, outputs, fold) for r in fold.recordings or kept])
     except UserError:
         left = _LOST**2 * reference
     of = reference.sum(axis=0)
@@ -134,16 +131,11 @@ def _left_out(experiment: Experiment, name: str, entry: ModelEntry, fold: Fold) 
     return found, np.maximum(of, 1e-12)
 
 
-def _residual(
-    model: Model,
-    campaign: Campaign,
-    recording: str,
-    outputs: Sequence[str],
-    noise: Sequence[float],
-    fold: Fold,
-) -> Array:
-    trajectory = predict_recording(model, campaign, recording, outputs, noise)
-
+def _residual(fit: Fit, campaign: Campaign, recording: str, outputs: Sequence[str], fold: Fold) -> Array:
+    known = fit.offset_in(recording)  # of a part that is left out, its recording was seen
+    trajectory = predict_recording(
+        fit.model, campaign, recording, outputs, fit.noise.white, known=known, zeros=fit.zeros
+    )
     grid = trajectory.system.grid
     rows = grid.readings - predict(trajectory)
     squares: Array = np.nansum(

@@ -59,6 +59,8 @@ _ROLES = {
 }
 OTHER = "other input"
 _STEPS = 255.0  # of a pulse width
+# a word that names a quantity, and one for a thing that usually has some: the current of a load is a current
+_NAMES, _HAS = 5.0, 3.0
 
 
 @dataclass
@@ -119,14 +121,18 @@ def evidence(
         values: (N,). hints: what its file and its neighbours say.
     """
     found = Evidence()
-    seen: set[str] = set()
     of_name = words_of(name)
+    clearest: dict[str, Word] = {}  # of words that say the same
     for word in [*of_name, *words_of(about)]:
-        if word.gloss not in seen:
-            head = _HEAD if of_name and word is of_name[-1] else 1.0
-            says = {key: head * odds for key, odds in word.says.items()}
-            found.add(f"'{_spelled(word, name)}' in its name", says)
-        seen.add(word.gloss)
+        if word.gloss not in clearest or _clear(word) > _clear(clearest[word.gloss]):
+            clearest[word.gloss] = word
+    named = max((_of_quantity(word) for word in of_name), default=0.0) >= _NAMES
+    for word in clearest.values():
+        head = _HEAD if of_name and word is of_name[-1] else 1.0
+        says = {key: head * odds for key, odds in word.says.items()}
+        if named and _of_quantity(word) <= _HAS:
+            says = {key: odds for key, odds in says.items() if key in PLACES}
+        found.add(f"'{_spelled(word, name)}' in its name", says)
     if unit is not None:
         odds = dict(dimension_of(unit))
         if odds and max(odds.values()) > 4:  # a quantity that cannot have the unit is out
@@ -136,9 +142,20 @@ def evidence(
     if form is not None:
         for why, more in value_odds(form, unit):
             found.add(why, more)
+        if form.binary and max(found.odds["coolant"], found.odds["fluid"]) > 0.0:
+            found.add("a fluid that is on or off flows", {"flow": 3.0})
     for why, more in hints:
         found.add(why, more)
     return found
+
+
+def _clear(word: Word) -> float:
+    return max(word.says.values(), default=0.0)
+
+
+def _of_quantity(word: Word) -> float:
+    """How clearly a word names one quantity."""
+    return max((odds for key, odds in word.says.items() if key in QUANTITIES), default=0.0)
 
 
 def is_set_point_word(name: str) -> bool:
@@ -189,6 +206,7 @@ def value_odds(form: Shape, unit: str | None) -> list[tuple[str, Mapping[str, fl
             "speed": 1.0,
             "power": 1.0,
             "signal": 1.0,
+            "current": 1.0,
             "flow": 0.5,
         }
         found.append(("it jumps", says))

@@ -36,14 +36,20 @@ def numbers_in(stem: str) -> list[Said]:
 
     >>> numbers_in("lathe_2000rpm_0-20C")
     [(2000.0, 2000.0, 'rpm'), (0.0, 20.0, 'degC')]
+    >>> numbers_in("test2_20rpm"), numbers_in("03_500rpm"), numbers_in("n1500rpm")
+    ([(20.0, 20.0, 'rpm')], [(500.0, 500.0, 'rpm')], [(1500.0, 1500.0, 'rpm')])
     """
     found = []
-    for one in _NUMBER.finditer(stem.replace("__", "_")):
+    for one in _NUMBER.finditer(stem := stem.replace("__", "_")):
         written = _SPELLED.get(one["unit"].lower(), one["unit"])
         unit = known_unit(written.replace("_", ""))
         low = float(one["low"].replace(",", "."))
         high = float(one["high"].replace(",", ".")) if one["high"] else low
-        if unit and (one["high"] is None or high > low):
+        counted = one.start() > 0 and stem[one.start() - 1].isalpha()  # the number of a test
+        between = stem[one.end("low") : one.start("high")].strip() if one["high"] else ""
+        if between == "_" and (counted or high <= low or unit not in ("degC", "degF")):
+            low, between = high, ""
+        if unit and (not between or high > low):
             found.append((low, high, unit))
     return found
 

@@ -109,8 +109,11 @@ def _fitted(cells: list[str], width: int) -> list[str] | None:
 
 
 def _units(cells: Sequence[str]) -> float:
-    """Share of the cells of a row that are units; one that only a list of all units has counts half: t, P."""
-    known = [cell.strip("[]()") for cell in cells if cell]
+    """Share of the cells of a row that are units; one that only a list of all units has counts half: t, P.
+
+    A number is the unit of a ratio, or a setting: it counts for neither.
+    """
+    known = [cell.strip("[]()") for cell in cells if cell and not is_number(cell)]
     usual = sum(bool(known_unit(cell) or time_unit(cell) or steps_in(cell)) for cell in known)
     any_unit = sum(is_unit(cell) or bool(time_unit(cell) or steps_in(cell)) for cell in known)
     return (usual + any_unit) / 2 / max(1, len(known))

@@ -55,6 +55,7 @@ _OF_DAY = re.compile(
 )
 _DOTTED_TIME = re.compile(r"\d{1,2}\.\d{2}\.\d{2}([.,]\d+)?")
 _ORDERS = ("DMY", "MDY", "YMD", "YDM")  # of 13.6.21 the first is the usual one
+_HALF = re.compile(r"\d\s*[ap]\.?\s?m\b", re.IGNORECASE)
 _LONGEST = 60  # letters of a stamp
 _NAMED = re.compile(r"[^\W\d]{3}|[./-]\s")  # a month, or marks with a blank behind
 _SAID = {"Y": "year", "M": "month", "D": "day"}
@@ -63,7 +64,7 @@ _SAID = {"Y": "year", "M": "month", "D": "day"}
 @dataclass(frozen=True)
 class Instants:
     """`seconds` (N,) since the first; `first`: ISO 8601; `about`: how they were read; `sure`; `zoned`: they
-    name their time zone.
+    name their time zone. `others`: the first in other orders of day and month that have the same steps.
     """
 
     seconds: Array
@@ -71,19 +72,21 @@ class Instants:
     about: str
     sure: bool = True
     zoned: bool = False
+    others: tuple[str, ...] = ()
 
 
 def read_instants(cells: Sequence[str]) -> Instants | None:
     """Dates with or without a time of day, in the order of day, month and year in which they run forward.
 
-    03/01 is the third of January or the first of March: the order with the most even steps counts. None where
-    a cell is none.
+    03/01 is the third of January or the first of March: the order with the most even steps counts, and of
+    equal ones that of countries that write a.m. and p.m. None where a cell is none.
     """
     parts = [_parts(cell) for cell in cells]
     if any(one is None for one in parts):
         return None
     found: list[tuple[str, Array, datetime]] = []
-    for order in _ORDERS:
+    halves = bool(_HALF.search(cells[0]))
+    for order in sorted(_ORDERS, key=lambda one: halves and one != "MDY"):
         try:
             stamps = [_instant(one, order) for one in parts if one is not None]
         except (ValueError, OverflowError):
@@ -96,15 +99,17 @@ def read_instants(cells: Sequence[str]) -> Instants | None:
     zoned = bool((one := _INSTANT.fullmatch(cells[0][:_LONGEST])) and one["zone"])
     order, best, first = min(forward, key=lambda one: unevenness(one[1]))
     others = [one for one in forward if not np.array_equal(one[1], best)]
+    same = (one[2].isoformat() for one in forward if np.array_equal(one[1], best) and one[2] != first)
+    also = tuple(dict.fromkeys(same))
     if (
         not others
         or not (np.diff(best) >= 0).all()
         or (unbroken(best) and not any(unbroken(one[1]) for one in others))
     ):
-        return Instants(best, first.isoformat(), "instants", zoned=zoned)
+        return Instants(best, first.isoformat(), "instants", zoned=zoned, others=also)
     other = min(others, key=lambda one: unevenness(one[1]))[0]
     about = f"instants (? dates read as {_order(order)}, the most even; {_order(other)} runs forward too)"
-    return Instants(best, first.isoformat(), about, sure=False, zoned=zoned)
+    return Instants(best, first.isoformat(), about, sure=False, zoned=zoned, others=also)
 
 
 def summer_time_begins(before: datetime, after: datetime) -> bool:

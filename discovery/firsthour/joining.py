@@ -88,7 +88,7 @@ def _common(shifts: Sequence[Shift]) -> Shift | None:
 def _joined(first: OwnTable, second: OwnTable, offset: float, how: str, shift: Shift) -> OwnTable:
     """Return one table with the stamps of both. A cell is empty if its logger has no reading then."""
     moved = second.time + offset + (shift.seconds if shift.seen else 0.0)
-    if moved[-1] < first.time[0] or moved[0] > first.time[-1]:
+    if not _overlap(first, second, moved[0] - second.time[0]):
         raise UserError(
             f"{second.path}: does not overlap with {first.path} ({how}); join files of the same hours"
         )
@@ -106,9 +106,22 @@ def _joined(first: OwnTable, second: OwnTable, offset: float, how: str, shift: S
 def _offset(first: OwnTable, second: OwnTable) -> tuple[float, str]:
     """Seconds from the first row of one to that of the other, by their dates where both have them."""
     if first.first and second.first:
-        a, b = (datetime.fromisoformat(one.first) for one in (first, second))
-        return (b - a).total_seconds(), "by the dates of both"
+        seconds = [_apart(a, b) for a in (first.first, *first.others) for b in (second.first, *second.others)]
+        usual = seconds[0]
+        best = next((one for one in seconds if _overlap(first, second, one)), usual)
+        how = "" if best == usual else ", with day and month of one in the other order (?)"
+        return best, f"by the dates of both{how}"
     return 0.0, "assumed to begin together, because not both have dates"
+
+
+def _apart(first: str, second: str) -> float:
+    """Seconds between two instants."""
+    return (datetime.fromisoformat(second) - datetime.fromisoformat(first)).total_seconds()
+
+
+def _overlap(first: OwnTable, second: OwnTable, offset: float) -> bool:
+    """Whether two tables share hours, with the second one begun so many seconds after the first."""
+    return bool(second.time[-1] + offset >= first.time[0] and second.time[0] + offset <= first.time[-1])
 
 
 def _said(shift: Shift, second: OwnTable) -> str:

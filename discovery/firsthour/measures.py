@@ -28,7 +28,7 @@ _SPELLED = {
     "nm": "nm",
     "m": "m meter metre",
     "inch": "in inch inches",
-    "mil": "mil mils thou",
+    "thou": "mil mils thou thousandths",
     "um/m": "um/m µm/m μm/m µrad μrad urad microrad",
     "mm/m": "mm/m mrad",
     "l/min": "nl/min nl/m nlpm nlm ln/min slm sl/min "

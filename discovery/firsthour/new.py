@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from discovery.errors import UsageError, UserError
@@ -18,10 +19,13 @@ from discovery.firsthour.room import unknown_room
 from discovery.firsthour.table import OwnTable, read_tables
 from discovery.firsthour.tableguess import sensors_as_inputs
 from discovery.firsthour.texts import campaign_text, clock_doubt, csv_text
-from discovery.firsthour.zeros import again_from_first_readings, from_first_readings
+from discovery.firsthour.zeros import again_from_first_readings, from_first_readings, perhaps_own_zeros
 from discovery.progress import Progress, silent
 from discovery.recordings.campaignfile import CampaignForm
 from discovery.runfolder import temporary_folder
+
+_GOOD = 0.05  # of the rms without a model: nothing to gain with one more unknown of each recording
+_CLEARLY_LESS = 0.8  # of the rms: one more unknown of each recording is worth it
 
 
 def new(
@@ -88,6 +92,17 @@ def new(
         text = campaign_text(folder.resolve().name, found, guesses, air, about_room, kept, zeros)
         write_atomic(temporary / "campaign.toml", text)
         made = plan(temporary, folder.resolve().name, names, progress, quick=quick)
+        own_zeros = perhaps_own_zeros(found, guesses, zeros)
+        if own_zeros and made.scores and made.scores[0].ratio > _GOOD:
+            progress("trying an own zero of each recording")
+            own = campaign_text(
+                folder.resolve().name, found, guesses, air, about_room, kept, zeros | own_zeros
+            )
+            write_atomic(temporary / "campaign.toml", own)
+            other = plan(temporary, folder.resolve().name, names, progress, quick=quick)
+            if other.scores[0].ratio < _CLEARLY_LESS * made.scores[0].ratio:
+                found = replace(found, notes=(*found.notes, _set_to_zero(own_zeros, made, other)))
+                text, made = own, other
         folder.mkdir(parents=True, exist_ok=True)
         for name in found.recordings:
             (temporary / f"{name}.csv").replace(folder / f"{name}.csv")
@@ -103,6 +118,15 @@ def new(
         "",
         *_next(folder, guesses, found),
     ]
+
+
+def _set_to_zero(errors: Iterable[str], before: Plan, after: Plan) -> str:
+    less, more = (f"{plan.scores[0].ratio:.0%}" for plan in (after, before))
+    return (
+        f"{', '.join(errors)}: the probe seems to have been set to zero before each file. `spread` in the "
+        "campaign file gives each recording a zero of its own: on recordings left out, "
+        f"{less} of the rms without a model remain instead of {more}"
+    )
 
 
 def _check_request(
@@ -224,6 +248,7 @@ def _predicted(outputs: Sequence[str], found: Recorded, guesses: Mapping[str, Gu
         column.header
         for column in found.seen
         if (guesses[column.name].role, guesses[column.name].unit) == ("other input", "1")
+        and guesses[column.name].quantity not in ("fan", "flow", "state")
     ]
     example = f'--is "{(*other, "CH1")[0]}=error,um"'
     return f"{line}; no column was recognised as an error: if one is, say so, as in {example}"

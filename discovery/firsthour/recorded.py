@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -163,7 +163,7 @@ def _in_unit(column: Column, unit: str) -> Column:
         "temperature"
         if here in DEGREES
         else "error"
-        if wanted in ("um", "mm", "inch", "mil")
+        if wanted in ("um", "mm", "inch", "thou")
         else "heat load"
     )
     try:
@@ -181,8 +181,7 @@ def _counted(
     if not undecided:
         return recordings, {}, []
     seen = [run for name, run in list(recordings.items())[:-1] if run.counted] or [recordings[undecided[0]]]
-    roles = {one.role for one in guess_all(seen[0].columns).values()}
-    thermal = not roles.isdisjoint((*TEMPERATURES, "error"))
+    thermal = _thermal(guess_all(seen[0].columns).values())
     odds: dict[str, float] = {}
     for run in seen:
         for unit, value in time_odds(
@@ -204,6 +203,15 @@ def _counted(
         for name, run in recordings.items()
     }
     return scaled, shares, []
+
+
+def _thermal(guesses: Iterable[Guess]) -> float:
+    """Probability that at least one column is a temperature or a thermal error."""
+    none = 1.0
+    for one in guesses:
+        roles = {one.role: one.chance, **dict(one.rivals)}
+        none *= 1.0 - min(1.0, sum(roles.get(role, 0.0) for role in (*TEMPERATURES, "error")))
+    return 1.0 - none
 
 
 def _common(runs: Sequence[OwnTable]) -> tuple[set[str], list[str]]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from discovery.errors import UserError
 from discovery.firsthour.cells import is_duration, is_empty, is_number, is_stamp, read_numbers
 from discovery.firsthour.instants import (
+    Instants,
     is_date,
     is_instant,
     is_time_of_day,
@@ -61,7 +62,7 @@ class Clock:
 
     `order`: the rows as they follow each other in time, None: as in the file. `first`: ISO 8601 of the first
     row, or "". `counted`: nothing says the unit of its numbers, they are not converted. `wall`: dates without
-    a time zone, as of a clock on a wall.
+    a time zone, as of a clock on a wall. `others`: the first row, if day and month are read otherwise.
     """
 
     columns: tuple[int, ...]
@@ -72,6 +73,7 @@ class Clock:
     first: str = ""
     counted: bool = False
     wall: bool = False
+    others: tuple[str, ...] = ()
 
 
 def find_clock(
@@ -87,7 +89,7 @@ def find_clock(
         UserError: no column is, or the one that should be does not run forward.
     """
     named = [k for k, name in enumerate(names) if CLOCKS.search(fold(name))]
-    named.sort(key=lambda k: (not CLOCKS.match(fold(names[k])), k))
+    named.sort(key=lambda k: (not _stated(sheet, k, names[k], units[k]), not CLOCKS.match(fold(names[k])), k))
     backwards = ""
     others = [k for k in range(len(names)) if k not in named]
     others.sort(key=lambda k: not _holds_stamps(sheet, k))  # before numbers of rows
@@ -113,6 +115,12 @@ def find_clock(
         f"{sheet.path}: no column of time was found; call one 'time' (seconds, or instants as "
         "2026-03-01T08:00:00), or add one if the file has none"
     )
+
+
+def _stated(sheet: Sheet, column: int, name: str, unit: str) -> bool:
+    """Whether a column says that it is a clock by more than one of its words: `Data_Point` does not."""
+    alone = bool(CLOCKS.fullmatch(fold(name)))
+    return alone or time_unit(unit) is not None or _holds_stamps(sheet, column)
 
 
 def _holds_stamps(sheet: Sheet, column: int) -> bool:
@@ -168,13 +176,21 @@ def _stamped(
             whole = found.seconds + milliseconds - milliseconds[0]
             if (np.diff(whole) >= 0).all():
                 about = f"{found.about} and milliseconds"
-                yield Clock((*columns, fine), whole, about, first=found.first, wall=not found.zoned)
-        yield Clock(columns, found.seconds, found.about, first=found.first, wall=not found.zoned)
+                yield replace(
+                    _of_instants(columns, found), columns=(*columns, fine), seconds=whole, about=about
+                )
+        yield _of_instants(columns, found)
     if (seconds := read_times_of_day(cells)) is not None:
         if of_two_parts(cells):
             yield _of_two_parts(at, seconds, f"{sheet.header[at]} {units[at]}")
         else:
             yield Clock((at,), seconds, "as time of day")
+
+
+def _of_instants(columns: tuple[int, ...], found: Instants) -> Clock:
+    return Clock(
+        columns, found.seconds, found.about, first=found.first, wall=not found.zoned, others=found.others
+    )
 
 
 def _of_two_parts(at: int, seconds: Array, header: str) -> Clock:

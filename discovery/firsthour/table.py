@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.errors import UserError
-from discovery.firsthour.cells import comma_is_decimal, is_number, is_stamp, read_numbers
+from discovery.firsthour.cells import comma_is_decimal, is_empty, is_number, is_stamp, read_numbers
 from discovery.firsthour.clocks import is_clock
+from discovery.firsthour.instants import is_instant
 from discovery.firsthour.longform import find_long, widen
 from discovery.firsthour.measures import steps_in, unit_in
 from discovery.firsthour.sheets import Sheet, read_sheets
 from discovery.firsthour.stamps import Clock, find_clock, spread_evenly
 from discovery.firsthour.vocabulary import words_of
 from discovery.naming import is_taken, is_word
+from discovery.recordings.oddvalues import logger_words
 from discovery.recordings.units import multiple
 
 Array = NDArray[np.float64]
@@ -79,8 +82,9 @@ class Column:
 class OwnTable:
     """`time` (N,) in s since the first row; `about_time`: how it was read; `notes`: what else was done.
 
-    `first`: ISO 8601 of the first row, or "". `counted`: nothing says the unit of `time`, no conversion;
-    `clock`: name of its column. `above`: lines over the table.
+    `first`: ISO 8601 of the first row, or ""; `others`: the same, if day and month are read otherwise.
+    `counted`: nothing says the unit of `time`, no conversion; `clock`: name of its column. `above`: lines
+    over the table.
     """
 
     path: Path
@@ -93,6 +97,7 @@ class OwnTable:
     clock: str = ""
     above: tuple[str, ...] = ()
     name: str = field(default="")
+    others: tuple[str, ...] = ()
 
     def values(self, name: str) -> Array | None:
         """Values of a column, (N,), or None."""
@@ -158,6 +163,7 @@ def _table(sheet: Sheet) -> OwnTable:
         sheet.header[clock.columns[0]],
         sheet.above,
         sheet.name,
+        clock.others,
     )
 
 
@@ -226,6 +232,7 @@ def _columns(
     taken: set[str],
 ) -> tuple[list[Column], list[str]]:
     columns, notes = [], []
+    codes: Counter[float] = Counter()
     for index, header in enumerate(sheet.header):
         if index in clock.columns:
             continue
@@ -235,6 +242,8 @@ def _columns(
             few = list(dict.fromkeys(filter(None, cells)))
             do = f" ({', '.join(few)}); write numbers for them if they matter" if 1 < len(few) <= 6 else ""
             notes.append(f"column '{header}' holds words: left out{do}")
+        elif read.wrong is not None and all(is_instant(cell) for cell in set(cells) if not is_empty(cell)):
+            notes.append(f"column '{header}' holds dates, and is not the clock: left out")
         elif read.wrong is not None:
             raise UserError(
                 f"{sheet.at(read.wrong)}, column '{header}': '{cells[read.wrong]}' is not a number; "
@@ -247,12 +256,28 @@ def _columns(
         else:
             about, unit = sheet.groups[index], units[index] or read.unit
             name = identifier(names[index] or about, taken)
-            columns.append(Column(header, name, unit, read.values[order], about, read.words))
+            values, emptied = _without_codes(read.values[order])
+            codes.update(emptied.tolist())
+            columns.append(Column(header, name, unit, values, about, read.words))
             if read.words:
                 notes.append(
                     f"column '{header}': '{read.words[0]}' is taken as 0, '{read.words[1]}' as 1 (?)"
                 )
+    if codes:
+        said = ", ".join(f"{code:g}" for code in sorted(codes))
+        notes.append(f"{codes.total()} cells hold a logger's code for a missing value ({said}): emptied")
     return columns, notes
+
+
+def _without_codes(values: Array) -> tuple[Array, Array]:
+    """The values of a column (N,) without the codes that loggers write where nothing was measured, and these
+    codes.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    rows = known[logger_words(values[known])]
+    kept = values.copy()
+    kept[rows] = np.nan
+    return kept, values[rows]
 
 
 def identifier(words: str, taken: set[str]) -> str:

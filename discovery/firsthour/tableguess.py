@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.firsthour.answering import explained_by
-from discovery.firsthour.evidence import OTHER
+from discovery.firsthour.evidence import OTHER, Evidence, is_set_point_word
 from discovery.firsthour.guess import (
     CURRENTS,
     NEXT,
@@ -27,7 +27,7 @@ from discovery.firsthour.odds import likely, probabilities
 from discovery.firsthour.shapes import HELD, shape
 from discovery.firsthour.table import Column
 from discovery.firsthour.unitodds import temperature_odds
-from discovery.firsthour.vocabulary import fold, words_of
+from discovery.firsthour.vocabulary import SET_POINT, fold, words_of
 from discovery.recordings.correction import corrected_by_name
 from discovery.recordings.valuecheck import below_zero
 
@@ -36,7 +36,10 @@ Hints = Mapping[str, Sequence[tuple[str, Mapping[str, float]]]]
 
 _ONE_OF_SEVERAL = re.compile(r"\d+|(?<![^\W\d_])(d ?)?[xyz](?![^\W\d_])")
 MOSTLY = 0.3  # share of a fluid temperature that loads and flows explain where they warm it
+_ELSE = 0.8  # probability from which a correction without an error is something else
+_CLEARLY = 0.2  # more: what answers to what
 _PUSHES = ("torque", "current", "signal", "flow", "power", "speed")
+_SAME = 10.0  # log odds that a set point has the quantity of what follows it
 _MOVED = ("rotation speed", "fluid flow")  # may be set, or answer to what is
 _OF_STEPS = 0.954  # median step of white noise over its standard deviation
 _STEP, _CALM = 6.0, 1.3  # times the noise: a step of what is set, and the scatter between two steps
@@ -46,6 +49,8 @@ def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str
     """Role and unit of each column by name, and which error a correction belongs to."""
     hints = hints or {}
     found = {column.name: evidence_of(column, hints.get(column.name, ())) for column in columns}
+    for name, (reading, quantity) in _set_points(columns, found).items():
+        found[name].add(f"the set point of {reading}", {quantity: _SAME})
     guesses = {
         column.name: guessed(
             column, found[column.name], [found[other.name] for other in _alike(column, columns)]
@@ -55,7 +60,7 @@ def guess_all(columns: Sequence[Column], hints: Hints | None = None) -> dict[str
     guesses = _one_scale(columns, guesses)
     guesses = _one_unit(columns, guesses)
     guesses = _the_fluid(_one_room(columns, _warmed_fluid(columns, guesses)))
-    guesses = _corrections(columns, _signed(columns, _answers(columns, guesses)))
+    guesses = _corrections(columns, _signed(columns, _answers(columns, guesses)), found)
     return sensors_as_inputs(guesses)
 
 
@@ -68,6 +73,19 @@ def sensors_as_inputs(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
                 why = f"{one.why}; a sensor on the machine is an input of the errors"
                 found[name] = replace(one, role=OTHER, why=why)
     return found
+
+
+def _set_points(columns: Sequence[Column], found: Mapping[str, Evidence]) -> dict[str, tuple[str, str]]:
+    """The reading that each set point belongs to by its name, and the quantity of both."""
+
+    def plain(header: str) -> str:
+        name, _ = unit_in(header) or (header, "")
+        said = [word.said for word in words_of(name) if word.gloss == SET_POINT]
+        return " ".join(word for word in fold(name).split() if word not in said)
+
+    readings = {plain(c.header): c for c in columns if not is_set_point_word(c.header)}
+    pairs = {c.name: readings.get(plain(c.header)) for c in columns if is_set_point_word(c.header)}
+    return {name: (one.header, found[one.name].quantity()) for name, one in pairs.items() if one is not None}
 
 
 def _alike(column: Column, columns: Sequence[Column]) -> list[Column]:
@@ -148,15 +166,33 @@ def _answers(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[st
         if one.quantity == "signal" and one.role == "heat load" and not any(map(_is_heat, found.values())):
             found[name] = replace(one, role=OTHER, why=f"{one.why}; nothing here is heated")
     if True not in holds.values():  # all move: what pushes drives what moves
-        pushes = [name for name, one in found.items() if one.quantity in _PUSHES and one.role == OTHER]
+        pushes = [n for n, one in found.items() if one.quantity in _PUSHES and one.role in (OTHER, *_MOVED)]
         for name, one in found.items():
             if pushes and one.role == OTHER and one.quantity not in _PUSHES and holds.get(name) is False:
                 found[name] = one.doubtful(f"taken to answer to {pushes[0]}", role="other output")
-        return found
+        return found if pushes else _explained(columns, found)
     for name, held in holds.items():
         if held is False and found[name].role in (OTHER, *_MOVED):
             why = "it never holds its value, so nobody sets it; nothing else is measured"
             found[name] = found[name].doubtful(why, role="other output")
+    return found
+
+
+def _explained(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
+    """If nothing says which of several inputs is an output, then the one that the others explain clearly
+    better than it and the rest explain them.
+    """
+    found = dict(guesses)
+    values = {c.name: c.values for c in columns if guesses[c.name].role == OTHER and not guesses[c.name].said}
+    shares = {
+        name: explained_by(mine, [other for o, other in values.items() if o != name])
+        for name, mine in values.items()
+        if len(values) > 1
+    }
+    best, *rest = sorted(shares, key=lambda name: -shares[name]) or [""]
+    if best and shares[best] > max(MOSTLY, shares[rest[0]] + _CLEARLY):
+        why = f"the other columns explain {shares[best]:.0%} of it, and it {shares[rest[0]]:.0%} of them"
+        found[best] = guesses[best].doubtful(why, role="other output")
     return found
 
 
@@ -297,15 +333,23 @@ def _the_fluid(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
     return found
 
 
-def _corrections(columns: Sequence[Column], guesses: Mapping[str, Guess]) -> dict[str, Guess]:
-    """Which error each applied correction belongs to; without an error it is an input like others."""
+def _corrections(
+    columns: Sequence[Column], guesses: Mapping[str, Guess], evidence: Mapping[str, Evidence]
+) -> dict[str, Guess]:
+    """Which error each applied correction belongs to; without an error it is an input like others, or the
+    error itself.
+    """
     found, stated = dict(guesses), {column.name: column.unit for column in columns}
     errors = [name for name, one in guesses.items() if one.role == "error"]
     corrections = [name for name, one in guesses.items() if one.role == "applied correction"]
     for name in corrections:
         one, error = guesses[name], corrected_by_name(name, errors, only=len(corrections) == 1)
-        if not errors:
-            found[name] = one.doubtful("but there is no error that it could correct", role=OTHER)
+        if not errors:  # what it is else
+            others = {role: odds for role, odds in evidence[name].roles().items() if role != one.role}
+            role, chance = likely(others)
+            found[name] = one.doubtful(
+                "but there is no error that it could correct", role=role if chance > _ELSE else OTHER
+            )
         elif error is None:
             found[name] = one.doubtful(f'say which error it corrects: corrects = "{errors[0]}"')
         else:

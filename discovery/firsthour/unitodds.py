@@ -20,6 +20,7 @@ _DEGREES = {
 _ELSEWHERE = 0.01  # density per K of a machine that starts hot or cold
 _USUAL_TRAVEL = (math.log(40.0), math.log(5.0))  # um of a thermal error: median, spread of the logarithm
 _USUAL_HEAT = (math.log(800.0), math.log(6.0))  # W of a heat load at its most
+_HALF = 0.5  # of its most: what a load reaches in most recordings
 _USUAL_SPEED = (math.log(3000.0), math.log(5.0))  # rpm at its most
 
 
@@ -58,6 +59,8 @@ def load_odds(form: Shape, *, signal: bool) -> dict[str, float]:
         return {"1": 8.0, "W": 0.0}
     odds = {"W": 0.0, "kW": -1.8, "percent": -1.0, "1": -3.0}
     top = max(abs(form.high), abs(form.low), 1e-9)
+    if form.low >= 0.0 and _HALF < form.high <= 1.0:  # the share of what a heater can
+        odds["1"] += 1.5 + (3.0 if form.high == 1.0 else 0.0)
     odds["W"] += _log_normal(top, _USUAL_HEAT)
     odds["kW"] += _log_normal(top * 1000.0, _USUAL_HEAT)
     if form.low >= -1e-9 and 10.0 < form.high <= 100.0:

@@ -110,7 +110,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     ),
     (
         "load",
-        {"power": 3, "torque": 1.5},
+        {"power": 3, "current": 2, "torque": 2},
         "load drive motor ~antrieb ~負荷 ~负载 ~負載 ~モータ ~电机 last spindellast motorlast ~auslastung",
     ),
     (
@@ -167,7 +167,8 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     (
         SET_POINT,
         {},
-        "setpoint setpoints set_point set_points set target targets soll ~sollwert ~sollwerte sp ~設定 ~设定 "
+        "setpoint setpoints set_point set_points set target targets ~soll ~sollwert ~sollwerte "
+        "sp ~設定 ~设定 "
         "~目標 ~目标 ~설정 consigne consigna",
     ),
     # places

@@ -9,12 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from discovery.firsthour.guess import Guess
+from discovery.firsthour.measures import DEGREES
 from discovery.firsthour.recorded import Recorded
 from discovery.firsthour.table import Array, OwnTable
 from discovery.recordings.campaignfile import CampaignForm
 from discovery.recordings.oddvalues import first_reading
+from discovery.recordings.units import conversion
 
 _FAR = 3.0  # times the span: no thermal error starts so far from zero
+_AT_ZERO, _PERHAPS = 0.03, 0.3  # of the largest span: at zero; so far apart that the zero may be another
+_WARMER = 1.0  # K: a machine that starts so much warmer has moved
 _APART = 2.0  # times the largest span: nor do recordings with one zero start so far from each other
 
 Zeros = dict[str, dict[str, float]]  # by recording and error: what its readings are counted from
@@ -43,6 +47,42 @@ def from_first_readings(found: Recorded, guesses: Mapping[str, Guess]) -> tuple[
     moved = {name: counted(run, zeros[name]) for name, run in found.recordings.items()}
     counted_from = replace(found, recordings=moved, notes=(*found.notes, *_notes(zeros)))
     return counted_from, _spreads(read, zeros, files)
+
+
+def perhaps_own_zeros(
+    found: Recorded, guesses: Mapping[str, Guess], known: Mapping[str, float]
+) -> dict[str, float]:
+    """Errors whose probe may have been set to zero before each recording, with the spread of each: they all
+    start at zero although temperatures differ there, or they start apart. Only a fit can tell.
+
+    Args:
+        known: errors with a zero of their own already.
+    """
+    runs = list(found.recordings.values())[:-1]
+    if len({(run.path, run.name) for run in runs}) < 2:
+        return {}
+    warmer = _warmer(runs, guesses) > _WARMER
+    spreads = {}
+    for error in (name for name, one in guesses.items() if one.role == "error" and name not in known):
+        read = [one for run in runs if (one := _known(_values(run, error))).size]
+        most = max((float(np.ptp(one)) for one in read), default=0.0)
+        firsts = np.array([first_reading(one) for one in read])
+        at_zero = warmer and np.abs(firsts).max(initial=0.0) <= _AT_ZERO * most
+        if most > 0.0 and (at_zero or np.ptp(firsts) > _PERHAPS * most):
+            moved = np.concatenate([one - first for one, first in zip(read, firsts, strict=True)])
+            spreads[error] = float(f"{np.sqrt(np.mean(moved**2)):.2g}")
+    return spreads
+
+
+def _warmer(runs: Sequence[OwnTable], guesses: Mapping[str, Guess]) -> float:
+    """How far a temperature starts apart between recordings [K], at most."""
+    apart = [0.0]
+    for name, one in guesses.items():
+        if one.unit in DEGREES:
+            known = [values for run in runs if (values := _known(_values(run, name))).size]
+            firsts = [first_reading(values) for values in known] or [0.0]
+            apart.append(float(np.ptp(firsts)) * conversion(one.unit, "temperature").factor)
+    return max(apart)
 
 
 def again_from_first_readings(
@@ -132,16 +172,16 @@ def _spreads(
 
 
 def _notes(zeros: Zeros) -> list[str]:
-    notes: dict[str, str] = {}
-    for name, zero in zeros.items():
-        for error, first in zero.items():
-            notes.setdefault(
-                error,
-                f"'{error}' starts at {first:g} in {name}, far from zero compared with how much it moves: in "
-                "each file it is counted from its first reading. Fits can only estimate what the machine had "
-                "moved before: begin all recordings cold, or keep one zero",
-            )
-    return list(notes.values())
+    notes = []
+    for error in dict.fromkeys(error for zero in zeros.values() for error in zero):
+        starts = {name: zero[error] for name, zero in zeros.items() if error in zero}
+        name = max(starts, key=lambda one: abs(starts[one]))
+        notes.append(
+            f"'{error}' starts at {starts[name]:g} in {name}, far from zero compared with how much it moves: "
+            "in each file it is counted from its first reading. Fits can only estimate what the machine had "
+            "moved before: begin all recordings cold, or keep one zero"
+        )
+    return notes
 
 
 def _far(values: Array) -> bool:

@@ -68,7 +68,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
     read = column[known]
     if not known.size:
         return
-    words = _logger_words(read)
+    words = logger_words(read)
     limits = ROLES[channel.role].ranges.get(channel.unit)
     listed = np.zeros(0, dtype=np.intp)  # what lies outside its range has a finding already
     if limits is not None:
@@ -128,7 +128,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
 
 def odd_readings(channel: Channel, read: Array) -> Lines:
     """Rows of readings (R,) that are words for nothing, zeros for missing readings, or stand alone."""
-    words = _logger_words(read)
+    words = logger_words(read)
     if channel.role not in _SENSORS or read.size < FEW:
         return words
     return np.unique(np.concatenate((words, _zeros(channel, read), lone_readings(read))))
@@ -198,8 +198,8 @@ def _count(readings: int) -> str:
     return "one reading" if readings == 1 else f"{readings} readings in a row"
 
 
-def _logger_words(read: Array) -> Lines:
-    """Return the rows with a code that loggers write for a missing value, far from all other readings."""
+def logger_words(read: Array) -> Lines:
+    """Rows of readings (R,) with a code that loggers write for a missing value, far from all others."""
     found = [np.flatnonzero(np.abs(read) > _LARGEST)]
     for word in _WORDS:
         rows = np.flatnonzero(read == word)

@@ -18,6 +18,8 @@ _PRIOR = {"s": 0.0, "min": -1.5, "h": -2.5, "ms": -3.5, "d": -5.0}
 _LENGTH = (np.log(5 * _HOUR), np.log(4.0))  # of a recording [s]: median and spread, both of the logarithm
 _STEP = (np.log(15.0), np.log(10.0))  # of a logger [s]
 _ANSWER = (np.log(0.5 * _HOUR), np.log(4.0))  # s that a temperature needs for a third of its range
+# the same of what is not thermal: a spring, a tank, a motor, a cell
+_OTHERS = ((np.log(300.0), np.log(30.0)), (np.log(0.1), np.log(100.0)), (np.log(10.0), np.log(100.0)))
 _USUAL_STEPS = (
     0.001,
     0.002,
@@ -50,14 +52,14 @@ _USUAL_STEPS = (
 
 
 def time_odds(
-    values: Array, moving: Sequence[Array], interval: float | None = None, *, thermal: bool = True
+    values: Array, moving: Sequence[Array], interval: float | None = None, *, thermal: float = 1.0
 ) -> dict[str, float]:
     """Log odds of the units in which a clock counts.
 
     Args:
         values: (N,) of the clock. moving: each (N,), what was read. interval: of the logger [s], where the
-            file states it. thermal: something of a machine's heat is recorded; of a spring or a tank nobody
-            knows how long it takes.
+            file states it. thermal: probability that something of a machine's heat is recorded; a spring or a
+            tank may take seconds or hours.
     """
     steps = np.diff(values)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
@@ -66,12 +68,18 @@ def time_odds(
     odds = {}
     for unit, prior in _PRIOR.items():
         scale = SECONDS[unit]
-        score = prior + thermal * (
-            _log_normal(length * scale, _LENGTH) + 0.5 * _log_normal(step * scale, _STEP)
-        )
+        kinds = [
+            np.log(max(chance, 1e-12))
+            + _density(length * scale, of_length)
+            + 0.5 * _density(step * scale, of_step)
+            + (_density(float(np.median(answers)) * scale, of_answer) if answers else 0.0)
+            for chance, (of_length, of_step, of_answer) in (
+                (thermal, (_LENGTH, _STEP, _ANSWER)),
+                (1.0 - thermal, _OTHERS),
+            )
+        ]
+        score = prior + float(np.logaddexp(*kinds))
         score += 1.5 * any(abs(step * scale / usual - 1) < 1e-3 for usual in _USUAL_STEPS)
-        if answers and thermal:
-            score += _log_normal(float(np.median(answers)) * scale, _ANSWER)
         if interval:
             score += 6.0 * (abs(step * scale / interval - 1) < 0.02)
         odds[unit] = score + _sixtieths(values, unit)
@@ -115,5 +123,6 @@ def _answer(series: Array, clock: Array) -> float | None:
     return None
 
 
-def _log_normal(value: float, about: tuple[float, float]) -> float:
-    return float(-0.5 * ((np.log(max(value, 1e-12)) - about[0]) / about[1]) ** 2)
+def _density(value: float, about: tuple[float, float]) -> float:
+    """Logarithm of a log-normal density, up to a constant. `about`: median and spread of the logarithm."""
+    return float(-0.5 * ((np.log(max(value, 1e-12)) - about[0]) / about[1]) ** 2 - np.log(about[1]))

@@ -115,7 +115,11 @@ def _per_revolution(given: "pint.Unit") -> "pint.Unit":
 
 @lru_cache(maxsize=512)
 def parse_unit(unit: str) -> "pint.Unit":
-    """The unit of a text, as pint knows it. Raises ValueError: it does not, or it might never end."""
+    """The unit of a text, as pint knows it; a mil is that of a machine tool, not the angle.
+
+    Raises ValueError: pint does not know it, or it might never end.
+    """
+    unit = re.sub(r"\bmils?\b", "thou", unit)
     if not unit or len(unit) > _LONGEST or not _SPELLING.fullmatch(unit):
         raise ValueError(unit)
     try:

@@ -5,7 +5,7 @@ The left-hand side of both is the readings themselves, so nothing is differentia
 
     library = FilteredInputs(["time", "P0", "P1"])
     model = SINDy(optimizer=SparseSearch(library), feature_library=library)
-    model.fit([X_a, X_b], t=1, x_dot=[Y_a, Y_b])        # rows of X: time [s], P0, P1; NaN in Y: no reading
+    model.fit([X_a, X_b], t=1, x_dot=[Y_a, Y_b])        # rows of X: time [s], P0, P1
     model.print(lhs=["E_Y"])                            # E_Y = 0.020 lag(P0, 3600)
 """
 

@@ -233,6 +233,7 @@ def regress(
     from discovery.sparse.library import ModelTerms
     from discovery.sparse.optimiser import SparseSearch
 
+    seen = _read(seen)
     library = ModelTerms(seen.names, seen.columns, seen.nuisance, seen.precision, seen.times)
     bounds = {
         name: ends for name, *ends in zip(seen.names, seen.low.tolist(), seen.high.tolist(), strict=True)
@@ -251,6 +252,24 @@ def regress(
     sindy = pysindy.SINDy(optimizer=search, feature_library=library)
     sindy.fit([t[:, None] for t in seen.times], t=1.0, x_dot=[y[:, None] for y in seen.target])
     return search.choices_[0]
+
+
+def _read(seen: Linearised) -> Linearised:
+    """The rows at which an output was read; pysindy takes no others. Where one output is read, another may
+    not be.
+    """
+    read = [np.isfinite(one) for one in seen.target]
+
+    def kept(parts: Sequence[Array]) -> tuple[Array, ...]:
+        return tuple(part[rows] for part, rows in zip(parts, read, strict=True))
+
+    return replace(
+        seen,
+        columns=kept(seen.columns),
+        target=kept(seen.target),
+        nuisance=kept(seen.nuisance),
+        times=kept(seen.times),
+    )
 
 
 def extended_bic(g: Gram, sizes: Sequence[int], costs: Sequence[float], library: int) -> Array:

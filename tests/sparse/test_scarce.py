@@ -141,6 +141,15 @@ def test_a_block_without_readings_is_no_warning() -> None:
     assert found.path
 
 
+def test_cells_of_one_sensor_may_be_empty_where_another_was_read() -> None:
+    where = board()
+    first = where.recordings["first"]
+    read = np.where(np.arange(len(first.time)) % 9 == 0, np.nan, first.values["T1"])
+    gaps = {**where.recordings, "first": Recording("first", first.time, {**first.values, "T1": read})}
+    found = discovered(Campaign("gaps", where.channels, gaps, Path("gaps")), ["T1", "T2"])
+    assert missed(found.model, where, "last", ["T1", "T2"]).max() < 0.6  # two steps of the sensor
+
+
 def test_the_plainer_of_two_twins_is_named_and_no_other() -> None:
     rng = np.random.default_rng(4)
     twin = rng.uniform(0, 10, 300)

@@ -26,9 +26,12 @@ _SPREADS = 8.0  # times the usual spread of a start between recordings
 _FASTER = 8.0  # times the fastest that a temperature moves elsewhere
 _CLIMB = 8.0  # K within a few minutes, at least
 _FLAT = 0.02  # of the readings at the largest value: a range that is full
+_PILE, _NEXT = 4.0, 3  # times as many readings as at any of so many next values: the end of a range
 _LOWER = 0.97  # of what the other recordings reach
 _MINUTES = 360.0  # s
 _APART = 2.0  # times the usual spread: another level
+_DIGITS = 2.0  # times its last digit: what an input should move by while it stays at one value
+_KEEPS = 0.8  # of the readings after one at that value have it, too
 _STILL, _LINE = 0.1, 0.8  # of the recording; correlation elsewhere
 _NEAR, _HELD = 0.02, 0.01  # of the range elsewhere; of the readings elsewhere: a value that was held there
 _RELATED = 0.5  # of what a channel moves: what a straight line of its sibling leaves
@@ -130,7 +133,7 @@ def _full_range(recordings: Sequence[Seen], channel: Channel) -> Iterator[Findin
         for sign in (1.0, -1.0):
             top = float(np.max(sign * read))
             tops[one.name, sign] = top
-            flat[one.name, sign] = float(np.mean(sign * read == top))
+            flat[one.name, sign] = float(np.mean(sign * read == top)) if _piles_up(sign * read) else 0.0
     for one in recordings:
         for sign in (1.0, -1.0):
             if (one.name, sign) not in flat or flat[one.name, sign] < _FLAT:
@@ -149,6 +152,14 @@ def _full_range(recordings: Sequence[Seen], channel: Channel) -> Iterator[Findin
                     f"{'higher' if sign > 0 else 'lower'} and never stays"
                 )
                 yield _finding(one, channel, row, what, "a full range or a limit: widen it", "saturated", 2.0)
+
+
+def _piles_up(read: Array) -> bool:
+    """Whether far more readings (N,) are at the largest value than at any of the next ones, as at the end of
+    a range. A slow sensor with few digits has as many at each.
+    """
+    _, counts = np.unique(read, return_counts=True)
+    return bool(counts[-1] > _PILE * counts[-1 - _NEXT : -1].max())
 
 
 def _climbs(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
@@ -299,7 +310,10 @@ def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Fi
                 known = still & _occurs(x, np.concatenate([o[0] for o in others]))
                 goes_on = float(np.std(x[known])) / (float(np.std(x)) or 1.0) if known.any() else 0.0
                 usual = max((_goes_on(o) for o in others), default=0.0)
-                if known.mean() > _STILL and goes_on > 0.4 and usual < 0.5 * goes_on:
+                moves = _answer(others) * float(np.std(x[known])) if known.any() else 0.0
+                seen = moves > _DIGITS * _step(np.concatenate([o[1] for o in others]))
+                seen = seen and (b.between == "held" or _lasts(still))  # what is set comes and goes
+                if known.mean() > _STILL and goes_on > 0.4 and usual < 0.5 * goes_on and seen:
                     what = (
                         f"'{b.name}' stays at {value:.4g} in {still.mean():.0%} of the recording "
                         f"while '{a.name}', with "
@@ -317,6 +331,18 @@ def _occurs(values: Array, elsewhere: Array) -> NDArray[np.bool_]:
         ordered, values - width, "left"
     )
     return near >= _HELD * ordered.size
+
+
+def _lasts(still: NDArray[np.bool_]) -> bool:
+    """Whether a channel (N,) keeps its value once it has it; one with noise and few digits comes and goes."""
+    before = still[:-1]
+    return bool(before.any() and np.mean(still[1:][before]) > _KEEPS)
+
+
+def _answer(others: Sequence[Array]) -> float:
+    """How much the second channel moves for each unit of the first, by a straight line."""
+    covariance = np.mean([np.cov(o) for o in others], axis=0)
+    return float(abs(covariance[0, 1]) / (covariance[0, 0] or 1.0))
 
 
 def _goes_on(pair: Array) -> float:
