@@ -83,7 +83,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     best = max(rest, key=lambda m: m.evidence)
     alone = _alone(context, found, answer, named) if matters else answer.evidence
     # names hold next to effects that are not sure, but not next to something that no effect explains; without
-    # names, something is missing only if it is of unknown cause, or an effect improves free runs outside the fit
+    # names, something is missing only if its cause is unknown, or an effect improves runs outside the fit
     without = max(m.evidence for m in rest if not m.forced) if named else alone
     if best.evidence - without > thresholds.SHORT and (
         named or best.forced or not _idle_all(context, found, answer, candidates)
