@@ -15,12 +15,12 @@ from discovery.fitting.noise import roughness
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.sparse.borrowed import borrowed
-from discovery.sparse.choice import Choice, chosen
+from discovery.sparse.choice import Choice, chosen, stability
 from discovery.sparse.constraints import matched
 from discovery.sparse.discovery import Discovery, PathPoint, path_points
 from discovery.sparse.drives import Drives
 from discovery.sparse.folds import PREDICT
-from discovery.sparse.library import Feature, FilteredInputs
+from discovery.sparse.library import STILL, Feature, FilteredInputs
 from discovery.sparse.masses import Response, Rules, mass_model, responses_of, slowest, surprise, within
 from discovery.sparse.optimiser import SparseSearch, features_of
 from discovery.sparse.options import SparseOptions
@@ -53,14 +53,16 @@ def discover_masses(
     """Choose the inputs and time constants of one output and fit their numbers.
 
     A term whose time constant the fit moves to the slow end only adds up its input there: the search then
-    begins anew with one term fewer of its family. Where the masses begin in a further recording follows from
-    all outputs together: see `starts_of`.
+    begins anew with one term fewer of its family. It also begins anew, once, where the fit finds that masses
+    forget otherwise without a flow than the search took them to. Where the masses begin in a further
+    recording follows from all outputs together: see `starts_of`.
     """
     options = matched(options, data.drives.expressions, campaign.path)
     grids = {r: data.grids[r].part(outputs=[output]) for r in recordings}
     readings = [grids[r].readings[:, 0] for r in recordings]
     channel = campaign.channels[output]
     stated = channel.noise
+    lasting = _lasting(data)
     library = FilteredInputs(
         ["time", *data.drives.inputs, "read"],
         [d for d in data.drives.expressions if d not in options.forbid],
@@ -70,28 +72,32 @@ def discover_masses(
         integrals=[d for d in data.drives.integrals if d not in options.forbid],
         # how far zeros are apart is stated, or known from several recordings alone
         zeroed=channel.spread > 0 or (channel.role == "error" and len(recordings) >= WHOLE),
+        gate=data.drives.gate,
     )
     most: dict[int, int] = {}
     while True:
         choice, noise = _searched(
-            library, grids, data.drives.inputs, options, stated or roughness(readings), most
+            library, grids, data.drives.inputs, options, stated or roughness(readings), most, lasting
         )
         features = features_of(library, choice.terms)
         rules = Rules(
             output,
             {name: c.unit for name, c in campaign.channels.items()},
             data.drives.settled,
-            _lasting(data, features),
+            {f.drive: lasting[f.drive] for f in features if f.drive in lasting and 0.0 < f.tau < np.inf},
             options.bounds,
             (float(library.taus_[0]), float(library.taus_[-1])),
             choice.start_sd,
             choice.zero_sd if library.zeroed and not channel.spread else None,  # the fit finds a stated one
+            data.drives.gate or "",
         )
         # a fit that does not know the noise takes for it what the model leaves
         missed = (stated or choice.fit[choice.row]) / noise
         model, kept, slow = _clear(rules, features, choice, campaign, recordings, grids, options, missed)
         fewer = {int(f): int(np.sum(choice.terms.family == f)) - 1 for f in choice.terms.family[slow]}
-        if all(most.get(f, many + 1) <= many for f, many in fewer.items()):
+        if library.still == STILL and (still := _still(model)):
+            library.still = still
+        elif all(most.get(f, many + 1) <= many for f, many in fewer.items()):
             return Discovery(model, *_evidence(output, features, kept, over(choice, noise), library))
         most |= fewer
 
@@ -103,14 +109,18 @@ def _searched(
     options: SparseOptions,
     noise: float,
     most: Mapping[int, int],
+    lasting: Mapping[str, float],
 ) -> tuple[Choice, float]:
     """The choice of a search, and the noise that it was made with.
 
     Where the model leaves more than the noise, starts and gains would bend to what it lacks: the search
-    begins anew and takes for noise what was left.
+    begins anew and takes for noise what was left. Recordings may begin cold, or while the machine works:
+    where masses that begin cold do not predict what was left out, the first search tries both, and that one
+    stands which predicts it better.
 
     Args:
         noise: of a reading, as stated or as rough as the readings are. most: terms of some families.
+        lasting: how long drives have lasted [s] where recordings begin warm.
     """
     import pysindy
 
@@ -118,7 +128,9 @@ def _searched(
     select = borrowed(options.optimiser, options.optimiser_arguments) if theirs else chosen
     tables = [_table(grid, inputs) for grid in grids.values()]
     readings = [grid.readings for grid in grids.values()]
-    for _ in range(_SEARCHES):
+
+    def searched(begun: Mapping[str, float]) -> Choice:
+        library.lasting = begun
         search = SparseSearch(
             library,
             options.max_terms,
@@ -127,27 +139,36 @@ def _searched(
             [noise],
             PREDICT if options.tolerance is None else options.tolerance,
             options.blocks,
-            options.bootstraps,
+            0,
             options.seed,
             lambda problem: select(replace(problem, families=problem.families.limited(most))),
         )
         sindy = pysindy.SINDy(optimizer=search, feature_library=library)
         sindy.fit(tables, t=1.0, x_dot=readings)
-        choice = search.choices_[0]
+        return search.choices_[0]
+
+    begun: Mapping[str, float] = {}
+    for k in range(_SEARCHES):
+        choice = searched(begun)
+        if k == 0 and lasting and choice.left_out[choice.row] > _MORE * noise:
+            other = searched(lasting)
+            if other.left_out[other.row] < choice.left_out[choice.row]:
+                choice, begun = other, lasting
         if choice.fit[choice.row] <= _MORE * noise:
             break
         noise, before = choice.fit[choice.row], noise
     else:
         noise = before
+    if choice.problem is not None:  # of the choice that stands alone: each bootstrap is a search
+        last = choice.problem.changed(bootstraps=options.bootstraps)
+        choice = replace(choice, stability=stability(last, choice.terms), problem=None)
     return choice, noise
 
 
-def _lasting(data: MassData, features: Sequence[Feature]) -> dict[str, float]:
-    """How long [s] the drives of responses have been about what they are, in the mean over an exponential
-    autocorrelation.
-    """
+def _lasting(data: MassData) -> dict[str, float]:
+    """How long [s] drives have been about what they are, in the mean over an exponential autocorrelation."""
     found = {}
-    for drive in {f.drive for f in features if 0.0 < f.tau < np.inf} & set(data.drives.passing):
+    for drive in data.drives.passing:
         halves = []
         for grid in data.grids.values():
             series = np.broadcast_to(evaluate(parse(drive), dict(grid.nodes)).value, grid.time.shape)
@@ -156,6 +177,13 @@ def _lasting(data: MassData, features: Sequence[Feature]) -> dict[str, float]:
         if halves:
             found[drive] = float(np.median(halves) / np.log(2.0))
     return found
+
+
+def _still(model: Model) -> float | None:
+    """How fast masses forget without a flow, where the fit excludes what the search began with."""
+    rests = [p for name, p in model.parameters.items() if "_rest" in name and p.low is not None]
+    sure = [p.value for p in rests if not (p.low or 0.0) <= STILL <= (p.high or 1.0)]
+    return float(f"{np.median(sure):.2g}") if sure else None
 
 
 def over(choice: Choice, noise: float) -> Choice:

@@ -39,6 +39,7 @@ class Choice:
     spreads: tuple[float, ...] = ()  # of the coefficients in their prior
     costs: tuple[float, ...] = ()  # of each term: share by which the left-out rms grows without it
     stability: tuple[float, ...] = ()  # of each term: share of block bootstraps whose set has its family
+    problem: Problem | None = None  # as it was believed in the end
 
 
 def chosen(problem: Problem) -> Choice:
@@ -83,6 +84,7 @@ def evidence(problem: Problem, terms: Terms) -> Choice:
         tuple(problem.spreads(terms).tolist()),
         costs,
         stability(problem, terms),
+        problem,
     )
 
 
@@ -110,7 +112,7 @@ def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:
     independent = search.g.count / readings_as_one([r[:, None] for r in left])
     most = off / moved / independent * len(terms)
     free = _left(problem, terms)
-    tried = [replace(problem, parts=most * share) for share in _WEAKER]
+    tried = [problem.changed(parts=most * share) for share in _WEAKER]
     firm = [trial for trial in tried if _left(trial, terms) <= _BENT * free] or tried[-1:]
     tried = firm if len(problem.columns) >= WHOLE else firm[:1]
     errors = np.full((len(tried), problem.blocks.count), np.nan)
@@ -144,7 +146,7 @@ def _with_spread(problem: Problem) -> Problem:
 
     def tried(masses: float, zero: float) -> tuple[float, Problem]:
         precision = equal_shares(masses * size, counts, zero * size if problem.zeroed else None)
-        one = replace(problem, start_sd=masses * size, zero_sd=zero * size, precision=precision)
+        one = problem.changed(start_sd=masses * size, zero_sd=zero * size, precision=precision)
         search = one.search()
         left = max(search.g.square - search.path(one.max_terms)[-1].gain, 1e-12 * search.g.square)
         volume = 0.0
@@ -174,7 +176,7 @@ def _with_parts(problem: Problem) -> Problem:
     moved = search.g.square - search.of(problem.always).gain
     left = max(search.g.square - largest.gain, 1e-12 * search.g.square)
     share = left / max(moved, left) / _effective(problem, search, largest)
-    return replace(problem, parts=share * len(largest))
+    return problem.changed(parts=share * len(largest))
 
 
 def _effective(problem: Problem, search: Search, terms: Terms) -> float:
@@ -263,14 +265,17 @@ def free_run(problem: Problem, terms: Terms, i: int, begin: tuple[Array, Array] 
 
 def _decays(problem: Problem, terms: Terms, i: int) -> Array:
     """What is left of the starts (R, k) of the masses in use in a trajectory, and of its zero."""
-    nuisance = problem.nuisance[i]
-    places = np.unique(terms.place[problem.curved(terms)])
+    nuisance, families = problem.nuisance[i], problem.families
+    curved = problem.curved(terms)
+    bank = np.zeros(len(families.count), int) if families.bank is None else families.bank
+    used = np.unique(np.column_stack([bank[terms.family], terms.place])[curved], axis=0)
     masses = nuisance.shape[1] - problem.zeroed
-    if not len(places) or not masses:
+    if not len(used) or not masses:
         return nuisance[:, masses:]
-    low = np.minimum(places.astype(int), masses - 2)
-    share = places - low
-    decays = (1 - share) * nuisance[:, low] + share * nuisance[:, low + 1]
+    count = masses // (int(bank.max()) + 1)
+    low = np.minimum(used[:, 1].astype(int), count - 2)
+    share, first = used[:, 1] - low, used[:, 0].astype(int) * count + low
+    decays = (1 - share) * nuisance[:, first] + share * nuisance[:, first + 1]
     return np.column_stack([decays, nuisance[:, masses:]])
 
 

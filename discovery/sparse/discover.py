@@ -27,12 +27,12 @@ from discovery.sparse.families import candidates
 from discovery.sparse.folds import CLAIM, PREDICT, choose
 from discovery.sparse.growth import Growth, grown
 from discovery.sparse.masses import fit_masses
-from discovery.sparse.options import HIDDEN, SparseOptions
+from discovery.sparse.options import FAMILIES, HIDDEN, SparseOptions
 from discovery.sparse.ratedata import make_rate_data
 from discovery.sparse.rates import with_candidates
 from discovery.sparse.structures import WORDS
 from discovery.sparse.temperatures import discover_temperatures
-from discovery.terms import names
+from discovery.terms import names, parse
 from discovery.threads import one_thread
 
 FILE_FAMILIES = ("wet", "rotation", "coupling")
@@ -153,8 +153,9 @@ def _each(
     Together they need no further hidden states. So this comes first, and ends the search if it leaves nothing
     but white noise; otherwise the better one on left-out data stands.
     """
-    if "coupling" in (options.library or ()) and options.form != "masses":
-        return [_best(campaign, recordings, outputs, inputs, forms, options, progress)]
+    if _coupled(options.library or (), outputs) and options.form != "masses":
+        whole = [form for form in forms if form != "upstream"] if len(outputs) > 1 else forms
+        return [_best(campaign, recordings, outputs, inputs, whole or forms, options, progress)]
     together: list[Discovery] = []
     rates = None
     if len(outputs) > 1 and "own" in forms and options.library is None:
@@ -170,6 +171,13 @@ def _each(
     tried = [parts, *([one] for one in together)]
     errors = np.array([left_out_of(rates, joined("tried", one, 0.0).model) for one in tried])
     return tried[choose(errors, PREDICT if options.tolerance is None else options.tolerance)]
+
+
+def _coupled(library: Sequence[str], outputs: Sequence[str]) -> bool:
+    """Whether terms of a library hold other outputs in the rate of one."""
+    own = [word for word in library if word not in FAMILIES]
+    named = frozenset().union(*(names(parse(word, "library of the discovery")) for word in own))
+    return "coupling" in library or (len(outputs) > 1 and not named.isdisjoint(outputs))
 
 
 def _best(

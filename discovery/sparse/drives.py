@@ -92,6 +92,7 @@ class Drives:
     settled: tuple[str, ...]  # expressions whose mass begins in balance with them: temperatures
     integrals: tuple[str, ...] = ()  # expressions that may add up without bound
     passing: tuple[str, ...] = ()  # expressions of no air and no body: a machine need not have stood in them
+    gate: str | None = None  # a flow that goes on and off: bodies that it reaches forget faster with it
 
 
 def make_drives(inputs: Inputs, campaign: Campaign, library: Sequence[str] | None = None) -> Drives:
@@ -127,6 +128,7 @@ def make_drives(inputs: Inputs, campaign: Campaign, library: Sequence[str] | Non
         tuple(settled),
         tuple(charges),
         tuple(passing),
+        inputs.gate if "wet" in words else None,
     )
 
 

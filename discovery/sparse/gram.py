@@ -47,9 +47,13 @@ def gram(columns: Array, target: Array) -> Gram:
 def total(grams: Sequence[Gram], weights: Sequence[float] | None = None) -> Gram:
     """Sum of blocks; `weights` say how often a bootstrap drew each of them."""
     w = np.ones(len(grams)) if weights is None else np.asarray(weights, dtype=float)
+    matrix, vector = np.zeros_like(grams[0].matrix), np.zeros_like(grams[0].vector)
+    for g, times in zip(grams, w, strict=True):  # without a stack of them: they may be large
+        matrix += g.matrix if times == 1.0 else times * g.matrix
+        vector += times * g.vector
     return Gram(
-        np.einsum("b,bij->ij", w, np.array([g.matrix for g in grams])),
-        np.einsum("b,bi->i", w, np.array([g.vector for g in grams])),
+        matrix,
+        vector,
         float(w @ [g.square for g in grams]),
         int(w @ [g.count for g in grams]),
     )

@@ -11,8 +11,8 @@ The left-hand side of both is the readings themselves, so nothing is differentia
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -23,29 +23,35 @@ from pysindy.feature_library.base import BaseFeatureLibrary, x_sequence_or_item
 from discovery.dynamics.grid import interleaved
 from discovery.sparse.bank import filtered
 from discovery.sparse.search import Families
-from discovery.terms import Expression, evaluate, parse, text
+from discovery.terms import Expression, evaluate, names, parse, text
 
 Array = NDArray[np.float64]
 
 COUNT = 30  # time constants of the grid
 SEEN = 3.0  # time constants in the longest trajectory at least: what is slower only adds up its input
 FINER = 10.0  # times the distance of two readings: what settles quicker acts at once
+STILL = 0.1  # of its rate with a flow: how fast a lag forgets without it, before a fit has found it
 
 
 @dataclass(frozen=True)
 class Feature:
     """A column: a drive that acts at once (tau 0), through a lag (tau in s), or added up (tau infinite).
 
-    The offset is the drive 1.
+    The offset is the drive 1. A lag may forget more slowly while a flow stands still: its rate is then
+    the share `rest` of 1/tau, and lag(u, 600, 6000) names both time constants.
     """
 
     drive: str
     tau: float = 0.0
+    rest: float = 1.0
 
     def __str__(self) -> str:
         if self.tau == 0.0:
             return self.drive
-        return f"integral({self.drive})" if np.isinf(self.tau) else f"lag({self.drive}, {self.tau:.4g})"
+        if np.isinf(self.tau):
+            return f"integral({self.drive})"
+        still = "" if self.rest == 1.0 else f", {self.tau / self.rest:.4g}"
+        return f"lag({self.drive}, {self.tau:.4g}{still})"
 
 
 class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
@@ -62,10 +68,15 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
             (the time between two inputs, if that is longer) and the length of the longest trajectory.
         linear: inputs that run straight between their stamps; the others are held.
         settled: drives whose lag starts in balance with the first value; the others start at zero.
+        lasting: how long [s] other drives have been about what they are at the start, T: their lags start
+            with the share T/(T + tau) of the balance.
         at_once: whether a drive may also act without a lag.
         integrals: drives that may be integrated without limit, such as a current (charge).
         offset: whether the library has a constant.
         zeroed: whether each trajectory has its own zero, as a probe that is set to zero at the start.
+        gate: expression, 0 to 1, of a flow that goes on and off: drives then also go through lags that
+            forget at the rate (still + (1 - still) gate)/tau, tau ds/dt = u - (still + (1 - still) gate) s.
+        still: how fast these forget without the flow, of their rate with it.
     """
 
     def __init__(
@@ -79,6 +90,9 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
         integrals: Sequence[str] = (),
         offset: bool = True,
         zeroed: bool = False,
+        gate: str | None = None,
+        still: float = STILL,
+        lasting: Mapping[str, float] | None = None,
     ) -> None:
         self.names = names
         self.drives = drives
@@ -89,6 +103,9 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
         self.integrals = integrals
         self.offset = offset
         self.zeroed = zeroed
+        self.gate = gate
+        self.still = still
+        self.lasting = lasting
 
     @x_sequence_or_item
     def fit(self, x_full: Sequence[Any], y: Any = None) -> Self:  # noqa: ARG002
@@ -104,11 +121,15 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
         at_once = [Feature("1")] if self.offset else []
         at_once += [Feature(d) for d in self.drives_ if self.at_once]
         at_once += [Feature(d, np.inf) for d in self.integrals]
-        curves = [Feature(d, float(tau)) for d in self.drives_ for tau in self.taus_]
+        self.rests_ = [1.0] if self.gate is None else [1.0, self.still]
+        curves = [
+            Feature(d, float(t), rest) for rest in self.rests_ for d in self.drives_ for t in self.taus_
+        ]
         self.features_ = [*at_once, *curves]
-        count = np.r_[np.ones(len(at_once), int), np.full(len(self.drives_), COUNT)]
+        count = np.r_[np.ones(len(at_once), int), np.full(len(self.rests_) * len(self.drives_), COUNT)]
         free = np.full(len(count), np.inf)
-        self.families_ = Families(np.r_[0, np.cumsum(count)[:-1]], count, -free, free)
+        bank = np.r_[np.zeros(len(at_once), int), np.repeat(np.arange(len(self.rests_)), len(self.drives_))]
+        self.families_ = Families(np.r_[0, np.cumsum(count)[:-1]], count, -free, free, bank=bank)
         self.grid_ = tuple(self.features_)
         self.drive_of_family_ = [self.grid_[i].drive for i in self.families_.start]
         self.n_features_in_ = width
@@ -143,10 +164,31 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
         return [AxesArray(columns, {"ax_time": 0, "ax_coord": 1}) for columns in made]
 
     def _decays(self, x: Any) -> Array:
-        """What is left of a start value (rows, COUNT) for each time constant of the grid; a zero stays."""
-        time = self._column(x, "time")
-        left = np.exp(-(time[self._read(x)] - time[0])[:, None] / self.taus_)
+        """What is left of a start value (rows, banks * COUNT) for each time constant of the grid; a zero
+        stays.
+        """
+        read, step = self._read(x), np.diff(self._column(x, "time"))
+        since = [np.r_[0.0, np.cumsum(step * self._rate(x, rest))][read] for rest in self.rests_]
+        left = np.hstack([np.exp(-one[:, None] / self.taus_) for one in since])
         return np.column_stack([left, np.ones(len(left))]) if self.zeroed else np.asarray(left)
+
+    def _rate(self, x: Any, rest: float) -> Array:
+        """How fast a lag forgets in each interval (T - 1,), of 1/tau."""
+        steps = np.asarray(x).shape[0] - 1
+        if rest == 1.0 or self.gate is None:
+            return np.ones(steps)
+        inputs = {name: self._column(x, name) for name in self.names}
+        gate = np.broadcast_to(evaluate(parse(self.gate), inputs).value, (steps + 1,))
+        straight = names(parse(self.gate)) & set(self.linear)
+        gate = (gate[:-1] + gate[1:]) / 2 if straight else gate[:-1]
+        return np.asarray(rest + (1.0 - rest) * gate)
+
+    def _share(self, drive: str, taus: Array) -> Array:
+        """The share of its balance with a drive that a lag begins with, for each time constant."""
+        if drive in self.settled:
+            return np.ones(len(taus))
+        lasts = (self.lasting or {}).get(drive, 0.0)
+        return np.asarray(lasts / (lasts + taus))
 
     def _features(self, x: Any) -> Array:
         time, read = self._column(x, "time"), self._read(x)
@@ -157,19 +199,22 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
         nodes: dict[str, Any] = inputs
         wanted = dict.fromkeys(f.drive for f in self.features_)
         trees: dict[str, Expression] = {d: parse(d) for d in wanted}
-        lags = {d: [f.tau for f in self.features_ if f.drive == d and 0 < f.tau < np.inf] for d in wanted}
+        lagged = [f for f in self.features_ if 0 < f.tau < np.inf]
+        rates = {rest: self._rate(x, rest) for rest in dict.fromkeys(f.rest for f in lagged)}
         step = np.diff(time)
         columns: dict[Feature, Array] = {}
         for drive, tree in trees.items():
             now = np.broadcast_to(evaluate(tree, nodes).value, time.shape)
             columns[Feature(drive)] = np.asarray(now[read])
             pair = np.broadcast_to(evaluate(tree, ends).value, (2 * len(step),)).reshape(-1, 2)
-            taus = np.array(sorted(set(lags[drive])))
-            if len(taus):
-                left, right = np.ascontiguousarray(pair[:, :1]), np.ascontiguousarray(pair[:, 1:])
-                start = np.full((1, len(taus)), now[0] if drive in self.settled else 0.0)
-                found = filtered(left, right, step, read, taus, start)[:, 0]
-                columns |= {Feature(drive, float(tau)): found[:, i] for i, tau in enumerate(taus)}
+            for rest, rate in rates.items():  # tau ds/dt = u - rate s: a clock that runs at this rate
+                taus = np.array(sorted({f.tau for f in lagged if f.drive == drive and f.rest == rest}))
+                if not len(taus):
+                    continue
+                left, right = (np.ascontiguousarray(side[:, None] / rate[:, None]) for side in pair.T)
+                start = now[0] * self._share(drive, taus)[None, :]
+                found = filtered(left, right, step * rate, read, taus, start)[:, 0]
+                columns |= {Feature(drive, float(tau), rest): found[:, i] for i, tau in enumerate(taus)}
             if Feature(drive, np.inf) in self.features_:
                 sums = np.r_[0.0, np.cumsum(pair.mean(axis=1) * step)]
                 columns[Feature(drive, np.inf)] = sums[read]
@@ -180,7 +225,7 @@ class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
         first: Feature = self.grid_[self.families_.start[family]]
         if self.families_.count[family] == 1:
             return first
-        return Feature(first.drive, float(self.taus_[0] * (self.taus_[1] / self.taus_[0]) ** place))
+        return replace(first, tau=float(self.taus_[0] * (self.taus_[1] / self.taus_[0]) ** place))
 
     def keep(self, features: Sequence[Feature]) -> None:
         """Hold these features alone from now on."""

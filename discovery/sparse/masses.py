@@ -14,18 +14,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Trajectory
+from discovery.dynamics import Grid, Trajectory
 from discovery.fitting import Fit, Noise, fit_model
 from discovery.models import Model, Parameter, State
 from discovery.models.dimensions import unit_of
 from discovery.recordings import Campaign
-from discovery.sparse.library import Feature
-from discovery.terms import Apply, Expression, Number, Term, evaluate, parse, text
+from discovery.sparse.library import STILL, Feature
+from discovery.terms import Number, Term, parse, text
 
 Array = NDArray[np.float64]
 
 _AT = 1e-3  # share of a bound that counts as at it
+_DOUBT = 0.1  # share of the variance of an input at the start that says nothing of how warm masses are
 _OWN = 1e-4  # share of the variance of a start that the starts of other masses never explain
+RESTS = (1e-3, 1.0)  # how fast a mass may forget without a flow, of its rate with it
 QUICKER, SLOWER = 10.0, 3.0  # times beyond the grid that the time constant of a fit may go
 
 
@@ -57,6 +59,7 @@ class Rules:
     time_constants: tuple[float, float]  # s, of the grid of the search
     start_sd: float
     zero_sd: float | None = None  # of the zero that each recording has of its own; None: they have none
+    gate: str = ""  # flow without which some masses forget more slowly
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -86,12 +89,16 @@ def mass_model(rules: Rules, responses: Sequence[Response]) -> Model:
             terms.append(Term(f"{drive} adds up in {state}", state, parse(driven)))
         else:
             state, tau = f"{y}_{number[r.pole]}", f"{y}_tau{number[r.pole]}"
+            rest = f"{y}_rest{number[r.pole]}" if r.feature.rest < 1.0 else ""
+            rate = f"({rest} + (1 - {rest})*({rules.gate}))" if rest else "1"
             if state not in states:
                 parameters[tau] = Parameter(r.feature.tau, "s", *rules.limits)
                 states[state] = State(
                     state, unit, None, Number(0.0), _start_sd(rules, responses, r.pole), 1.0
                 )
-                terms.append(Term(f"{state} settles", state, parse(f"-{state}/{tau}")))
+                if rest:
+                    parameters[rest] = Parameter(r.feature.rest, "1", *RESTS, prior=(STILL, STILL))
+                terms.append(Term(f"{state} settles", state, parse(text(parse(f"-{state}*{rate}/{tau}")))))
             if share := _share(rules, drive, tau):
                 start = states[state].start
                 begun = text(parse(f"{driven}*{share}"))
@@ -151,7 +158,9 @@ def responses_of(fit: Fit, responses: Sequence[Response]) -> tuple[list[Response
     for k, r in enumerate(responses):
         gain = _gain(y, k, r)
         tau = values[f"{y}_tau{number[r.pole]}"].value if r.lagged else r.feature.tau
-        found.append(replace(r, feature=replace(r.feature, tau=tau), gain=values[gain].value))
+        rest = values[f"{y}_rest{number[r.pole]}"].value if r.feature.rest < 1.0 else 1.0
+        rest = 1.0 if rest > RESTS[1] * (1 - _AT) else rest
+        found.append(replace(r, feature=replace(r.feature, tau=tau, rest=rest), gain=values[gain].value))
         strength.append(abs(values[gain].value) / max(errors[gain], 1e-300))
     return found, strength
 
@@ -179,7 +188,7 @@ def within(rules: Rules, responses: Sequence[Response]) -> list[Response]:
         if not r.lagged or (r.feature.tau > least and not slowest(rules, r)):
             found.append(r)
         elif r.feature.tau <= least:
-            direct = replace(r.feature, tau=0.0)
+            direct = replace(r.feature, tau=0.0, rest=1.0)
             if all(direct != other.feature for other in responses):
                 found.append(replace(r, feature=direct))
     return found
@@ -204,55 +213,81 @@ def fit_masses(
 
 
 def starts_of(fit: Fit) -> Model:
-    """The fitted model with the start values of its masses in another recording: means, spreads, and how the
-    start of each follows those of the masses above it.
+    """The fitted model with the start values of its masses in another recording: means that follow the inputs
+    of that moment, spreads, and how the start of each follows those of the masses above it.
 
     A recording may be cut out of a longer one; then the masses start anywhere in their range. That counts as
     one start among those that were found: a few cold starts do not prove that all are cold. Masses are warm
-    together, so the first reading says much of each. Starts are counted from the declared ones,
-    which follow the inputs where a mass begins in balance with them.
+    together, so the first reading says much of each; and what is recorded at that moment, as the power of a
+    cooler, says how warm they are.
     """
     order = list(fit.problem.model.states)
     if not order:
         return fit.model
-    mean, covariance = _population(fit)
+    inputs = [name for name in fit.problem.model.inputs if all(name in g.nodes for g in _grids(fit))]
+    mean, covariance = _population(fit, inputs)
+    covariance, along = conditioned(covariance, mean[: len(inputs)])
     states = dict(fit.model.states)
     for i, name in enumerate(order):
         above = covariance[:i, :i] + _OWN * np.diag(np.diag(covariance)[:i])
         follows = np.linalg.solve(above, covariance[:i, i])
         rest = max(covariance[i, i] - follows @ covariance[:i, i], _OWN * covariance[i, i])
-        declared = states[name].start or Number(0.0)
+        parts = [
+            f"{by:.6g}*({u} - {usual:.6g})"
+            for by, u, usual in zip(along[:, i], inputs, mean, strict=False)
+            if by != 0.0
+        ]
         states[name] = replace(
             states[name],
-            start=_later(declared, float(mean[i])),
+            start=parse(" + ".join([f"{mean[len(inputs) + i]:.6g}", *parts])),
             start_sd=float(np.sqrt(rest)),
             start_with=dict(zip(order[:i], follows.tolist(), strict=True)),
         )
     return replace(fit.model, states=states)
 
 
-def _later(declared: Expression, by: float) -> Expression:
-    """A start moved by a number."""
-    match declared:
-        case Number(value):
-            return Number(float(f"{value + by:.6g}"))
-        case Apply("+", (rest, Number(value))):
-            return Apply("+", (rest, Number(float(f"{value + by:.6g}"))))
-    return Apply("+", (declared, Number(float(f"{by:.6g}"))))
+def conditioned(covariance: Array, usual: Array) -> tuple[Array, Array]:
+    """The last n of normal numbers given the first m, of which `usual` (m,) is the mean: covariance (n, n),
+    and how their mean follows each of these (m, n).
+
+    Few recordings say how inputs and starts go together: where inputs hardly differ, starts follow little.
+    """
+    count = len(usual)
+    first, rest = covariance[:count, :count], covariance[:count, count:]
+    scale = np.sqrt(np.diag(first))
+    moving = scale > 1e-9 * np.abs(usual)  # else it is constant but for rounding
+    along = np.zeros(rest.shape)
+    alike = first[np.ix_(moving, moving)] / np.outer(scale[moving], scale[moving])
+    along[moving] = (
+        np.linalg.solve(alike + _DOUBT * np.eye(len(alike)), rest[moving] / scale[moving, None])
+        / scale[moving, None]
+    )
+    left = covariance[count:, count:] - along.T @ rest - rest.T @ along + along.T @ first @ along
+    return left, along
 
 
-def _population(fit: Fit) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n) of the start values of the masses in another recording, from the
-    declared ones.
+def _grids(fit: Fit) -> list[Grid]:
+    return [run.system.grid for run in fit.trajectories]
+
+
+def _population(fit: Fit, inputs: Sequence[str]) -> tuple[Array, Array]:
+    """Mean (m + n,) and covariance of the inputs (m) and the masses (n) where another recording starts.
 
     Known are the starts that the fit found, each with its covariance; a recording that is cut out of a longer
     one starts anywhere in the range of the masses.
     """
-    order = list(fit.problem.model.states)
-    away = [one.x - _begun(one) for one in fit.trajectories]
-    every = np.concatenate(away)
-    anywhere = every.mean(axis=0), np.cov(every.T, bias=True).reshape(len(order), -1)
-    seen = [(one[0], _start_covariance(fit, run)) for one, run in zip(away, fit.trajectories, strict=True)]
+    m, n = len(inputs), len(fit.problem.model.states)
+    both = [
+        np.column_stack([*(run.system.grid.nodes[u] for u in inputs), run.x])[run.system.grid.read]
+        for run in fit.trajectories
+    ]
+    every = np.concatenate(both)
+    anywhere = every.mean(axis=0), np.cov(every.T, bias=True).reshape(m + n, -1)
+    seen = []
+    for rows, run in zip(both, fit.trajectories, strict=True):
+        covariance = np.zeros((m + n, m + n))
+        covariance[m:, m:] = _start_covariance(fit, run)
+        seen.append((np.r_[rows[0, :m], run.x[0]], covariance))
     return next_start(seen, anywhere)
 
 
@@ -283,15 +318,3 @@ def _start_covariance(fit: Fit, trajectory: Trajectory) -> Array:
     found = np.zeros((len(order), len(order)))
     found[np.ix_(free, free)] = fit.covariance[np.ix_(rows, rows)]
     return found
-
-
-def _begun(trajectory: Trajectory) -> Array:
-    """(T, n) declared start of each mass if the recording began at each instant."""
-    grid = trajectory.system.grid
-    known: dict[str, float | Array] = {**grid.nodes, **trajectory.values}
-    return np.column_stack(
-        [
-            np.broadcast_to(0.0 if s.start is None else evaluate(s.start, known).value, grid.time.shape)
-            for s in trajectory.system.model.states.values()
-        ]
-    )

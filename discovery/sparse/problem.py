@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,13 @@ class Problem:
             mine = {int(b): known & (block == b) for b in np.unique(block)}
             found.append({b: gram(rows[one], y[one]) for b, one in mine.items()})
         return tuple(found)
+
+    def changed(self, **changes: Any) -> Problem:
+        """The problem with other beliefs of the same readings and columns: normal equations stay."""
+        other = replace(self, **changes)
+        if "grams" in self.__dict__:
+            other.__dict__["grams"] = self.grams
+        return other
 
     def pooled(self, weights: Array | None = None) -> Gram:
         """Normal equations of the library, the nuisance taken out; `weights` (B,) says how often a block

@@ -33,6 +33,11 @@ class Families:
     low: Array
     high: Array
     most: Ints | None = None  # terms of each family at most; None: any number
+    bank: Ints | None = None  # (F,) which of several kinds of filters a family stands for; None: one kind
+
+    def alike(self, members: Ints) -> bool:
+        """Whether terms of these families may share a mass."""
+        return self.bank is None or len(set(self.bank[members].tolist())) < 2
 
     @property
     def columns(self) -> int:
@@ -208,7 +213,7 @@ class Search:
             for a, b in combinations(poles, 2):
                 pole = np.where(terms.pole == b, a, terms.pole)
                 mine = (pole == a) & curved
-                if len(set(terms.family[mine])) < mine.sum():
+                if len(set(terms.family[mine])) < mine.sum() or not self.families.alike(terms.family[mine]):
                     continue  # two terms of one family are two masses
                 _, pole = np.unique(pole, return_inverse=True)
                 place = np.where(mine, terms.place[mine].mean(), terms.place)

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.integrate import solve_ivp
 
 from discovery.fitting import fit_model
 from discovery.frames import campaign_from_frames
@@ -271,3 +272,30 @@ def test_the_resistance_of_a_cell_is_found_under_a_curve_that_the_model_lacks() 
     kept = found.report["groups"][0]["kept"]
     direct = found.model.parameters[f"U_gain{kept.index('I')}"].value
     assert direct == pytest.approx(-0.010, rel=0.1)
+
+
+def prey_and_predator(seed: int) -> pd.DataFrame:
+    """Lotka and Volterra: dh/dt = 1.1 h - 0.4 h l, dl/dt = 0.1 h l - 0.4 l, without any input."""
+    rng = np.random.default_rng(seed)
+    begin, time = [rng.uniform(5, 15), rng.uniform(3, 8)], 0.1 * np.arange(600)
+
+    def rates(_: float, z: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[float]:
+        return [1.1 * z[0] - 0.4 * z[0] * z[1], 0.1 * z[0] * z[1] - 0.4 * z[1]]
+
+    path = solve_ivp(rates, (0.0, time[-1]), begin, t_eval=time, rtol=1e-9).y.T
+    counted = path + 0.05 * rng.standard_normal((600, 2))
+    return pd.DataFrame(counted, index=time, columns=["hare", "lynx"])
+
+
+def test_an_expression_of_two_outputs_makes_them_one_system() -> None:
+    """Each alone has no channel of the other's name."""
+    frames = {f"r{seed}": prey_and_predator(seed) for seed in (0, 1)}
+    roles = {name: {"role": "other output", "unit": "1"} for name in ("hare", "lynx")}
+    campaign = campaign_from_frames(frames, roles)
+    options = SparseOptions(form="rates", library=("linear", "hare*lynx"), stable=False, bootstraps=0)
+    found = discover(campaign, list(frames), ["hare", "lynx"], options)
+    model = fit_model(found.model, campaign, list(frames), ["hare", "lynx"]).model
+    values = sorted(
+        p.value * TIME_UNITS["s"] / TIME_UNITS[model.time_unit] for p in model.parameters.values()
+    )
+    assert values == pytest.approx([-0.4, -0.4, 0.1, 1.1], rel=0.02)

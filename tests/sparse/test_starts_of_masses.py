@@ -50,8 +50,38 @@ def test_starts_make_up_for_an_offset(offset: float) -> None:
     model = fit_masses(slow(offset), cold_starts(), ["r0", "r1"], ["E"]).model
     start = model.states["s"].start
     assert start is not None
-    assert float(evaluate(start, {}).value) == pytest.approx(-offset, abs=0.6)
-    assert not isinstance(start, Number)  # what was declared stays a formula
+    for power in (500.0, 900.0):
+        assert float(evaluate(start, {"P": power}).value) == pytest.approx(-offset, abs=0.6)
+
+
+def test_starts_follow_what_is_recorded_at_that_moment() -> None:
+    """A mass that the load warms, and a cooler whose power says how warm it is when the load stands still."""
+    rng, tau = np.random.default_rng(3), 7200.0
+    time = np.arange(0.0, 200_000.0, 300.0)
+    recordings = {}
+    for k in range(3):
+        load = np.repeat(rng.choice([0.0, 400.0, 900.0], 70), 10)[: len(time) + 30]
+        mass = lfilter([1 - np.exp(-300.0 / tau)], [1.0, -np.exp(-300.0 / tau)], 0.02 * load)[30:]
+        load = load[30:]
+        cooler = 10.0 * mass + 0.2 * rng.standard_normal(len(time))
+        load[0] = 0.0  # it stands still for the first reading
+        readings = mass + 0.05 * rng.standard_normal(len(time))
+        recordings[f"r{k}"] = Recording(f"r{k}", time, {"P": load, "Q": cooler, "E": readings})
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "Q": Channel("Q", "cooling power", "W", None, "held"),
+        "E": Channel("E", "error", "um", 0.05, "linear"),
+    }
+    parameters = {"g": Parameter(0.02, "um/W"), "tau": Parameter(tau, "s"), "h": Parameter(0.0, "um/W")}
+    terms = (Term("settles", "s", parse("-s/tau")), Term("driven", "s", parse("g*P/tau + h*Q/tau")))
+    states = {"s": State("s", "um", None, Number(0.0), 5.0, 1.0)}
+    model = Model("m", parameters, states, terms, {"E": parse("s")}, "s")
+    campaign = Campaign("c", channels, recordings, Path("c"))
+    start = fit_masses(model, campaign, ["r0", "r1"], ["E"]).model.states["s"].start
+    assert start is not None
+    for recording in recordings.values():
+        now = {name: float(recording.values[name][0]) for name in ("P", "Q")}
+        assert float(evaluate(start, now).value) == pytest.approx(now["Q"] / 10.0, abs=1.5)
 
 
 @pytest.mark.parametrize("tau", [600.0, 3600.0, 20_000.0])
