@@ -27,6 +27,7 @@ _FASTER = 8.0  # times the fastest that a temperature moves elsewhere
 _CLIMB = 8.0  # K within a few minutes, at least
 _FLAT = 0.02  # of the readings at the largest value: a range that is full
 _PILE, _NEXT = 4.0, 3  # times as many readings as at any of so many next values: the end of a range
+_SET, _VISITS = 0.5, 3  # of the readings are as the one before; stays at the largest value
 _LOWER = 0.97  # of what the other recordings reach
 _MINUTES = 360.0  # s
 _APART = 2.0  # times the usual spread: another level
@@ -133,7 +134,8 @@ def _full_range(recordings: Sequence[Seen], channel: Channel) -> Iterator[Findin
         for sign in (1.0, -1.0):
             top = float(np.max(sign * read))
             tops[one.name, sign] = top
-            flat[one.name, sign] = float(np.mean(sign * read == top)) if _piles_up(sign * read) else 0.0
+            clipped = _piles_up(sign * read) and not _is_a_setting(sign * read)
+            flat[one.name, sign] = float(np.mean(sign * read == top)) if clipped else 0.0
     for one in recordings:
         for sign in (1.0, -1.0):
             if (one.name, sign) not in flat or flat[one.name, sign] < _FLAT:
@@ -160,6 +162,15 @@ def _piles_up(read: Array) -> bool:
     """
     _, counts = np.unique(read, return_counts=True)
     return bool(counts[-1] > _PILE * counts[-1 - _NEXT : -1].max())
+
+
+def _is_a_setting(read: Array) -> bool:
+    """Whether the largest of some readings (N,) is one of the levels that an input is set to: it keeps each
+    of them for a while, and comes to this one once or twice. What is clipped comes there again and again.
+    """
+    kept = float(np.mean(np.diff(read) == 0))
+    visits = int(np.count_nonzero(np.diff((read == read.max()).astype(int), prepend=0) == 1))
+    return kept > _SET and visits < _VISITS
 
 
 def _climbs(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:

@@ -1,0 +1,33 @@
+"""An input that is clipped comes to the end of its range again and again; one that is set comes there once."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from discovery.recordings.campaign import Channel
+from discovery.recordings.compare.levels import _full_range
+from discovery.recordings.compare.seen import Seen
+
+Array = NDArray[np.float64]
+POWER = Channel("P", "heat load", "W", None, "held")
+
+
+def blocks(seed: int, highest: float) -> Array:
+    """Levels that a program sets, each for half an hour in steps of 60 s; one of them stays three hours."""
+    levels = np.random.default_rng(seed).uniform(100.0, highest, 80).round()
+    levels[7] = highest
+    return np.repeat(levels, np.where(np.arange(80) == 7, 180, 30))
+
+
+def seen(name: str, power: Array) -> Seen:
+    time = 60.0 * np.arange(len(power))
+    return Seen(name, Path(f"{name}.csv"), time, {"P": power}, np.arange(len(power)))
+
+
+@pytest.mark.parametrize(("clipped", "found"), [(False, 0), (True, 1)])
+def test_a_level_that_stays_long_is_no_limit(clipped: bool, found: int) -> None:
+    power = np.minimum(blocks(3, 800.0), 500.0) if clipped else blocks(3, 500.0)
+    others = [seen("monday", blocks(1, 800.0)), seen("tuesday", blocks(2, 800.0))]
+    assert len(list(_full_range([*others, seen("friday", power)], POWER))) == found
