@@ -1,4 +1,4 @@
-"""An input that is clipped comes to the end of its range again and again; one that is set comes there once."""
+"""An input that is clipped comes to the end of its range again and again; one that is set, once."""
 
 from pathlib import Path
 
