@@ -322,8 +322,9 @@ def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Fi
                 goes_on = float(np.std(x[known])) / (float(np.std(x)) or 1.0) if known.any() else 0.0
                 usual = max((_goes_on(o) for o in others), default=0.0)
                 moves = _answer(others) * float(np.std(x[known])) if known.any() else 0.0
-                seen = moves > _DIGITS * _step(np.concatenate([o[1] for o in others]))
-                seen = seen and (b.between == "held" or _lasts(still))  # what is set comes and goes
+                digits = _step(np.concatenate([o[1] for o in others]))
+                # what is set comes and goes, by steps of any size; a sensor moves by more than its digits
+                seen = b.between == "held" or (moves > _DIGITS * digits and _lasts(still))
                 if known.mean() > _STILL and goes_on > 0.4 and usual < 0.5 * goes_on and seen:
                     what = (
                         f"'{b.name}' stays at {value:.4g} in {still.mean():.0%} of the recording "
