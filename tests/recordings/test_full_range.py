@@ -18,16 +18,16 @@ def blocks(seed: int, highest: float) -> Array:
     """Levels that a program sets, each for half an hour in steps of 60 s; one of them stays three hours."""
     levels = np.random.default_rng(seed).uniform(100.0, highest, 80).round()
     levels[7] = highest
-    return np.repeat(levels, np.where(np.arange(80) == 7, 180, 30))
+    return np.asarray(np.repeat(levels, np.where(np.arange(80) == 7, 180, 30)), dtype=np.float64)
 
 
 def seen(name: str, power: Array) -> Seen:
-    time = 60.0 * np.arange(len(power))
+    time = np.arange(0.0, 60.0 * len(power), 60.0)
     return Seen(name, Path(f"{name}.csv"), time, {"P": power}, np.arange(len(power)))
 
 
 @pytest.mark.parametrize(("clipped", "found"), [(False, 0), (True, 1)])
 def test_a_level_that_stays_long_is_no_limit(clipped: bool, found: int) -> None:
-    power = np.minimum(blocks(3, 800.0), 500.0) if clipped else blocks(3, 500.0)
+    power = np.asarray(np.minimum(blocks(3, 800.0), 500.0)) if clipped else blocks(3, 500.0)
     others = [seen("monday", blocks(1, 800.0)), seen("tuesday", blocks(2, 800.0))]
     assert len(list(_full_range([*others, seen("friday", power)], POWER))) == found
