@@ -144,7 +144,7 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
 
     zero, one, first = np.zeros(len(time)), np.ones(len(time)), (time < length / 2).astype(float)
     sixth, twelfth = (((time // (length / n)) % 2 == 0).astype(float) for n in (6, 12))
-    speed, load, pump = (r in roles.values() for r in ("rotation speed", "heat load", "fluid flow"))
+    speed, load = (r in roles.values() for r in ("rotation speed", "heat load"))
 
     def called(role: str, word: str) -> str:
         """The only channel of a role by its name, several by a word."""
@@ -153,12 +153,12 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
 
     names = called("rotation speed", "speed"), called("heat load", "load")
     moving = " and ".join(name for name, there in zip(names, (speed, load), strict=True) if there)
-    dry, still = ", dry" if pump and wet else "", "stand still" if speed else "leave everything off"
+    dry, still = ", dry" if wet else "", "stand still" if speed else "leave everything off"
     half, two, hour = (_duration(length / n) for n in (2, 6, 12))
     wanted: dict[str, Mapping[str, Array]] = {}
-    if pump and wet:
+    if wet:
         wanted[f"switch the pump every {two} at standstill with warm fluid"] = build(zero, zero, sixth, True)
-    if pump and wet and moving:
+    if wet and moving:
         wanted[f"switch the pump every {two} at full {moving}"] = build(one, one, sixth, False)
         wanted[f"step {moving} every {hour} with the pump running"] = build(twelfth, twelfth, one, False)
     if moving:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from math import ceil, erf, exp, inf, log, pi, sqrt
 from typing import Literal
 
@@ -85,7 +86,7 @@ def _around_zero() -> tuple[tuple[float, float], ...]:
     towards zero. An effect without a size (a clock that is wrong) is as small as its shape.
     """
     edges = [_REACH * 0.5**k for k in range(_HALVES)]
-    cells = [*zip(edges[1:], edges, strict=False), (0.0, edges[-1])]
+    cells = [*((low, high) for high, low in pairwise(edges)), (0.0, edges[-1])]
     mass = [(erf(high / sqrt(2)) - erf(low / sqrt(2))) / 2 for low, high in cells]
     moment = [(exp(-0.5 * low**2) - exp(-0.5 * high**2)) / sqrt(2 * pi) for low, high in cells]
     total = 2 * sum(mass)

@@ -140,8 +140,8 @@ class Grams:
         dets = -float(self.logdet.sum()) if weights is None else -weights @ self.logdet
         found = []
         if more:
-            beside = corner[:, more:]
-            bare = np.linalg.cholesky(beside @ beside.transpose(0, 2, 1))
+            rest = corner[:, more:]  # without the form errors
+            bare = np.linalg.cholesky(rest @ rest.transpose(0, 2, 1))
             widened = np.count_nonzero(np.diag(self.prior)[1:-more]) * np.log(wide)
             constant = self.constant + float(np.sum(np.log(extra)))
             found.append(_concluded(bare, few, dets - volume + constant - widened))

@@ -12,7 +12,7 @@ from discovery.effects.form import Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="fluid_convection_flow",
-    title="Coolant that follows its flow otherwise",
+    title="Cooling that follows the flow of the coolant",
     group="cutting fluid",
     place="coolant terms",
     formula="by_flow*(max(rate, 0.02)**m_flow - 1)*term",
