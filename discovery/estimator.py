@@ -109,7 +109,7 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         max_terms: int = 15,
         time_constants: tuple[float, float] | None = None,
         hidden: str = "auto",
-        stable: bool = True,
+        stable: bool | None = None,
         keep: Sequence[str] = (),
         forbid: Sequence[str] = (),
         bounds: Mapping[str, tuple[float, float]] | None = None,

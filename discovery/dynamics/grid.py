@@ -73,6 +73,14 @@ class Grid:
         time = self.time[begin : end + 1]
         return replace(self, time=time, read=self.read[:0], readings=self.readings[:0], means=None, known={})
 
+    def divided(self, parts: int) -> Grid:
+        """The grid with each interval in so many equal parts; one of means of readings stays as it is."""
+        if parts == 1 or self.means is not None:
+            return self
+        share = np.arange(parts) / parts
+        inner = self.time[:-1, None] + share * self.step[:, None]
+        return replace(self, time=np.append(inner, self.time[-1]), read=self.read * parts, known={})
+
     @cached_property
     def step(self) -> Array:
         """Interval lengths (T - 1,) in s."""

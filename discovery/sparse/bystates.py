@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery import terms
-from discovery.errors import RunsAwayError
+from discovery.errors import RunsAwayError, UserError
 from discovery.fitting import Fit, fit_model
 from discovery.fitting.noise import readings_as_one
 from discovery.models import Model, Parameter
@@ -20,16 +20,16 @@ from discovery.progress import Progress
 from discovery.recordings import Campaign
 from discovery.sparse.byrates import discover_rates
 from discovery.sparse.constraints import UnknownTermError, matched
-from discovery.sparse.discovery import Discovery
+from discovery.sparse.discovery import Discovery, held
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.freeruns import left_out
 from discovery.sparse.gram import Gram, total
 from discovery.sparse.growth import Growth, grown
 from discovery.sparse.laws import with_levels
-from discovery.sparse.options import SparseOptions
-from discovery.sparse.ratedata import RateData, rough_noise
+from discovery.sparse.options import FAMILIES, SparseOptions
+from discovery.sparse.ratedata import RateData, in_pieces, resolved, rough_noise
 from discovery.sparse.rates import refit, with_candidates, without
-from discovery.sparse.search import Search, plain
+from discovery.sparse.search import Search, Terms, plain
 from discovery.sparse.structures import FLOWS, WORDS, Structure, balanced, own, rate, started, upstream
 from discovery.sparse.weak import half_widths, weak_rows
 from discovery.terms import Number
@@ -43,6 +43,7 @@ _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
 _MOVED = 0.02  # share by which a level moves that makes the set grow anew
 _FIRST = 12  # of a fit of a linear chain from one of its starts
+_HORIZONS = (4.0, 16.0)  # lengths of free runs, in time scales of the readings
 _NEAREST = 3  # of these starts, by their first step, are fitted further
 _FAR = 3.0  # times the rms of another form at its start
 _WHITE = 1.5  # readings that say the same once: less is noise
@@ -50,19 +51,35 @@ _CHAIN = (0.3, 1.0, 3.0)  # times the time scale of the readings: time constants
 
 
 @dataclass(frozen=True)
-class Start:
-    """A structure with start values, the candidates that are in it from the start, the options as they match
-    its terms, and the cost of a short fit.
+class Begun:
+    """A structure with start values, the candidates that are in it from the start, those that a bound holds
+    back with the coefficients that the readings ask for, and the cost of a short fit.
     """
 
     structure: Structure
     entered: set[int]
+    back: Mapping[int, float] = field(default_factory=dict)
+    cost: float = np.inf
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a kind of hidden state begins, the data with steps that are short enough for it, and the options
+    as they match its terms.
+    """
+
+    data: RateData
+    begun: Begun
     options: SparseOptions
-    cost: float = 0.0
 
 
 def discover_states(
-    data: RateData, options: SparseOptions, hidden: Sequence[str], progress: Progress, rival: float = np.inf
+    data: RateData,
+    options: SparseOptions,
+    hidden: Sequence[str],
+    progress: Progress,
+    rival: float = np.inf,
+    held_back: list[str] | None = None,
 ) -> Iterator[Discovery]:
     """A discovery for each kind of hidden state that was asked for and does not run away, made when it is
     asked for; none for a kind that begins far from the readings where another one begins near.
@@ -70,10 +87,14 @@ def discover_states(
     Args:
         rival: mean squared error of another model on left-out data. A kind that leaves more of the readings
             that it is fitted to is no better on others: it is not made. Nor is one that begins far from it.
+        held_back: takes a sentence for each bound that holds a term of any kind back.
     """
     words = options.library or WORDS
+    _check_names(data, words, hidden)
     roles = {data.campaign.channels[y].role for y in data.outputs}
     unit = "h" if roles <= THERMAL_ROLES and data.scale >= _SLOW else time_unit(data.scale)
+    if options.stable is None:  # heat flows downhill; anything else may swing by itself
+        options = options.model_copy(update={"stable": roles <= THERMAL_ROLES})
     flows = [word for word in FLOWS if word in words] or ["linear"]
     kinds = [k for kind in hidden for k in ([f"{kind} {f}" for f in flows] if kind == "upstream" else [kind])]
     goal = 0.5 * rival * sum(int(data.grids[r].measured.sum()) for r in data.recordings)
@@ -85,7 +106,9 @@ def discover_states(
         nonlocal nearest, lacking
         try:
             starts[kind] = _start(data, kind, words, unit, options)
-            nearest = min(nearest, starts[kind].cost)
+            nearest = min(nearest, starts[kind].begun.cost)
+            if held_back is not None:
+                held_back.extend(_held(starts[kind]))
         except RunsAwayError:
             pass
         except UnknownTermError as error:  # a term that this form does not have: another one may
@@ -98,15 +121,32 @@ def discover_states(
         progress(f"terms of {', '.join(data.outputs)}, {kind}")
         if kind not in starts and kind.startswith("upstream"):
             begin(kind)
-        if kind in starts and starts[kind].cost <= _FAR**2 * nearest:
+        if kind in starts and starts[kind].begun.cost <= _FAR**2 * nearest:
             try:
-                found = _discovered(data, kind.split()[0], starts[kind], goal)
+                found = _discovered(kind.split()[0], starts[kind], goal)
             except RunsAwayError:
                 continue
             if found:
                 yield found
     if lacking is not None and not starts and options.form != "auto" and len(hidden) == 1:
         raise lacking
+
+
+def _check_names(data: RateData, words: Sequence[str], hidden: Sequence[str]) -> None:
+    """Refuse an expression that names what is neither an input nor a state of the forms that are tried."""
+    states = {"own": {"y"}, "rate": {"y", "rate"}, "upstream": {"y", "up"}}
+    known = {"time", *data.outputs, *next(iter(data.grids.values())).samples}.union(
+        *(states[h] for h in hidden)
+    )
+    for word in words:
+        if word in FAMILIES:
+            continue
+        for name in sorted(terms.names(terms.parse(word, "library of the discovery")) - known):
+            raise UserError(
+                f"{data.campaign.path}: the library of the discovery names '{name}' in '{word}', which is "
+                f"neither a family ({', '.join(FAMILIES)}) nor made of inputs and states "
+                f"({', '.join(sorted(known))})"
+            )
 
 
 def _start(data: RateData, kind: str, words: Sequence[str], unit: str, options: SparseOptions) -> Start:
@@ -118,18 +158,29 @@ def _start(data: RateData, kind: str, words: Sequence[str], unit: str, options: 
         full, cost = _chain(data, y, kind.split()[1], words, unit)
         structure, options = _allowed(data, full, options)
         entered = {i for i, c in enumerate(structure.candidates) if c.start != 0.0}
-        return Start(structure, entered, options, cost)
-    bare = (own if kind == "own" else rate)(data, data.outputs, words, unit, options.stable)
+        return Start(data, Begun(structure, entered, cost=cost), options)
+    bare = (own if kind == "own" else rate)(data, data.outputs, words, unit, bool(options.stable))
     bare, options = _allowed(data, bare, options)
-    structure, entered, cost = _begun(data, bare)
-    return Start(structure, entered, options, cost)
+    begun = _begun(data, bare)
+    if np.isfinite(begun.cost):
+        finer = resolved(data, _of(begun.structure, begun.entered))
+        if finer is not data:
+            data, begun = finer, _begun(finer, bare)
+    return Start(data, begun, options)
 
 
-def _discovered(data: RateData, kind: str, start: Start, goal: float) -> Discovery | None:
+def _of(structure: Structure, entered: Collection[int]) -> Model:
+    """The model of a structure with some of its candidates."""
+    model, labels = with_candidates(structure.model, structure.candidates)
+    return without(model, [name for i, name in enumerate(labels) if i not in entered])
+
+
+def _discovered(kind: str, start: Start, goal: float) -> Discovery | None:
     """The terms that the readings ask for: grown, levels refined after each growth, then chosen by free
     runs; None where they leave more than `goal`.
     """
-    structure, entered, options = start.structure, start.entered, start.options
+    data, options = start.data, start.options
+    structure, entered = start.begun.structure, start.begun.entered
     stay = {i for i, c in enumerate(structure.candidates) if c.label in options.keep}
     for _ in range(_GROWTHS):
         model, labels = with_candidates(structure.model, structure.candidates)
@@ -152,6 +203,16 @@ def _discovered(data: RateData, kind: str, start: Start, goal: float) -> Discove
     found = discover_rates(data, small, kept, always, options, grown=True, tolerance=PREDICT)
     model = with_free_levels(data, found.model) if options.refine else found.model
     return replace(found, model=model, report=found.report | {"hidden": kind})
+
+
+def _held(start: Start) -> list[str]:
+    """Sentences on bounds that hold candidates back."""
+    said = []
+    for i, asked in start.begun.back.items():
+        c = start.begun.structure.candidates[i]
+        given = c.label in start.options.bounds
+        said.append(held(c.into, c.label, asked, "bounds" if given else "stable = true"))
+    return said
 
 
 def _refined(
@@ -197,36 +258,50 @@ def _allowed(data: RateData, structure: Structure, options: SparseOptions) -> tu
     return replace(structure, candidates=tuple(kept)), options
 
 
-def _begun(data: RateData, bare: Structure) -> tuple[Structure, set[int], float]:
-    """Start values of the candidates and the set to begin with: of several widths of the weak form the first
-    from which a short fit of free runs comes near, else the one from which it comes nearest; and its cost.
+def _begun(data: RateData, bare: Structure) -> Begun:
+    """Where the search begins: of several widths of the weak form the first from which a short fit of free
+    runs comes near, else the one from which it comes nearest.
     """
     noise = rough_noise(data).white
     grids = [data.grids[r] for r in data.recordings]
     near = 0.5 * sum(int(grid.measured.sum()) for grid in grids)  # cost of a fit that is off by this noise
     widths = [half_widths(grids, y, s, bare.order) for y, s in zip(data.outputs, noise, strict=True)]
-    begun: list[tuple[Structure, set[int], float]] = []
+    begun: list[Begun] = []
     for k in range(max(map(len, widths))):
-        structure, entered = _weakly(data, bare, [one[min(k, len(one) - 1)] for one in widths])
-        model, labels = with_candidates(structure.model, structure.candidates)
-        small = without(model, [name for i, name in enumerate(labels) if i not in entered])
-        try:
-            least = min((cost for *_, cost in begun), default=np.inf)
-            begun.append((structure, entered, _fit(data, small, {}, _FIRST, least).cost))
-            if begun[-1][2] <= near:
-                break
-        except RunsAwayError:
-            begun.append((structure, entered, np.inf))
-    return min(begun, key=lambda one: one[2])
+        structure, entered, back = _weakly(data, bare, [one[min(k, len(one) - 1)] for one in widths])
+        small = _of(structure, entered)
+        for lengthened in (False, True):
+            least = min((one.cost for one in begun), default=np.inf)
+            try:
+                fit = _fit(data, _lengthened(data, small) if lengthened else small, {}, _FIRST, least)
+            except RunsAwayError:
+                begun.append(Begun(structure, entered, back, np.inf))
+                continue
+            _, labels = with_candidates(structure.model, structure.candidates)
+            values = {i: fit.model.parameters[name].value for i, name in enumerate(labels) if i in entered}
+            begun.append(Begun(started(structure, values), entered, back, fit.cost))
+            if fit.cost <= near:
+                return begun[-1]
+    return min(begun, key=lambda one: one.cost)
 
 
-def _weakly(data: RateData, structure: Structure, widths: Sequence[float]) -> tuple[Structure, set[int]]:
-    """Start values of the candidates and the set to begin with, by the weak form of the readings with windows
-    of a half width [s] for each output.
+def _lengthened(data: RateData, model: Model) -> Model:
+    """The model fitted to longer and longer free runs, from a few time scales of the readings on."""
+    for scales in _HORIZONS:
+        model = _fit(in_pieces(data, scales * data.scale), model, {}, _FIRST).model
+    return model
+
+
+def _weakly(
+    data: RateData, structure: Structure, widths: Sequence[float]
+) -> tuple[Structure, set[int], dict[int, float]]:
+    """Start values of the candidates, the set to begin with, and candidates that a bound holds back with what
+    is asked for, by the weak form of the readings with windows of a half width [s] for each output.
     """
     second = TIME_UNITS[structure.model.time_unit]
     values: dict[int, float] = {}
     chosen: set[int] = set()
+    back: dict[int, float] = {}
     for k, output in enumerate(data.outputs):
         into = structure.rates.get(output, output)
         mine = [i for i, c in enumerate(structure.candidates) if c.into == into]
@@ -246,13 +321,24 @@ def _weakly(data: RateData, structure: Structure, widths: Sequence[float]) -> tu
         best = min(path, key=lambda one: _criterion(g, independent, one.gain, len(one), len(mine)))
         values |= {mine[f]: float(v) for f, v in zip(best.family, best.theta, strict=True)}
         chosen |= {mine[f] for f in best.members}
-    return started(structure, values), chosen
+        price = _price(independent, len(mine))
+        back |= {mine[f]: asked for f, asked in search.held(best, price, _always(independent)).items()}
+    return started(structure, values), chosen, back
 
 
 def _criterion(g: Gram, effective: float, gain: float, size: int, library: int) -> float:
     """Extended BIC at the number of independent windows."""
     left = max(g.square - gain, 1e-9 * g.square)
-    return float(effective * np.log(left / g.count) + size * (np.log(effective) + 2 * np.log(library)))
+    return float(effective * np.log(left / g.count) + size * _price(effective, library))
+
+
+def _always(count: float) -> Callable[[Terms], float]:
+    return lambda _: count
+
+
+def _price(effective: float, library: int) -> float:
+    """What the criterion asks of one more term."""
+    return float(np.log(effective) + 2 * np.log(library))
 
 
 def _chain(

@@ -39,6 +39,7 @@ class Choice:
     spreads: tuple[float, ...] = ()  # of the coefficients in their prior
     costs: tuple[float, ...] = ()  # of each term: share by which the left-out rms grows without it
     stability: tuple[float, ...] = ()  # of each term: share of block bootstraps whose set has its family
+    held: tuple[tuple[int, float], ...] = ()  # families that a bound holds back, and what is asked for
     problem: Problem | None = None  # as it was believed in the end
 
 
@@ -72,6 +73,7 @@ def chosen(problem: Problem) -> Choice:
 def evidence(problem: Problem, terms: Terms) -> Choice:
     """A set as a choice: what each term costs, and how stable it is."""
     left, costs = _costs(problem, terms)
+    search = problem.search()
     residual = np.concatenate(problem.residuals(on_grid(terms, problem.families)))
     return Choice(
         terms,
@@ -84,8 +86,16 @@ def evidence(problem: Problem, terms: Terms) -> Choice:
         tuple(problem.spreads(terms).tolist()),
         costs,
         stability(problem, terms),
+        _held(problem, search, terms),
         problem,
     )
+
+
+def _held(problem: Problem, search: Search, terms: Terms) -> tuple[tuple[int, float], ...]:
+    """Families that a bound holds back, and the coefficients that the readings ask for."""
+    effective = partial(_effective, problem, search)
+    price = np.log(effective(terms)) + 2 * np.log(problem.families.columns)
+    return tuple(search.held(terms, float(price), effective).items())
 
 
 def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from discovery.dynamics import make_grid
-from discovery.errors import UserError
+from discovery.errors import RunsAwayError, UserError
 from discovery.fitting import Fit, fit_model
 from discovery.models.check import check_model
 from discovery.models.modelfile import read_model
@@ -79,7 +80,7 @@ def discover(
             parts = [discover_temperatures(campaign, recordings, warm, inputs, options)]
             others = [name for name in outputs if name not in warm]
         if others:
-            forms = _forms(roles - {"temperature"} if warm else roles, options)
+            forms = _forms(roles - {"temperature"} if warm else roles, options, others)
             parts += _each(campaign, recordings, others, inputs, forms, options, progress)
             together = not warm and forms == ("masses",)
     found = joined("discovered", parts, 0.0)
@@ -126,7 +127,7 @@ def _warm(campaign: Campaign, outputs: Sequence[str], roles: set[str], options: 
     return [name for name in outputs if campaign.channels[name].role == "temperature"]
 
 
-def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:
+def _forms(roles: set[str], options: SparseOptions, outputs: Sequence[str]) -> tuple[str, ...]:
     """Forms to try, the plainer one first: "masses", and what may stand behind an output in rates."""
     states = HIDDEN if options.hidden == "auto" else (options.hidden,)
     if options.form == "masses":
@@ -135,6 +136,8 @@ def _forms(roles: set[str], options: SparseOptions) -> tuple[str, ...]:
         return ("own",) if options.hidden == "auto" and roles == {"error"} else states
     if options.hidden != "auto":
         return states
+    if any(_names_states(word, outputs) for word in options.library or ()):
+        return ("own",) if roles == {"error"} else states
     return ("masses",) if roles <= {"error", "temperature"} else ("masses", *states)
 
 
@@ -162,9 +165,10 @@ def _each(
         rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
         coupled = options.model_copy(update={"library": (*WORDS, "coupling")})
         for one in discover_states(rates, coupled, [f for f in forms if f in ("own", "rate")], progress):
-            if leaves_noise(campaign, recordings, one.model, outputs):
-                return [one]
-            together.append(one)
+            with suppress(RunsAwayError):  # between the readings that the search has thinned out
+                if leaves_noise(campaign, recordings, one.model, outputs):
+                    return [one]
+                together.append(one)
     parts = [_best(campaign, recordings, [name], inputs, forms, options, progress) for name in outputs]
     if not together or rates is None:
         return parts
@@ -175,9 +179,15 @@ def _each(
 
 def _coupled(library: Sequence[str], outputs: Sequence[str]) -> bool:
     """Whether terms of a library hold other outputs in the rate of one."""
-    own = [word for word in library if word not in FAMILIES]
-    named = frozenset().union(*(names(parse(word, "library of the discovery")) for word in own))
-    return "coupling" in library or (len(outputs) > 1 and not named.isdisjoint(outputs))
+    if "coupling" in library or len(outputs) < 2:
+        return "coupling" in library
+    return "product" in library or any(_names_states(word, outputs, ()) for word in library)
+
+
+def _names_states(word: str, outputs: Sequence[str], states: Sequence[str] = ("y", "rate", "up")) -> bool:
+    """Whether a word of a library is an expression of states, or of outputs."""
+    own = () if word in FAMILIES else names(parse(word, "library of the discovery"))
+    return not {*states, *outputs}.isdisjoint(own)
 
 
 def _best(
@@ -210,22 +220,25 @@ def _best(
     found = [_begun(one, campaign, recordings, outputs, options) for one in found]
     rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
     errors = [left_out_of(rates, one.model) for one in found]
-    if not (found and leaves_noise(campaign, recordings, found[0].model, outputs)):
+    held: list[str] = []
+    done = bool(found) and leaves_noise(campaign, recordings, found[0].model, outputs)
+    if not done:
         rival = float(errors[0].mean()) if errors else np.inf
-        for one in discover_states(rates, options, states, progress, rival):
-            found.append(one)
-            errors.append(left_out_of(rates, one.model))
-            if leaves_noise(campaign, recordings, one.model, outputs):
-                break
+        for one in discover_states(rates, options, states, progress, rival, held):
+            with suppress(RunsAwayError):
+                done = leaves_noise(campaign, recordings, one.model, outputs)
+                found.append(one)
+                errors.append(left_out_of(rates, one.model))
+                if done:
+                    break
     if not found:
         raise UserError(
             f"{campaign.path}: no model of {', '.join(outputs)} in the form asked for stays finite on "
             "its own readings and has the terms under keep and bounds; offer other terms under library, or "
-            "leave out form and hidden"
+            + "; ".join(["leave out form and hidden", *held])
         )
-    if len(found) == 1:
-        return found[0]
-    return found[choose(np.array(errors), PREDICT if options.tolerance is None else options.tolerance)]
+    best = found[choose(np.array(errors), PREDICT if options.tolerance is None else options.tolerance)]
+    return best if done or not held else replace(best, report=best.report | {"held": held})
 
 
 def _on_file(

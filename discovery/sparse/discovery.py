@@ -48,6 +48,16 @@ def path_points(
     return tuple(points)
 
 
+def held(place: str, term: str, asked: float, line: str = "bounds") -> str:
+    """A sentence on a bound that binds.
+
+    >>> held("E_Y", "P", -0.013)
+    "E_Y: the line bounds holds the term 'P' back; the readings ask for the coefficient -0.013"
+    """
+    asks = f"the readings ask for the coefficient {asked:.3g}"
+    return f"{place}: the line {line} holds the term '{term}' back; {asks}"
+
+
 def merged(name: str, parts: Sequence[Model]) -> Model:
     """Models of separate outputs side by side in one; equal time units, no shared names."""
     first = parts[0]
@@ -63,7 +73,8 @@ def joined(name: str, parts: Sequence[Discovery], seconds: float) -> Discovery:
     path = tuple(point for part in parts for point in part.path)
     stability = {label: share for part in parts for label, share in part.stability.items()}
     report = {
-        "groups": [part.report for part in parts],
+        "groups": [group for part in parts for group in part.report.get("groups", [part.report])],
+        "held": [said for part in parts for said in part.report.get("held", ())],
         "path": [
             {
                 "outputs": list(point.outputs),

@@ -61,7 +61,11 @@ class SparseOptions(Strict):
         'mass on a spring); "upstream": a body that empties into it (a tank above a tank); "auto": the one '
         "that predicts best",
     )
-    stable: bool = Field(True, description="no pole in the right half plane: every state returns to rest")
+    stable: bool | None = Field(
+        None,
+        description="true: no pole in the right half plane, every state returns to rest; false: it may swing "
+        "by itself; default true for errors and temperatures, false for anything else",
+    )
     keep: Words = Field((), description="terms that always stay")
     forbid: Words = Field((), description="terms that the search must not use")
     bounds: dict[str, Annotated[tuple[Bound, Bound], FROM_LIST]] = Field(

@@ -143,6 +143,37 @@ class Search:
         slow = (last > 0) & (terms.place > last - _EDGE)
         return {int(f): int(np.sum(~slow & (terms.family == f))) for f in terms.family[slow]}
 
+    def held(self, terms: Terms, price: float, effective: Callable[[Terms], float]) -> dict[int, float]:
+        """Families that a bound keeps out of the set, or at the bound, though the readings ask for what lies
+        beyond it; and the coefficient that they ask for.
+
+        Args:
+            price: of one more term in a criterion. effective: independent readings, by the set.
+        """
+        f, found = self.families, {}
+        for one in np.flatnonzero(np.isfinite(f.low) | np.isfinite(f.high)):
+            if f.most is not None and not f.most[one]:
+                continue
+            low, high = f.low.copy(), f.high.copy()
+            low[one], high[one] = -np.inf, np.inf
+            free = Search(self.g, replace(f, low=low, high=high), self.always)
+            family, place = terms.family, terms.place
+            if one not in family:
+                barred = np.repeat(np.arange(len(f.start)) != one, f.count)
+                entered, at = pursuit.entry(*self._problem, family, place, low, high, barred)
+                if entered < 0:
+                    continue
+                family, place = np.append(family, one), np.append(place, float(at))
+            other = free.refined(family, place)
+            asked = other.theta[other.family == one]
+            beyond = asked[(asked < f.low[one]) | (asked > f.high[one])]
+            if not len(beyond):
+                continue
+            before, after = (max(self.g.square - s.gain, 1e-9 * self.g.square) for s in (terms, other))
+            if effective(other) * np.log(before / after) > price:
+                found[int(one)] = float(beyond[np.argmax(np.abs(beyond))])
+        return found
+
     def without(self, terms: Terms, k: int) -> Terms:
         """The set without its term k, refined."""
         rest = np.arange(len(terms)) != k

@@ -20,9 +20,10 @@ from discovery.fitting.noise import roughness
 from discovery.models import Model, Parameter, State
 from discovery.models.model import TIME_UNITS
 from discovery.sparse.laws import LAWS, laws, products
+from discovery.sparse.options import FAMILIES
 from discovery.sparse.ratedata import RateData
 from discovery.sparse.rates import Candidate
-from discovery.terms import Number, Term, evaluate, names, parse
+from discovery.terms import Name, Number, Term, evaluate, names, parse, substitute
 
 Array = NDArray[np.float64]
 
@@ -55,8 +56,8 @@ def own(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str,
         found += _driven(data, y, outputs, words)
         found += [Candidate(y, parse(one)) for o in others for one in _laws(data, words, o)]
         found += [_law(y, y, one, stable) for one in _laws(data, words, y)]
-        found += [Candidate(y, parse(one)) for one in products(words, [y, *others, *inputs])]
-        found += _expressions(words, y, {"y": y})
+        found += [Candidate(y, parse(one)) for one in products(words, [*outputs, *inputs])]
+        found += _expressions(data, words, y, {"y": y}, outputs)
     return Structure("own", Model("own", {}, states, (), {}, unit), tuple(found))
 
 
@@ -84,8 +85,8 @@ def rate(data: RateData, outputs: Sequence[str], words: Sequence[str], unit: str
             found += [Candidate(v, parse(one)) for one in (o, rates[o])]
             bent = laws([w for w in words if w in ("cubic", "drag")], f"({o} - {y})")
             found += [Candidate(v, parse(one)) for one in bent]
-        found += [Candidate(v, parse(one)) for one in products(words, [y, v, *others, *inputs])]
-        found += _expressions(words, v, {"y": y, "rate": v})
+        found += [Candidate(v, parse(one)) for one in products(words, [*outputs, v, *inputs])]
+        found += _expressions(data, words, v, {"y": y, "rate": v}, outputs)
     return Structure("rate", Model("rate", {}, states, tuple(terms), {}, unit), tuple(found), 2, rates)
 
 
@@ -114,7 +115,7 @@ def upstream(
     found += [_flow(output, one, most, h) for one in laws(words, h, level, hidden=True)]
     found += [_flow(output, one, most) for one in laws(words, output, seen)]
     found += [_flow(h, one, most) for one in laws([w for w in words if w == "threshold"], h, level)]
-    found += _expressions(words, output, {"y": output, "up": h})
+    found += _expressions(data, words, output, {"y": output, "up": h}, [output])
     return Structure("upstream", Model("upstream", parameters, states, (), {}, unit), tuple(found))
 
 
@@ -166,13 +167,14 @@ def _law(into: str, variable: str, law: str, stable: bool) -> Candidate:
     return Candidate(into, parse(law), *(DOWN if stable and law == variable else FREE))
 
 
-def _expressions(words: Sequence[str], into: str, aliases: Mapping[str, str]) -> list[Candidate]:
-    """Expressions of the user; `y`, `rate` and `up` are the states."""
-    from discovery.sparse.options import FAMILIES
-    from discovery.terms import Name, substitute
-
-    replaced = {alias: Name(name) for alias, name in aliases.items()}
-    return [Candidate(into, substitute(parse(w), replaced)) for w in words if w not in FAMILIES]
+def _expressions(
+    data: RateData, words: Sequence[str], into: str, aliases: Mapping[str, str], outputs: Sequence[str]
+) -> list[Candidate]:
+    """Expressions of the user that this form has all states of; `y`, `rate` and `up` are states."""
+    states = {alias: Name(name) for alias, name in aliases.items()}
+    known = {*states, *outputs, *_inputs(data, outputs), "time"}
+    own = [parse(word, "library of the discovery") for word in words if word not in FAMILIES]
+    return [Candidate(into, substitute(one, states)) for one in own if names(one) <= known]
 
 
 def _measured(data: RateData, output: str, unit: str) -> State:
