@@ -21,7 +21,7 @@ from discovery.experiment.modelfits import fit_of
 from discovery.fitting import Fit, predict_recording
 from discovery.progress import Progress, silent
 from discovery.recordings import Campaign, Recording
-from discovery.sparse.ratedata import time_scale
+from discovery.sparse.ratedata import readings_that_show, time_scale
 from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
@@ -166,12 +166,13 @@ def _inside(time: Array, fold: Fold, recording: str) -> NDArray[np.bool_]:
 
 def _points(experiment: Experiment) -> int:
     """Return the instants of a recording at which models are compared. There are more where the outputs
-    move quickly.
+    move quickly, or ring.
     """
     campaign, fit = experiment.fitting, experiment.fit
     scale = min(time_scale(campaign, fit, [y]) for y in experiment.outputs)
     longest = max(float(campaign.recordings[r].time[-1]) for r in fit)
-    return int(np.clip(_IN_TIME_SCALE * longest / scale, _FEWEST, _MOST))
+    wanted = max(_IN_TIME_SCALE * longest / scale, readings_that_show(campaign, fit, experiment.outputs))
+    return int(np.clip(wanted, _FEWEST, _MOST))
 
 
 def thinned(campaign: Campaign, points: int = _FEWEST) -> Campaign:
@@ -182,11 +183,25 @@ def thinned(campaign: Campaign, points: int = _FEWEST) -> Campaign:
     return replace(campaign, recordings=recordings)
 
 
+def _switches(recording: Recording, campaign: Campaign) -> NDArray[np.intp]:
+    """Rows at which a held input changes."""
+    found = [np.zeros(0, dtype=np.intp)]
+    for name, series in recording.values.items():
+        channel = campaign.channels[name]
+        if channel.is_input and channel.between == "held":
+            known = np.flatnonzero(np.isfinite(series))
+            found.append(known[1:][np.diff(series[known]) != 0])
+    return np.unique(np.concatenate(found))
+
+
 def _thin(recording: Recording, campaign: Campaign, points: int) -> Recording:
     count = len(recording.time)
     if count < 2 * points:
         return recording
     edges = np.linspace(0, count, points + 1).astype(int)
+    switches = _switches(recording, campaign)
+    if len(switches) <= points:  # what is held until it jumps keeps the instant of the jump
+        edges = np.union1d(edges, switches)
     values = {}
     for name, series in recording.values.items():
         pieces = list(_pieces(series, edges))

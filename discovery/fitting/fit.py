@@ -6,7 +6,7 @@ import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.kalman import innovations
 from discovery.fitting.noise import Noise, readings_as_one, resolution, roughness, white_noise
 from discovery.fitting.problem import FORMER, Prior, Problem, make_problem
+from discovery.fitting.resolution import resolved
 from discovery.fitting.solve import Loss, Solution, solve
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -157,7 +158,7 @@ def fit_model(
         outputs: measured channels to compare; default all that model and campaign share.
         noise: covariance of the residual; default white.
         loss: "soft_l1", "huber" or "cauchy" limit the weight of outliers (scipy.optimize.least_squares).
-        grids: grids to share between fits.
+        grids: grids to share between fits; default as in `predict_recording`.
         priors, belief: as in `make_problem`.
         guess: first values of parameters, if they differ from the start values of the model.
         begin: a fit to start from, of a model that has most of the unknowns; `guess` overrides it.
@@ -213,7 +214,7 @@ def fit_model(
     assert solution is not None
     excess = _excess(problem, solution) if noise is None and loss == "linear" else 1.0
     covariance, lost = _covariance(problem, solution, together, excess)
-    return Fit(
+    fit = Fit(
         problem,
         theta,
         covariance,
@@ -225,6 +226,13 @@ def fit_model(
         together,
         solution.ended_early,
     )
+    finer = resolved(fit.trajectories, current.white) if grids is None else None
+    if finer is None:
+        return fit
+    options: dict[str, Any] = {"noise": noise, "loss": loss, "priors": priors, "belief": belief}
+    ends: dict[str, Any] = {"max_rounds": max_rounds, "tolerance": tolerance, "goal": goal}
+    again = fit_model(model, campaign, recordings, outputs, grids=finer, begin=fit, **options, **ends)
+    return replace(again, seconds=clock.perf_counter() - began)
 
 
 def _covariance(

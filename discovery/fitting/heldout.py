@@ -21,6 +21,7 @@ from discovery.dynamics import (
 )
 from discovery.dynamics.system import inputs_of, shifted, uncertain
 from discovery.fitting.problem import read_spread
+from discovery.fitting.resolution import parts_needed
 from discovery.models import Model, State, expanded
 from discovery.recordings import Campaign
 
@@ -46,12 +47,20 @@ def predict_recording(
     Args:
         outputs: measured channels.
         white: (Y,) reading noise that weighs the first reading against the declared start; default 1 um each.
+        grid: default every stamp of an input or a reading, steps divided where the noise would show how far
+            they err.
         known: offsets of inputs that a fit found in this recording (`Fit.offset_in`); the first reading
             corrects only the others.
         zeros: mean and spread of the zero of an output in a recording that no fit has seen (`Fit.zeros`).
     """
     model = expanded(model, campaign.channels)
-    grid = grid or make_grid(campaign, recording, inputs_of(model, campaign, outputs), outputs)
+    if grid is None:
+        grid = make_grid(campaign, recording, inputs_of(model, campaign, outputs), outputs)
+        run = predict_recording(model, campaign, recording, outputs, white, grid, known, zeros)
+        parts = parts_needed(run, white) if white is not None else 1
+        if parts == 1:
+            return run
+        grid = grid.divided(parts)
     known = known or {}
     others = {name: one for name, one in (zeros or {}).items() if name in outputs and name not in known}
     grid = replace(grid, spread={**grid.spread, **{name: sd for name, (_, sd) in others.items()}})

@@ -27,7 +27,7 @@ from discovery.sparse.gram import Gram, total
 from discovery.sparse.growth import Growth, grown
 from discovery.sparse.laws import with_levels
 from discovery.sparse.options import FAMILIES, SparseOptions
-from discovery.sparse.ratedata import RateData, in_pieces, resolved, rough_noise
+from discovery.sparse.ratedata import RateData, in_pieces, rough_noise, with_short_steps
 from discovery.sparse.rates import refit, with_candidates, without
 from discovery.sparse.search import Search, Terms, plain
 from discovery.sparse.structures import FLOWS, WORDS, Structure, balanced, own, rate, started, upstream
@@ -43,6 +43,7 @@ _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
 _MOVED = 0.02  # share by which a level moves that makes the set grow anew
 _FIRST = 12  # of a fit of a linear chain from one of its starts
+_SHORTER = 0.5  # of what it misses of whole recordings: then a law holds better over short pieces
 _HORIZONS = (4.0, 16.0)  # lengths of free runs, in time scales of the readings
 _NEAREST = 3  # of these starts, by their first step, are fitted further
 _FAR = 3.0  # times the rms of another form at its start
@@ -60,6 +61,7 @@ class Begun:
     entered: set[int]
     back: Mapping[int, float] = field(default_factory=dict)
     cost: float = np.inf
+    weak: Structure | None = None  # with the start values of the weak form
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ def discover_states(
     def begin(kind: str) -> None:
         nonlocal nearest, lacking
         try:
-            starts[kind] = _start(data, kind, words, unit, options)
+            starts[kind] = _start(data, kind, words, unit, options, nearest)
             nearest = min(nearest, starts[kind].begun.cost)
             if held_back is not None:
                 held_back.extend(_held(starts[kind]))
@@ -149,7 +151,9 @@ def _check_names(data: RateData, words: Sequence[str], hidden: Sequence[str]) ->
             )
 
 
-def _start(data: RateData, kind: str, words: Sequence[str], unit: str, options: SparseOptions) -> Start:
+def _start(
+    data: RateData, kind: str, words: Sequence[str], unit: str, options: SparseOptions, nearest: float
+) -> Start:
     """Where a kind of hidden state begins: by the weak form, or as a chain of two bodies ("upstream sqrt": of
     the law of its flow).
     """
@@ -161,11 +165,11 @@ def _start(data: RateData, kind: str, words: Sequence[str], unit: str, options: 
         return Start(data, Begun(structure, entered, cost=cost), options)
     bare = (own if kind == "own" else rate)(data, data.outputs, words, unit, bool(options.stable))
     bare, options = _allowed(data, bare, options)
-    begun = _begun(data, bare)
+    begun = _begun(data, bare, nearest)
     if np.isfinite(begun.cost):
-        finer = resolved(data, _of(begun.structure, begun.entered))
+        finer = with_short_steps(data, _of(begun.structure, begun.entered))
         if finer is not data:
-            data, begun = finer, _begun(finer, bare)
+            data, begun = finer, _begun(finer, bare, nearest)
     return Start(data, begun, options)
 
 
@@ -258,9 +262,12 @@ def _allowed(data: RateData, structure: Structure, options: SparseOptions) -> tu
     return replace(structure, candidates=tuple(kept)), options
 
 
-def _begun(data: RateData, bare: Structure) -> Begun:
+def _begun(data: RateData, bare: Structure, nearest: float) -> Begun:
     """Where the search begins: of several widths of the weak form the first from which a short fit of free
-    runs comes near, else the one from which it comes nearest.
+    runs comes near, else the one from which it comes nearest. Where none comes near, shorter runs are tried.
+
+    Args:
+        nearest: cost of a short fit of another form.
     """
     noise = rough_noise(data).white
     grids = [data.grids[r] for r in data.recordings]
@@ -268,33 +275,50 @@ def _begun(data: RateData, bare: Structure) -> Begun:
     widths = [half_widths(grids, y, s, bare.order) for y, s in zip(data.outputs, noise, strict=True)]
     begun: list[Begun] = []
     for k in range(max(map(len, widths))):
-        structure, entered, back = _weakly(data, bare, [one[min(k, len(one) - 1)] for one in widths])
-        small = _of(structure, entered)
-        for lengthened in (False, True):
-            least = min((one.cost for one in begun), default=np.inf)
-            try:
-                fit = _fit(data, _lengthened(data, small) if lengthened else small, {}, _FIRST, least)
-            except RunsAwayError:
-                begun.append(Begun(structure, entered, back, np.inf))
-                continue
-            _, labels = with_candidates(structure.model, structure.candidates)
-            values = {i: fit.model.parameters[name].value for i, name in enumerate(labels) if i in entered}
-            begun.append(Begun(started(structure, values), entered, back, fit.cost))
-            if fit.cost <= near:
-                return begun[-1]
+        one = _weakly(data, bare, [some[min(k, len(some) - 1)] for some in widths])
+        least = min((other.cost for other in begun), default=np.inf)
+        with suppress(RunsAwayError):
+            one = _briefly(data, one, _of(one.structure, one.entered), least)
+        if one.cost <= near:
+            return one
+        begun.append(one)
+    if nearest > near:
+        for one in tuple(begun):
+            least = min(other.cost for other in begun)
+            with suppress(RunsAwayError):
+                begun.append(_briefly(data, one, _lengthened(data, one), least))
+                if begun[-1].cost <= near:
+                    break
     return min(begun, key=lambda one: one.cost)
 
 
-def _lengthened(data: RateData, model: Model) -> Model:
-    """The model fitted to longer and longer free runs, from a few time scales of the readings on."""
+def _briefly(data: RateData, begun: Begun, model: Model, least: float) -> Begun:
+    """A start with the values and the cost of a short fit, which begins at those of the model."""
+    fit = _fit(data, model, {}, _FIRST, least)
+    _, labels = with_candidates(begun.structure.model, begun.structure.candidates)
+    values = {i: fit.model.parameters[n].value for i, n in enumerate(labels) if i in begun.entered}
+    return replace(begun, structure=started(begun.structure, values), cost=fit.cost, weak=begun.structure)
+
+
+def _lengthened(data: RateData, begun: Begun) -> Model:
+    """A start fitted to longer and longer free runs, from a few time scales of the readings on.
+
+    Raises:
+        RunsAwayError: it misses short pieces by as much as whole recordings, so their length is not why.
+    """
+    model = _of(begun.weak or begun.structure, begun.entered)
+    count = sum(int(grid.measured.sum()) for grid in data.grids.values())
     for scales in _HORIZONS:
-        model = _fit(in_pieces(data, scales * data.scale), model, {}, _FIRST).model
+        pieces = in_pieces(data, scales * data.scale)
+        fit = _fit(pieces, model, {}, _FIRST)
+        read = sum(int(grid.measured.sum()) for grid in pieces.grids.values())
+        if fit.cost / read > _SHORTER * begun.cost / count:
+            raise RunsAwayError(f"'{model.name}' misses short pieces as well")
+        model = fit.model
     return model
 
 
-def _weakly(
-    data: RateData, structure: Structure, widths: Sequence[float]
-) -> tuple[Structure, set[int], dict[int, float]]:
+def _weakly(data: RateData, structure: Structure, widths: Sequence[float]) -> Begun:
     """Start values of the candidates, the set to begin with, and candidates that a bound holds back with what
     is asked for, by the weak form of the readings with windows of a half width [s] for each output.
     """
@@ -323,7 +347,7 @@ def _weakly(
         chosen |= {mine[f] for f in best.members}
         price = _price(independent, len(mine))
         back |= {mine[f]: asked for f, asked in search.held(best, price, _always(independent)).items()}
-    return started(structure, values), chosen, back
+    return Begun(started(structure, values), chosen, back)
 
 
 def _criterion(g: Gram, effective: float, gain: float, size: int, library: int) -> float:

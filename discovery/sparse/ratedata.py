@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,8 @@ from numpy.typing import NDArray
 from discovery.dynamics import Grid, make_grid, predict
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise, predict_recording
+from discovery.fitting.noise import roughness
+from discovery.fitting.resolution import resolved
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.sparse.folds import Blocks, make_blocks
@@ -22,9 +23,7 @@ _MOST = 4000  # readings of one output in one recording
 _NOISE_GROWS = 1.15  # mean square between two noisy readings: 3/2 in their middle, 5/3 on average
 _MISSED = 0.03  # share of the spread of readings that thinning may lose
 _RASTER = 4096  # points on which this time is looked for
-_UNRESOLVED = 0.2  # times the noise by which half the steps move what a model predicts
-_MOST_STEPS = 8000  # of a recording, about
-_IN_PIECE = 8  # readings of a piece of a recording, at least
+_IN_PIECE, _PIECES = 8, 6  # readings of a piece of a recording, at least; pieces of a recording, at most
 _FAR = 3.0  # times the rms: start values that are no use
 
 
@@ -138,7 +137,7 @@ def thinned(
 
 
 def in_pieces(data: RateData, seconds: float) -> RateData:
-    """The data with recordings cut into pieces of about so many seconds, each a recording of its own.
+    """A few pieces of about so many seconds of each recording, evenly placed, each a recording of its own.
 
     A free run of a short piece is near the readings at once. That of a whole recording of something that
     swings drifts out of phase, and a fit to it ends where the phase is right by chance.
@@ -146,41 +145,32 @@ def in_pieces(data: RateData, seconds: float) -> RateData:
     grids: dict[str, Grid] = {}
     for r in data.recordings:
         grid = data.grids[r]
-        time = grid.time[grid.read]
-        count = max(min(round((time[-1] - time[0]) / seconds), (len(time) - 1) // _IN_PIECE), 1)
-        edges = np.linspace(0, len(time) - 1, count + 1).astype(int)
-        for k, (a, b) in enumerate(pairwise(edges)):
-            begin, end = int(grid.read[a]), int(grid.read[b])
-            part = replace(grid.part(slice(a, b + 1)), recording=f"{r} ({k})", known={})
-            part = replace(part, time=grid.time[begin : end + 1], read=part.read - begin)
+        time, last = grid.time[grid.read], len(grid.read) - 1
+        step = (time[-1] - time[0]) / max(last, 1)
+        long = int(np.clip(round(seconds / step), min(_IN_PIECE, last), last)) if step else last
+        count = min(last // long, _PIECES) if last else 1
+        for k, begin in enumerate(np.linspace(0, last - long, count).astype(int)):
+            first, end = int(grid.read[begin]), int(grid.read[begin + long])
+            part = replace(grid.part(slice(begin, begin + long + 1)), recording=f"{r} ({k})", known={})
+            part = replace(part, time=grid.time[first : end + 1], read=part.read - first)
             grids[part.recording] = part
     blocks = make_blocks([g.time[g.read] for g in grids.values()], data.blocks.count)
     return replace(data, recordings=tuple(grids), grids=grids, blocks=blocks)
 
 
-def resolved(data: RateData, model: Model) -> RateData:
-    """The data with steps so short that the integration of the model errs by little of the noise.
-
-    Steps are of second order: half of them leave a quarter of the error.
-    """
-    noise = rough_noise(data).white
-    grids = {}
-    for r in data.recordings:
-        grid, parts = data.grids[r], 1
-        try:
-            now = predict(predict_recording(model, data.campaign, r, data.outputs, noise, grid))
-            while len(grid.time) * parts < _MOST_STEPS and grid.means is None:
-                half = grid.divided(2 * parts)
-                then = predict(predict_recording(model, data.campaign, r, data.outputs, noise, half))
-                off = np.sqrt(np.nanmean(((then - now) / np.array(noise)) ** 2))
-                if not off > _UNRESOLVED:
-                    break
-                now, parts = then, 2 * parts
-        except RunsAwayError:  # what runs away is not resolved by shorter steps
-            pass
-        grids[r] = grid.divided(parts)
-    same = all(grids[r] is data.grids[r] for r in data.recordings)
-    return data if same else replace(data, grids=grids)
+def with_short_steps(data: RateData, model: Model) -> RateData:
+    """The data with steps so short that the integration of the model errs by little of the noise."""
+    seen = [[data.grids[r].readings[:, y] for r in data.recordings] for y in range(len(data.outputs))]
+    noise = [min(n, roughness(some)) for n, some in zip(rough_noise(data).white, seen, strict=True)]
+    try:
+        runs = [
+            predict_recording(model, data.campaign, r, data.outputs, noise, data.grids[r])
+            for r in data.recordings
+        ]
+    except RunsAwayError:
+        return data
+    grids = resolved(runs, noise)
+    return replace(data, grids=grids) if grids else data
 
 
 def stated_noise(data: RateData) -> dict[str, float | None]:
