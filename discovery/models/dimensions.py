@@ -99,6 +99,8 @@ def unit_of(expression: Expression, units: Mapping[str, str]) -> str:
     >>> from discovery.terms import parse
     >>> unit_of(parse("pump*(T_env - 21.9)*speed**2"), {"pump": "1", "T_env": "degC", "speed": "rpm"})
     'K*rpm**2'
+    >>> unit_of(parse("sqrt(max(level - 2.5, 0))"), {"level": "cm"})
+    'cm**0.5'
     """
     match expression:
         case Name(id=name):
@@ -111,14 +113,9 @@ def unit_of(expression: Expression, units: Mapping[str, str]) -> str:
                 return right if left == "1" else f"{left}*{right}"
             return f"{left}/({right})" if set("*/") & set(right) else f"{left}/{right}"
         case Apply(function="**", arguments=(a, Number(value=power))):
-            base = unit_of(a, units)
-            return (
-                "1"
-                if base == "1"
-                else f"({base})**{power:g}"
-                if set("*/") & set(base)
-                else f"{base}**{power:g}"
-            )
+            return _to_power(unit_of(a, units), power)
+        case Apply(function="sqrt", arguments=(a,)):
+            return _to_power(unit_of(a, units), 0.5)
         case Apply(function=function) if function in (*COMPARISONS, *_PURE, "sign", "**"):
             return "1"
         case Apply(function="where", arguments=(_, *others)):
@@ -129,6 +126,12 @@ def unit_of(expression: Expression, units: Mapping[str, str]) -> str:
             return _first_unit(arguments, units)
         case _:
             return "1"
+
+
+def _to_power(unit: str, power: float) -> str:
+    if unit == "1":
+        return unit
+    return f"({unit})**{power:g}" if set("*/") & set(unit) else f"{unit}**{power:g}"
 
 
 def _first_unit(expressions: Sequence[Expression], units: Mapping[str, str]) -> str:

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from discovery import terms
 from discovery.errors import RunsAwayError, UserError
-from discovery.fitting import Fit, fit_model
+from discovery.fitting import Fit, Noise, fit_model
 from discovery.fitting.noise import readings_as_one
 from discovery.models import Model, Parameter
 from discovery.models.model import TIME_UNITS
 from discovery.progress import Progress
 from discovery.recordings import Campaign
+from discovery.sparse.bymasses import CLEAR
 from discovery.sparse.byrates import discover_rates
 from discovery.sparse.constraints import UnknownTermError, matched
 from discovery.sparse.discovery import Discovery, held
@@ -205,8 +206,48 @@ def _discovered(kind: str, start: Start, goal: float) -> Discovery | None:
         return None
     always = [names[i] for i in stay]
     found = discover_rates(data, small, kept, always, options, grown=True, tolerance=PREDICT)
-    model = with_free_levels(data, found.model) if options.refine else found.model
-    return replace(found, model=model, report=found.report | {"hidden": kind})
+    report = found.report | {"hidden": kind}
+    if not options.refine:
+        return replace(found, report=report)
+    model = with_free_levels(data, found.model)
+    model = _clear(data, model, [name for name in kept if name in model.free and name not in always])
+    left = {kept[name] for name in kept if name in model.free}
+    report["kept"] = [label for label in report["kept"] if label in left]
+    report["costs"] = {label: cost for label, cost in report["costs"].items() if label in left}
+    stability = {label: share for label, share in found.stability.items() if label in left}
+    return replace(found, model=model, stability=stability, report=report | {"terms": len(report["kept"])})
+
+
+def _clear(data: RateData, model: Model, names: Sequence[str]) -> Model:
+    """The model without those of the coefficients whose 95 % interval holds zero, the least sure one first,
+    where the criterion does not ask for it. Terms that stand for each other become surer that way.
+    """
+
+    def fitted(one: Model, noise: Noise | None) -> Fit:
+        return refit(one, data.campaign, data.recordings, data.outputs, {}, data.grids, noise, _LAST)
+
+    fit, tried = fitted(model, None), set[str]()
+    while True:
+        se = dict(zip((u.name for u in fit.problem.unknowns), fit.standard_errors, strict=True))
+        sure = {n: abs(fit.model.parameters[n].value) / max(se[n], 1e-300) for n in names if n in se}
+        weakest = min(sure.keys() - tried, key=lambda n: (sure[n], n), default=None)
+        if weakest is None or sure[weakest] >= CLEAR:
+            return fit.model
+        tried.add(weakest)
+        with suppress(RunsAwayError):
+            other = fitted(_without_term(fit.model, weakest), fit.noise)
+            count = sum(int(np.isfinite(r).sum()) for r in other.residuals().values())
+            effective = count / readings_as_one(list(other.residuals().values()))
+            if effective * np.log(other.cost / fit.cost) < np.log(effective):
+                fit = fitted(other.model, None)
+
+
+def _without_term(model: Model, name: str) -> Model:
+    """The model without a coefficient, its term and what that alone used."""
+    small = without(model, [name])
+    read = [*small.outputs.values(), *(term.expression for term in small.terms)]
+    used = small.start_names.union(*(terms.names(one) for one in read))
+    return replace(small, parameters={n: p for n, p in small.parameters.items() if n in used})
 
 
 def _held(start: Start) -> list[str]:
