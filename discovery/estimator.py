@@ -237,7 +237,9 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return equations(self.model_)
 
     def summary(self) -> str:
-        """Return a page of text: equations, parameters with intervals, and the cost of each term."""
+        """Return a page of text: equations, parameters with intervals, the cost of each term, and bounds that
+        bind.
+        """
         table = self.coefficients()
         lines = ["Equations", *(f"  {line}" for line in self.equations()), "", "Parameters (95 % interval)"]
         for name, p in self.model_.parameters.items():
@@ -252,6 +254,8 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             of = ", ".join(group["outputs"])
             lines.append(f"  {of}: rms on left-out data {group['left_out_rms']:.4g} times the reading noise")
             lines += [f"    {label}  {100 * cost:+.1f} %" for label, cost in group.get("costs", {}).items()]
+        if held := self.discovery_.report["held"]:
+            lines += ["", "Bounds that bind", *(f"  {one}" for one in held)]
         return "\n".join(lines)
 
     def _options(self) -> SparseOptions:

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+import discovery
 from discovery.errors import UserError
 from discovery.frames import campaign_from_frames
 from discovery.models.model import TIME_UNITS
@@ -149,3 +150,18 @@ def test_an_expression_of_an_unknown_name_is_refused() -> None:
     options = SparseOptions(form="rates", library=("linear", "hair*lynx"), bootstraps=0)
     with pytest.raises(UserError, match="names 'hair' in 'hair\\*lynx'"):
         discover(campaign, ["a"], ["hare", "lynx"], options)
+
+
+def test_a_summary_names_bounds_that_bind() -> None:
+    channels = {"u": {"role": "other input", "unit": "V"}, "y": {"role": "other output", "unit": "cm"}}
+    u = np.repeat(np.random.default_rng(3).uniform(0.0, 2.0, 20), 20)
+    level, read = 1.0, []
+    for pump in u:
+        read.append(level)
+        level = pump * 1.5 + (level - pump * 1.5) * np.exp(-0.2)
+    noise = 0.005 * np.random.default_rng(4).standard_normal(len(u))
+    frame = pd.DataFrame({"u": u, "y": np.array(read) + noise}, index=1.0 * np.arange(len(u)))
+    options = {"form": "rates", "hidden": "own", "library": ["linear"]}
+    assert "Bounds that bind" not in discovery.discover({"a": frame}, ["y"], channels, **options).summary()
+    tight = discovery.discover({"a": frame}, ["y"], channels, bounds={"u": (0.0, 0.1)}, **options).summary()
+    assert "Bounds that bind\n  y: the line bounds holds the term 'u' back" in tight
