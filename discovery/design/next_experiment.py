@@ -170,7 +170,8 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
         wanted[f"run at half {names[0]} and full {names[1]}{dry}"] = build(0.5 * one, one, zero, False)
     wanted[f"{still} and follow the room"] = build(zero, zero, zero, False)
     stepped = ("other input",) if wet else ("other input", "fluid flow")  # a coolant never stays off
-    for n in (n for n, role in roles.items() if role in stepped):
+    # what is set stays until it is set anew; what moves in between, as a temperature, is only measured
+    for n in (n for n, role in roles.items() if role in stepped and channels[n].between == "held"):
         low, high = np.quantile(series[n], (0.05, 0.95))
         if high > low:
             wanted[f"step {n} every {hour}{dry}"] = {

@@ -244,3 +244,20 @@ def test_a_coolant_is_stepped_but_never_stays_off() -> None:
     assert not [words for words in found if "dry" in words or "switch" in words]
     kept = [inputs["pump"] for words, inputs in found.items() if "step pump" not in words]
     assert all((flow > 0).all() for flow in kept)
+
+
+def test_what_is_only_measured_is_not_stepped() -> None:
+    """Nobody sets the temperature of a column, though a model may be driven by it."""
+    seen = campaign(simulated(1))
+    fan = replace(seen.channels["pump"], name="pump", role="other input")
+    column = replace(fan, between="linear")
+    for channel, there in ((fan, True), (column, False)):
+        where = cast(
+            Context,
+            SimpleNamespace(
+                campaign=replace(seen, channels={**seen.channels, "pump": channel}),
+                grids={"r1": make_grid(seen, "r1", machine.INPUTS, list(SEEN))},
+                recordings=("r1",),
+            ),
+        )
+        assert any(words.startswith("step pump") for words in _designs(where, 43200.0)) == there
