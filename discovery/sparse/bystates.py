@@ -2,37 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery import terms
-from discovery.errors import RunsAwayError, UserError
+from discovery.errors import RunsAwayError
 from discovery.fitting import Fit, Noise, fit_model
 from discovery.fitting.noise import readings_as_one
 from discovery.models import Model, Parameter
 from discovery.models.model import TIME_UNITS
 from discovery.progress import Progress
 from discovery.recordings import Campaign
+from discovery.sparse.beginning import FIRST, Begun, begin, fit_briefly, model_of
 from discovery.sparse.bymasses import CLEAR
 from discovery.sparse.byrates import discover_rates
-from discovery.sparse.constraints import UnknownTermError, matched
+from discovery.sparse.constraints import UnknownTermError, check_names, matched
 from discovery.sparse.discovery import Discovery, held
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.freeruns import left_out
-from discovery.sparse.gram import Gram, total
 from discovery.sparse.growth import Growth, grown
 from discovery.sparse.laws import with_levels
-from discovery.sparse.options import FAMILIES, SparseOptions
-from discovery.sparse.ratedata import RateData, in_pieces, rough_noise, with_short_steps
+from discovery.sparse.options import SparseOptions
+from discovery.sparse.ratedata import RateData, rough_noise, with_short_steps
 from discovery.sparse.rates import refit, with_candidates, without
-from discovery.sparse.search import Search, Terms, plain
 from discovery.sparse.structures import FLOWS, WORDS, Structure, balanced, own, rate, started, upstream
-from discovery.sparse.weak import half_widths, weak_rows
 from discovery.terms import Number
 
 Array = NDArray[np.float64]
@@ -43,26 +41,10 @@ _ROUNDS = 6  # of a fit in a fold
 _LAST = 40  # of a fit with free levels
 _GROWTHS = 3  # of a set, levels refined in between
 _MOVED = 0.02  # share by which a level moves that makes the set grow anew
-_FIRST = 12  # of a fit of a linear chain from one of its starts
-_SHORTER = 0.5  # of what it misses of whole recordings: then a law holds better over short pieces
-_HORIZONS = (4.0, 16.0)  # lengths of free runs, in time scales of the readings
 _NEAREST = 3  # of these starts, by their first step, are fitted further
 _FAR = 3.0  # times the rms of another form at its start
 _WHITE = 1.5  # readings that say the same once: less is noise
 _CHAIN = (0.3, 1.0, 3.0)  # times the time scale of the readings: time constants that a chain starts from
-
-
-@dataclass(frozen=True)
-class Begun:
-    """A structure with start values, the candidates that are in it from the start, those that a bound holds
-    back with the coefficients that the readings ask for, and the cost of a short fit.
-    """
-
-    structure: Structure
-    entered: set[int]
-    back: Mapping[int, float] = field(default_factory=dict)
-    cost: float = np.inf
-    weak: Structure | None = None  # with the start values of the weak form
 
 
 @dataclass(frozen=True)
@@ -93,7 +75,7 @@ def discover_states(
         held_back: takes a sentence for each bound that holds a term of any kind back.
     """
     words = options.library or WORDS
-    _check_names(data, words, hidden)
+    check_names(data.campaign.path, words, [*data.outputs, *next(iter(data.grids.values())).samples], hidden)
     roles = {data.campaign.channels[y].role for y in data.outputs}
     unit = "h" if roles <= THERMAL_ROLES and data.scale >= _SLOW else time_unit(data.scale)
     if options.stable is None:  # heat flows downhill; anything else may swing by itself
@@ -105,7 +87,7 @@ def discover_states(
     lacking: UnknownTermError | None = None
     starts: dict[str, Start] = {}
 
-    def begin(kind: str) -> None:
+    def start(kind: str) -> None:
         nonlocal nearest, lacking
         try:
             starts[kind] = _start(data, kind, words, unit, options, nearest)
@@ -119,11 +101,11 @@ def discover_states(
 
     for kind in kinds:
         if not kind.startswith("upstream"):  # quick to begin: which is near is known before one grows
-            begin(kind)
+            start(kind)
     for kind in kinds:
         progress(f"terms of {', '.join(data.outputs)}, {kind}")
         if kind not in starts and kind.startswith("upstream"):
-            begin(kind)
+            start(kind)
         if kind in starts and starts[kind].begun.cost <= _FAR**2 * nearest:
             try:
                 found = _discovered(kind.split()[0], starts[kind], goal)
@@ -133,23 +115,6 @@ def discover_states(
                 yield found
     if lacking is not None and not starts and options.form != "auto" and len(hidden) == 1:
         raise lacking
-
-
-def _check_names(data: RateData, words: Sequence[str], hidden: Sequence[str]) -> None:
-    """Refuse an expression that names what is neither an input nor a state of the forms that are tried."""
-    states = {"own": {"y"}, "rate": {"y", "rate"}, "upstream": {"y", "up"}}
-    known = {"time", *data.outputs, *next(iter(data.grids.values())).samples}.union(
-        *(states[h] for h in hidden)
-    )
-    for word in words:
-        if word in FAMILIES:
-            continue
-        for name in sorted(terms.names(terms.parse(word, "library of the discovery")) - known):
-            raise UserError(
-                f"{data.campaign.path}: the library of the discovery names '{name}' in '{word}', which is "
-                f"neither a family ({', '.join(FAMILIES)}) nor made of inputs and states "
-                f"({', '.join(sorted(known))})"
-            )
 
 
 def _start(
@@ -166,18 +131,12 @@ def _start(
         return Start(data, Begun(structure, entered, cost=cost), options)
     bare = (own if kind == "own" else rate)(data, data.outputs, words, unit, bool(options.stable))
     bare, options = _allowed(data, bare, options)
-    begun = _begun(data, bare, nearest)
+    begun = begin(data, bare, nearest)
     if np.isfinite(begun.cost):
-        finer = with_short_steps(data, _of(begun.structure, begun.entered))
+        finer = with_short_steps(data, model_of(begun.structure, begun.entered))
         if finer is not data:
-            data, begun = finer, _begun(finer, bare, nearest)
+            data, begun = finer, begin(finer, bare, nearest)
     return Start(data, begun, options)
-
-
-def _of(structure: Structure, entered: Collection[int]) -> Model:
-    """The model of a structure with some of its candidates."""
-    model, labels = with_candidates(structure.model, structure.candidates)
-    return without(model, [name for i, name in enumerate(labels) if i not in entered])
 
 
 def _discovered(kind: str, start: Start, goal: float) -> Discovery | None:
@@ -202,7 +161,7 @@ def _discovered(kind: str, start: Start, goal: float) -> Discovery | None:
         structure, moved = _refined(data, structure, small, names)
         if not moved:
             break
-    if _fit(data, small, {}, _FIRST).cost > goal:
+    if fit_briefly(data, small, FIRST).cost > goal:
         return None
     always = [names[i] for i in stay]
     found = discover_rates(data, small, kept, always, options, grown=True, tolerance=PREDICT)
@@ -303,109 +262,6 @@ def _allowed(data: RateData, structure: Structure, options: SparseOptions) -> tu
     return replace(structure, candidates=tuple(kept)), options
 
 
-def _begun(data: RateData, bare: Structure, nearest: float) -> Begun:
-    """Where the search begins: of several widths of the weak form the first from which a short fit of free
-    runs comes near, else the one from which it comes nearest. Where none comes near, shorter runs are tried.
-
-    Args:
-        nearest: cost of a short fit of another form.
-    """
-    noise = rough_noise(data).white
-    grids = [data.grids[r] for r in data.recordings]
-    near = 0.5 * sum(int(grid.measured.sum()) for grid in grids)  # cost of a fit that is off by this noise
-    widths = [half_widths(grids, y, s, bare.order) for y, s in zip(data.outputs, noise, strict=True)]
-    begun: list[Begun] = []
-    for k in range(max(map(len, widths))):
-        one = _weakly(data, bare, [some[min(k, len(some) - 1)] for some in widths])
-        least = min((other.cost for other in begun), default=np.inf)
-        with suppress(RunsAwayError):
-            one = _briefly(data, one, _of(one.structure, one.entered), least)
-        if one.cost <= near:
-            return one
-        begun.append(one)
-    if nearest > near:
-        for one in tuple(begun):
-            least = min(other.cost for other in begun)
-            with suppress(RunsAwayError):
-                begun.append(_briefly(data, one, _lengthened(data, one), least))
-                if begun[-1].cost <= near:
-                    break
-    return min(begun, key=lambda one: one.cost)
-
-
-def _briefly(data: RateData, begun: Begun, model: Model, least: float) -> Begun:
-    """A start with the values and the cost of a short fit, which begins at those of the model."""
-    fit = _fit(data, model, {}, _FIRST, least)
-    _, labels = with_candidates(begun.structure.model, begun.structure.candidates)
-    values = {i: fit.model.parameters[n].value for i, n in enumerate(labels) if i in begun.entered}
-    return replace(begun, structure=started(begun.structure, values), cost=fit.cost, weak=begun.structure)
-
-
-def _lengthened(data: RateData, begun: Begun) -> Model:
-    """A start fitted to longer and longer free runs, from a few time scales of the readings on.
-
-    Raises:
-        RunsAwayError: it misses short pieces by as much as whole recordings, so their length is not why.
-    """
-    model = _of(begun.weak or begun.structure, begun.entered)
-    count = sum(int(grid.measured.sum()) for grid in data.grids.values())
-    for scales in _HORIZONS:
-        pieces = in_pieces(data, scales * data.scale)
-        fit = _fit(pieces, model, {}, _FIRST)
-        read = sum(int(grid.measured.sum()) for grid in pieces.grids.values())
-        if fit.cost / read > _SHORTER * begun.cost / count:
-            raise RunsAwayError(f"'{model.name}' misses short pieces as well")
-        model = fit.model
-    return model
-
-
-def _weakly(data: RateData, structure: Structure, widths: Sequence[float]) -> Begun:
-    """Start values of the candidates, the set to begin with, and candidates that a bound holds back with what
-    is asked for, by the weak form of the readings with windows of a half width [s] for each output.
-    """
-    second = TIME_UNITS[structure.model.time_unit]
-    values: dict[int, float] = {}
-    chosen: set[int] = set()
-    back: dict[int, float] = {}
-    for k, output in enumerate(data.outputs):
-        into = structure.rates.get(output, output)
-        mine = [i for i, c in enumerate(structure.candidates) if c.into == into]
-        library = [structure.candidates[i].expression for i in mine]
-        grids = [data.grids[r] for r in data.recordings]
-        rows = [
-            weak_rows(g, output, library, None, None, structure.order, widths[k], structure.rates, second)
-            for g in grids
-        ]
-        g = total([one.gram for one in rows])
-        low, high = (
-            np.array([getattr(structure.candidates[i], side) for i in mine]) for side in ("low", "high")
-        )
-        search = Search(g, plain(len(mine), low, high), np.array([], int))
-        path = search.path(min(len(mine), 12))
-        independent = sum(float(one.time[-1] - one.time[0]) / one.half + 1 for one in rows)
-        best = min(path, key=lambda one: _criterion(g, independent, one.gain, len(one), len(mine)))
-        values |= {mine[f]: float(v) for f, v in zip(best.family, best.theta, strict=True)}
-        chosen |= {mine[f] for f in best.members}
-        price = _price(independent, len(mine))
-        back |= {mine[f]: asked for f, asked in search.held(best, price, _always(independent)).items()}
-    return Begun(started(structure, values), chosen, back)
-
-
-def _criterion(g: Gram, effective: float, gain: float, size: int, library: int) -> float:
-    """Extended BIC at the number of independent windows."""
-    left = max(g.square - gain, 1e-9 * g.square)
-    return float(effective * np.log(left / g.count) + size * _price(effective, library))
-
-
-def _always(count: float) -> Callable[[Terms], float]:
-    return lambda _: count
-
-
-def _price(effective: float, library: int) -> float:
-    """What the criterion asks of one more term."""
-    return float(np.log(effective) + 2 * np.log(library))
-
-
 def _chain(
     data: RateData, output: str, flow: str, words: Sequence[str], unit: str
 ) -> tuple[Structure, float]:
@@ -421,12 +277,12 @@ def _chain(
         guess = balanced(data, bare, first * data.scale, then * data.scale)
         model, _ = with_candidates(bare.model, started(bare, guess).candidates)
         with suppress(RunsAwayError):
-            fits.append(_fit(data, model, {}, 1))
+            fits.append(fit_briefly(data, model, 1))
     nearest = sorted(fits, key=lambda one: one.cost)[:_NEAREST]
     fits = []
     for one in nearest:
         with suppress(RunsAwayError):
-            fits.append(_fit(data, one.model, {}, _FIRST, min((f.cost for f in fits), default=np.inf)))
+            fits.append(fit_briefly(data, one.model, FIRST, min((f.cost for f in fits), default=np.inf)))
     if not fits:
         raise RunsAwayError(f"no chain of two bodies stays finite on the readings of {output}")
     fit = min(fits, key=lambda one: one.cost)
@@ -441,11 +297,6 @@ def _chain(
         if (c.into, c.source, c.label) in found
     }
     return started(full, values), fit.cost
-
-
-def _fit(data: RateData, model: Model, values: Mapping[str, float], rounds: int, goal: float = np.inf) -> Fit:
-    noise, recordings = rough_noise(data), data.recordings
-    return refit(model, data.campaign, recordings, data.outputs, values, data.grids, noise, rounds, goal)
 
 
 def with_free_levels(data: RateData, model: Model) -> Model:
@@ -465,7 +316,7 @@ def with_free_levels(data: RateData, model: Model) -> Model:
         found.append(term)
     if not count:
         return model
-    return _fit(data, replace(model, parameters=parameters, terms=tuple(found)), {}, _LAST).model
+    return fit_briefly(data, replace(model, parameters=parameters, terms=tuple(found)), _LAST).model
 
 
 def leaves_noise(campaign: Campaign, recordings: Sequence[str], model: Model, outputs: Sequence[str]) -> bool:

@@ -8,8 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from discovery.errors import UserError
-from discovery.sparse.options import SparseOptions
-from discovery.terms import Name, parse, substitute, text
+from discovery.sparse.options import FAMILIES, SparseOptions
+from discovery.terms import Name, names, parse, substitute, text
+
+STATES = {"own": {"y"}, "rate": {"y", "rate"}, "upstream": {"y", "up"}}  # in expressions, by form
 
 
 class UnknownTermError(UserError):
@@ -31,10 +33,10 @@ def matched(
     Raises:
         UnknownTermError: a term that the library does not have.
     """
-    names = {alias: Name(name) for alias, name in (aliases or {}).items()}
+    known = {alias: Name(name) for alias, name in (aliases or {}).items()}
 
     def terms_of(word: str, key: str) -> list[str]:
-        said = text(substitute(parse(word, f"{key} of the discovery"), names))
+        said = text(substitute(parse(word, f"{key} of the discovery"), known))
         found = [one for one in offered if one == said] or [o for o in offered if o.startswith(f"{said} - ")]
         if not found and not (key == "forbid" and options.form == "auto"):
             raise UnknownTermError(
@@ -54,3 +56,21 @@ def kept(labels: Mapping[str, str], options: SparseOptions, path: Path) -> list[
     terms = {name: label.split(": ", 1)[1] for name, label in labels.items()}
     stay = matched(options.model_copy(update={"bounds": {}, "forbid": ()}), [*terms.values()], path).keep
     return [name for name, term in terms.items() if term in stay]
+
+
+def check_names(path: Path, words: Sequence[str], channels: Sequence[str], hidden: Sequence[str]) -> None:
+    """Refuse an expression that names what is neither a channel nor a state of the forms that are tried.
+
+    Raises:
+        UserError: a name that none of these forms has.
+    """
+    known = {"time", *channels}.union(*(STATES[form] for form in hidden))
+    for word in words:
+        if word in FAMILIES:
+            continue
+        for name in sorted(names(parse(word, "library of the discovery")) - known):
+            raise UserError(
+                f"{path}: the library of the discovery names '{name}' in '{word}', which is "
+                f"neither a family ({', '.join(FAMILIES)}) nor made of inputs and states "
+                f"({', '.join(sorted(known))})"
+            )
