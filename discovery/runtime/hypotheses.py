@@ -31,6 +31,7 @@ from discovery.printed import counted
 from discovery.recordings import Campaign
 from discovery.runtime.changes import Change, Seen, Table, make_table
 from discovery.runtime.newphysics import new_physics
+from discovery.runtime.unseen import unseen
 from discovery.runtime.unused import Path, path_columns, paths, taken_in
 from discovery.runtime.verdict import (
     NOTHING,
@@ -69,6 +70,7 @@ class Comparison:
     during the recordings; `rows`: what is known after it. `path`: of the unused input, with its parameters.
     `physics`: effects of the catalogue that were fitted, by name; `probability`: of the verdict, where it is
     new physics. `share`: by which all exchange with a temperature changed, where it is that, to first order.
+    `unseen`: sizes of changes that the readings may hide, where the verdict is `nothing`.
     """
 
     recordings: tuple[str, ...]
@@ -85,6 +87,7 @@ class Comparison:
     probability: float | None = None
     share: float | None = None
     during: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    unseen: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
         others = ", ".join(f"{name} {value:+.1f}" for name, value in self.odds.items() if name != "nothing")
@@ -187,6 +190,7 @@ def compare(
         probability(odds, new) if new else None,
         _share(seen, offered[new]) if new in offered else None,
         {n: during[n] for n in change},
+        unseen(exported, table, seen, offered, physics, OTHER[0]) if verdict == "nothing" else {},
     )
 
 

@@ -49,6 +49,9 @@ class Update:
             )
             return lines
         lines.append(f"the model is kept: {_why(found)}")
+        if found.unseen:
+            hidden = "; ".join(f"{name} up to {size}" for name, size in found.unseen.items())
+            lines.append(f"smaller changes may be hidden, in the numbers of the model: {hidden}")
         return lines
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from discovery.export.document import Exported
 from discovery.export.trend import Trend
-from discovery.runtime.changes import Table, Wear
+from discovery.runtime.changes import Change, Table, Wear
 from discovery.terms import names
 
 Array = NDArray[np.float64]
@@ -58,6 +58,18 @@ def wears(exported: Exported, table: Table) -> list[Wear]:
             for width in WIDTHS
             for root in (common, np.hstack([common, own]))
         ]
+    return found
+
+
+def one_load(exported: Exported, table: Table) -> list[tuple[list[str], Change]]:
+    """For each group of loads that wear the same parameters, those parameters by one share, at once; the
+    change has a size of one.
+    """
+    loads = dict.fromkeys(ageing(exported).values())
+    found = []
+    for load in loads:
+        wear = _wear_of(exported, table, _roots(exported, [load])[0])
+        found.append((sorted(load), Change(wear.before, wear.root)))
     return found
 
 
