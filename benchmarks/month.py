@@ -414,7 +414,8 @@ def compare(
         (folder / "known").mkdir()
         left = 1.0 - 0.01 * true_world.times / DAY  # the losses are shares of this power
         worn_inputs = {**true_world.inputs, "P_drive": true_world.inputs["P_drive"] * left}
-        best = live(exported, replace(true_world, inputs=worn_inputs), plan, folder / "known", faults=True)
+        seen = replace(true_world, inputs=worn_inputs)
+        best = live(exported, seen, plan, folder / "known", faults=True, learn=learn)
         figures["with known wear, last week, um"] = rms(best.left[quiet & last])
         figures["with known wear, by readings, um"] = rms((best.left + read)[quiet & last])
     figures["said"] = found.events

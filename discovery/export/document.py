@@ -14,6 +14,7 @@ from discovery.errors import UserError
 from discovery.export.compiled import Compiled, compile_model, model_inputs
 from discovery.export.ranges import InputRange, OutputRange
 from discovery.export.seal import Seal, open_seal, seal_bytes
+from discovery.export.trend import Trend, read_trend
 from discovery.extras import need
 from discovery.files import write_atomic
 from discovery.models import Model, Parameter, State
@@ -60,6 +61,7 @@ class Exported:
     changelog: tuple[Mapping[str, Any], ...]
     document: Mapping[str, Any]
     seal: Seal
+    trend: Trend | None = None
 
 
 def render(document: Mapping[str, Any], key: Ed25519PrivateKey | None = None) -> bytes:
@@ -116,6 +118,9 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
         above.add(state.name)
     if model_inputs(model) != tuple(i["name"] for i in document["inputs"]):
         raise UserError(f"{place}: the inputs listed are not those of its formulas; export the model again")
+    trend = read_trend(document)
+    if trend is not None and not trend.per_day.keys() <= model.parameters.keys():
+        raise UserError(f"{place}: its trend moves a parameter that is not listed; export the model again")
     ranges = InputRange.__dataclass_fields__
     return Exported(
         model,
@@ -139,6 +144,7 @@ def from_document(document: Mapping[str, Any], seal: Seal, place: str | Path) ->
         tuple(document["changelog"]),
         document,
         seal,
+        trend,
     )
 
 

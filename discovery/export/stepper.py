@@ -13,7 +13,7 @@ no memory allocated.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,9 +63,9 @@ class Snapshot:
 class Stepper:
     """A running model: `start` it with the first inputs, then `step` it with the inputs of each tick."""
 
-    def __init__(self, compiled: Compiled) -> None:
+    def __init__(self, compiled: Compiled, tables: _Tables | None = None) -> None:
         self.compiled = compiled
-        self._tables = _Tables(compiled)
+        self._tables = tables or _Tables(compiled)
         n, delays = len(compiled.states), len(compiled.delays)
         self.x, self.carry = np.zeros(n), np.zeros(n)
         self.delayed, self.plays = np.zeros(delays), np.zeros(compiled.plays)
@@ -94,6 +94,18 @@ class Stepper:
             self.delayed[k] = u[delay.input]
         self.position[:] = 0
         self.count = 0
+
+    def twin(self) -> Stepper:
+        """Another one in the same state, of the same parameters from now on."""
+        found = Stepper(self.compiled, self._tables)
+        found.restore(self.snapshot())
+        return found
+
+    def retune(self, values: Mapping[str, float]) -> None:
+        """Move parameters; delays keep their length."""
+        for k, (name, _) in enumerate(self.compiled.parameters):
+            if name in values:
+                self._tables.retune(k, values[name])
 
     def outputs(self, u: Array) -> Array:
         """Outputs (Y,) of the present state under inputs u (U,), without a step."""
@@ -178,6 +190,14 @@ class _Tables:
         columns = [[d.input for d in delays], compiled.offsets, [d.length for d in delays]]
         self.delays = np.array(columns, dtype=np.int64).reshape(3, -1).T.copy()
         self.part = np.array([delay.part for delay in delays])
+        self.programs = (compiled.start, compiled.rates, compiled.results)
+
+    def retune(self, parameter: int, value: float) -> None:
+        """Move the parameter of this number."""
+        for program, table in zip(self.programs, (self.start, self.rates, self.outputs), strict=True):
+            for k, i in enumerate(program.instructions):
+                if i.operation == "parameter" and i.index == parameter:
+                    table[1][k] = value
 
 
 def _table(program: Program, parameters: Sequence[float]) -> Table:

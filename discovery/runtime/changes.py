@@ -55,29 +55,34 @@ class Change:
 @dataclass(frozen=True)
 class Wear:
     """Parameters that may age, with a square root (A, K) of the covariance of their changes: columns (A,) of
-    the slopes for changes before the recordings, and bit by bit during them.
+    the slopes for changes before the recordings, and bit by bit during them; `share`: of the changes during
+    them, over those before.
     """
 
     before: Ints
     during: Ints
     root: Array
+    share: float = 1.0
 
     @property
     def change(self) -> Change:
         """As something that may have changed: so much before the recordings, and so much during them."""
-        twice = np.asarray(np.kron(np.eye(2), self.root), dtype=float)
-        return Change(np.concatenate([self.before, self.during]), twice)
+        first = Change(self.before, self.root)
+        return first.and_also(Change(self.during, self.share * self.root))
 
 
 @dataclass(frozen=True)
 class Followed:
     """How far parameters have worn at the end of the recordings (A,), its standard deviation (A,), and what
-    is known of all parameters and form errors then, as rows of `Knowledge`.
+    is known of all parameters and form errors then, as rows of `Knowledge`. `during` (A,): how much of it
+    came during the recordings, with its standard deviation.
     """
 
     by: Array
     sd: Array
     rows: Array
+    during: Array
+    during_sd: Array
 
 
 @dataclass(frozen=True)
@@ -171,12 +176,19 @@ class Table:
         """
         size, kept, new = self.spread[: self.kept], self.kept, slice(self.fitted, None)
         before, during = (self.slopes[:, at] @ wear.root for at in (wear.before, wear.during))
+        count = wear.root.shape[1]
         # per unit of wear before and during: what the readings show less than the parameters at the end do
         rows_of_fit = self.base[: self.fitted, wear.before] @ _over(wear.root, size[wear.before])
         lag = np.hstack([np.zeros_like(before), during - before])
         lag[: self.fitted] = -np.tile(rows_of_fit, 2)
+        lag[:, count:] *= wear.share
         every = np.column_stack([self.residual, self.base, lag])
-        gram = _without(every.T @ every, 1 + kept)
+        gram = every.T @ every
+        inverse = np.linalg.inv(gram[1:, 1:] + np.eye(len(gram) - 1))
+        grown = wear.share * wear.root
+        during_by = grown @ (inverse @ gram[1:, 0])[-count:]
+        during_sd = np.sqrt(np.einsum("ij,jk,ik->i", grown, inverse[-count:, -count:], grown))
+        gram = _without(gram, 1 + kept)
         covariance = np.linalg.inv(gram[1:, 1:] + np.eye(kept))
         mine = before[new]
         narrow = np.linalg.solve(mine.T @ mine + np.eye(mine.shape[1]), mine.T @ self.base[new, :kept])
@@ -187,7 +199,8 @@ class Table:
         gram[:, 0] -= gram[:, 1:] @ moved
         gram[0] -= moved @ gram[1:]
         sd = np.sqrt(np.einsum("ij,jk,ik->i", to, covariance, to))
-        return Followed(by, sd, compressed(gram, np.concatenate([[1.0], size])))
+        rows = compressed(gram, np.concatenate([[1.0], size]))
+        return Followed(by, sd, rows, during_by, during_sd)
 
 
 def _over(values: Array, size: Array) -> Array:

@@ -22,6 +22,8 @@ from discovery.runtime.events import Change, Event, state_event
 from discovery.runtime.fastforward import fast_forward
 from discovery.runtime.guards import Checked, Fault, Reading, guards, number
 from discovery.runtime.hindsight import LONGEST_S, Hindsight
+from discovery.runtime.measured import new_errors
+from discovery.runtime.observer import SETTLED, Observer, levels
 
 Array = NDArray[np.float64]
 
@@ -49,9 +51,12 @@ class Settings(Times):
     longest_gap_s: float = 30 * 24 * 3600.0  # beyond this the model starts anew
     bump_s: float = 1800.0  # time constant with which the difference at a change of model fades
     hindsight: bool = True  # go through a gap of an input again once it is back; controllers cannot
+    observe: bool = True  # measured errors correct the states after a gap of the model; controllers cannot
 
 
 BUMP, LATE, LIMITED, RATED, UNTIMELY = 1 << 16, 1 << 17, 1 << 18, 1 << 19, 1 << 20
+AHEAD_S = 60.0  # of the clock of a reading; one that claims more would keep all later ones out
+AGES_EVERY_S = 3600.0  # parameters that move by date are moved so often
 TROUBLE = (State.DEGRADED, State.FROZEN, State.FAULT)
 
 
@@ -95,9 +100,13 @@ class Compensator:
         self.heartbeat = 0
         self.gain = 1.0
         self.hindsight: Hindsight | None = None  # since an input is replaced
+        self.level = levels(exported.document, exported.compiled)
+        self.observer: Observer | None = None  # since a gap, until measured errors have settled the states
+        self.uncertain = 0.0  # how far predictions are, in residuals of the fit, since nobody fed the model
         self.acknowledged = False  # an operator has looked since the last tick
         self.shift = 0.0  # added to the clock of the readings where it was set back [s]
         self.events: list[Event] = []  # of the present tick
+        self.aged_at = -math.inf  # when the parameters that move by date were moved last
         self.inherited: Mapping[str, float] | None = (
             None  # states of the model before this one, taken over at the start
         )
@@ -146,6 +155,7 @@ class Compensator:
             change = Change(was.name, self.state.name, failed=failed, switched_on=on)
             self.events.append(state_event(change, self.guards, faults, readings, now))
         flags |= self._move(elapsed)
+        self._observe(readings, now)
         for fault in faults.values():
             flags |= int(fault)
         valid = now + self.exported.compiled.step_s
@@ -179,7 +189,10 @@ class Compensator:
 
     def _advance(self, u: Array, lost: NDArray[np.bool_], now: float) -> tuple[bool, bool]:
         """Bring the model to `now`: whether it was late, whether it failed."""
-        step = self.exported.compiled.step_s
+        step, trend = self.exported.compiled.step_s, self.exported.trend
+        if trend is not None and now - self.aged_at >= AGES_EVERY_S:
+            self.stepper.retune(trend.values(self.exported.model, now))
+            self.aged_at = now
         if self.origin is None or now - self.origin - self.stepper.count * step > self.settings.longest_gap_s:
             try:
                 self.stepper.start(u)
@@ -192,10 +205,12 @@ class Compensator:
         due = math.floor((now - self.origin) / step + 1e-9) + 1 - self.stepper.count
         late = due * step > self.settings.catch_up_s
         if late:
-            before = self.stepper.count
+            before, x = self.stepper.count, self.stepper.x.copy()
             fast_forward(self.exported, self.stepper, u if self.inputs is None else self.inputs, u, due - 1)
             self.settling, self.started_at, self.hindsight = State.WARM, now, None
             due -= self.stepper.count - before
+            if self.settings.observe and np.isfinite(self.level).any():
+                self.observer = Observer.after(self.stepper, self.stepper.x - x, self.level)
         if due <= 0:
             return False, False
         held = np.tile(
@@ -205,6 +220,8 @@ class Compensator:
         if self.hindsight is None and lost.any() and self.inputs is not None and self.settings.hindsight:
             self.hindsight = Hindsight(self.stepper.snapshot(), self.inputs)
         y = self.stepper.run(held)
+        if self.observer is not None and not (len(y) == due and self.observer.run(held)):
+            self.observer = None
         if len(y):
             if self.inherited is not None:
                 self._no_bump(y[-1])
@@ -225,7 +242,22 @@ class Compensator:
         elif not lost.any():
             found = self.hindsight.replay(self.exported, self.stepper)
             self.predicted = self.predicted if found is None else found
-            self.hindsight = None
+            self.hindsight, self.observer = None, None
+
+    def _observe(self, readings: Mapping[str, Reading], now: float) -> None:
+        """After a gap: let measured errors correct the states, from the next step on."""
+        self.uncertain = 0.0
+        if self.observer is None or self.inputs is None or self.predicted is None:
+            return
+        slopes = self.observer.slopes(self.stepper, self.inputs)
+        found = new_errors(self.names, readings, self.observer.counted, until=now + AHEAD_S)
+        if found:
+            places = dict(zip(self.names, self.places, strict=True))
+            left = {places[n]: value - float(self.predicted[places[n]]) for n, value in found.items()}
+            self.observer.correct(self.stepper, slopes, left)
+        self.uncertain = self.observer.uncertain(slopes)
+        if self.uncertain < SETTLED:
+            self.observer = None
 
     def _change_state(
         self,

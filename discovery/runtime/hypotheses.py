@@ -23,6 +23,7 @@ from discovery.errors import UserError
 from discovery.evidence.bayes import Score
 from discovery.export.document import Exported
 from discovery.export.knowledge import problem_of, read_knowledge, settle_starts
+from discovery.export.trend import DAY_S
 from discovery.fitting.covariance import Z95
 from discovery.fitting.problem import Problem
 from discovery.models import Model
@@ -30,6 +31,7 @@ from discovery.printed import counted
 from discovery.recordings import Campaign
 from discovery.runtime.changes import Change, Seen, Table, make_table
 from discovery.runtime.newphysics import new_physics
+from discovery.runtime.unseen import unseen
 from discovery.runtime.unused import Path, path_columns, paths, taken_in
 from discovery.runtime.verdict import (
     NOTHING,
@@ -64,10 +66,11 @@ class Comparison:
     """What the recordings say. `odds`: log of the probability of the readings under each hypothesis over that
     under `nothing`, prior odds included. `verdict` and `what`: the best one, and the sensor where it is one.
     `rms`: residual of the model at work in units of that of its fit; `lately`: the same, as of now.
-    `change`: of the parameters that age, under wear, with standard deviations; `rows`: what is known after
-    it. `path`: of the unused input, with its parameters. `physics`: effects of the catalogue that were
-    fitted, by name; `probability`: of the verdict, where it is new physics. `share`: by which all exchange
-    with a temperature changed, where it is that, to first order.
+    `change`: of the parameters that age, under wear, with standard deviations; `during`: of it, what came
+    during the recordings; `rows`: what is known after it. `path`: of the unused input, with its parameters.
+    `physics`: effects of the catalogue that were fitted, by name; `probability`: of the verdict, where it is
+    new physics. `share`: by which all exchange with a temperature changed, where it is that, to first order.
+    `unseen`: sizes of changes that the readings may hide, where the verdict is `nothing`.
     """
 
     recordings: tuple[str, ...]
@@ -83,6 +86,8 @@ class Comparison:
     physics: Mapping[str, Score] = field(default_factory=dict)
     probability: float | None = None
     share: float | None = None
+    during: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    unseen: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
         others = ", ".join(f"{name} {value:+.1f}" for name, value in self.odds.items() if name != "nothing")
@@ -101,12 +106,14 @@ def compare(
     *,
     choose: bool = False,
     named: bool = True,
+    since: float | None = None,
 ) -> Comparison:
     """Compare the hypotheses on recordings taken since the last revision.
 
     Args:
         choose: a recorded input that the model does not use may act by a path of its own, too.
         named: effects of the catalogue may have begun; to try them all takes a minute.
+        since: instant [s] where the recording begins, for a model that moves by date.
 
     Raises:
         UserError: a model without knowledge of its parameters, or no reading of any output.
@@ -119,7 +126,7 @@ def compare(
             f"{campaign.path}: recording '{recordings[0]}' holds no reading of {', '.join(levels)}; "
             "there is nothing to learn from"
         )
-    problem = problem_of(exported.model, campaign, recordings, outputs)
+    problem = problem_of(_moving(exported, since), campaign, recordings, outputs)
     channels = [i.name for i in exported.inputs if i.role in TEMPERATURES]
     ways = {str(p): p for p in paths(exported, campaign, recordings, outputs)} if choose else {}
     idle = taken_in(exported.model) if choose else {}
@@ -127,7 +134,8 @@ def compare(
     columns |= {channel: path_columns(problem, gains) for channel, gains in idle.items()}
     table = make_table(known, problem, channels, columns)
     worn = wears(exported, table)
-    usual = usual_wear(exported, table, known.worn)
+    days = sum(float(system.grid.time[-1]) for system in problem.systems) / DAY_S
+    usual = usual_wear(exported, table, known.worn, days)
     seen = table.seen(usual.change if usual else None)
     offered = {WEAR: [one.change for one in worn]}
     for name in channels:
@@ -161,8 +169,9 @@ def compare(
     new = next((one for one in odds if str(one) == what), None) if verdict == "new physics" else None
     most = max([*worn, usual] if usual else worn, key=lambda one: alone.log_odds(one.change))
     followed = table.followed(usual if usual and verdict == "wear goes on" else most)
-    pairs = zip(followed.by.tolist(), followed.sd.tolist(), strict=True)
-    change = {n: pair for n, pair in zip(ageing(exported), pairs, strict=True) if pair[1] > 0.0}
+    every = _by_name(exported, followed.by, followed.sd)
+    change = {n: pair for n, pair in every.items() if pair[1] > 0.0}
+    during = _by_name(exported, followed.during, followed.during_sd)
     chosen = _chosen(seen, table, [(n, p) for n, p in ways.items() if p.channel == what], levels)
     count = int(sum(np.isfinite(s.grid.readings).sum() for s in problem.systems))
     rms, lately = (_rms(problem, levels, outputs, memory) for memory in (np.inf, MEMORY_S))
@@ -180,15 +189,32 @@ def compare(
         physics,
         probability(odds, new) if new else None,
         _share(seen, offered[new]) if new in offered else None,
+        {n: during[n] for n in change},
+        unseen(exported, table, seen, offered, physics, OTHER[0]) if verdict == "nothing" else {},
     )
 
 
-def residual_lately(exported: Exported, campaign: Campaign, recordings: Sequence[str]) -> float:
-    """Residual of a model on recordings, as of now, in units of that of its fit."""
+def residual_lately(
+    exported: Exported, campaign: Campaign, recordings: Sequence[str], since: float | None = None
+) -> float:
+    """Residual of a model on recordings, as of now, in units of that of its fit; `since`: see `compare`."""
     residual = exported.document["knowledge"]["residual"]
     levels = {n: r for n, r in residual.items() if r is not None}
     outputs = [n for n in levels if any(_read(campaign, r, n) for r in recordings)]
-    return _rms(problem_of(exported.model, campaign, recordings, outputs), levels, outputs, MEMORY_S)
+    problem = problem_of(_moving(exported, since), campaign, recordings, outputs)
+    return _rms(problem, levels, outputs, MEMORY_S)
+
+
+def _by_name(exported: Exported, by: Array, sd: Array) -> dict[str, tuple[float, float]]:
+    """Changes (A,) of the parameters that age, with standard deviations (A,)."""
+    return dict(zip(ageing(exported), zip(by.tolist(), sd.tolist(), strict=True), strict=True))
+
+
+def _moving(exported: Exported, since: float | None) -> Model:
+    """The model on a recording that begins at an instant, where that is known."""
+    if exported.trend is None or since is None:
+        return exported.model
+    return exported.trend.moving(exported.model, since)
 
 
 def _exchanges(exported: Exported, table: Table, channel: str) -> list[Change]:

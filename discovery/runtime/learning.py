@@ -27,6 +27,7 @@ from discovery.recordings import Campaign
 from discovery.runtime.compensator import Compensator, State
 from discovery.runtime.guards import Reading, number
 from discovery.runtime.hypotheses import Comparison, begun, compare
+from discovery.runtime.measured import new_errors
 from discovery.runtime.recorder import Recorder
 from discovery.runtime.shadow import predictions
 from discovery.runtime.update import revision_of
@@ -35,10 +36,11 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 ACTION = 1.6  # rms of the last errors left, in units of the residual of the fit: measure
+UNCERTAIN = 0.5  # residuals of the fit by which predictions are uncertain after a gap: measure
 RECENT = 32  # errors that the action limit looks at
 FILE = "learning.json"
 ROWS = ("times", "inputs", "others", "errors", "marks")
-OWN = ("left", "counted", "new", "compared", "advice")
+OWN = ("left", "counted", "new", "compared", "advice", "because")
 LEAST = 6  # new errors of at least one output before hypotheses are compared
 EVERY_S = 6 * 3600.0  # between two comparisons where the action limit is kept ...
 SOON_S = 4 * 3600.0  # ... and where it is not
@@ -48,11 +50,12 @@ SAVE_S = 600.0  # between two copies on disk; what comes after the last one is l
 
 @dataclass(frozen=True)
 class Question:
-    """Recordings of a model at work, and its states where they begin."""
+    """A recording of a model at work, its states where it begins, and the instant [s] of that."""
 
     exported: Exported
     campaign: Campaign
     begin: Mapping[str, float]
+    since: float
 
 
 Answer = tuple[Comparison, dict[str, Any] | None]
@@ -65,9 +68,9 @@ def answer(question: Question) -> Answer:
     Raises:
         UserError: a model without knowledge of its parameters.
     """
-    exported, campaign, begin = question.exported, question.campaign, question.begin
-    found = compare(begun(exported, begin), campaign, ["running"], choose=True, named=False)
-    revised = revision_of(exported, campaign, found, begin=begin)
+    exported, campaign, begin, since = question.exported, question.campaign, question.begin, question.since
+    found = compare(begun(exported, begin), campaign, ["running"], choose=True, named=False, since=since)
+    revised = revision_of(exported, campaign, found, begin=begin, since=since)
     return found, None if revised is None else revised[0]
 
 
@@ -85,6 +88,7 @@ class _Kept(BaseModel):
     new: int
     compared: float
     advice: str
+    because: str = ""
 
     def fits(self, inputs: int) -> bool:
         """Whether its rows belong together, for a model of so many inputs."""
@@ -100,11 +104,12 @@ class _Kept(BaseModel):
 class Learner:
     """What the running loop knows since the last revision.
 
-    `key` signs new revisions. `advice` is what to do now, in words; empty: nothing.
+    `key` signs new revisions. `advice` is what to do now, in words, and `because` of what; empty: nothing.
     """
 
     key: Ed25519PrivateKey | None
     advice: str = ""
+    because: str = ""  # "action limit", "after a gap"
     said: tuple[str, str] = ("", "")  # the last verdict, and of what
     seen: Recorder = field(default_factory=Recorder)
     left: list[float] = field(default_factory=list)  # errors left, in units of the residual of the fit
@@ -140,7 +145,11 @@ class Learner:
         """
         if self.seen.times and now - self.seen.times[-1] > GAP_S:
             self.begin(compensator)
-        found = self._errors(compensator, readings)
+        found = new_errors(compensator.names, readings, self.counted)
+        if compensator.uncertain > UNCERTAIN:
+            self.because, self.advice = "after a gap", "measure the errors every half hour for the next 4 h"
+        elif self.because == "after a gap":
+            self.advice = ""
         if compensator.inputs is None or compensator.state is not State.ACTIVE:
             return False
         self.new += self.seen.add(compensator, now, _others(compensator, readings), found)
@@ -151,27 +160,16 @@ class Learner:
                     self.left.append((value - predicted[name]) / self.levels[name])
             del self.left[:-RECENT]
         beyond = self.beyond()
-        self.advice = "measure the errors every half hour for the next 8 h" if beyond else ""
+        if beyond:
+            self.because, self.advice = "action limit", "measure the errors every half hour for the next 8 h"
+        elif self.because == "action limit":
+            self.advice = ""
         wait = SOON_S if beyond else EVERY_S
         return self.new >= LEAST and now - self.compared >= wait
 
     def beyond(self) -> bool:
         """Whether the errors left are beyond the action limit."""
         return len(self.left) >= RECENT // 2 and math.sqrt(float(np.mean(np.square(self.left)))) > ACTION
-
-    def _errors(self, compensator: Compensator, readings: Mapping[str, Reading]) -> dict[str, float]:
-        """New good measured errors, as they would be without compensation."""
-        found = {}
-        for name in compensator.names:
-            reading, applied = readings.get(name), readings.get(f"{name}_applied")
-            if reading is None or not reading.good or (applied is not None and not applied.good):
-                continue
-            stamp = number(reading.time)
-            value = number(reading.value) + (number(applied.value) if applied is not None else 0.0)
-            if math.isfinite(value) and stamp > self.counted.get(name, -math.inf):
-                self.counted[name] = stamp
-                found[name] = value
-        return found
 
     def save(self, compensator: Compensator, folder: Path, now: float, *, last: bool = False) -> None:
         """Keep what was seen on disk, every ten minutes and at the end; a disk that fails costs what was
@@ -207,7 +205,8 @@ class Learner:
         """What was seen, for `answer`."""
         self.compared, self.new = now, 0
         campaign = self.seen.campaign(compensator.exported)
-        question = Question(compensator.exported, campaign, dict(self.seen.marks[0][1]))
+        begin = dict(self.seen.marks[0][1])
+        question = Question(compensator.exported, campaign, begin, self.seen.times[0])
         self.seen.mark(compensator)
         return question
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from discovery.errors import UserError
 from discovery.export.stepper import Snapshot
 from discovery.runtime.compensator import Compensator, State
+from discovery.runtime.observer import Observer
 
 NAMES = ("state.json", "state.previous.json")
 # What a guard remembers
@@ -196,6 +197,7 @@ def _content(c: Compensator) -> dict[str, Any]:
         "gain": c.gain,
         "held": [[getattr(guard, name) for name in KEPT] for guard in c.guards],
         "snapshot": snapshot,
+        "observer": None if c.observer is None else c.observer.saved(),
     }
 
 
@@ -220,7 +222,7 @@ def _apply(c: Compensator, content: dict[str, Any]) -> None:
     numbers = [*content["offsets"], *content["bump"], *snapshot.x]
     if not all(math.isfinite(value) for value in numbers) or len(content["offsets"]) != len(c.places):
         raise ValueError("not finite")
-    found = {
+    found: dict[str, Any] = {
         "last": float(content["time"]),
         "origin": _number(content["origin"]),
         "state": State[content["state"]],
@@ -237,6 +239,10 @@ def _apply(c: Compensator, content: dict[str, Any]) -> None:
     }
     held = [dict(zip(KEPT, kept, strict=True)) for kept in content["held"]]
     pairs = list(zip(c.guards, held, strict=True))
+    observer = content.get("observer")
+    beside = c.stepper.twin()
+    beside.restore(snapshot)
+    found["observer"] = None if observer is None else Observer.resumed(observer, beside, c.level)
     c.stepper.restore(snapshot)  # nothing is changed by a copy that does not fit
     for name, value in found.items():
         setattr(c, name, value)

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from discovery.runtime.learning import Answer, Learner, Question
 
 Say = Callable[[str], None]
+CAUSES = {
+    "action limit": "the residual errors exceed the action limit",
+    "after a gap": "what the machine did meanwhile is not known, so the prediction is uncertain",
+}
 
 
 class Session:
@@ -244,8 +248,8 @@ class Session:
         if self.folder is not None:
             learn.save(self.compensator, self.folder, now)
         if learn.advice and not advised:
-            self.tell(now, "action limit", "the residual errors exceed the action limit", learn.advice)
-        elif advised and not learn.advice:
+            self.tell(now, learn.because, CAUSES[learn.because], learn.advice)
+        elif advised and not learn.advice and learn.because == "action limit":
             self.tell(now, "action limit kept", "the residual errors are within the action limit again")
         if due and self.asking is None and self.shadow is None and self.folder is not None:
             self.asking = self._ask(learn.question(self.compensator, now))

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 
 from discovery.export.document import Exported
 from discovery.printed import counted
-from discovery.runtime.compensator import Compensator, Settings, State
-from discovery.runtime.guards import Reading, number
-
-LONGEST_AHEAD_S = 60.0  # of the clock of a reading; one that claims more would keep all later ones out
+from discovery.runtime.compensator import AHEAD_S, Compensator, Settings, State
+from discovery.runtime.guards import Reading
+from discovery.runtime.measured import new_errors
 
 
 @dataclass(frozen=True)
@@ -53,26 +52,12 @@ class Shadow:
         failed = found.state in (State.FROZEN, State.FAULT)
         self.trouble |= failed and active.state is not found.state  # inputs that are missing fail both
         old, new = predictions(active), predictions(self.compensator)
-        for name in old.keys() & new.keys():
+        both = old.keys() & new.keys()
+        for name in both:
             self.difference = max(self.difference, abs(old[name] - new[name]))
-            error = self._new_error(name, readings, now)
-            if math.isfinite(error):
-                self.residuals.setdefault(name, []).append((error - old[name], error - new[name]))
-
-    def _new_error(self, name: str, readings: Mapping[str, Reading], now: float) -> float:
-        """Return the uncompensated error if it is a good reading and newer than the last one, else NaN.
-
-        A source may show one reading for many ticks, from before the shadow run as well.
-        """
-        reading, applied = readings.get(name), readings.get(f"{name}_applied", Reading(0.0, now))
-        if reading is None or not reading.good or not applied.good or self.began is None:
-            return math.nan
-        if not self.counted.get(name, self.began) < number(reading.time) <= now + LONGEST_AHEAD_S:
-            return math.nan
-        error = number(reading.value) + number(applied.value)
-        if math.isfinite(error):
-            self.counted[name] = number(reading.time)
-        return error
+        errors = new_errors(both, readings, self.counted, since=self.began, until=now + AHEAD_S)
+        for name, error in errors.items():
+            self.residuals.setdefault(name, []).append((error - old[name], error - new[name]))
 
     def verdict(self, now: float) -> tuple[bool, str] | None:
         """Whether the candidate may take over, and why; None: not yet known."""

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 from discovery.export.document import Exported, from_document, read_document, render, write_document
 from discovery.export.knowledge import read_knowledge
 from discovery.export.seal import open_seal
+from discovery.export.trend import DAY_S
 from discovery.recordings import Campaign
 from discovery.runtime.hypotheses import Comparison, begun, compare, model_with, residual_lately
 from discovery.runtime.newphysics import sizes_of
 from discovery.runtime.unused import with_input, without_input
+from discovery.runtime.wear import trend_of
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -47,6 +49,9 @@ class Update:
             )
             return lines
         lines.append(f"the model is kept: {_why(found)}")
+        if found.unseen:
+            hidden = "; ".join(f"{name} up to {size}" for name, size in found.unseen.items())
+            lines.append(f"smaller changes may be hidden, in the numbers of the model: {hidden}")
         return lines
 
 
@@ -97,20 +102,25 @@ def update_file(
 
 
 def revision_of(
-    exported: Exported, campaign: Campaign, found: Comparison, begin: Mapping[str, float] | None = None
+    exported: Exported,
+    campaign: Campaign,
+    found: Comparison,
+    begin: Mapping[str, float] | None = None,
+    since: float | None = None,
 ) -> tuple[dict[str, Any], float] | None:
     """The document of the next revision and the residual that it leaves; None where there is no wear, or
     where it gains nothing.
 
     Args:
         begin: states of the model where the recordings begin; default its own start.
+        since: instant [s] where the recording begins; the revision holds the trend of wear then.
     """
     if found.verdict not in ("wear", "wear goes on", "unused input", "idle input"):
         return None
-    document = next_revision(exported, campaign, found)
+    document = next_revision(exported, campaign, found, since)
     again = from_document(*open_seal(render(document), exported.model.name), exported.model.name)
     started = begun(again, begin) if begin is not None else again
-    after = residual_lately(started, campaign, found.recordings)
+    after = residual_lately(started, campaign, found.recordings, since)
     return (document, after) if after < MAY * found.lately else None
 
 
@@ -121,7 +131,9 @@ def next_name(path: Path) -> Path:
     return path.with_name(f"{stem}.r{revision}{path.suffix}")
 
 
-def next_revision(exported: Exported, campaign: Campaign, found: Comparison) -> dict[str, Any]:
+def next_revision(
+    exported: Exported, campaign: Campaign, found: Comparison, since: float | None = None
+) -> dict[str, Any]:
     """The document of the updated model with its changelog entry; only what wear can change has moved, or an
     input has come in or is left out. Ranges and limits stay. What is known of the parameters after wear goes
     with the revision: the next comparison holds it to that.
@@ -134,7 +146,14 @@ def next_revision(exported: Exported, campaign: Campaign, found: Comparison) -> 
     if found.verdict == "idle input":
         document = without_input(exported, campaign, found.what)
         return _revised(exported, document, found, f"{found.what} is no input any more")
-    document, model = {**exported.document}, model_with(exported.model, found.change)
+    document, moving, trend = {**exported.document}, exported.model, None
+    document.pop("trend", None)
+    if since is not None:
+        lasted = sum(float(campaign.recordings[r].time[-1]) for r in found.recordings)
+        if exported.trend is not None:
+            moving = moving.with_values(exported.trend.values(moving, since + lasted))
+        trend = trend_of(exported, found.during, lasted / DAY_S, since + lasted)
+    model = model_with(moving, found.change)
     entries = []
     for entry in document["parameters"]:
         p = model.parameters[entry["name"]]
@@ -145,6 +164,9 @@ def next_revision(exported: Exported, campaign: Campaign, found: Comparison) -> 
     )
     before = read_knowledge(model.name, document["knowledge"])
     known = replace(before, rows=found.rows, worn=tuple(sorted({*before.worn, *found.change})))
+    if trend is not None:
+        document["trend"] = trend.document()
+        moved += "; a day: " + ", ".join(f"{n} {rate:+.2g}" for n, rate in trend.per_day.items())
     new = document | {"parameters": entries, "knowledge": known.document()}
     return _revised(exported, new, found, moved)
 

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.export.document import Exported
-from discovery.runtime.changes import Table, Wear
+from discovery.export.trend import Trend
+from discovery.runtime.changes import Change, Table, Wear
 from discovery.terms import names
 
 Array = NDArray[np.float64]
 
 # Chosen on seeds set aside for it and confirmed on others, see benchmarks/runtime.md
 WIDTHS = (0.05, 0.2)  # relative change of a parameter that ages; both widths count half
+SUDDEN = 0.02  # relative change at once of a machine whose wear goes on
+RATE = 0.01  # relative change a day of what wears, before it is seen
+TURNS = 0.001  # relative change a day by which a rate of wear turns in one day, sqrt(2) of it in two
 AGES = ("heat load", "rotation speed", "fluid flow", "cooling power", "coolant temperature")
 
 
@@ -55,10 +61,46 @@ def wears(exported: Exported, table: Table) -> list[Wear]:
     return found
 
 
-def usual_wear(exported: Exported, table: Table, worn: Sequence[str]) -> Wear | None:
-    """Wear that goes on where a machine has worn before."""
+def one_load(exported: Exported, table: Table) -> list[tuple[list[str], Change]]:
+    """For each group of loads that wear the same parameters, those parameters by one share, at once; the
+    change has a size of one.
+    """
+    loads = dict.fromkeys(ageing(exported).values())
+    found = []
+    for load in loads:
+        wear = _wear_of(exported, table, _roots(exported, [load])[0])
+        found.append((sorted(load), Change(wear.before, wear.root)))
+    return found
+
+
+def usual_wear(exported: Exported, table: Table, worn: Sequence[str], days: float) -> Wear | None:
+    """Wear that goes on where a machine has worn before: over so many days, of any size where no trend is
+    known, else at about its rate.
+    """
     loads = {load for name, load in ageing(exported).items() if name in worn}
-    return _wear_of(exported, table, WIDTHS[0] * _roots(exported, loads)[0]) if loads else None
+    if not loads:
+        return None
+    root, trend = _roots(exported, loads)[0], exported.trend
+    if trend is None:
+        return _wear_of(exported, table, WIDTHS[0] * root)
+    during = days * math.hypot(trend.sd, TURNS * math.sqrt(days))
+    return replace(_wear_of(exported, table, SUDDEN * root), share=during / SUDDEN)
+
+
+def trend_of(
+    exported: Exported, change: Mapping[str, tuple[float, float]], days: float, at: float
+) -> Trend | None:
+    """The trend after recordings of so many days until an instant [s], in which parameters wore by so much
+    more than the trend before said, with standard deviations.
+    """
+    sizes = {n: abs(exported.model.parameters[n].value) for n in change}
+    shares = [sd / sizes[n] / days for n, (_, sd) in change.items() if sizes[n] > 0]
+    if not shares:
+        return None
+    before, sd = exported.trend.per_day if exported.trend else {}, math.sqrt(np.mean(np.square(shares)))
+    kept = 1.0 if exported.trend else RATE**2 / (RATE**2 + sd**2)
+    rates = {n: before.get(n, 0.0) + kept * by / days for n, (by, _) in change.items()}
+    return Trend(at, {**before, **rates}, math.sqrt(kept) * sd)
 
 
 def _roots(exported: Exported, part: Collection[frozenset[str]]) -> tuple[Array, Array]:

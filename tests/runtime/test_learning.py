@@ -32,6 +32,9 @@ def test_wear_is_followed_in_the_loop_and_an_unchanged_machine_is_left_alone(
     assert found.counted["shadow run"] >= 1
     assert found.counted["the new model takes over"] >= 1
     assert active.revision >= 2
+    assert active.trend is not None  # what is lost was lost at once, so nothing goes on by much
+    sizes = {n: abs(active.model.parameters[n].value) for n in active.trend.per_day}
+    assert all(abs(rate) <= 0.01 * sizes[n] + 1e-9 for n, rate in active.trend.per_day.items())
     require_trusted(active.seal, public_key(tmp_path / "key.pem.pub"), "active")
     alone = tmp_path / "alone"
     alone.mkdir()

@@ -72,7 +72,11 @@ def test_a_machine_that_has_not_changed_keeps_its_model(machine: Campaign, at_wo
     assert max(v for n, v in found.comparison.odds.items() if n != "nothing") < 3.0
     assert found.path is None
     assert not at_work.with_name("new.json").exists()
-    assert "these recordings show no change" in found.lines()[-1]
+    kept, hidden = found.lines()[-2:]
+    assert "these recordings show no change" in kept
+    assert "smaller changes may be hidden" in hidden
+    percent = float(hidden.split("wear with P_drive up to ")[1].split(" %")[0])
+    assert 2.0 < percent < 12.0  # less_loss(0.8) and (0.9) are found in as many readings
 
 
 def test_only_what_wear_can_change_is_told_to_age(exported: Exported) -> None:
@@ -288,6 +292,8 @@ def test_what_readings_do_not_distinguish_is_not_signed() -> None:
         assert verdict_of({**odds, one: 30.0}, {**evidence, one: 32.0}) == (verdict, "fan")
     said = Comparison(("a",), 9, "undecided", "wear or sensor of T", {}, 1.4, 1.4, {}, np.zeros((0, 1)))
     assert "measure more often, wet and dry" in Update(said).lines()[-1]
+    quiet = replace(said, verdict="nothing", what="", unseen={"sensor of T": "0.5 K"})
+    assert Update(quiet).lines()[-1].endswith("sensor of T up to 0.5 K")
 
 
 def test_an_effect_is_named_only_where_it_is_sure() -> None:

@@ -1,7 +1,7 @@
 """Tests that need what others made are there where it is installed: a TwinCAT grammar (a package of the
-development), PLCopen's schema (`make outside`), a compiler for Windows and wine (Debian:
-gcc-mingw-w64-x86-64, wine64), a compiler of structured text (iec2c of matiec, strucpp of STruC++: from their
-sources, no index of packages has them).
+development), a grammar of the standard and PLCopen's schema (`make outside`), a compiler for Windows and wine
+(Debian: gcc-mingw-w64-x86-64, wine64), a compiler of structured text (iec2c of matiec, strucpp of STruC++:
+from their sources, no index of packages has them).
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ NEEDED = {
     "test_st_compilers.py": any(shutil.which(name) for name in COMPILERS),
     "test_plcopen_schema.py": importlib.util.find_spec("xmlschema") is not None and SCHEMA.is_file(),
     "test_twincat_grammar.py": importlib.util.find_spec("blark") is not None,
+    "test_standard_grammar.py": importlib.util.find_spec("tree_sitter_iec61131_3_st") is not None,
     "test_windows.py": shutil.which(WINDOWS) is not None,
     "test_wine.py": shutil.which(WINDOWS) is not None and WINE.exists(),
 }

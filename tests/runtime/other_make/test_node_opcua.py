@@ -33,7 +33,13 @@ class Machine:
         assert self.process.stdout is not None
         self.process.stdin.write(json.dumps(wish) + "\n")
         self.process.stdin.flush()
-        return dict(json.loads(self.process.stdout.readline())) if "show" in wish else {}
+        if "show" not in wish:
+            return {}
+        line = ""
+        while not line.startswith("{"):  # node-opcua prints warnings of its own there
+            line = self.process.stdout.readline()
+            assert line, "the server has stopped"
+        return dict(json.loads(line))
 
     def wait(self, **wanted: int) -> dict[str, Any]:
         """Until the low byte of the status, or the heartbeat, is as wanted (20 s at most)."""
@@ -144,7 +150,7 @@ def test_it_compensates_survives_a_frozen_server_and_stops_off(
         ({"user": "somebody"}, "user 'somebody' or its password is refused"),
         ({"user": None, "password_file": None}, "does not take this kind of login"),
         ({"application_uri": "urn:mine"}, "application_uri 'urn:mine' is not the one in"),
-        ({"server_certificate": "compensator.der"}, "the server shows another certificate"),
+        ({"server_certificate": "compensator.der"}, "the certificate of the server (SHA-1 "),
         ({"certificate": "stranger.der", "private_key": "stranger.pem"}, "does not trust the certificate"),
     ],
 )
