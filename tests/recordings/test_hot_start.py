@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from discovery.recordings.campaign import Channel
-from discovery.recordings.compare.levels import _starts
 from discovery.recordings.compare.seen import Seen
+from discovery.recordings.compare.temperatures import starts
 
 Array = NDArray[np.float64]
 TIME = np.linspace(0.0, 3600.0, 240)
@@ -38,5 +38,5 @@ def warmed() -> Array:
 )
 def test_a_hot_start(nozzle: Array, sound: bool) -> None:
     recordings = [seen("monday", warmed()), seen("tuesday", warmed()), seen("friday", nozzle)]
-    found = list(_starts(recordings, CHANNELS))
+    found = list(starts(recordings, CHANNELS))
     assert ([f.channel for f in found] == []) is sound

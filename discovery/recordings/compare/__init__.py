@@ -8,7 +8,9 @@ from discovery.recordings.campaign import Channel
 from discovery.recordings.compare.agreement import Disagreement, disagreements
 from discovery.recordings.compare.leaks import copied_channels, copies, near_copies
 from discovery.recordings.compare.levels import level_findings
+from discovery.recordings.compare.pairs import pair_findings
 from discovery.recordings.compare.seen import Seen
+from discovery.recordings.compare.temperatures import temperature_findings
 from discovery.recordings.finding import Finding
 
 __all__ = ["Seen", "compare", "copies"]
@@ -29,7 +31,8 @@ def compare(path: Path, recordings: Sequence[Seen], channels: Mapping[str, Chann
     for one in disagreements(recordings, channels):
         damaged |= {(one.recording, name) for name in one.repair.channels}
         yield _disagreement(by_name[one.recording], one)
-    for finding in level_findings(recordings, channels):
+    by_itself = (level_findings, temperature_findings, pair_findings)
+    for finding in (one for found in by_itself for one in found(recordings, channels)):
         where = next((one.name for one in recordings if one.file == finding.file), "")
         if (where, finding.channel) not in damaged:  # one damage, one line
             yield finding

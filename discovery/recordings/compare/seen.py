@@ -12,6 +12,7 @@ import numpy as np
 
 from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Array, Lines
+from discovery.recordings.finding import Finding
 
 
 @dataclass(frozen=True)
@@ -68,3 +69,16 @@ def noise_of(readings: Array) -> float:
         return 0.0
     second = np.diff(readings, 2)
     return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0))
+
+
+def smallest_step(readings: Array) -> float:
+    """The smallest step between different readings, where most steps are multiples of it."""
+    different = np.diff(np.unique(readings))
+    return float(np.min(different)) if different.size > 2 else 0.0
+
+
+def warning(one: Seen, channel: Channel, row: int, what: str, do: str, kind: str, weight: float) -> Finding:
+    """A finding at a reading (`row`) of a channel."""
+    return Finding(
+        "warning", one.file, one.line(channel.name, row), what, do, kind, channel.name, float(weight)
+    )
