@@ -17,7 +17,7 @@ from discovery.recordings.correction import pair_corrections, uncompensated
 from discovery.recordings.longfile import How
 from discovery.recordings.oddvalues import first_reading, impossible_readings
 from discovery.recordings.reading import read_columns
-from discovery.recordings.roles import ROLES, Between, is_input
+from discovery.recordings.roles import ROLES, SENSORS, Between, is_input
 from discovery.recordings.units import Conversion, UnitError, conversion
 from discovery.schema import Named, suggest
 
@@ -48,6 +48,14 @@ class Channel:
     def is_input(self) -> bool:
         """Whether models are fed with this."""
         return is_input(self.role)
+
+    @property
+    def is_sensor(self) -> bool:
+        """Whether this is read from a thermometer or a probe, also one that models are fed with. What is held
+        between stamps is set.
+        """
+        thermometer = self.role == "other input" and self.unit == "degC" and self.between == "linear"
+        return self.role in SENSORS or thermometer
 
 
 @dataclass(frozen=True)

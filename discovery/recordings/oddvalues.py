@@ -12,7 +12,7 @@ import numpy as np
 
 from discovery.recordings.columns import Array, Lines
 from discovery.recordings.finding import Finding, more
-from discovery.recordings.roles import ROLES
+from discovery.recordings.roles import ROLES, SENSORS
 
 if TYPE_CHECKING:
     from discovery.recordings.campaign import Channel
@@ -59,7 +59,6 @@ _SOME = 3  # readings that are none: no slip any more
 _MANY, _MANY_SHARE = 5, 0.01  # so many lone readings, or such a share of all, pull at a fit
 _ZERO, _FALL = 15.0, 3.0  # median steps, and large ones, that a reading falls to be exactly zero
 _STEP = 12.0  # times the largest of the steps around it: a jump, not a response
-_SENSORS = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature", "error")
 
 
 def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
@@ -88,7 +87,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         "sentinel",
         weight=5.0,
     )
-    if channel.role not in _SENSORS or known.size < FEW:
+    if not channel.is_sensor or known.size < FEW:
         return
     zeros = np.setdiff1d(_zeros(channel, read), words)
     yield from _findings(
@@ -116,7 +115,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         do = "it is left out" if dropped else "leave the cell empty if the sensor failed there"
         line = int(lines[known[first]])
         yield Finding("warning", file, line, what + more(lone.size), do, "outlier", channel.name, 2.0)
-    if not channel.measured:  # the air may jump: a door
+    if not channel.measured and channel.role in SENSORS:  # the air may jump: a door
         return
     for row in _steps(read, np.unique(np.concatenate((words, zeros, lone, listed)))):
         what = (
@@ -129,7 +128,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
 def odd_readings(channel: Channel, read: Array) -> Lines:
     """Rows of readings (R,) that are words for nothing, zeros for missing readings, or stand alone."""
     words = logger_words(read)
-    if channel.role not in _SENSORS or read.size < FEW:
+    if not channel.is_sensor or read.size < FEW:
         return words
     return np.unique(np.concatenate((words, _zeros(channel, read), lone_readings(read))))
 
@@ -141,7 +140,7 @@ def impossible_readings(channel: Channel, read: Array) -> Lines:
     where the one before them was.
     """
     least = _IMPOSSIBLE.get(channel.unit)
-    if channel.role not in _SENSORS or least is None or read.size < FEW:
+    if not channel.is_sensor or least is None or read.size < FEW:
         return np.zeros(0, dtype=np.intp)
     steps = np.diff(read)
     sizes, far = np.abs(steps), far_step(steps, least)

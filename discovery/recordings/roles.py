@@ -21,6 +21,13 @@ Role = Literal[
     "other output",
 ]
 CORRECTION: Role = "applied correction"
+SENSORS: tuple[Role, ...] = (
+    "ambient temperature",
+    "fluid temperature",
+    "coolant temperature",
+    "temperature",
+    "error",
+)
 
 
 @dataclass(frozen=True)
@@ -49,8 +56,11 @@ class RoleFacts:
 
 
 def _temperature(low: float, high: float, *, measured: bool = False) -> RoleFacts:
-    ranges = {"degC": Range((low, high), (-273.15, 2000.0))}
-    return RoleFacts(("degC",), between="linear", ranges=ranges, measured=measured)
+    return RoleFacts(("degC",), between="linear", ranges=_degrees(low, high), measured=measured)
+
+
+def _degrees(low: float, high: float) -> dict[str, Range]:
+    return {"degC": Range((low, high), (-273.15, 2000.0))}
 
 
 _DEVIATION = {"um": Range((-2000.0, 2000.0)), "um/m": Range((-2000.0, 2000.0))}
@@ -71,7 +81,7 @@ ROLES: dict[str, RoleFacts] = {
     "nozzle side": RoleFacts(("1",), ranges={"1": Range((-2.0, 2.0))}),
     "error": RoleFacts(("um", "um/m"), ranges=_DEVIATION, measured=True, open=True),
     CORRECTION: RoleFacts(("um", "um/m"), ranges=_DEVIATION),
-    "other input": RoleFacts(()),
+    "other input": RoleFacts((), ranges=_degrees(-50.0, 300.0)),
     "other output": RoleFacts((), between="linear", measured=True),
 }
 

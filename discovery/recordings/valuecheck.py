@@ -20,7 +20,6 @@ _SMALLEST = {
     ("heat load", "W"): (2.0, "kW"),
     ("rotation speed", "rpm"): (2.0, "1000 rpm"),
 }
-_SENSORS = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature", "error")
 
 
 def range_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
@@ -32,18 +31,17 @@ def range_findings(file: Path, lines: Lines, channel: Channel, column: Array) ->
     if limits is None:
         return
     unit = f" {channel.unit}" if channel.unit != "1" else ""
+    kind = "temperature" if channel.role == "other input" else channel.role
     do = f"check its unit and the sensor; usual is {limits.usual[0]:g} to {limits.usual[1]:g}{unit}"
     impossible = _outside(column, limits.possible)
     if impossible.size:
-        what = f"'{channel.name}' is {column[impossible[0]]:g}{unit}, no {channel.role} can be that"
+        what = f"'{channel.name}' is {column[impossible[0]]:g}{unit}, no {kind} can be that"
         yield Finding("error", file, int(lines[impossible[0]]), what + more(impossible.size), do)
     known = np.flatnonzero(np.isfinite(column))
     left_out = known[impossible_readings(channel, column[known])]
     unusual = np.setdiff1d(_outside(column, limits.usual), [*impossible, *left_out]).astype(np.intp)
     if unusual.size:
-        what = (
-            f"'{channel.name}' is {column[unusual[0]]:g}{unit}, unusual for a channel of role {channel.role}"
-        )
+        what = f"'{channel.name}' is {column[unusual[0]]:g}{unit}, unusual for a channel of role {kind}"
         yield Finding("warning", file, int(lines[unusual[0]]), what + more(unusual.size), do)
 
 
@@ -78,7 +76,7 @@ def frozen_findings(file: Path, lines: Lines, channel: Channel, column: Array) -
     is about ln(n)/p (Erdos and Renyi 1970); several times that is a sensor that stands still.
     """
     known = np.flatnonzero(np.isfinite(column))
-    if channel.role not in _SENSORS or known.size < FEW:
+    if not channel.is_sensor or known.size < FEW:
         return
     readings = column[known]
     ends = np.append(np.flatnonzero(np.diff(readings) != 0.0), known.size - 1)

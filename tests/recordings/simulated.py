@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Begin = Literal["cold", "warm"]
 HOUR = 3600.0
 
 
@@ -19,11 +21,15 @@ class Simulated:
     frames: dict[str, dict[str, Array]]
 
 
-def simulated(seed: int) -> Simulated:
-    """A machine of two to five bodies, one to three loads, now and then a fluid; two to six recordings of
-    it.
+def simulated(seed: int, begin: Begin = "cold") -> Simulated:
+    """A machine of two to five bodies, one to three loads, now and then a fluid; two to six recordings of it.
+
+    Args:
+        begin: "cold": all bodies begin at room temperature. "warm": every second recording, drawn by chance,
+            begins at up to what loads of any size keep the bodies at.
     """
     rng = np.random.default_rng([seed, 7])
+    before = np.random.default_rng([seed, 8])
     bodies, loads = int(rng.integers(2, 6)), int(rng.integers(1, 4))
     has_fluid, has_room = rng.random() < 0.4, rng.random() < 0.8
     step = float(rng.choice([1.0, 5.0, 10.0, 30.0, 60.0]))
@@ -70,6 +76,11 @@ def simulated(seed: int) -> Simulated:
         flow = (_cycle(rng, n, 1.0) > 0.3).astype(float) if has_fluid else np.zeros(n)
         fluid = room + 4 + rng.normal(0, 1) + np.cumsum(rng.normal(0, 0.01, n))
         x = np.full(bodies, room[0]) + rng.normal(0, 0.1, bodies)
+        if begin == "warm" and before.random() < 0.5:
+            steady = np.linalg.solve(
+                np.diag(loss + link.sum(axis=1)) - link, gain @ (watts * before.random(loads))
+            )
+            x = x + before.random() * steady
         states = np.empty((n, bodies))
         dt = np.diff(t, append=t[-1] + step)
         for k in range(n):

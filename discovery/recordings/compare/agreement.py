@@ -24,6 +24,7 @@ from discovery.recordings.compare.crossprediction import (
 )
 from discovery.recordings.compare.repairs import Repair, all_repairs, drifting, offset, shiftable, shifted
 from discovery.recordings.compare.seen import Seen, inputs_of, outputs_of
+from discovery.recordings.compare.switches import used_inverted
 from discovery.threads import one_thread
 
 _SHARES = (0.0, 1 / 500, 1 / 150, 1 / 50, 1 / 15, 1 / 5)  # of the longest recording: time constants
@@ -34,6 +35,7 @@ _GAIN, _TWO_GAIN = 1.3, 1.7  # among several recordings; of two that stand again
 # a recording that is so many times as far off as the others, and as near as they are once the repair is made,
 # needs less of a gain
 _FAR, _BACK, _WHOLE = 3.0, 1.15, 0.75
+_INVERTED = 0.6  # of a switch that is on as much as it is off elsewhere: two signs of one damage
 _AGREES = 3.0  # times the usual misfit, at most, after a repair
 _POOR = (
     0.5  # of the movement: what others predict no better has causes that nobody recorded, and says nothing
@@ -123,6 +125,8 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
         each = [np.log(max(misfit[y], LEAST) / max(after[y], LEAST)) for y in touched]
         gain = float(np.sum(each)) / len(touched) ** 0.5
         least = (_TWO_GAIN if two else _GAIN) + _DOUBT[repair.kind]
+        if repair.kind == "sign" and used_inverted(one, list(known.recordings.values()), repair.channels[0]):
+            least = _INVERTED
         whole = b > _FAR * limit and a < _BACK * limit and gain > _WHOLE and not two
         # an offset of free size and place fits a little of anything: it has to explain the whole
         if agrees and (whole or (gain > least and repair.kind != "offset")):
@@ -157,7 +161,7 @@ def _candidates(
     yield from all_repairs(one, known.channels, known.inputs, known.outputs)
     for group in shiftable(one, known.channels, known.inputs, known.outputs):
         if (seconds := _lateness(known, one, group, predicted)) != 0.0:
-            yield shifted(one, group, seconds)
+            yield shifted(one, group, known.channels, seconds)
     if known.has_room:  # otherwise a drift may be the air around, which nobody recorded
         for y, reading in read.items():
             left = known.residual(predicted, y, reading)

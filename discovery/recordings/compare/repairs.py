@@ -68,6 +68,7 @@ _CLOCKS = (
     (86400.0, "days"),
     (1 / 60.0, "sixtieths of a second"),
 )
+_SWITCHED = 0.95  # of the readings of a switch are 0 or 1
 _WHEN = tuple(np.linspace(0.1, 0.9, 17))  # of a recording: where a damage may begin
 
 Channels = Mapping[str, Channel]
@@ -86,7 +87,7 @@ def units(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
     """A channel in another unit than the campaign says, or a decimal point that slipped."""
     for name in _moving(one, [*inputs, *outputs]):
         channel, values = channels[name], one.values[name]
-        if _is_switch(values):
+        if is_switch(values):
             continue
         if channel.unit == "degC":
             for unit, factor, offset in _SCALES:
@@ -109,7 +110,7 @@ def signs(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
     """A channel with the other sign; a switch the other way round."""
     for name in _moving(one, [*inputs, *outputs]):
         values = one.values[name]
-        if _is_switch(values):
+        if is_switch(values):
             what, do = f"'{name}' is 1 where it should be 0", "invert the switch"
             yield Repair("sign", (name,), what, do, one.having({name: 1.0 - values}))
         elif channels[name].unit != "degC":
@@ -131,9 +132,16 @@ def swaps(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequenc
                 yield Repair("swap", (a, b), what, do, one.having({a: one.values[b], b: one.values[a]}))
 
 
-def shifted(one: Seen, group: Sequence[str], seconds: float) -> Repair:
-    """A channel, or all readings, that are late (early where below zero) by so many seconds."""
-    said = f"'{group[0]}' is" if len(group) == 1 else "the readings are"
+def shifted(one: Seen, group: Sequence[str], channels: Channels, seconds: float) -> Repair:
+    """A channel, all readings, or all inputs that are set, late (early if below zero) by so many seconds."""
+    names = ", ".join(f"'{name}'" for name in group)
+    said = (
+        f"{names} is"
+        if len(group) == 1
+        else "the readings are"
+        if channels[group[0]].measured
+        else f"{names} are"
+    )
     when = "late" if seconds > 0 else "early"
     what = f"{said} {_duration(abs(seconds))} {when} compared with the other channels"
     moved = {name: _moved(one.time, one.values[name], seconds) for name in group if name in one.values}
@@ -161,10 +169,13 @@ def offset(one: Seen, name: str, since: float, size: float, unit: str) -> Repair
 def shiftable(
     one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]
 ) -> list[tuple[str, ...]]:
-    """Channels that may be late by themselves, and all readings together."""
-    groups = [(name,) for name in _moving(one, inputs) if channels[name].between == "held"]
-    groups += [(name,) for name in _moving(one, outputs)]
-    return groups + ([tuple(outputs)] if len(outputs) > 1 else [])
+    """Channels that may be late by themselves, and those of one logger: all readings, or all inputs that are
+    set where others are measured. Without others, late inputs are early readings.
+    """
+    held = [name for name in _moving(one, inputs) if channels[name].between == "held"]
+    groups: list[tuple[str, ...]] = [(name,) for name in [*held, *_moving(one, outputs)]]
+    groups += [tuple(outputs)] if len(outputs) > 1 else []
+    return groups + ([tuple(held)] if 1 < len(held) < len(_moving(one, inputs)) else [])
 
 
 def clocks(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]) -> Iterator[Repair]:
@@ -180,7 +191,7 @@ def halves(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequen
     length = float(one.time[-1])
     for name in _moving(one, [*outputs, *inputs]):
         values, channel = one.values[name], channels[name]
-        if _is_switch(values):
+        if is_switch(values):
             continue
         changes: list[tuple[str, float, float]] = []
         if channel.unit == "degC":
@@ -220,8 +231,12 @@ def _moves(values: Array) -> bool:
     return bool(known.size and known.min() < known.max())
 
 
-def _is_switch(values: Array) -> bool:
-    return bool(np.isin(values[np.isfinite(values)], (0.0, 1.0)).all())
+def is_switch(values: Array) -> bool:
+    """Whether a channel is 0 or 1, but for a few rows in which it was switched: a row is a mean."""
+    known = values[np.isfinite(values)]
+    if known.size == 0 or known.min() < 0.0 or known.max() > 1.0:
+        return False
+    return bool(np.mean(np.isin(known, (0.0, 1.0))) >= _SWITCHED)
 
 
 def _moved(time: Array, values: Array, seconds: float) -> Array:

@@ -69,7 +69,11 @@ def _fastest(time: Array, read: Array) -> tuple[float, int]:
 
 
 def starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iterator[Finding]:
-    """Find a temperature that differs from the others at a cold start, and does not in other recordings."""
+    """Find a temperature that differs from the others at a cold start, and does not in other recordings.
+
+    Where it starts as its siblings do, nothing is wrong with it, wherever it starts elsewhere: the other
+    recordings may have begun with a warm machine.
+    """
     away: dict[tuple[str, str], float] = {}
     agree: dict[str, float] = {}
     for one in recordings:
@@ -97,7 +101,8 @@ def starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Itera
             if elsewhere.size >= 2:
                 middle = float(np.median(elsewhere))
                 spread = 1.4826 * float(np.median(np.abs(elsewhere - middle)))
-                odd = abs(here - middle) > max(_START, _SPREADS * spread, 1.5 * np.ptp(elsewhere))
+                usual = max(_START, _SPREADS * spread, 1.5 * np.ptp(elsewhere))
+                odd = abs(here - middle) > usual and abs(here) > _START
                 odd = odd and agree[f"{one.name}|{c.name}"] < _START
                 odd = odd and (siblings > 1 or _stays_apart(one, c.name, recordings))
             else:
