@@ -30,6 +30,8 @@ _ENCODINGS = (
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _SIGNS = set("°℃℉µμ±²³·ΔΩ×‰")
 _SAMPLE = 65536  # bytes
+# no word has a sign, or letters of East Asia, between two letters
+_INSIDE = re.compile(r"[^\W\d_][²³¹¼½¾¿¡¬¦§¨´¸¯][^\W\d_]|[a-z][\u3040-\u9fff\uac00-\ud7af]+[a-z]")
 _MIXED = re.compile(r"[a-z][\u0400-\u04ff]|[\u0400-\u04ff][a-z]", re.IGNORECASE)  # no word has both alphabets
 _WORD, _LETTER, _SIGN, _ODD = 6.0, 0.5, 1.0, -4.0
 
@@ -58,7 +60,14 @@ def decode(data: bytes, path: Path) -> tuple[str, tuple[str, ...]]:
     return data.decode(best, errors="replace"), (f"text read as {_CALLED.get(best, best)}",)
 
 
-_CALLED = {"cp1252": "Windows-1252", "cp932": "Shift-JIS", "euc_jp": "EUC-JP", "gb18030": "GB 18030"}
+_CALLED = {
+    "cp1252": "Windows-1252",
+    "cp1250": "Windows-1250",
+    "cp1251": "Windows-1251",
+    "cp932": "Shift-JIS",
+    "euc_jp": "EUC-JP",
+    "gb18030": "GB 18030",
+}
 
 
 def _without_mark(data: bytes) -> str:
@@ -79,7 +88,7 @@ def _likely(data: bytes, encoding: str) -> float:
         return float("-inf")
     found = sum(not word.said.isascii() or len(word.said) > 2 for word in words_of(text[:2000]))
     letters = sum(map(_letter, filter(lambda c: not c.isascii(), text)))
-    return _WORD * found + letters + _ODD * len(_MIXED.findall(text))
+    return _WORD * found + letters + _ODD * (len(_MIXED.findall(text)) + len(_INSIDE.findall(text)))
 
 
 def _letter(char: str) -> float:

@@ -24,8 +24,8 @@ from discovery.progress import Progress, silent
 from discovery.recordings.campaignfile import CampaignForm
 from discovery.runfolder import temporary_folder
 
-_GOOD = 0.05  # of the rms without a model: nothing to gain with one more unknown of each recording
-_CLEARLY_LESS = 0.8  # of the rms: one more unknown of each recording is worth it
+GOOD = 0.05  # of the rms without a model: nothing to gain with one more unknown of each recording
+KEPT = 0.8  # of the rms: one more unknown of each recording is worth it
 
 
 def new(
@@ -93,14 +93,14 @@ def new(
         write_atomic(temporary / "campaign.toml", text)
         made = plan(temporary, folder.resolve().name, names, progress, quick=quick)
         own_zeros = perhaps_own_zeros(found, guesses, zeros)
-        if own_zeros and made.scores and made.scores[0].ratio > _GOOD:
+        if own_zeros and made.scores and made.scores[0].ratio > GOOD:
             progress("trying an own zero of each recording")
             own = campaign_text(
                 folder.resolve().name, found, guesses, air, about_room, kept, zeros | own_zeros
             )
             write_atomic(temporary / "campaign.toml", own)
             other = plan(temporary, folder.resolve().name, names, progress, quick=quick)
-            if other.scores[0].ratio < _CLEARLY_LESS * made.scores[0].ratio:
+            if other.scores[0].ratio < KEPT * made.scores[0].ratio:
                 found = replace(found, notes=(*found.notes, _set_to_zero(own_zeros, made, other)))
                 text, made = own, other
         folder.mkdir(parents=True, exist_ok=True)

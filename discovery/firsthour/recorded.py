@@ -16,7 +16,7 @@ from discovery.firsthour.guess import TEMPERATURES, Guess, guess
 from discovery.firsthour.measures import DEGREES, TIME_UNITS, known_unit
 from discovery.firsthour.odds import probabilities
 from discovery.firsthour.stamps import stated_interval
-from discovery.firsthour.table import Array, Column, OwnTable
+from discovery.firsthour.table import Array, Column, OwnTable, ascii_of
 from discovery.firsthour.tableguess import guess_all
 from discovery.firsthour.vocabulary import SET_POINT, words_of
 from discovery.recordings.timeunit import time_odds
@@ -129,7 +129,7 @@ def _recordings(tables: Sequence[OwnTable]) -> dict[str, OwnTable]:
         return {"first_part": _cut(tables[0], slice(split)), "last_part": _cut(tables[0], slice(split, None))}
     found: dict[str, OwnTable] = {}
     for table in tables:
-        stem = re.sub(r"[^\w.+-]+", "_", _stem(table), flags=re.ASCII).strip("_.")
+        stem = re.sub(r"[^\w.+-]+", "_", ascii_of(_stem(table))).strip("_.")
         stem = name = stem or "recording"
         count = 1
         while name in found:

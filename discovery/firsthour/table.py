@@ -280,6 +280,16 @@ def _without_codes(values: Array) -> tuple[Array, Array]:
     return kept, values[rows]
 
 
+def ascii_of(text: str) -> str:
+    """A text in ASCII letters, as a person would type it without the others.
+
+    >>> ascii_of("Körning 1"), ascii_of("Płyta"), ascii_of("試験3")
+    ('Koerning 1', 'Plyta', '3')
+    """
+    text = unicodedata.normalize("NFC", text).translate(_UMLAUTS)
+    return unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+
+
 def identifier(words: str, taken: set[str]) -> str:
     """A word that expressions can use, of the words of a header; words of other scripts are translated.
 
@@ -292,8 +302,7 @@ def identifier(words: str, taken: set[str]) -> str:
         for c in text
     ):
         text = _translated(text)
-    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
-    name = re.sub(r"\W+", "_", plain, flags=re.ASCII).strip("_") or "channel"
+    name = re.sub(r"\W+", "_", ascii_of(text), flags=re.ASCII).strip("_") or "channel"
     name = f"x_{name}" if name[0].isdigit() else name
     base, count = name, 1
     while name in taken or is_taken(name) or not is_word(name):

@@ -13,6 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
+from discovery.firsthour.recorded import recorded
+from discovery.firsthour.table import read_tables
 
 Row = Callable[[int], str]
 
@@ -229,6 +231,35 @@ def test_a_room_in_japanese_and_empty_cells_behind_the_last_tab(tmp_path: Path) 
     channels = _campaign(tmp_path / "rig")["channels"]
     assert channels["room"] == {"role": "ambient temperature", "unit": "degC"}
     assert channels["disp_X"]["role"] == "error"
+
+
+POLISH = "Płyta lewa [°C],Moc grzałki [mW]"
+
+
+@pytest.mark.parametrize(
+    ("header", "encoding", "names"),
+    [
+        (POLISH, "cp1250", {"Plyta_lewa", "Moc_grzalki"}),
+        ("Strömung [m³/h],Temp. Gehäuse [°C]", "cp1252", {"Stroemung", "Temp_Gehaeuse"}),
+        ("主轴功率(W),X轴温度(℃)", "gbk", {"spindle_power", "X_temp"}),
+    ],
+)
+def test_names_in_code_pages(header: str, encoding: str, names: set[str], tmp_path: Path) -> None:
+    rows = [f"{k},{100 * (k // 20 % 2)},{20 + k % 9 / 7}" for k in range(120)]
+    (tmp_path / "Körning 1.csv").write_bytes("\n".join([f"time,{header}", *rows]).encode(encoding))
+    [table] = read_tables(tmp_path / "Körning 1.csv")
+    assert {column.name for column in table.columns} == names
+
+
+def test_recordings_have_the_names_of_their_files_in_ascii(tmp_path: Path) -> None:
+    rows = [f"{k},{k % 3},{20 + k % 7}" for k in range(90)]
+    paths = [tmp_path / f"Körning {k}.csv" for k in (1, 2)]
+    for path in paths:
+        path.write_text("\n".join(["time,P [W],T [°C]", *rows]), "utf-8")
+    assert list(recorded([table for path in paths for table in read_tables(path)], None).recordings) == [
+        "Koerning_1",
+        "Koerning_2",
+    ]
 
 
 def _probe(zero: float, further: float = 0.0) -> Row:
