@@ -78,10 +78,11 @@ lock: $(STAMP)
 	    --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-emit-options --no-header \
 	    --output-file requirements.lock pyproject.toml
 
-# Known holes in what is locked (asks the advisory database of the index, so it needs the network)
+# Known holes in what is locked (asks the advisory database of the index, so it needs the network); fails if it
+# has no answer about a package
 audit: $(STAMP)
 	$(BIN)/python -m pip install --quiet pip-audit
-	$(BIN)/pip-audit --requirement requirements.lock --disable-pip --require-hashes
+	$(BIN)/pip-audit --requirement requirements.lock --disable-pip --require-hashes --strict
 
 licences: $(STAMP)
 	$(BIN)/python -m pip install --quiet pip-licenses

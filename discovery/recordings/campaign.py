@@ -54,7 +54,7 @@ class Channel:
         """Whether this is read from a thermometer or a probe, also one that models are fed with. What is held
         between stamps is set.
         """
-        thermometer = self.role == "other input" and self.unit == "degC" and self.between == "linear"
+        thermometer = self.role == "other input" and self.unit in ("degC", "K") and self.between == "linear"
         return self.role in SENSORS or thermometer
 
 

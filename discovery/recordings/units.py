@@ -24,6 +24,7 @@ _SPELLING = re.compile(rf"1?([^\W\d]|[/*() %°·²³⁻¹]|{_POWER}|(?<=[/(])1(?
 _MULTIPLE = re.compile(
     r"[x×*·]?\s*(\d{1,12}(?:[.,]\d{1,12})?(?:[eE][-+]?\d{1,3})?|1/1\d{1,12}|10\^[-+]?\d{1,2})\s*[x×*·]?\s*((?!\d)[\w°%].{0,99})"
 )
+_FAHRENHEIT = ("degF", "°F", "degree_Fahrenheit", "fahrenheit")
 _LONGEST = 100  # letters; the coefficient of a product of several inputs has a long one
 _MISTAKEN = {"C": "degC", "c": "degC", "F": "degF", "u/min": "rpm", "U/min": "rpm", "µ": "um", "l/m": "l/min"}
 
@@ -53,11 +54,15 @@ def conversion(unit: str, role: str) -> Conversion:
     Conversion(unit='um', factor=2.5, offset=0.0)
     >>> conversion("1/min", "rotation speed")
     Conversion(unit='rpm', factor=1.0, offset=0.0)
+    >>> conversion("degF", "other input").unit, conversion("K", "other input").unit
+    ('degC', 'K')
     """
     if (steps := multiple(unit)) is not None:
         one = conversion(steps[1], role)
         return Conversion(one.unit, steps[0] * one.factor, one.offset)
     facts = ROLES[role]
+    if not facts.units and unit in _FAHRENHEIT:  # a temperature in any role
+        return _affine(parse_unit(unit), "degC")
     if unit in facts.units or (not facts.units and parts(unit) is not None):
         return Conversion(unit)
     if facts.plain and unit in ("1", "percent", "%"):

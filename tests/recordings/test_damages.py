@@ -13,6 +13,7 @@ from tests.recordings.damages import (
     DAMAGES,
     Damage,
     findings,
+    harm,
     is_named,
     others,
     sound,
@@ -21,13 +22,8 @@ from tests.recordings.damages import (
 )
 from tests.recordings.simulated import simulated
 
-# what the comparison does not find: too near to what sound recordings differ by; or names by its other side:
-# readings that are early, where the inputs are late
-NOT_FOUND = {
-    "pump switch turned round",
-    "a clock that runs 20 % fast",
-    "a clock one hour off",
-}
+# what the comparison does not find: too near to what sound recordings differ by, and without harm
+NOT_FOUND = {"a clock that runs 20 % fast"}
 NMV5000 = Path(__file__).parents[2] / "datasets" / "nmv5000"
 CYCLES = ["fit", "validation", "left_nozzle", "height_100", "worn"]  # the flow is at 0 or at 8 l/min
 FLOWS = {"pump": ("fluid flow", "1"), "flow": ("fluid flow", "l/min"), "E_Y0C": ("error", "um")}
@@ -37,7 +33,11 @@ SEEDS = range(12)  # the thresholds were set on 100 others: benchmarks/damages.m
 def test_there_are_sixty_kinds_and_more() -> None:
     assert len({one.name for one in DAMAGES}) >= 60
     assert {one.name for one in DAMAGES} >= NOT_FOUND
-    assert len(NOT_FOUND) <= 0.05 * len(DAMAGES)
+
+
+def test_what_is_not_found_does_no_harm() -> None:
+    for one in (d for d in DAMAGES if d.name in NOT_FOUND):
+        assert harm(one) < 1.02  # times the held-out rms with sound recordings
 
 
 # every sixth here; all of them, with a table, by `python -m tests.recordings.damages` (5 min)

@@ -40,3 +40,10 @@ def test_a_hot_start(nozzle: Array, sound: bool) -> None:
     recordings = [seen("monday", warmed()), seen("tuesday", warmed()), seen("friday", nozzle)]
     found = list(starts(recordings, CHANNELS))
     assert ([f.channel for f in found] == []) is sound
+
+
+def test_a_cold_start_among_warm_ones() -> None:
+    """It starts as its siblings do: nothing is wrong, though the other recordings begin with a hot nozzle."""
+    cooling = 22.0 + 78.0 * np.exp(-TIME / 900.0)
+    recordings = [seen("monday", cooling), seen("tuesday", cooling), seen("friday", warmed())]
+    assert list(starts(recordings, CHANNELS)) == []

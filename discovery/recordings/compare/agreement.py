@@ -54,6 +54,7 @@ _DOUBT = {
     "factor": 0.2,
     "drift": 0.2,
     "offset": 0.0,
+    "level": 0.05,
 }
 _LATE = np.arange(0.002, 0.25, 0.001)  # of a recording: how late a channel may be
 _STEP = 0.05  # of a recording, on both sides of an offset: half of it has come there

@@ -68,6 +68,7 @@ _CLOCKS = (
     (86400.0, "days"),
     (1 / 60.0, "sixtieths of a second"),
 )
+_OFF = 5.0  # K: what siblings differ by when a machine is cold
 _SWITCHED = 0.95  # of the readings of a switch are 0 or 1
 _WHEN = tuple(np.linspace(0.1, 0.9, 17))  # of a recording: where a damage may begin
 
@@ -79,7 +80,7 @@ def all_repairs(
     one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]
 ) -> Iterator[Repair]:
     """Every repair of a recording that is known, but for shifts, whose size has to be found (`shifted`)."""
-    for family in (units, signs, swaps, clocks, halves):
+    for family in (units, signs, swaps, clocks, halves, levels):
         yield from family(one, channels, inputs, outputs)
 
 
@@ -176,6 +177,22 @@ def shiftable(
     groups: list[tuple[str, ...]] = [(name,) for name in [*held, *_moving(one, outputs)]]
     groups += [tuple(outputs)] if len(outputs) > 1 else []
     return groups + ([tuple(held)] if 1 < len(held) < len(_moving(one, inputs)) else [])
+
+
+def levels(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]) -> Iterator[Repair]:
+    """A thermometer that is off by what it differs from its siblings at the beginning."""
+    first = {
+        name: float(np.median(one.known(name)[1][:5]))
+        for name in _recorded(one, [*inputs, *outputs])
+        if channels[name].is_sensor and channels[name].unit == "degC" and one.known(name)[1].size
+    }
+    for name in _moving(one, [n for n in inputs if n in first]):
+        siblings = [value for other, value in first.items() if other != name]
+        away = first[name] - float(np.median(siblings)) if len(siblings) > 1 else 0.0
+        if abs(away) > _OFF:
+            what = f"'{name}' is {abs(away):.2g} K too {'high' if away > 0 else 'low'} throughout"
+            do = "look at the sensor, its unit and its contact"
+            yield Repair("level", (name,), what, do, one.having({name: one.values[name] - away}))
 
 
 def clocks(one: Seen, channels: Channels, inputs: Sequence[str], outputs: Sequence[str]) -> Iterator[Repair]:

@@ -41,7 +41,7 @@ def _climbs(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
     """
     fastest = {one.name: _fastest(*one.known(channel.name)) for one in recordings}
     for one in recordings:
-        others = [v for name, (v, _) in fastest.items() if name != one.name]
+        others = [abs(v) for name, (v, _) in fastest.items() if name != one.name]
         if len(others) < 2:
             continue
         change, row = fastest[one.name]

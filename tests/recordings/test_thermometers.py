@@ -1,0 +1,65 @@
+"""A thermometer on the machine that models are fed with is checked as every other sensor."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from discovery.recordings.campaign import Channel
+from discovery.recordings.compare.seen import Seen
+from discovery.recordings.compare.temperatures import temperature_findings
+from tests.recordings.conftest import CAMPAIGN, Write, found
+
+Array = NDArray[np.float64]
+BODY = CAMPAIGN.replace("[recordings]", 'body = { role = "other input", unit = "degC"%s }\n\n[recordings]')
+WARM = 22.0 + 20.0 * (1.0 - np.exp(-np.arange(200) / 50.0)) + np.random.default_rng(1).normal(0.0, 0.05, 200)
+
+
+def recorded(body: Array) -> list[str]:
+    rows = [
+        f"{60 * k},{20 + k % 7 / 10:.1f},{600 * (k // 50 % 2)},{'' if k % 2 else f'{k / 9 + k % 5 / 10:.2f}'}"
+        for k in range(body.size)
+    ]
+    lines = [f"{row},{value:.2f}" for row, value in zip(rows, body, strict=True)]
+    return ["time,T_env,speed,E_Y0C,body", *lines]
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda v: np.where(np.arange(v.size) > 99, v[99], v), "'body' stays at "),
+        (lambda v: np.where(np.arange(v.size) % 40 == 7, 0.0, v), "'body' is 0, exactly zero between"),
+        (lambda v: np.full(v.size, -180.0), "unusual for a channel of role temperature"),
+        (lambda v: v - 300.0, "no temperature can be that"),
+        (lambda v: np.where(np.isin(np.arange(v.size), [60, 61]), v + 400.0, v), "2 readings in a row"),
+        (lambda v: v + 15.0 * (np.arange(v.size) > 150), "'body' jumps from "),
+    ],
+)
+def test_a_faulty_thermometer(damage: Callable[[Array], Array], said: str, write: Write) -> None:
+    path = write(recorded(damage(WARM.copy())), BODY % ', between = "linear"')
+    assert any(said in one for one in found(path)), found(path)
+
+
+def test_a_sound_thermometer_and_a_set_point(write: Write) -> None:
+    assert found(write(recorded(WARM), BODY % ', between = "linear"')) == []
+    held = np.where(np.arange(200) < 20, 22.0, 60.0)  # what a controller was told stands still
+    assert found(write(recorded(held), BODY % "")) == []
+
+
+def test_fahrenheit_is_checked_as_celsius(write: Write) -> None:
+    fahrenheit = BODY.replace('degC"%s', 'degF"%s') % ', between = "linear"'
+    assert found(write(recorded(32.0 + 1.8 * WARM), fahrenheit)) == []
+    assert any("-180 degC" in one for one in found(write(recorded(np.full(200, -292.0)), fahrenheit)))
+
+
+def test_a_body_that_warms_as_fast_as_it_cools_elsewhere_is_sound() -> None:
+    time = np.linspace(0.0, 3980.0, 200)
+    cools, warms = 30.0 + 12.0 * np.exp(-time / 200.0), 42.0 - 12.0 * np.exp(-time / 200.0)
+    recordings = [
+        Seen(name, Path(f"{name}.csv"), time, {"body": values}, np.arange(200))
+        for name, values in (("a", cools), ("b", cools), ("c", warms))
+    ]
+    body = Channel("body", "other input", "degC", None, "linear")
+    assert [one.kind for one in temperature_findings(recordings, {"body": body})] == []
