@@ -10,6 +10,7 @@ from discovery.errors import UsageError, UserError
 from discovery.files import read_toml, write_atomic
 from discovery.firsthour.again import rewrite, touched
 from discovery.firsthour.asking import Ask, answered, doubt, questions, read_statements, with_statements
+from discovery.firsthour.celsius import in_celsius
 from discovery.firsthour.guess import TEMPERATURES, Guess, drives
 from discovery.firsthour.joining import join_all
 from discovery.firsthour.measures import DEGREES
@@ -73,7 +74,7 @@ def new(
     guesses = with_statements(found.seen, found.guesses, said, room)
     if ask is not None:
         guesses = answered(guesses, questions(found.seen, guesses), ask)
-    guesses = sensors_as_inputs(guesses)
+    found, guesses = in_celsius(found, sensors_as_inputs(guesses))
     found, zeros = from_first_readings(found, guesses)
     outputs = _outputs(found, guesses)
     if not outputs:

@@ -262,6 +262,17 @@ def test_recordings_have_the_names_of_their_files_in_ascii(tmp_path: Path) -> No
     ]
 
 
+def test_kelvin_of_a_machine_with_errors_becomes_celsius(tmp_path: Path) -> None:
+    """Models count degC from the room; kelvin would count from absolute zero."""
+    header = "time [min],T body [K],T rise [K],Disp. Z [um]"
+    row: Row = lambda k: f"{k},{295 + k / 9:.2f},{k / 9:.2f},{k / 3:.2f}"  # noqa: E731
+    said, rig = _made(tmp_path, header, row, row, row)
+    assert "'T_body': converted from kelvin to degC" in said
+    channels = _campaign(rig)["channels"]
+    assert (channels["T_body"]["unit"], channels["T_rise"]["unit"]) == ("degC", "K")
+    assert _read(rig, "run0", "T_body")[0] == pytest.approx(21.85)
+
+
 def _probe(zero: float, further: float = 0.0) -> Row:
     """A bed that is heated, a probe with an arbitrary zero that follows it, and the number of the sample."""
     return lambda k: f"{k},{k // 3},{21 + k % 5 / 9},{25 + k * k / 90},{zero + further * (k == 59) - k / 2}"
