@@ -1,7 +1,8 @@
 """Recordings and channels that are copies of each other, with noise added, cut, scaled or shifted.
 
 The noise of readings is drawn anew each time. Two series whose second differences hang together share their
-noise: one is a copy of the other, whatever was done to it.
+noise: one is a copy of the other, whatever was done to it. Recordings of one program move alike, too, if they
+are read so seldom that second differences hold the response: so what inputs explain does not count.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ _FEWEST = 60  # readings in common
 _ALIKE = 0.8  # correlation of second differences
 _TOGETHER = 0.99  # correlation of the readings of a channel and its copy
 _JUMPS = 0.1  # of the second differences, at most
+_MEMORY = 12  # readings for which an input may act on second differences
 _TAIL = 3.0  # robust standard deviations beyond which a second difference is a jump, no noise
 
 
@@ -64,7 +66,9 @@ def near_copies(
         for b in recordings[k + 1 :]:
             for name in measured:
                 left, right = series.get((a.name, name)), series.get((b.name, name))
-                if left is not None and right is not None and _overlap(left, right):
+                if left is None or right is None or not _overlap(left, right):
+                    continue
+                if _overlap(*(_unexplained(one, name, channels) for one in (a, b))):
                     yield a.name, b.name, name
                     break
 
@@ -88,9 +92,32 @@ def share_noise(a: Array, b: Array) -> bool:
     return _alike(_second(a), _second(b)) and abs(float(np.corrcoef(a, b)[0, 1])) > _TOGETHER
 
 
+def _unexplained(one: Seen, name: str, channels: Mapping[str, Channel]) -> Array:
+    """Second differences of the readings of a channel that those of the inputs, up to some readings before,
+    do not explain.
+    """
+    at, read = one.known(name)
+    moves = []
+    for other, channel in channels.items():
+        if channel.is_input and other in one.values and (known := one.known(other))[0].size:
+            moves.append(np.diff(np.interp(at, *known), 2))
+    target = np.diff(read, 2)
+    past = [np.concatenate((np.zeros(k), move[: move.size - k])) for move in moves for k in range(_MEMORY)]
+    past = [column for column in past if column.any()]
+    if not past or 2 * len(past) > target.size:
+        return _second(read)
+    columns = np.column_stack(past)
+    left: Array = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
+    return _noise(left)
+
+
 def _second(readings: Array) -> Array:
     """Return second differences of the noise: jumps are cut to a few standard deviations."""
-    second = np.diff(readings, 2)
+    return _noise(np.diff(readings, 2))
+
+
+def _noise(second: Array) -> Array:
+    """Return second differences in standard deviations, jumps cut to a few of them."""
     scale = 1.4826 * float(np.median(np.abs(second - np.median(second))))
     if scale <= 0 or np.mean(np.abs(second) > _TAIL * scale) > _JUMPS:
         return np.zeros(0)  # a series of jumps has no noise that could be shared
