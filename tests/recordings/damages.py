@@ -343,6 +343,7 @@ def _damages() -> list[Damage]:
         Damage("heaters: Fahrenheit", H, h, ("T1",), _set("T1", lambda v, _: 1.8 * v + 32)),
         Damage("heaters: minutes read as seconds", H, h, (), lambda f: f | {"time": f["time"] / 60}),
         Damage("heaters: hours read as seconds", H, h, (), lambda f: f | {"time": f["time"] / 3600}),
+        Damage("heaters: a clock that runs 20 % fast", H, h, (), _times(1.2)),
         Damage("heaters: shares read as percent", H, h, ("heater1",), _set("heater1", lambda v, _: v / 100)),
         Damage("heaters: a temperature 5 min late", H, h, ("T1", "T2"), _late(("T1",), 300.0)),
         Damage("heaters: a heater 5 min late", H, h, ("heater1",), _late(("heater1",), 300.0)),

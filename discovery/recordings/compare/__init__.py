@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Literal
 
 from discovery.recordings.campaign import Channel
-from discovery.recordings.compare.agreement import Disagreement, disagreements
+from discovery.recordings.compare.agreement import disagreements
 from discovery.recordings.compare.leaks import copied_channels, copies, near_copies
 from discovery.recordings.compare.levels import level_findings
 from discovery.recordings.compare.pairs import pair_findings
+from discovery.recordings.compare.repairs import Disagreement
 from discovery.recordings.compare.seen import Seen
 from discovery.recordings.compare.temperatures import temperature_findings
 from discovery.recordings.finding import Finding

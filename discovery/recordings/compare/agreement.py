@@ -8,7 +8,6 @@ agreement is named. The damage with the largest gain is undone first, and the re
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,7 +21,16 @@ from discovery.recordings.compare.crossprediction import (
     Reading,
     readings_of,
 )
-from discovery.recordings.compare.repairs import Repair, all_repairs, drifting, offset, shiftable, shifted
+from discovery.recordings.compare.pace import odd_pace
+from discovery.recordings.compare.repairs import (
+    Disagreement,
+    Repair,
+    all_repairs,
+    drifting,
+    offset,
+    shiftable,
+    shifted,
+)
 from discovery.recordings.compare.seen import Seen, inputs_of, outputs_of
 from discovery.recordings.compare.switches import used_inverted
 from discovery.threads import one_thread
@@ -61,18 +69,6 @@ _STEP = 0.05  # of a recording, on both sides of an offset: half of it has come 
 _MOST = 6  # repairs of a campaign that are looked for
 
 
-@dataclass(frozen=True)
-class Disagreement:
-    """A repair that makes a recording agree: misfit before and after, in parts of the movement."""
-
-    recording: str
-    repair: Repair
-    before: float
-    after: float
-    usual: float
-    gain: float
-
-
 @one_thread
 def disagreements(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -> list[Disagreement]:
     """Repairs that make recordings agree with the others, the largest gain first."""
@@ -87,6 +83,8 @@ def disagreements(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -
     while len(found) < _MOST and (best := _best_repair(known)) is not None:
         found.append(best)
         known = known.having(best.repair.made)
+    if (odd := odd_pace(known)) is not None:
+        found.append(odd)
     return found
 
 

@@ -29,6 +29,18 @@ class Repair:
     made: Seen
 
 
+@dataclass(frozen=True)
+class Disagreement:
+    """A repair that makes a recording agree: misfit before and after, in parts of the movement."""
+
+    recording: str
+    repair: Repair
+    before: float
+    after: float
+    usual: float
+    gain: float
+
+
 _FACTORS: dict[str, tuple[tuple[float, str, str], ...]] = {
     "error": ((1e3, "mm", "um"), (1e-3, "nm", "um"), (25.4e3, "inches", "um")),
     "heat load": ((1e3, "kW", "W"), (1e-3, "mW", "W"), (745.7, "hp", "W")),
@@ -147,6 +159,15 @@ def shifted(one: Seen, group: Sequence[str], channels: Channels, seconds: float)
     what = f"{said} {_duration(abs(seconds))} {when} compared with the other channels"
     moved = {name: _moved(one.time, one.values[name], seconds) for name in group if name in one.values}
     return Repair("shift", tuple(group), what, "check the clock of its logger", one.having(moved))
+
+
+def paced(one: Seen, factor: float) -> Repair:
+    """A clock that counts another time than has passed, by a factor of any size."""
+    side = "fast" if factor < 1.0 else "slow"
+    what = f"its clock runs about {abs(1.0 / factor - 1.0):.0%} {side} compared with the other recordings"
+    return Repair(
+        "pace", (), what, "check the interval of its logger", one.having({}, time=factor * one.time)
+    )
 
 
 def drifting(one: Seen, name: str, per_second: float) -> Repair:
