@@ -11,14 +11,15 @@ from discovery.dynamics import Grid, Trajectory, make_system, predict, simulate
 from discovery.errors import RunsAwayError
 
 UNRESOLVED = 0.05  # times the noise by which half the steps move what a model predicts
-MOST_STEPS = 40_000  # of a recording, about
+CONVERGES = 0.7  # times the change of the halving before: less, or shorter steps do not resolve the run
+MOST_PARTS, MOST_STEPS = 8, 40_000  # of a step; of a recording, about
 
 
 def parts_needed(run: Trajectory, white: Sequence[float] | NDArray[np.float64]) -> int:
     """In how many parts each step of a free run has to be divided: then half the steps would move what it
     predicts by less than UNRESOLVED of the noise, and what they err by is a third of this.
 
-    Means of readings are of steps that are short in any case.
+    Means of readings are of steps that are short in any case. What is chaotic is resolved by no steps.
 
     Args:
         white: (Y,) reading noise.
@@ -26,8 +27,8 @@ def parts_needed(run: Trajectory, white: Sequence[float] | NDArray[np.float64]) 
     grid = run.system.grid
     if run.system.affine or grid.means is not None or not len(grid.read):
         return 1
-    parts, now = 1, predict(run)
-    while len(grid.time) * parts < MOST_STEPS:
+    parts, now, before = 1, predict(run), np.inf
+    while parts < MOST_PARTS and len(grid.time) * parts < MOST_STEPS:
         half = make_system(run.system.model, grid.divided(2 * parts))
         try:
             then = predict(simulate(half, run.values, run.x[0]))
@@ -36,7 +37,9 @@ def parts_needed(run: Trajectory, white: Sequence[float] | NDArray[np.float64]) 
         off = np.sqrt(np.mean(((then - now) / np.asarray(white)) ** 2))
         if not off > UNRESOLVED:
             break
-        now, parts = then, 2 * parts
+        if off > CONVERGES * before:
+            return 1
+        now, parts, before = then, 2 * parts, off
     return parts
 
 
