@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
 from discovery.errors import RunsAwayError
+from discovery.fitting.begin import first_noise, first_spreads, gains_first
 from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.kalman import innovations
-from discovery.fitting.noise import Noise, readings_as_one, resolution, roughness, white_noise
+from discovery.fitting.noise import Noise, readings_as_one, resolution, white_noise
 from discovery.fitting.problem import FORMER, Prior, Problem, make_problem
 from discovery.fitting.resolution import resolved
 from discovery.fitting.solve import Loss, Solution, solve
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.terms import names
 from discovery.threads import one_thread
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 3  # of a fit that also finds how much a prior counts
 _MOST = 20  # ... or a reading noise that is not stated: it falls from what the start values leave
-_BEGINS = 0.05  # of what a state moves in a recording, how far from its start it may begin
-_SMALL = 0.01  # of the spread of readings: the least noise to begin with, where none is stated
 _ROUGH = 15  # of Levenberg-Marquardt in a round between the first and the last
 
 
@@ -176,10 +174,10 @@ def fit_model(
     theta = _beginning(problem, guess or {}, begin)
     least = resolution([system.grid.single for system in problem.systems])
     if not guess and begin is None:
-        theta = _gains_first(problem, theta, noise or _first_noise(problem, theta, stated, least))
-    current = noise or _first_noise(problem, theta, stated, least)
+        theta = gains_first(problem, theta, noise or first_noise(problem, theta, stated, least))
+    current = noise or first_noise(problem, theta, stated, least)
     nuisance = any(u.is_nuisance for u in problem.unknowns)
-    problem = problem.spread(current, _first_spreads(problem, theta))
+    problem = problem.spread(current, first_spreads(problem, theta))
     together = 1.0
     rounds = _ROUNDS if noise is None or nuisance else 1
     unknown = noise is None and any(stated[name] is None for name in problem.outputs)
@@ -268,75 +266,6 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
         covariance=fit.covariance[np.ix_(index, index)],
         trajectories=tuple(problem.run(s, theta) for s in problem.systems),
     )
-
-
-def _gains_first(problem: Problem, theta: Array, noise: Noise) -> Array:
-    """Where a fit begins once the gains of inputs are right for everything else.
-
-    Outputs are linear in them, so one step finds them. With gains that are wrong by orders, a fit bends rates
-    and rooms to what the gains miss, and does not come back.
-    """
-    gains = _gains(problem.model)
-    if not gains:
-        return theta
-    held = tuple(
-        u if u.name in gains and not u.is_nuisance else replace(u, low=float(x), high=float(x))
-        for u, x in zip(problem.unknowns, theta, strict=True)
-    )
-    try:
-        return solve(replace(problem, unknowns=held), theta, noise, "linear", 1, 0.0).theta
-    except RunsAwayError:
-        return theta
-
-
-def _gains(model: Model) -> set[str]:
-    """Free parameters that stand next to inputs only, never in a term or an output with a state."""
-    found = set(model.free)
-    for expression in model.expressions():
-        used = names(expression)
-        if used & set(model.states):
-            found -= used
-    return found & frozenset().union(*(names(term.expression) for term in model.terms))
-
-
-def _first_noise(
-    problem: Problem, theta: Array, stated: Mapping[str, float | None], least: Sequence[float]
-) -> Noise:
-    """The first noise: the residual at the start of the fit, but not more than the roughness of the readings.
-
-    With too much noise, or outputs weighed otherwise than in the end, the first round forgets where it began.
-    """
-    single = [system.grid.single for system in problem.systems]
-    rough = [_rough([r[:, j][np.isfinite(r[:, j])] for r in single]) for j in range(len(problem.outputs))]
-    left = [problem.residual(problem.run(s, theta)) * s.grid.per_reading for s in problem.systems]
-    begun = white_noise(problem.outputs, stated, left, least)
-    white = [
-        stated[name] or max(min(a, b) if np.isfinite(a) else b, floor)
-        for name, a, b, floor in zip(problem.outputs, begun.white, rough, least, strict=True)
-    ]
-    return replace(begun, white=tuple(white))
-
-
-def _rough(readings: Sequence[Array]) -> float:
-    """Roughness of the readings (R,) of a channel, at least a small share of their spread, because a logger
-    that interpolates shows no roughness.
-    """
-    spread = np.concatenate(readings)
-    return max(roughness(readings), _SMALL * float(np.std(spread)) if len(spread) else 0.0)
-
-
-def _first_spreads(problem: Problem, theta: Array) -> dict[str, float]:
-    """A first guess of how far states begin from their start that are neither read nor given a spread: a
-    share of what they move.
-    """
-    asked = [u for u in problem.unknowns if u.spread == "fitted" and u.is_start]
-    runs = [problem.run(s, theta) for s in problem.systems] if asked else []
-    moved: dict[str, float] = {}
-    for run in runs:
-        for u in (u for u in asked if u.recording == run.system.grid.recording):
-            series = run.x[:, run.system.states.index(u.name)]
-            moved[u.name] = max(moved.get(u.name, 0.0), _BEGINS * float(np.ptp(series)), 1e-6)
-    return moved
 
 
 def _found_spreads(

@@ -1,0 +1,90 @@
+"""What a fit begins with: gains that fit the other start values, a first noise, first spreads of starts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.errors import RunsAwayError
+from discovery.fitting.noise import Noise, roughness, white_noise
+from discovery.fitting.problem import Problem
+from discovery.fitting.solve import solve
+from discovery.models import Model
+from discovery.terms import names
+
+Array = NDArray[np.float64]
+
+_BEGINS = 0.05  # of what a state moves in a recording, how far from its start it may begin
+_SMALL = 0.01  # of the spread of readings: the least noise to begin with, where none is stated
+
+
+def gains_first(problem: Problem, theta: Array, noise: Noise) -> Array:
+    """Where a fit begins once the gains of inputs are right for everything else.
+
+    Outputs are linear in them, so one step finds them. With gains that are wrong by orders, a fit bends rates
+    and rooms to what the gains miss, and does not come back.
+    """
+    gains = _gains(problem.model)
+    if not gains:
+        return theta
+    held = tuple(
+        u if u.name in gains and not u.is_nuisance else replace(u, low=float(x), high=float(x))
+        for u, x in zip(problem.unknowns, theta, strict=True)
+    )
+    try:
+        return solve(replace(problem, unknowns=held), theta, noise, "linear", 1, 0.0).theta
+    except RunsAwayError:
+        return theta
+
+
+def _gains(model: Model) -> set[str]:
+    """Free parameters that stand next to inputs only, never in a term or an output with a state."""
+    found = set(model.free)
+    for expression in model.expressions():
+        used = names(expression)
+        if used & set(model.states):
+            found -= used
+    return found & frozenset().union(*(names(term.expression) for term in model.terms))
+
+
+def first_noise(
+    problem: Problem, theta: Array, stated: Mapping[str, float | None], least: Sequence[float]
+) -> Noise:
+    """The first noise: the residual at the start of the fit, but not more than the roughness of the readings.
+
+    With too much noise, or outputs weighed otherwise than in the end, the first round forgets where it began.
+    """
+    single = [system.grid.single for system in problem.systems]
+    rough = [_rough([r[:, j][np.isfinite(r[:, j])] for r in single]) for j in range(len(problem.outputs))]
+    left = [problem.residual(problem.run(s, theta)) * s.grid.per_reading for s in problem.systems]
+    begun = white_noise(problem.outputs, stated, left, least)
+    white = [
+        stated[name] or max(min(a, b) if np.isfinite(a) else b, floor)
+        for name, a, b, floor in zip(problem.outputs, begun.white, rough, least, strict=True)
+    ]
+    return replace(begun, white=tuple(white))
+
+
+def _rough(readings: Sequence[Array]) -> float:
+    """Roughness of the readings (R,) of a channel, at least a small share of their spread, because a logger
+    that interpolates shows no roughness.
+    """
+    spread = np.concatenate(readings)
+    return max(roughness(readings), _SMALL * float(np.std(spread)) if len(spread) else 0.0)
+
+
+def first_spreads(problem: Problem, theta: Array) -> dict[str, float]:
+    """A first guess of how far states begin from their start that are neither read nor given a spread: a
+    share of what they move.
+    """
+    asked = [u for u in problem.unknowns if u.spread == "fitted" and u.is_start]
+    runs = [problem.run(s, theta) for s in problem.systems] if asked else []
+    moved: dict[str, float] = {}
+    for run in runs:
+        for u in (u for u in asked if u.recording == run.system.grid.recording):
+            series = run.x[:, run.system.states.index(u.name)]
+            moved[u.name] = max(moved.get(u.name, 0.0), _BEGINS * float(np.ptp(series)), 1e-6)
+    return moved
