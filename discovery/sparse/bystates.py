@@ -113,7 +113,7 @@ def discover_states(
                 continue
             if found:
                 yield found
-    if lacking is not None and not starts and options.form != "auto" and len(hidden) == 1:
+    if lacking is not None and not starts and rival == np.inf:
         raise lacking
 
 
@@ -132,7 +132,8 @@ def _start(
     bare = (own if kind == "own" else rate)(data, data.outputs, words, unit, bool(options.stable))
     bare, options = _allowed(data, bare, options)
     begun = begin(data, bare, nearest)
-    if np.isfinite(begun.cost):
+    near = 0.5 * sum(int(data.grids[r].measured.sum()) for r in data.recordings)
+    if begun.cost <= _FAR**2 * near:  # short steps do not bring a law near that is far from the readings
         finer = with_short_steps(data, model_of(begun.structure, begun.entered))
         if finer is not data:
             data, begun = finer, begin(finer, bare, nearest)

@@ -152,6 +152,14 @@ def test_an_expression_of_an_unknown_name_is_refused() -> None:
         discover(campaign, ["a"], ["hare", "lynx"], options)
 
 
+@pytest.mark.parametrize("form", ["auto", "rates"])
+def test_a_bound_of_an_unknown_term_is_named(form: str) -> None:
+    campaign = campaign_from_frames(hare_and_lynx(), {"hare": OTHER, "lynx": OTHER})
+    options = SparseOptions.model_validate({"form": form, "library": ["linear"], "bounds": {"hair": [0, 1]}})
+    with pytest.raises(UserError, match="has 'hair' under bounds, which is not a term of its library"):
+        discover(campaign, ["a"], ["hare", "lynx"], options)
+
+
 def test_a_summary_names_bounds_that_bind() -> None:
     channels = {"u": {"role": "other input", "unit": "V"}, "y": {"role": "other output", "unit": "cm"}}
     u = np.repeat(np.random.default_rng(3).uniform(0.0, 2.0, 20), 20)
