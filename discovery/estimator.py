@@ -254,8 +254,8 @@ class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             of = ", ".join(group["outputs"])
             lines.append(f"  {of}: rms on left-out data {group['left_out_rms']:.4g} times the reading noise")
             lines += [f"    {label}  {100 * cost:+.1f} %" for label, cost in group.get("costs", {}).items()]
-        if held := self.discovery_.report["held"]:
-            lines += ["", "Bounds that bind", *(f"  {one}" for one in held)]
+        if binding := self.discovery_.report["binding"]:
+            lines += ["", "Bounds that bind", *(f"  {one}" for one in binding)]
         return "\n".join(lines)
 
     def _options(self) -> SparseOptions:

@@ -105,7 +105,7 @@ def judged(
         *check_dimensions(model, experiment.campaign.channels),
     ]
     notes += bound_notes(fit.model)
-    notes += (report or {}).get("held", ())
+    notes += (report or {}).get("binding", ())
     notes += offset_notes(fit, experiment.campaign.channels)
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
     return Fitted(name, kind, model, fit, predictions, validation, report or {}, tuple(notes), seconds)

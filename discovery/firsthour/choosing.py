@@ -21,7 +21,7 @@ from discovery.experiment.modelfits import fit_of
 from discovery.fitting import Fit, predict_recording
 from discovery.progress import Progress, silent
 from discovery.recordings import Campaign, Recording
-from discovery.sparse.ratedata import readings_that_show, time_scale
+from discovery.sparse.ratedata import jumps, readings_that_show, time_scale
 from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
@@ -183,23 +183,15 @@ def thinned(campaign: Campaign, points: int = _FEWEST) -> Campaign:
     return replace(campaign, recordings=recordings)
 
 
-def _switches(recording: Recording, campaign: Campaign) -> NDArray[np.intp]:
-    """Rows at which a held input changes."""
-    found = [np.zeros(0, dtype=np.intp)]
-    for name, series in recording.values.items():
-        channel = campaign.channels[name]
-        if channel.is_input and channel.between == "held":
-            known = np.flatnonzero(np.isfinite(series))
-            found.append(known[1:][np.diff(series[known]) != 0])
-    return np.unique(np.concatenate(found))
-
-
 def _thin(recording: Recording, campaign: Campaign, points: int) -> Recording:
     count = len(recording.time)
     if count < 2 * points:
         return recording
     edges = np.linspace(0, count, points + 1).astype(int)
-    switches = _switches(recording, campaign)
+    held = [n for n, c in campaign.channels.items() if c.is_input and c.between == "held"]
+    switches = np.unique(
+        np.concatenate([edges[:0], *(jumps(recording.values[n]) for n in held if n in recording.values)])
+    )
     if len(switches) <= points:  # what is held until it jumps keeps the instant of the jump
         edges = np.union1d(edges, switches)
     values = {}

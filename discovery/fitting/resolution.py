@@ -11,7 +11,6 @@ from discovery.dynamics import Grid, Trajectory, make_system, predict, simulate
 from discovery.errors import RunsAwayError
 
 UNRESOLVED = 0.05  # times the noise by which half the steps move what a model predicts
-CONVERGES = 0.7  # times the change of the halving before: less, or shorter steps do not resolve the run
 MOST_PARTS, MOST_STEPS = 8, 40_000  # of a step; of a recording, about
 
 
@@ -19,7 +18,7 @@ def parts_needed(run: Trajectory, white: Sequence[float] | NDArray[np.float64]) 
     """In how many parts each step of a free run has to be divided: then half the steps would move what it
     predicts by less than UNRESOLVED of the noise, and what they err by is a third of this.
 
-    Means of readings are of steps that are short in any case. What is chaotic is resolved by no steps.
+    Means of readings are of steps that are short in any case.
 
     Args:
         white: (Y,) reading noise.
@@ -27,7 +26,7 @@ def parts_needed(run: Trajectory, white: Sequence[float] | NDArray[np.float64]) 
     grid = run.system.grid
     if run.system.affine or grid.means is not None or not len(grid.read):
         return 1
-    parts, now, before = 1, predict(run), np.inf
+    parts, now = 1, predict(run)
     while parts < MOST_PARTS and len(grid.time) * parts < MOST_STEPS:
         half = make_system(run.system.model, grid.divided(2 * parts))
         try:
@@ -37,9 +36,7 @@ def parts_needed(run: Trajectory, white: Sequence[float] | NDArray[np.float64]) 
         off = np.sqrt(np.mean(((then - now) / np.asarray(white)) ** 2))
         if not off > UNRESOLVED:
             break
-        if off > CONVERGES * before:
-            return 1
-        now, parts, before = then, 2 * parts, off
+        now, parts = then, 2 * parts
     return parts
 
 

@@ -1,10 +1,10 @@
 """After a gap: measured errors say where the states of the model are.
 
 Through a gap nobody fed the model, and a machine at rest is where its laws are known least. So the states
-after a gap are x + dx, where dx has a spread of a share of what they moved meanwhile. One model for each
-state runs beside the one at work, begun a little further on in this state: so the errors that each part of dx
-makes are known at every later instant, and a measured error corrects all states by the usual formula of
-linear regression (Kalman, Trans. ASME J. Basic Eng. 82, 1960, without process noise).
+after a gap are x + dx. The standard deviation of dx is a share of what the states moved in the gap. For each
+state a second model runs that began with a small step in this state. Its outputs show how each part of dx
+moves the predicted errors, and a measured error corrects all states by the usual formula of linear
+regression (Kalman, Trans. ASME J. Basic Eng. 82, 1960, without process noise).
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ Array = NDArray[np.float64]
 
 # Chosen on seed 4000 of benchmarks/month.py and confirmed on others, see benchmarks/runtime.md
 SHARE = 0.3  # standard deviation of a state after a gap, as a share of what it moved meanwhile
-BESIDE = 0.1  # units of a state (K, um) by which the models beside begin further on
+STEP = 0.1  # of a state in its unit (K, um), with which a stepped model begins
 FAR = 4.0  # standard deviations: an error further away than this corrects nothing
 SETTLED = 0.1  # standard deviation of every predicted error, in residuals of the fit, at which it ends
 
 
 @dataclass
 class Observer:
-    """Models beside the one at work, and the covariance (N, N) of the parts of dx, in the units of the
-    states. `level` (Y,): residual of the fit of each output, NaN where there is none.
+    """Models that began with a step in one state each, and the covariance (N, N) of the parts of dx, in the
+    units of the states. `level` (Y,): residual of the fit of each output, NaN where there is none.
     """
 
-    beside: list[Stepper]
+    stepped: list[Stepper]
     covariance: Array
     level: Array
     counted: dict[str, float] = field(default_factory=dict)  # instant of the last reading of each error
@@ -43,21 +43,21 @@ class Observer:
     def after(cls, stepper: Stepper, moved: Array, level: Array) -> Observer:
         """Of a model after a gap in which its states moved by so much (n,)."""
         places = np.flatnonzero(moved != 0.0)
-        beside = []
+        stepped = []
         for i in places:
             one = stepper.twin()
-            one.x[i] += BESIDE
-            beside.append(one)
-        return cls(beside, np.diag((SHARE * moved[places]) ** 2), level)
+            one.x[i] += STEP
+            stepped.append(one)
+        return cls(stepped, np.diag((SHARE * moved[places]) ** 2), level)
 
     def run(self, u: Array) -> bool:
         """Take the steps of the model at work, inputs (K, U); False: one of the models failed."""
-        return all(len(one.run(u)) == len(u) for one in self.beside)
+        return all(len(one.run(u)) == len(u) for one in self.stepped)
 
     def slopes(self, stepper: Stepper, u: Array) -> Array:
         """Slopes (Y, N) of the outputs of the model at work."""
         y = stepper.outputs(u)
-        columns = [(one.outputs(u) - y) / BESIDE for one in self.beside]
+        columns = [(one.outputs(u) - y) / STEP for one in self.stepped]
         return np.array(columns).reshape(-1, len(y)).T
 
     def uncertain(self, slopes: Array) -> float:
@@ -75,36 +75,36 @@ class Observer:
         if not at or np.any(np.abs(seen) > FAR * np.sqrt(np.diag(spread))):
             return
         gain = np.linalg.solve(spread, rows @ self.covariance).T
-        moves = np.array([(one.x - stepper.x) / BESIDE for one in self.beside]).T @ (gain @ seen)
-        for one in (stepper, *self.beside):
+        moves = np.array([(one.x - stepper.x) / STEP for one in self.stepped]).T @ (gain @ seen)
+        for one in (stepper, *self.stepped):
             one.x += moves
         self.covariance = self.covariance - gain @ rows @ self.covariance
 
     def saved(self) -> dict[str, Any]:
         """What a restart needs."""
         return {
-            "states": [one.x.tolist() for one in self.beside],
+            "states": [one.x.tolist() for one in self.stepped],
             "covariance": self.covariance.tolist(),
             "counted": self.counted,
         }
 
     @classmethod
     def resumed(cls, saved: Mapping[str, Any], stepper: Stepper, level: Array) -> Observer:
-        """As it was saved, beside a model that was restored.
+        """As it was saved, with a model that was restored.
 
         Raises:
             ValueError: numbers that do not fit the model.
         """
-        beside = []
+        stepped = []
         for states in saved["states"]:
             one = stepper.twin()
             one.x[:] = np.array(states, dtype=float).reshape(len(one.x))
-            beside.append(one)
-        covariance = np.array(saved["covariance"], dtype=float).reshape(len(beside), len(beside))
-        if not all(np.isfinite(one.x).all() for one in beside) or not np.isfinite(covariance).all():
+            stepped.append(one)
+        covariance = np.array(saved["covariance"], dtype=float).reshape(len(stepped), len(stepped))
+        if not all(np.isfinite(one.x).all() for one in stepped) or not np.isfinite(covariance).all():
             raise ValueError("not finite")
         counted = {str(name): float(stamp) for name, stamp in saved["counted"].items()}
-        return cls(beside, covariance, level, counted)
+        return cls(stepped, covariance, level, counted)
 
 
 def levels(document: Mapping[str, Any], compiled: Compiled) -> Array:

@@ -240,9 +240,9 @@ def _apply(c: Compensator, content: dict[str, Any]) -> None:
     held = [dict(zip(KEPT, kept, strict=True)) for kept in content["held"]]
     pairs = list(zip(c.guards, held, strict=True))
     observer = content.get("observer")
-    beside = c.stepper.twin()
-    beside.restore(snapshot)
-    found["observer"] = None if observer is None else Observer.resumed(observer, beside, c.level)
+    restored = c.stepper.twin()
+    restored.restore(snapshot)
+    found["observer"] = None if observer is None else Observer.resumed(observer, restored, c.level)
     c.stepper.restore(snapshot)  # nothing is changed by a copy that does not fit
     for name, value in found.items():
         setattr(c, name, value)

@@ -26,13 +26,13 @@ _HORIZONS = (4.0, 16.0)  # lengths of free runs, in time scales of the readings
 
 @dataclass(frozen=True)
 class Begun:
-    """A structure with start values, the candidates that are in it from the start, those that a bound holds
-    back with the coefficients that the readings ask for, and the cost of a short fit.
+    """A structure with start values, the candidates that are in it from the start, those whose bound
+    binds with the coefficients that the readings ask for, and the cost of a short fit.
     """
 
     structure: Structure
     entered: set[int]
-    back: Mapping[int, float] = field(default_factory=dict)
+    binding: Mapping[int, float] = field(default_factory=dict)
     cost: float = np.inf
     weak: Structure | None = None  # with the start values of the weak form
 
@@ -94,13 +94,13 @@ def _lengthened(data: RateData, begun: Begun) -> Model:
 
 
 def _weakly(data: RateData, structure: Structure, widths: Sequence[float]) -> Begun:
-    """Start values of the candidates, the set to begin with, and candidates that a bound holds back with what
-    is asked for, by the weak form of the readings with windows of a half width [s] for each output.
+    """Start values of the candidates, the set to begin with, and candidates whose bound binds with what the
+    readings ask for, by the weak form of the readings with windows of a half width [s] for each output.
     """
     second = TIME_UNITS[structure.model.time_unit]
     values: dict[int, float] = {}
     chosen: set[int] = set()
-    back: dict[int, float] = {}
+    binding: dict[int, float] = {}
     for k, output in enumerate(data.outputs):
         into = structure.rates.get(output, output)
         mine = [i for i, c in enumerate(structure.candidates) if c.into == into]
@@ -121,8 +121,8 @@ def _weakly(data: RateData, structure: Structure, widths: Sequence[float]) -> Be
         values |= {mine[f]: float(v) for f, v in zip(best.family, best.theta, strict=True)}
         chosen |= {mine[f] for f in best.members}
         price = _price(independent, len(mine))
-        back |= {mine[f]: asked for f, asked in search.held(best, price, _always(independent)).items()}
-    return Begun(started(structure, values), chosen, back)
+        binding |= {mine[f]: asked for f, asked in search.binding(best, price, _always(independent)).items()}
+    return Begun(started(structure, values), chosen, binding)
 
 
 def _criterion(g: Gram, effective: float, gain: float, size: int, library: int) -> float:

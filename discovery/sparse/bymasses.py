@@ -17,7 +17,7 @@ from discovery.recordings import Campaign
 from discovery.sparse.borrowed import borrowed
 from discovery.sparse.choice import Choice, chosen, stability
 from discovery.sparse.constraints import matched
-from discovery.sparse.discovery import Discovery, PathPoint, held, path_points
+from discovery.sparse.discovery import Discovery, PathPoint, about_bound, path_points
 from discovery.sparse.drives import Drives
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.library import STILL, Feature, FilteredInputs
@@ -264,6 +264,6 @@ def _evidence(
             for f, cost in zip(features, choice.costs, strict=True)
             if f in left and np.isfinite(cost)
         },
-        "held": [held(output, library.drive_of_family_[f], asked) for f, asked in choice.held],
+        "binding": [about_bound(output, library.drive_of_family_[f], asked) for f, asked in choice.binding],
     }
     return points, stability, report

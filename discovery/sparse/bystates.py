@@ -22,7 +22,7 @@ from discovery.sparse.beginning import FIRST, Begun, begin, fit_briefly, model_o
 from discovery.sparse.bymasses import CLEAR
 from discovery.sparse.byrates import discover_rates
 from discovery.sparse.constraints import UnknownTermError, check_names, matched
-from discovery.sparse.discovery import Discovery, held
+from discovery.sparse.discovery import Discovery, about_bound
 from discovery.sparse.folds import PREDICT
 from discovery.sparse.freeruns import left_out
 from discovery.sparse.growth import Growth, grown
@@ -64,7 +64,7 @@ def discover_states(
     hidden: Sequence[str],
     progress: Progress,
     rival: float = np.inf,
-    held_back: list[str] | None = None,
+    binding: list[str] | None = None,
 ) -> Iterator[Discovery]:
     """A discovery for each kind of hidden state that was asked for and does not run away, made when it is
     asked for; none for a kind that begins far from the readings where another one begins near.
@@ -72,7 +72,7 @@ def discover_states(
     Args:
         rival: mean squared error of another model on left-out data. A kind that leaves more of the readings
             that it is fitted to is no better on others: it is not made. Nor is one that begins far from it.
-        held_back: takes a sentence for each bound that holds a term of any kind back.
+        binding: takes a sentence for each bound that binds, in any kind.
     """
     words = options.library or WORDS
     check_names(data.campaign.path, words, [*data.outputs, *next(iter(data.grids.values())).samples], hidden)
@@ -92,8 +92,8 @@ def discover_states(
         try:
             starts[kind] = _start(data, kind, words, unit, options, nearest)
             nearest = min(nearest, starts[kind].begun.cost)
-            if held_back is not None:
-                held_back.extend(_held(starts[kind]))
+            if binding is not None:
+                binding.extend(_about_bounds(starts[kind]))
         except RunsAwayError:
             pass
         except UnknownTermError as error:  # a term that this form does not have: another one may
@@ -210,13 +210,13 @@ def _without_term(model: Model, name: str) -> Model:
     return replace(small, parameters={n: p for n, p in small.parameters.items() if n in used})
 
 
-def _held(start: Start) -> list[str]:
-    """Sentences on bounds that hold candidates back."""
+def _about_bounds(start: Start) -> list[str]:
+    """Sentences on bounds that bind."""
     said = []
-    for i, asked in start.begun.back.items():
+    for i, asked in start.begun.binding.items():
         c = start.begun.structure.candidates[i]
         given = c.label in start.options.bounds
-        said.append(held(c.into, c.label, asked, "bounds" if given else "stable = true"))
+        said.append(about_bound(c.into, c.label, asked, "bounds" if given else "stable = true"))
     return said
 
 

@@ -39,7 +39,7 @@ class Choice:
     spreads: tuple[float, ...] = ()  # of the coefficients in their prior
     costs: tuple[float, ...] = ()  # of each term: share by which the left-out rms grows without it
     stability: tuple[float, ...] = ()  # of each term: share of block bootstraps whose set has its family
-    held: tuple[tuple[int, float], ...] = ()  # families that a bound holds back, and what is asked for
+    binding: tuple[tuple[int, float], ...] = ()  # families whose bound binds, and the coefficient asked for
     problem: Problem | None = None  # as it was believed in the end
 
 
@@ -86,16 +86,16 @@ def evidence(problem: Problem, terms: Terms) -> Choice:
         tuple(problem.spreads(terms).tolist()),
         costs,
         stability(problem, terms),
-        _held(problem, search, terms),
+        _binding(problem, search, terms),
         problem,
     )
 
 
-def _held(problem: Problem, search: Search, terms: Terms) -> tuple[tuple[int, float], ...]:
-    """Families that a bound holds back, and the coefficients that the readings ask for."""
+def _binding(problem: Problem, search: Search, terms: Terms) -> tuple[tuple[int, float], ...]:
+    """Families whose bound binds, and the coefficients that the readings ask for."""
     effective = partial(_effective, problem, search)
     price = np.log(effective(terms)) + 2 * np.log(problem.families.columns)
-    return tuple(search.held(terms, float(price), effective).items())
+    return tuple(search.binding(terms, float(price), effective).items())
 
 
 def _believed(problem: Problem, terms: Terms) -> tuple[Problem, Terms]:

@@ -220,11 +220,11 @@ def _best(
     found = [_begun(one, campaign, recordings, outputs, options) for one in found]
     rates = make_rate_data(campaign, recordings, outputs, inputs.names, options.blocks)
     errors = [left_out_of(rates, one.model) for one in found]
-    held: list[str] = []
+    binding: list[str] = []
     done = bool(found) and leaves_noise(campaign, recordings, found[0].model, outputs)
     if not done:
         rival = float(errors[0].mean()) if errors else np.inf
-        for one in discover_states(rates, options, states, progress, rival, held):
+        for one in discover_states(rates, options, states, progress, rival, binding):
             with suppress(RunsAwayError):
                 done = leaves_noise(campaign, recordings, one.model, outputs)
                 found.append(one)
@@ -235,10 +235,13 @@ def _best(
         raise UserError(
             f"{campaign.path}: no model of {', '.join(outputs)} in the form asked for stays finite on "
             "its own readings and has the terms under keep and bounds; offer other terms under library, or "
-            + "; ".join(["leave out form and hidden", *held])
+            + "; ".join(["leave out form and hidden", *binding])
         )
     best = found[choose(np.array(errors), PREDICT if options.tolerance is None else options.tolerance)]
-    return best if done or not held else replace(best, report=best.report | {"held": held})
+    if done or not binding:
+        return best
+    own = best.report.get("binding", [])
+    return replace(best, report=best.report | {"binding": [*own, *binding]})
 
 
 def _on_file(

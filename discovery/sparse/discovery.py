@@ -48,14 +48,14 @@ def path_points(
     return tuple(points)
 
 
-def held(place: str, term: str, asked: float, line: str = "bounds") -> str:
+def about_bound(place: str, term: str, asked: float, line: str = "bounds") -> str:
     """A sentence on a bound that binds.
 
-    >>> held("E_Y", "P", -0.013)
-    "E_Y: the line bounds holds the term 'P' back; the readings ask for the coefficient -0.013"
+    >>> about_bound("E_Y", "P", -0.013)
+    "E_Y: 'bounds' limits the coefficient of 'P'; without this limit, the readings ask for -0.013"
     """
-    asks = f"the readings ask for the coefficient {asked:.3g}"
-    return f"{place}: the line {line} holds the term '{term}' back; {asks}"
+    asks = f"without this limit, the readings ask for {asked:.3g}"
+    return f"{place}: '{line}' limits the coefficient of '{term}'; {asks}"
 
 
 def merged(name: str, parts: Sequence[Model]) -> Model:
@@ -74,7 +74,7 @@ def joined(name: str, parts: Sequence[Discovery], seconds: float) -> Discovery:
     stability = {label: share for part in parts for label, share in part.stability.items()}
     report = {
         "groups": [group for part in parts for group in part.report.get("groups", [part.report])],
-        "held": [said for part in parts for said in part.report.get("held", ())],
+        "binding": [said for part in parts for said in part.report.get("binding", ())],
         "path": [
             {
                 "outputs": list(point.outputs),

@@ -129,7 +129,7 @@ def thinned(
         for channel in set(inputs) & set(values):
             known = np.flatnonzero(np.isfinite(values[channel]))
             if campaign.channels[channel].between == "held" and len(known) > 1:
-                same = known[1:][np.diff(values[channel][known]) == 0]
+                same = np.setdiff1d(known[1:], jumps(values[channel]))
                 values[channel] = values[channel].copy()
                 values[channel][same] = np.nan
         made[name] = replace(recording, values=values)
@@ -171,6 +171,12 @@ def with_short_steps(data: RateData, model: Model) -> RateData:
         return data
     grids = resolved(runs, noise)
     return replace(data, grids=grids) if grids else data
+
+
+def jumps(series: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Rows at which a series (N,), NaN where nothing is known, changes its value."""
+    known = np.flatnonzero(np.isfinite(series))
+    return np.asarray(known[1:][np.diff(series[known]) != 0])
 
 
 def stated_noise(data: RateData) -> dict[str, float | None]:

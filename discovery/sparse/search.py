@@ -143,9 +143,9 @@ class Search:
         slow = (last > 0) & (terms.place > last - _EDGE)
         return {int(f): int(np.sum(~slow & (terms.family == f))) for f in terms.family[slow]}
 
-    def held(self, terms: Terms, price: float, effective: Callable[[Terms], float]) -> dict[int, float]:
-        """Families that a bound keeps out of the set, or at the bound, though the readings ask for what lies
-        beyond it; and the coefficient that they ask for.
+    def binding(self, terms: Terms, price: float, effective: Callable[[Terms], float]) -> dict[int, float]:
+        """Families whose bound binds, because the readings ask for a coefficient beyond it; and that
+        coefficient.
 
         Args:
             price: of one more term in a criterion. effective: independent readings, by the set.

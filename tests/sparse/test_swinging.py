@@ -114,7 +114,7 @@ def test_a_line_that_holds_the_law_back_is_named() -> None:
     options = SparseOptions(
         library=("linear", "cubic", "y**2*rate"), hidden="rate", stable=True, bootstraps=0
     )
-    with pytest.raises(UserError, match="the line stable = true holds the term 'x_rate' back"):
+    with pytest.raises(UserError, match="'stable = true' limits the coefficient of 'x_rate'"):
         discover(campaign_from_frames(swings(), {"x": OTHER}), ["a", "b"], ["x"], options)
 
 
@@ -142,7 +142,7 @@ def test_a_bound_of_a_gain_that_binds_is_named(bounds: dict[str, tuple[float, fl
     }
     campaign = campaign_from_frames({"a": warmed(0), "b": warmed(1)}, channels)
     found = discover(campaign, ["a", "b"], ["E"], SparseOptions(bounds=bounds, bootstraps=0))
-    assert any("bounds holds the term 'P' back" in said for said in found.report["held"]) == told
+    assert any("'bounds' limits the coefficient of 'P'" in said for said in found.report["binding"]) == told
 
 
 def test_an_expression_of_an_unknown_name_is_refused() -> None:
@@ -172,4 +172,4 @@ def test_a_summary_names_bounds_that_bind() -> None:
     options = {"form": "rates", "hidden": "own", "library": ["linear"]}
     assert "Bounds that bind" not in discovery.discover({"a": frame}, ["y"], channels, **options).summary()
     tight = discovery.discover({"a": frame}, ["y"], channels, bounds={"u": (0.0, 0.1)}, **options).summary()
-    assert "Bounds that bind\n  y: the line bounds holds the term 'u' back" in tight
+    assert "Bounds that bind\n  y: 'bounds' limits the coefficient of 'u'" in tight

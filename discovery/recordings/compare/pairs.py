@@ -22,7 +22,7 @@ _RELATED = 0.5  # of what a channel moves: what a straight line of its sibling l
 
 
 def pair_findings(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -> Iterator[Finding]:
-    """Inputs that look swapped, frozen or full beside another one."""
+    """Pairs of inputs of which one looks swapped, frozen, or at the end of its range."""
     inputs = [channel for channel in channels.values() if channel.is_input]
     yield from _exchanged(recordings, inputs)
     yield from _stuck(recordings, inputs)
