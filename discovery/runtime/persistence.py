@@ -208,7 +208,7 @@ def _read(path: Path) -> dict[str, Any] | None:
             return None
         content: dict[str, Any] = json.loads(data["body"])
         whole = isinstance(content["model"], str) and math.isfinite(_saved(content).time)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
         return None
     return content if whole else None
 

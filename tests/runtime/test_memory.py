@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import hashlib
 import itertools
 import json
 import signal
@@ -21,7 +22,7 @@ from discovery.export.document import Exported
 from discovery.runtime.compensator import Compensator, Settings, State
 from discovery.runtime.guards import Reading
 from discovery.runtime.output import Output
-from discovery.runtime.persistence import NAMES, restore, save
+from discovery.runtime.persistence import NAMES, peek, restore, save
 from discovery.runtime.session import Session
 
 STEP = 10.0
@@ -77,15 +78,24 @@ def test_a_state_of_another_model_is_not_restored(
     running: Compensator, exported: Exported, tmp_path: Path
 ) -> None:
     save(running, tmp_path).result()
-    data = json.loads((tmp_path / NAMES[0]).read_text())
-    body = json.loads(data["body"]) | {"model": "0" * 64}
-    import hashlib
-
-    text = json.dumps(body)
-    (tmp_path / NAMES[0]).write_text(
-        json.dumps({"sha256": hashlib.sha256(text.encode()).hexdigest(), "body": text})
-    )
+    change_body(tmp_path / NAMES[0], {"model": "0" * 64})
     assert restore(Compensator(exported), tmp_path) is None
+
+
+def test_a_time_of_four_hundred_digits_is_left_aside(
+    running: Compensator, exported: Exported, tmp_path: Path
+) -> None:
+    """A whole number that no floating-point number holds (found by fuzzing)."""
+    save(running, tmp_path).result()
+    change_body(tmp_path / NAMES[0], {"time": 10**400})
+    assert peek(Compensator(exported), tmp_path) is None
+    assert restore(Compensator(exported), tmp_path) is None
+
+
+def change_body(path: Path, changes: dict[str, Any]) -> None:
+    """Change a saved state and renew its checksum."""
+    text = json.dumps(json.loads(json.loads(path.read_text())["body"]) | changes)
+    path.write_text(json.dumps({"sha256": hashlib.sha256(text.encode()).hexdigest(), "body": text}))
 
 
 def test_through_a_gap_the_state_is_that_of_a_machine_at_rest(
