@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 SURE = 0.9  # probability below which a guess is asked about
 _SENT = 0.85  # that what a controller sends is what heats
 NEXT = 0.02  # of an answer worth offering
-TEMPERATURES = ("ambient temperature", "fluid temperature", "coolant temperature", "temperature")
+FLUIDS = ("fluid temperature", "coolant temperature")
+TEMPERATURES = ("ambient temperature", *FLUIDS, "temperature")
 CURRENTS, VOLTAGES = ("A", "mA", "kA"), ("V", "mV", "kV")
 
 

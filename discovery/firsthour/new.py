@@ -11,7 +11,7 @@ from discovery.files import read_toml, write_atomic
 from discovery.firsthour.again import rewrite, touched
 from discovery.firsthour.asking import Ask, answered, doubt, questions, read_statements, with_statements
 from discovery.firsthour.celsius import in_celsius
-from discovery.firsthour.guess import TEMPERATURES, Guess, drives
+from discovery.firsthour.guess import FLUIDS, TEMPERATURES, Guess, drives
 from discovery.firsthour.joining import join_all
 from discovery.firsthour.measures import DEGREES
 from discovery.firsthour.plan import Plan, plan, predicted
@@ -222,7 +222,9 @@ def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Gue
             f"  {quantity} in {unit} from the names of the files: "
             + ", ".join(f"{v:g}" for v in values.values())
         )
-    warmed = [n for n, one in guesses.items() if one.role == "other input" and one.unit in DEGREES]
+    warmed = any(
+        one.role in FLUIDS or (one.role == "other input" and one.unit in DEGREES) for one in guesses.values()
+    )
     thermal = any(one.role == "error" or one.role in TEMPERATURES for one in guesses.values())
     if thermal and not drives(guesses) and not warmed and not found.constants:
         lines.append(

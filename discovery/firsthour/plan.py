@@ -15,7 +15,7 @@ from discovery.files import read_toml, write_atomic
 from discovery.firsthour.choosing import CANDIDATES, NOT_TRIED, Score, choose
 from discovery.firsthour.explain import FIRST_MODELS
 from discovery.firsthour.firstmodel import first_model, usual_inputs
-from discovery.firsthour.guess import Guess, drives
+from discovery.firsthour.guess import FLUIDS, Guess, drives
 from discovery.firsthour.inputs import strongest
 from discovery.firsthour.texts import experiment_text
 from discovery.firsthour.vocabulary import words_of
@@ -203,7 +203,7 @@ def missing(
             f"{', '.join(bodies)}: measured temperatures, which no model uses as inputs; "
             "give one the role 'other input' if the errors follow it"
         )
-    if not loads:
+    if not loads and not any(one.role in FLUIDS for one in guesses.values()):
         found.append("record what heats the machine: a power, current, speed or switch")
     elif len(still) == len(loads):
         found.append(f"let {', '.join(still)} move while you record: steps of an hour or two, and pauses")

@@ -201,11 +201,17 @@ def _is_heat(one: Guess) -> bool:
 
 
 def _unwarmed(guesses: Mapping[str, Guess]) -> dict[str, Guess]:
-    """If nothing here warms, but a force or the like is recorded, a displacement is no thermal error."""
+    """If nothing here warms, but a force, a flow or the like is recorded, a displacement is no thermal error:
+    it may be the way of a mass on a spring, or the level of a tank.
+    """
     found = dict(guesses)
     warm = drives({name: one for name, one in found.items() if one.unit not in VOLTAGES})
     thermal = warm or any(one.role in TEMPERATURES for one in found.values())
-    pushed = [name for name, one in found.items() if one.role == OTHER and one.unit not in ("1", *DEGREES)]
+    pushed = [
+        name
+        for name, one in found.items()
+        if (one.role == OTHER and one.unit not in ("1", *DEGREES)) or one.role == "fluid flow"
+    ]
     if not thermal and pushed:
         for name, one in found.items():
             if one.role == "error" and not one.said:

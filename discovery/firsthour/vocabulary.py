@@ -200,7 +200,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     (
         "inlet",
         {"fluid": 6},
-        "inlet inflow ~zulauf ~eintritt ~einlass entree ingresso entrada ~入口",
+        "inlet inflow intake ~zulauf ~eintritt ~einlass entree ingresso entrada ~入口",
     ),
     (
         "cell",
@@ -231,6 +231,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
 # names that are formulas rather than words
 _FORMS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     ("error", {"displacement": 6}, r"\be ?[xyzabcr]\d?[0a-z]*\b"),
+    ("inlet", {"fluid": 6}, r"\b(hot|cold|water|steam|shell|tube|feed|primary|secondary) in(let)?\b"),
     ("disp", {"displacement": 4}, r"\b(d|delta) ?[xyz](?![^\W\d_])"),
     ("disp", {"displacement": 2, "position": 2}, r"\b[xyz](?![^\W\d_])"),
     ("nozzle height", {"nozzle height": 7}, r"\bnozzle.*height\b|\bh nozzle\b"),

@@ -121,6 +121,17 @@ def test_a_spring_a_cell_and_a_vessel() -> None:
     assert [one.role for one in vessel.values()] == ["other input", "other output"]
 
 
+def test_levels_of_tanks_and_inlets_of_an_exchanger() -> None:
+    """A length that a flow alone moves is no thermal error; what flows into an exchanger drives it."""
+    tanks = _guessed(("pump", "l/min", 1, 6), ("h1", "cm", 0, 20), ("h2", "cm", 0, 15))
+    assert [one.role for one in tanks.values()] == ["fluid flow", "other output", "other output"]
+    cooled = _guessed(("pump", "l/min", 1, 6), ("T_coolant", "degC", 20, 24), ("Z", "um", 0, 20))
+    assert cooled["Z"].role == "error"
+    streams = _guessed(*((f"T_{name}", "degC", 20, 40) for name in ("hot_in", "cold_in", "hot_out", "bed")))
+    fluid, body = "fluid temperature", "temperature"
+    assert [one.role for one in streams.values()] == [fluid, fluid, body, body]
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 def test_a_motor_and_two_masses(noise: float) -> None:
     """A speed that answers to a voltage is no input, a displacement that a force makes no thermal error."""
