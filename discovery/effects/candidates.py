@@ -207,7 +207,7 @@ def _naming(
     binding: Mapping[str, Expression],
     scene: Scene,
 ) -> _Naming:
-    everywhere = spot.each or (spot.terms and len(spot.bodies) > 1)
+    everywhere = spot.each or (spot.terms and len({t.into for t in spot.terms}) > 1)
     at = () if everywhere else spot.bodies or spot.outputs[: 1 if len(spot.outputs) == 1 else 0]
     suffix = "_".join([*channels, *at, *((run,) if run else ())])
     taken = {*model.parameters, *model.states, *scene.channels}
@@ -293,7 +293,8 @@ def _changed(
     """
     known = naming.sized(effect)
     if TERM in names(formula):
-        change = substitute(formula, {**known, TERM: term.expression, "body": Name(term.into)})
+        ends = {"body": Name(term.into), **({"other": Name(term.source)} if term.source else {})}
+        change = substitute(formula, {**known, TERM: term.expression, **ends})
         return Term(f"{effect.title}: {term.name}", term.into, change, term.source, effect.word)
     if effect.place == "inputs of a recording":
         used = names(term.expression) & inputs

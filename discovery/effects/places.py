@@ -87,7 +87,7 @@ def spots(
             for a, b in combinations(parts.bodies, 2):
                 is_link = frozenset((a, b)) in parts.links
                 if effect.place == "any pair" or is_link == (effect.place == "link"):
-                    yield Spot((a, b))
+                    yield Spot((a, b), _between(parts, a, b) if TERM in names(parse(effect.formula)) else ())
         case "driven and another":
             yield from (Spot((a, b)) for a in _driven(effect, parts) for b in parts.bodies if a != b)
         case "current terms":
@@ -163,6 +163,11 @@ def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, st
         if _holds(t, wanted, role) or (wanted == "heat load" and _is_friction(t, model, role))
     )
     yield from _of(effect, terms)
+
+
+def _between(parts: Layout, a: str, b: str) -> tuple[Term, ...]:
+    """Terms of the link of two bodies."""
+    return tuple(t for t in parts.own if t.source and {t.into, t.source} == {a, b})
 
 
 def _of(effect: Effect, terms: tuple[Term, ...]) -> Iterator[Spot]:

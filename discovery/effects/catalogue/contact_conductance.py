@@ -1,10 +1,10 @@
 """A joint that conducts better (or worse) as the machine warms up.
 
-    q = G_p (T - T_env)/10 (T_other - T)     [W] into one body and out of the other
+    q = p (T_joint - T_env)/10 q_link    [W] into one body and out of the other
 
-G_p in W/K per 10 K, of either sign: 10 to 30 % of the link between cold and warm. Source: joint
-conductance against contact pressure. Limits: straight in the temperature rise; the link itself stays in
-the model. Seldom visible.
+q_link is what the model lets flow through the joint; T_joint: mean of both bodies; p: share for each 10 K, of
+either sign. Source: joint conductance against contact pressure: 10 to 30 % between cold and warm. Limits:
+straight in the temperature rise. Seldom visible.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example
@@ -14,10 +14,10 @@ EFFECT = Effect(
     title="Contact conductance",
     group="air and structure",
     place="link",
-    formula="G_p*(body - ambient)/10*(other - body)",
-    amplitude=Amplitude("G_p", "W/K", 8.0, 0),
+    formula="p_joint*((body + other)/2 - ambient)/10*term",
+    amplitude=Amplitude("p_joint", "1", 0.2, 0, most=0.5),
     signature="a link between bodies gets better or worse as they warm up",
     confused_with=("natural_convection",),
     source="joint conductance changes with contact pressure: 10 to 30 % between cold and warm",
-    examples=(Example({"G_p": 5.0, "body": 32.0, "ambient": 22.0, "other": 34.0}, 10.0),),
+    examples=(Example({"p_joint": 0.2, "body": 30.0, "other": 34.0, "ambient": 22.0, "term": 40.0}, 8.0),),
 )
