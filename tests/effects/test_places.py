@@ -65,6 +65,24 @@ def test_what_stands_for_a_late_channel_is_written_read_and_simulated(word: str,
         assert np.allclose(found, predict(trajectory(on)), rtol=0, atol=1e-6)
 
 
+def test_a_joint_conducts_a_share_more_at_each_link() -> None:
+    """The parameters of two links have names of their own, and the heat is a share of what flows there."""
+    baseline, _ = sample()
+    links = [t for t in baseline.terms if t.source]
+    found = claims(baseline, catalogue()["contact_conductance"])
+    assert {frozenset(h.states) for h in found} == {frozenset((t.into, t.source)) for t in links}
+    assert len({h.amplitudes for h in found}) == len(found)
+    warm = {name: 30.0 + 2.0 * k for k, name in enumerate(sorted({t.into for t in links} | set(INPUTS)))}
+    known = {**baseline.values(), **warm, "room": 22.0}
+    for h in found:
+        [term] = h.terms
+        [link] = [t for t in links if {t.into, t.source} == {term.into, term.source}]
+        flow = float(evaluate(link.expression, known | {s: warm.get(s, 30.0) for s in h.states}).value)
+        at = {s: warm.get(s, 30.0) for s in h.states}
+        more = float(evaluate(term.expression, known | at | h.values("one", 0.2)).value)
+        assert more == pytest.approx(0.2 * (np.mean(list(at.values())) - 22.0) / 10 * flow)
+
+
 @pytest.mark.parametrize("file", DRIVEN)
 def test_losses_come_of_a_recorded_heat_or_of_a_law_of_the_speed(file: str) -> None:
     effect = catalogue()[file]
