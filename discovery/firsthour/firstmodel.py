@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import product
 
 from discovery.firsthour.guess import Guess, drives, squared
 from discovery.firsthour.measures import DEGREES
@@ -93,11 +94,16 @@ def _temperature(
     for fan in [name for name, one in guesses.items() if one.quantity == "fan"] if room else []:
         more = block.parameter(f"{fan}_{output}", "1e-4", f"1/s{_per(canonical(guesses[fan]))}", least="0.0")
         block.term(f"{fan} cools {output}", output, f"{more}*{fan}*({room} - {output})")
-    fluid, pump = _first(guesses, "fluid temperature"), _first(guesses, "fluid flow")
-    if fluid:
+    fluids, pumps = (
+        [n for n, one in guesses.items() if one.role == role] for role in ("fluid temperature", "fluid flow")
+    )
+    for fluid, pump in product(fluids, pumps or [""]):  # which fluid a pump moves is for the fit to find
+        of = [*[pump] * (len(pumps) > 1), *[fluid] * (len(fluids) > 1)]
         per = _per(canonical(guesses[pump])) if pump else ""
-        name = block.parameter(f"fluid_{output}", "1e-4", f"1/s{per}", least="0.0")
-        block.term(f"fluid on {output}", output, f"{name}*{f'{pump}*' if pump else ''}({fluid} - {output})")
+        name = block.parameter("_".join(["fluid", *of, output]), "1e-4", f"1/s{per}", least="0.0")
+        which = "fluid" if len(fluids) == 1 else fluid
+        which += f" with {pump}" if len(pumps) > 1 else ""
+        block.term(f"{which} on {output}", output, f"{name}*{f'{pump}*' if pump else ''}({fluid} - {output})")
     if masses == 2:
         core = f"{output}_core"
         block.states.append(
@@ -184,7 +190,3 @@ def canonical(one: Guess) -> str:
         return conversion(one.unit, one.role).unit
     except UnitError:  # the check of the campaign says so
         return one.unit
-
-
-def _first(guesses: Mapping[str, Guess], role: str) -> str | None:
-    return next((name for name, one in guesses.items() if one.role == role), None)

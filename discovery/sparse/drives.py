@@ -27,6 +27,7 @@ class Inputs:
     reference: float  # degC
     gate: str | None  # expression, 0 to 1, of a flow that goes on and off in these recordings
     bodies: tuple[str, ...] = ()  # inputs of no special role that are temperatures
+    gates: tuple[str, ...] = ()  # the same as `gate` for every flow
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -70,11 +71,12 @@ def make_inputs(campaign: Campaign, recordings: Sequence[str], asked: Sequence[s
             by_role[role] = (*by_role.get(role, ()), name)
     air = [series for name, series in values.items() if campaign.channels[name].role == AMBIENT]
     flow = by_role.get(FLOW, ())
-    most = float(np.max(values[flow[0]])) if flow else 1.0
-    gate = (flow[0] if most <= 1.0 else f"{flow[0]}/{most:g}") if flow else None
+    most = [float(np.max(values[name])) for name in flow]
+    gates = tuple(n if top <= 1.0 else f"{n}/{top:g}" for n, top in zip(flow, most, strict=True))
     others = by_role.get("other input", ())
     bodies = tuple(name for name in others if campaign.channels[name].unit in ("degC", "K"))
-    return Inputs(by_role, float(np.round(np.mean(air[0]), 1)) if air else 20.0, gate, bodies)
+    reference = float(np.round(np.mean(air[0]), 1)) if air else 20.0
+    return Inputs(by_role, reference, next(iter(gates), None), bodies, gates)
 
 
 def _known(campaign: Campaign, recording: str, name: str) -> NDArray[np.float64]:

@@ -108,7 +108,7 @@ def _family(
             return plain("1", *own) + towards(*warm)
         case "wet" if inputs.gate:
             fluid = inputs.of("fluid temperature")
-            wet = [(name, f"{inputs.gate}*({name} - {state})") for name in fluid]
+            wet = [(name, f"{gate}*({name} - {state})") for name in fluid for gate in inputs.gates]
             wet += [
                 (name, f"{inputs.gate}*(abs({n}) > 1)*({name} - {state})") for name in fluid for n in speeds
             ]
