@@ -79,6 +79,9 @@ def test_the_lines_on_discovery_run(capsys: pytest.CaptureFixture[str]) -> None:
         exec(compile(text, "docs/discovery.md", "exec"), names)
     printed = capsys.readouterr().out
     assert "lag(P0" in printed.rpartition("E_Y")[2]
+    page = (ROOT / "docs" / "discovery.md").read_text("utf-8")
+    swinging = page[page.index("Equations\n") : page.index("\n```\n\nIn an experiment file")]
+    assert swinging in printed
 
 
 def numbers(values: Any) -> str:

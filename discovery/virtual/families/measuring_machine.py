@@ -1,5 +1,4 @@
-"""A measuring machine in a room with a day: granite table, ceramic bridge, ram; nothing turns, nothing is
-wet.
+"""A measuring machine in a room that warms by day: granite table, ceramic bridge, ram; all is dry.
 
 Heat comes from the room: people and sun by day, an air conditioner that pulses. The air below the ceiling
 is a state of its own, the granite conducts so badly that its top and its bottom are bodies of five cells
