@@ -1,7 +1,7 @@
 """A bearing test rig: shaft, rings, housing, plate; oil flow, load and speed change in steps.
 
-Not hours but minutes; readings every few seconds. Friction by Palmgren with a load-dependent part; temperatures of the outer ring and
-the housing are measured, and the growth of the shaft.
+Not hours but minutes; readings every few seconds. Friction by Palmgren with a load-dependent part;
+temperatures of the outer ring and the housing are measured, and the growth of the shaft.
 """
 
 from __future__ import annotations
