@@ -126,7 +126,7 @@ def make_context(
 
     grids = thinned(whole)
     fit = fitted(grids)
-    whole = perhaps_late(fit, whole)
+    whole = perhaps_late(fit, campaign, whole, thresholds.SHORT)
     if any(g.unsure for g in whole.values()):
         grids = thinned(whole)
         fit = fitted(grids, fit)

@@ -1,9 +1,8 @@
-"""Inputs that may be logged late: with fast bodies and frequent readings, a switch some seconds before its
-stamp looks like missing heat.
+"""Inputs that may be logged late: a switch some seconds before its stamp looks like missing heat.
 
-A logger that holds or smooths its samples is late by up to about one of its intervals. This shift is an
-unknown of each recording, like the offset of an input with a spread. It is left out if the fastest body needs
-many intervals to respond, or if readings are too rare to follow it.
+A logger that holds, averages or smooths its samples is late by up to about one of its intervals. This shift
+is an unknown of each recording, like the offset of an input with a spread. It is left out if readings are too
+rare to follow it, or if a shift by a whole interval could not pass for an effect.
 
 A shift that differs from switch to switch is noise (`process_noise.py`).
 """
@@ -16,22 +15,49 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid, Trajectory
+from discovery.dynamics import Grid
 from discovery.dynamics.grid import MOVED
-from discovery.fitting import Fit
+from discovery.fitting import Fit, make_problem
+from discovery.fitting.noise import resolution, roughness
+from discovery.recordings import Campaign
 
-FAST = 10.0  # intervals of an input within which a body answers, for a late stamp to matter
 OFTEN = 2.0  # intervals of an input between readings that still show it
 SAID = 3.0  # standard errors beyond which what was found is said
 SMALL = 0.25  # of an interval, below which it is not
 
 
-def perhaps_late(fit: Fit, grids: Mapping[str, Grid]) -> dict[str, Grid]:
+def perhaps_late(fit: Fit, campaign: Campaign, grids: Mapping[str, Grid], enough: float) -> dict[str, Grid]:
     """Grids with an unknown shift in time of each input that may be logged late, if the recordings could show
     it.
+
+    Args:
+        fit: of the model, to some or all readings of the grids.
+        enough: log likelihood that a shift by a whole interval has to change, under the noise of readings
+            (as stated, or as rough as they are).
     """
-    fastest = min(_fastest(t) for t in fit.trajectories)
-    return {name: replace(grid, unsure=_unsure(grid, fastest)) for name, grid in grids.items()}
+    possible = {name: _possible(grid) for name, grid in grids.items()}
+    if not any(possible.values()):
+        return dict(grids)
+    fitted = {t.system.grid.recording: t.system.grid for t in fit.trajectories}
+    unsure = {name: replace(grid, unsure=possible[name]) for name, grid in fitted.items()}
+    problem = make_problem(fit.model, campaign, list(unsure), fit.problem.outputs, unsure)
+    known = {u.key: value for u, value in zip(fit.problem.unknowns, fit.theta, strict=True)}
+    theta = np.array([known.get(u.key, u.start) for u in problem.unknowns])
+    steps = resolution([grid.readings for grid in fitted.values()])
+    noise = [
+        campaign.channels[y].noise or max(roughness([g.readings[:, k] for g in fitted.values()]), steps[k])
+        for k, y in enumerate(fit.problem.outputs)
+    ]
+    shown: dict[str, dict[str, float]] = {name: {} for name in grids}
+    for system in problem.systems:
+        name = system.grid.recording
+        jacobian = problem.jacobian(problem.run(system, theta)) / np.array(noise)[:, None]
+        for k, u in enumerate(problem.unknowns):
+            if u.is_late and u.recording == name:
+                interval = possible[name][u.name]
+                if 0.5 * float(np.nansum((jacobian[..., k] * interval) ** 2)) > enough:
+                    shown[name][u.name] = interval
+    return {name: replace(grid, unsure=shown[name]) for name, grid in grids.items()}
 
 
 def beside_switches(grid: Grid) -> NDArray[np.bool_]:
@@ -46,25 +72,15 @@ def beside_switches(grid: Grid) -> NDArray[np.bool_]:
     return beside
 
 
-def _unsure(grid: Grid, fastest: float) -> dict[str, float]:
-    """Logging interval in s of each held input that switches, where a late stamp can matter."""
+def _possible(grid: Grid) -> dict[str, float]:
+    """Logging interval in s of each held input that switches, where readings can follow a late stamp."""
     spacing = float(np.median(np.diff(grid.time[grid.read]))) if len(grid.read) > 1 else np.inf
-    found = {}
-    for name, samples in grid.samples.items():
-        if samples.linear or not np.ptp(samples.value) > 0:
-            continue
-        interval = grid.logged.get(name, np.inf)
-        if fastest <= FAST * interval and spacing <= OFTEN * interval:
-            found[name] = interval
-    return found
-
-
-def _fastest(trajectory: Trajectory) -> float:
-    """The shortest time constant in s of a model anywhere on a trajectory."""
-    kinds, first = np.unique(trajectory.which, return_index=True)
-    size = np.abs(np.linalg.eigvals(trajectory.e[kinds])).min(axis=1)
-    decay = -np.log(np.clip(size, 1e-300, 1.0)) / trajectory.system.grid.step[first]
-    return float(1.0 / max(decay.max(initial=0.0), 1e-300))
+    return {
+        name: grid.logged[name]
+        for name, samples in grid.samples.items()
+        if not samples.linear and np.ptp(samples.value) > 0
+        if name in grid.logged and spacing <= OFTEN * grid.logged[name]
+    }
 
 
 def sentences(fit: Fit) -> list[str]:

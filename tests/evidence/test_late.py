@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from discovery.diagnosis.context import make_context
 from discovery.diagnosis.selection import Search
+from discovery.diagnosis.thresholds import SHORT
 from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.late import beside_switches, perhaps_late
@@ -84,7 +85,7 @@ def found(seen: Campaign) -> tuple[str, ...]:
 def test_a_power_that_is_logged_late_is_no_missing_physics(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = campaign(light(1, 40.0), light(2, 35.0))
     assert found(seen) == ()
-    monkeypatch.setattr("discovery.diagnosis.context.perhaps_late", lambda _, grids: grids)
+    monkeypatch.setattr("discovery.diagnosis.context.perhaps_late", lambda _fit, _seen, grids, _enough: grids)
     assert found(seen) != ()
 
 
@@ -105,7 +106,7 @@ def test_stamps_that_are_exact_stay_so() -> None:
     assert late == pytest.approx([0.0, 0.0], abs=3.0)
 
 
-def test_it_is_asked_only_where_bodies_and_readings_are_fast() -> None:
+def test_it_is_asked_only_where_readings_show_a_shift() -> None:
     seen = campaign(light(5, 0.0))
     context = make_context(seen, model(), ["r5"], ("coil", "frame"), [], after(seen))
     assert context.grids["r5"].unsure == {"P": INTERVAL}
@@ -113,7 +114,7 @@ def test_it_is_asked_only_where_bodies_and_readings_are_fast() -> None:
     for name in ("coil", "frame"):
         rare.values[name][np.arange(len(rare.time)) % 3 > 0] = np.nan
     grid = make_grid(campaign(rare), "r5", ["P", "room"], ["coil", "frame"])
-    assert perhaps_late(context.baseline, {"r5": grid})["r5"].unsure == {}
+    assert perhaps_late(context.baseline, seen, {"r5": grid}, SHORT)["r5"].unsure == {}
     slow = machine.campaign(machine.simulated(1), machine.simulated(2))
     context = make_context(slow, machine.model(), ["r1", "r2"], tuple(machine.SEEN), [], after(slow))
     assert not any(g.unsure for g in context.grids.values())
