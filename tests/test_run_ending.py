@@ -7,6 +7,8 @@ import platform
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from typer.testing import CliRunner
 
 from discovery.cli import app
 from discovery.experiment import load_experiment
-from discovery.experiment.ending import Ending
+from discovery.experiment.ending import Ending, constants
 from discovery.experiment.modelfits import fit_of
 from discovery.report.lead import Lead
 from tests.small import write_small
@@ -69,27 +71,42 @@ def test_a_run_ends_in_five_lines(folder: Path) -> None:
     ],
 )
 def test_a_verdict_is_not_said_of_recordings_that_refute_it(verdict: str, share: float, said: str) -> None:
-    lead = Lead(0.5, 0.4, 0.6, 1.0)
-    end = Ending(
-        "a",
-        "a",
-        lead,
-        None,
-        None,
-        {"um": 1.0},
-        ["c"],
-        verdict,
-        "first_order",
-        share,
-        [],
-        [],
-        {},
-        {},
-        "",
-        "",
-        1.0,
-    )
+    end = ended(verdict=verdict, diagnosed="first_order", diagnosed_ratio=share)
     assert end.lines()[2] == said
+
+
+def ended(**said: Any) -> Ending:
+    """The end of a run of one model that helps, with more of what it found."""
+    usual: dict[str, Any] = {
+        "best": "a", "winner": "a", "against_none": Lead(0.5, 0.4, 0.6, 1.0), "runner_up": None,
+        "against_runner_up": None, "rms": {"um": 1.0}, "held_out": ["c"], "verdict": None, "diagnosed": None,
+        "diagnosed_ratio": None, "repaired_ratio": None, "effects": [], "findings": [], "constants": [],
+        "guesses": {}, "hangs_on_guesses": {}, "next": "", "report": "", "seconds": 1.0,
+    }  # fmt: skip
+    return Ending(**usual | said)
+
+
+def test_a_repair_that_makes_held_out_recordings_worse_is_said() -> None:
+    said = ended(verdict="missing physics", effects=["wear at a (98%)"], repaired_ratio=1.59).lines()[2]
+    assert said.endswith(
+        "wear at a (98%); but the repair makes the rms on held-out recordings 1.59 times as large"
+    )
+
+
+def test_a_zero_that_is_not_the_same_is_a_doubt() -> None:
+    """The errors of the recording that was held out, with 5 um added to each reading."""
+    results = {
+        "fit": ["a"], "held_out": ["b"], "roles": {"E": "error", "T": "temperature"}, "units": {"E": "um"},
+        "models": {"m": {"recordings": {
+            "a": {"E": {"rms": 0.3, "mean": 0.0}, "T": {"rms": 0.1, "mean": 0.0}},
+            "b": {"E": {"rms": 5.01, "mean": 5.0}, "T": {"rms": 5.0, "mean": 5.0}},
+        }}},
+    }  # fmt: skip
+    run = SimpleNamespace(results=results, held_out=["b"])
+    assert constants(run, "m") == ["E by 5 um in b"]  # type: ignore[arg-type]
+    results["models"]["m"]["recordings"]["b"]["E"]["mean"] = 1.0  # type: ignore[index]
+    assert constants(run, "m") == []  # type: ignore[arg-type]
+    assert "another zero of the probe" in ended(constants=["E by 5 um in b"]).lines()[3]
 
 
 def test_the_end_as_json_says_the_same(folder: Path) -> None:

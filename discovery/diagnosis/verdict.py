@@ -290,13 +290,18 @@ def _apart(found: Search, answer: Scored, rest: Sequence[Named]) -> tuple[str, .
         added = _added(found, answer, n.hypothesis)
         sentence = (
             f"{n.hypothesis.effect.word} at {n.hypothesis.where} is possible but not sure enough to be named "
-            f"(probability {n.probability:.2f}, log evidence {added:.0f})"
+            f"(probability {n.probability:.2f}, log evidence {added:.0f}{_lacking(added)})"
         )
         if n.rivals and n.rivals[0].below < added:
             other, below = n.rivals[0].hypothesis, n.rivals[0].below
             sentence += f"; {other.effect.word} at {other.where} instead has {below:.1f} less"
         sentences.append(sentence)
     return tuple(sentences)
+
+
+def _lacking(added: float) -> str:
+    """What a name has to add, where this is what an effect lacks."""
+    return f" of the {thresholds.SHORT:g} that a name needs" if added < thresholds.SHORT else ""
 
 
 def _added(found: Search, answer: Scored, h: Hypothesis) -> float:

@@ -20,14 +20,16 @@ from discovery.runfolder import DIAGNOSIS
 from discovery.terms import names
 
 _BETTER = 0.95  # of the rms without a model: less is no improvement
+_CONSTANT, _TIMES = 0.8, 2.0  # of the rms, and times the rms in the fit: a miss that is mostly a constant
 _MOVES = 0.05  # share of an effect from which a guess matters
 
 
 @dataclass(frozen=True)
 class Ending:
     """What a run found. `winner`: None where no model is better than none, which is `best`, then.
-    `diagnosed`: the model that the verdict is about; `diagnosed_ratio`: its rms on held-out recordings over
-    that without a model.
+    `diagnosed`: the model that the verdict is about; `diagnosed_ratio`: its rms on held-out recordings
+    over that without a model. `repaired_ratio`: the rms there after the repair over that before. `constants`:
+    where the best model is off by a constant.
     """
 
     best: str | None
@@ -40,8 +42,10 @@ class Ending:
     verdict: str | None
     diagnosed: str | None
     diagnosed_ratio: float | None
+    repaired_ratio: float | None
     effects: Sequence[str]
     findings: Sequence[str]
+    constants: Sequence[str]
     guesses: Mapping[str, str]
     hangs_on_guesses: Mapping[str, float]
     next: str
@@ -104,6 +108,9 @@ class Ending:
                 f" in the recordings of the fit; but on the held-out ones {self.diagnosed} has "
                 f"{ratio:.0%} of the rms without a model"
             )
+        if self.repaired_ratio is not None and self.repaired_ratio > 1.0:
+            times = f"{self.repaired_ratio:.2f} times as large"
+            but = f"; but the repair makes the rms on held-out recordings {times}"
         return f"verdict: {self.verdict}{effects}{but}"
 
     def _doubts(self) -> str:
@@ -112,6 +119,11 @@ class Ending:
             worst = self.findings[0]
             rest = f" (and {len(self.findings) - 1} more: discovery check)" if self.findings[1:] else ""
             worst_first.append(f"{worst}{rest}")
+        if self.constants:
+            worst_first.append(
+                f"{self.best} misses {', '.join(self.constants[:3])}, much the same at all times: another zero "
+                "of the probe (state `spread`), or something that acts there alone"
+            )
         if self.guesses:
             named = [
                 f"{name} ({self.hangs_on_guesses[name]:.0%} of the prediction)"
@@ -154,14 +166,45 @@ def ending(folder: Path) -> Ending:
         str(diagnosis["verdict"]) if diagnosis else None,
         about,
         ratio(run, about, None) if about else None,
+        repaired_ratio(diagnosis) if diagnosis else None,
         [_effect(one) for one in (diagnosis or {}).get("physics") or []],
         list(run.results.get("findings") or []),
+        constants(run, best) if best else [],
         guesses,
         hanging(run, best, guesses) if best else {},
         _next(run, best, helps, diagnosis, guesses),
         str(folder / "report.html"),
         float(run.results.get("seconds") or 0.0),
     )
+
+
+def repaired_ratio(diagnosis: Mapping[str, Any]) -> float | None:
+    """The rms of free runs of all held-out recordings after the repair over that before; None without one."""
+    held = [one for one in (diagnosis.get("improvement") or {}).get("held_out", {}).values() if one]
+    before, after = (
+        np.array([one.get(key) or np.nan for one in held]) for key in ("rms_before", "rms_after")
+    )
+    if not diagnosis.get("physics") or not len(held) or not np.isfinite(before + after).all():
+        return None
+    return float(np.sqrt(np.mean(after**2) / np.mean(before**2)))
+
+
+def constants(run: Run, model: str) -> list[str]:
+    """Errors that a model misses in a held-out recording by much the same at all times, and by more than in
+    the fit: a zero that is not the same, rather than a law.
+    """
+    seen = run.results["models"][model].get("recordings") or {}
+    roles = run.results.get("roles") or {}
+    found = []
+    for recording in run.held_out:
+        for output, one in (seen.get(recording) or {}).items():
+            fitted = [seen[r][output]["rms"] for r in run.results.get("fit", []) if output in seen.get(r, {})]
+            usual = float(np.sqrt(np.mean(np.square(fitted)))) if fitted else np.inf
+            is_error = roles.get(output, "error") == "error"
+            if is_error and one["rms"] > _TIMES * usual and abs(one["mean"]) > _CONSTANT * one["rms"]:
+                unit = (run.results.get("units") or {}).get(output, "")
+                found.append(f"{output} by {one['mean']:.2g} {unit} in {recording}")
+    return found
 
 
 def _effect(one: Mapping[str, Any]) -> str:

@@ -65,7 +65,8 @@ def new(
     if not sources:
         if statements or room:
             raise UsageError(
-                f"--is and --room need --from; without it, write the roles into {folder}/campaign.toml"
+                f"--is and --room need --from; without it, write the roles into {folder}/campaign.toml "
+                '(a room is role = "ambient temperature"), then `discovery new DIR --again`'
             )
         return _planned_again(folder, progress, quick=quick)
     said, clock = read_statements(statements)

@@ -345,7 +345,7 @@ class Compensator:
             cause = (
                 f"{', '.join(far)} far outside of the training" if far else "inputs are back in the training"
             )
-            remedy = "record there and fit the model again" if far else ""
+            remedy = "check the units; if they are right, record there and fit the model again" if far else ""
             self.events.append(Event(now, "gain falls" if far else "full gain", cause, remedy))
         self.gain = gain
 

@@ -1,4 +1,4 @@
-"""Units that are wrong at the first tick: a number far outside of the training that another unit explains."""
+"""Units that are wrong at the start: a first value far outside of the training that another unit explains."""
 
 from __future__ import annotations
 
@@ -21,8 +21,11 @@ _OTHER: tuple[tuple[str, str, Callable[[float], float]], ...] = (
 )
 
 
-def refuse_wrong_units(inputs: Sequence[Input], readings: Mapping[str, Reading]) -> None:
+def refuse_wrong_units(inputs: Sequence[Input], readings: Mapping[str, Reading], known: set[str]) -> None:
     """Refuse readings whose unit is not that of the model.
+
+    Args:
+        known: inputs of which a value has come before; those of which one comes now are added.
 
     Raises:
         UserError: a value so far outside of the training that the gain is zero, and inside of it in another
@@ -31,12 +34,15 @@ def refuse_wrong_units(inputs: Sequence[Input], readings: Mapping[str, Reading])
     for spec in inputs:
         reading = readings.get(spec.name)
         guard, value = InputGuard(spec), number(reading.value if reading is not None else None)
-        if value != value or guard.gain(value) > 0.0:
+        if value != value or spec.name in known:
+            continue
+        known.add(spec.name)
+        if guard.gain(value) > 0.0:
             continue
         for unit, other, convert in _OTHER:
             if spec.unit == unit and guard.outside(convert(value)) <= 0.2:
                 raise UserError(
-                    f"{spec.name} is {value:g} at the first tick, which looks like {other} "
+                    f"{spec.name} is {value:g} at first, which looks like {other} "
                     f"({convert(value):.4g} {unit} would fit the training, {spec.range.low:g} to "
                     f"{spec.range.high:g} {unit}); give it in {unit}"
                 )

@@ -78,6 +78,7 @@ class Session:
         self.opens: Callable[[], Output] | None = None  # the output, with the first tick
         self.output: Output | None = None
         self.found: Tick | None = None  # the last tick
+        self.read: set[str] = set()  # inputs whose first value came before the first offset
         self.events = 0
         self.counts: dict[str, int] = {}  # ticks by state
         self.events_now: list[Event] = []  # of the present tick
@@ -152,12 +153,12 @@ class Session:
         """One tick with the newest readings, measured errors among them if there are any.
 
         Raises:
-            UserError: at the first tick, readings in a wrong unit.
+            UserError: the first value of an input is in a wrong unit.
         """
         self.events_now = []
         compensator = self.compensator
-        if compensator.origin is None and compensator.heartbeat == 0:
-            refuse_wrong_units(compensator.exported.inputs, readings)
+        if compensator.origin is None:
+            refuse_wrong_units(compensator.exported.inputs, readings, self.read)
         found = compensator.tick(readings, now, enabled=enabled, part_done=part_done, acknowledge=acknowledge)
         for event in found.events:
             self._tell(event)

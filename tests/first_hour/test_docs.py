@@ -71,7 +71,7 @@ def test_the_tutorial_prints_what_it_says(place: Path) -> None:
 def _the_readme_agrees_with(results: dict[str, Any]) -> None:
     """The caption of the picture: what the simple and the repaired model leave at sensor 2."""
     text = " ".join((ROOT / "README.md").read_text("utf-8").split())
-    patterns = (r"rms at sensor 2 is (\d+) K", r"rms on this step is below (\d+) K")
+    patterns = (r"sensor 2 has an rms error of (\d+) K", r"rms error on this step is below (\d+) K")
     before, rms = (re.search(pattern, text) for pattern in patterns)
     assert before
     assert rms

@@ -90,7 +90,17 @@ def test_a_wrong_unit_is_refused_at_the_first_tick(
     exported: Exported, name: str, value: float, unit: str
 ) -> None:
     with pytest.raises(UserError, match=rf"{name} is .*looks like .*{unit}.* give it in"):
-        refuse_wrong_units(exported.inputs, {name: Reading(value, 0.0)})
+        refuse_wrong_units(exported.inputs, {name: Reading(value, 0.0)}, set())
+
+
+def test_an_input_that_comes_later_is_asked_at_its_first_value(exported: Exported) -> None:
+    """Two loggers of different rates: the slower one has no cell in the first row."""
+    middle = {i.name: Reading(0.5 * (i.range.low + i.range.high), 0.0) for i in exported.inputs}
+    known: set[str] = set()
+    refuse_wrong_units(exported.inputs, middle | {"T_env": Reading(float("nan"), 0.0)}, known)
+    with pytest.raises(UserError, match="T_env is 72 at first, which looks like degrees Fahrenheit"):
+        refuse_wrong_units(exported.inputs, middle | {"T_env": Reading(72.0, 60.0)}, known)
+    refuse_wrong_units(exported.inputs, {"T_env": Reading(72.0, 120.0)}, known)  # a spike is for the guards
 
 
 def test_values_of_the_training_are_no_wrong_unit(exported: Exported) -> None:
@@ -98,7 +108,7 @@ def test_values_of_the_training_are_no_wrong_unit(exported: Exported) -> None:
     for share in (-0.3, 0.0, 0.5, 1.0, 1.3):
         found = {i.name: i.range.low + share * (i.range.high - i.range.low) for i in exported.inputs}
         try:
-            refuse_wrong_units(exported.inputs, {name: Reading(value, 0.0) for name, value in found.items()})
+            refuse_wrong_units(exported.inputs, {n: Reading(value, 0.0) for n, value in found.items()}, set())
         except UserError as error:
             refused.append((share, str(error)))
     assert refused == []
