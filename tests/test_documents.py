@@ -80,7 +80,7 @@ def test_the_lines_on_discovery_run(capsys: pytest.CaptureFixture[str]) -> None:
     printed = capsys.readouterr().out
     assert "lag(P0" in printed.rpartition("E_Y")[2]
     page = (ROOT / "docs" / "discovery.md").read_text("utf-8")
-    swinging = page[page.index("Equations\n") : page.index("\n```\n\nIn an experiment file")]
+    swinging = page[page.index("Equations\n") : page.index("\n```\n\nThe same in files.")]
     assert swinging in printed
 
 
