@@ -56,7 +56,7 @@ def discover(
             own class derived from `pysindy.optimizers.BaseOptimizer`.
 
     Returns:
-        The fitted estimator.
+        The fitted estimator: `equations()`, `coefficients()`, `predict(X)`, `summary()`, `plot()`.
 
     Raises:
         UserError: a column is missing, or an option does not fit.
@@ -85,19 +85,29 @@ def _is_text(one: Any) -> bool:
 class SparseDiscovery(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """Sparse dynamics of outputs y driven by inputs X, as a scikit-learn estimator.
 
+    form="masses": y = zero + sum_i s_i with tau_i ds_i/dt = gain_i u_i - s_i.
+    form="rates": dy/dt = sum_k c_k f_k(y, u) with f_k from `library`.
+
+    Terms enter by orthogonal matching pursuit (Pati, Rezaiifar & Krishnaprasad, Asilomar 1993); data left
+    out choose their number. `docs/discovery.md` describes the method.
+
     X and y are frames or arrays with a row for each instant. The index of a frame is time, or (recording,
     time). Rows of an array are `step` seconds apart. In the folds of `GridSearchCV`, a frame keeps its time
     and an array does not: use `TimeSeriesSplit` for arrays.
 
     Args:
         channels: column -> {"role": ..., "unit": ...}; default inputs and outputs without a unit.
-        step: time between two rows of an array [s].
+        step: time between two rows of an array [s]; a frame has its own time.
         form, library, max_terms, time_constants, hidden, stable, keep, forbid, bounds, optimiser,
             optimiser_arguments, tolerance, bootstraps, seed: as in an experiment file.
 
     Attributes:
         model_: the fitted model; its parameters have 95 % intervals.
         discovery_: the path of the search, and stability and cost of each term.
+        inputs_, outputs_: names of the columns of X and y; an array has x0, x1, ... and y0, y1, ...
+        noise_: reading noise of each output, in its unit.
+
+    Methods raise `UserError` if a column, a channel or an option does not fit.
     """
 
     def __init__(

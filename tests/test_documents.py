@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from pydantic import BaseModel
 
-from discovery import __version__, limits
+from discovery import __version__, limits, read_model, run
 from discovery.diagnosis import thresholds
 from discovery.experiment.form import ExperimentForm
 from discovery.models.modelfile import ModelForm
@@ -80,8 +80,27 @@ def test_the_lines_on_discovery_run(capsys: pytest.CaptureFixture[str]) -> None:
     printed = capsys.readouterr().out
     assert "lag(P0" in printed.rpartition("E_Y")[2]
     page = (ROOT / "docs" / "discovery.md").read_text("utf-8")
-    swinging = page[page.index("Equations\n") : page.index("\n```\n\nIn an experiment file")]
+    swinging = page[page.index("Equations\n") : page.index("\n```\n\nThe same in files.")]
     assert swinging in printed
+
+
+def test_the_files_on_a_swinging_system_run(tmp_path: Path) -> None:
+    channels, experiment = (
+        next(text for text in blocks("docs/discovery.md", "toml") if text.startswith(start))
+        for start in ("hare =", "name     =")
+    )
+    source = next(text for text in blocks("docs/discovery.md", "python") if "def meadow" in text)
+    names: dict[str, Any] = {}
+    exec(compile(source.partition("found = ")[0], "docs/discovery.md", "exec"), names)
+    recordings = ""
+    for name, frame in names["meadows"].items():
+        frame.rename_axis("time").to_csv(tmp_path / f"{name}.csv")
+        recordings += f'[recordings.{name}]\nfile = "{name}.csv"\n'
+    (tmp_path / "campaign.toml").write_text(f'name = "meadow"\n[channels]\n{channels}{recordings}')
+    (tmp_path / "experiment.toml").write_text(experiment)
+    results = run(tmp_path / "experiment.toml", tmp_path / "run")
+    model = read_model(results.folder / "models" / "discovered.toml")
+    assert sorted(abs(round(p.value, 1)) for p in model.parameters.values()) == [0.3, 0.5, 0.8, 1.0]
 
 
 def numbers(values: Any) -> str:

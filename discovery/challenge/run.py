@@ -110,8 +110,8 @@ def family_list() -> str:
 
 
 def summary_of(make: Callable[..., object]) -> str:
-    """First line of the documentation of a family's module."""
-    return str(import_module(make.__module__).__doc__).splitlines()[0]
+    """First paragraph of the documentation of a family's module, as one line."""
+    return " ".join(str(import_module(make.__module__).__doc__).split("\n\n")[0].split())
 
 
 def read_answers(folder: Path, cases: Sequence[str], method: str) -> dict[str, dict[str, Any] | None]:

@@ -120,9 +120,10 @@ class Ending:
             rest = f" (and {len(self.findings) - 1} more: discovery check)" if self.findings[1:] else ""
             worst_first.append(f"{worst}{rest}")
         if self.constants:
+            where = ", ".join(self.constants[:3])
             worst_first.append(
-                f"{self.best} misses {', '.join(self.constants[:3])}, much the same at all times: another zero "
-                "of the probe (state `spread`), or something that acts there alone"
+                f"{self.best} misses {where}, much the same at all times: another zero of the probe (state "
+                "`spread`), or something that acts there alone"
             )
         if self.guesses:
             named = [

@@ -164,6 +164,10 @@ def fit_model(
         tolerance: relative change of the cost that ends them.
         goal: the cost that is good enough to matter; a fit that would not reach it ends early.
 
+    Returns:
+        The fit. `model` has the fitted values with 95 % intervals, `residuals()` gives readings minus model
+        by recording, (readings, outputs), `unidentified` names what these recordings do not determine.
+
     Raises:
         UserError: an input that a recording does not hold.
         RunsAwayError: the model does not stay finite where the fit begins.

@@ -97,6 +97,12 @@ class ModelForm(Strict):
 def read_model(path: Path) -> Model:
     """Read a model file; `docs/own_model.md` describes its form.
 
+    Args:
+        path: the model file (TOML).
+
+    Returns:
+        The model: parameters, states, terms and outputs. Its parameters have their start values.
+
     Raises:
         UserError: a mistake in the file, with file, line and key.
     """
@@ -286,5 +292,10 @@ def _distinct(names: list[str]) -> list[str]:
 
 
 def write_model(path: Path, model: Model) -> None:
-    """Write a model file that `read_model` reads back to the same model."""
+    """Write a model file that `read_model` reads back to the same model.
+
+    Args:
+        path: the file to write (TOML). An existing file is replaced.
+        model: any model, for example `fit_model(...).model`; fitted values become start values.
+    """
     write_toml(path, model_document(model))

@@ -103,12 +103,21 @@ class Campaign:
 
 
 def load_campaign(path: str | os.PathLike[str], only: Collection[str] | None = None) -> Campaign:
-    """The campaign at `path` (the file or its folder) in canonical units; with `only`, those recordings.
+    """Read a campaign file and its recordings.
 
-    Applied corrections are added to the readings of their errors: what follows sees uncompensated errors.
+    Applied corrections are added to the readings of their errors, so the errors are uncompensated.
 
-    Raises UserError with file, line and what to do: mistakes in the campaign file, an unknown unit, a missing
-    column, text in number cells, time that does not increase.
+    Args:
+        path: the campaign file, or its folder.
+        only: names of the recordings to read; default all.
+
+    Returns:
+        The campaign. `channels[name]` has role and unit; `recordings[name]` has `time` (T,) in s and
+        `values[channel]` (T,) in canonical units: um, um/m, degC, W, rpm, l/min. NaN: nothing was measured.
+
+    Raises:
+        UserError: a mistake in the campaign file, an unknown unit, a missing column, text in a number cell,
+            or time that does not increase. The message has file and line.
     """
     path = campaign_path(Path(path))
     form = read_toml(path, CampaignForm)

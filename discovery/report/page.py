@@ -33,7 +33,13 @@ _MOST_CURVES = 6  # more of them cannot be distinguished
 def write_report(run_dir: Path) -> Path:
     """Write ``report.html`` of a run folder: one file, no network, below 3 MB.
 
-    What the folder does not hold (diagnosis, predictions, a discovered model) does not show.
+    The report has no section for a result that the folder does not hold, for example a diagnosis.
+
+    Args:
+        run_dir: folder of a finished `discovery run`.
+
+    Returns:
+        Path of the report.
 
     Raises:
         UserError: no results there, or a file that cannot be read.

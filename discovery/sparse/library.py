@@ -55,7 +55,10 @@ class Feature:
 
 
 class FilteredInputs(BaseFeatureLibrary):  # type: ignore[misc]
-    """Inputs without a lag and through first-order lags, tau ds/dt = u - s: exact, also at irregular stamps.
+    """PySINDy library of inputs u, without a lag and through first-order lags, tau ds/dt = u - s.
+
+    The lags are exact, also at irregular time stamps: s moves by (1 - exp(-dt/tau)) (u - s) in a time dt in
+    which the input u is held.
 
     After `fit` the features have a grid of time constants. `SparseSearch(library)` moves the time constants,
     and the library then holds only the chosen features.

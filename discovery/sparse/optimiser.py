@@ -24,7 +24,11 @@ Bounds = Mapping[str, tuple[float, float]]
 
 
 class SparseSearch(BaseOptimizer):  # type: ignore[misc]
-    """Orthogonal matching pursuit on normal equations; left-out data choose the number of terms.
+    """PySINDy optimiser: orthogonal matching pursuit on normal equations.
+
+    Minimises |y - x c|^2 for each number of non-zero coefficients c, term by term (Pati, Rezaiifar &
+    Krishnaprasad, Asilomar 1993). Data left out choose the number of terms: the smallest model within
+    `tolerance` standard errors of the best one.
 
     With a `FilteredInputs` library the search moves the time constants, and after `fit` the library holds
     only the chosen features. With any other library the columns do not change.
@@ -35,11 +39,16 @@ class SparseSearch(BaseOptimizer):  # type: ignore[misc]
         bounds: smallest and largest coefficient by drive (without a library: by number of the column); (0,
             inf) fixes the sign.
         keep: drives (columns) that are in every set.
-        noise: standard deviation of a reading of each target; default estimated from the readings.
+        noise: standard deviation of a reading of each target, in its unit; default estimated from the
+            readings.
         tolerance: a sparser set may be worse on left-out data by so many standard errors.
         blocks: number of pieces of the trajectories for these standard errors.
         bootstraps, seed: number and seed of block bootstraps for the stability of the terms.
         select: makes the `Choice` of a `Problem`; default by free runs on left-out data.
+
+    Attributes:
+        coef_: (targets, columns) coefficients.
+        choices_: for each target, the path of the search and the chosen terms.
     """
 
     def __init__(
