@@ -97,6 +97,41 @@ def test_switches_off_the_grid_of_the_logger_are_no_missing_physics(monkeypatch:
     assert found(seen) != ()
 
 
+def heavy(seed: int) -> Recording:
+    """Three hours of a body with a time constant of 9 min, read every 10 s to 0.06 K. Each reading is stamped
+    at the end of the interval in which its power acted.
+    """
+    rng = np.random.default_rng(seed)
+    power: Array = np.repeat(rng.choice([0.0, 1000.0, 1800.0, 2600.0], 11), 100)
+    warm: Array = np.full(len(power) + 1, 22.0)
+    for k, heat in enumerate(power):
+        balance = 22.0 + heat / 46.0
+        warm[k + 1] = balance + (warm[k] - balance) * np.exp(-10.0 * 46.0 / 25000.0)
+    read = warm[1:] + 0.06 * rng.standard_normal(len(power))
+    room = np.full(len(power), 22.0)
+    time: Array = 10.0 * np.arange(len(power), dtype=float)
+    return Recording(f"r{seed}", time, {"P": power, "room": room, "body": read})
+
+
+def test_precise_readings_of_a_slow_body_show_a_late_stamp(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = campaign(heavy(7), heavy(8))
+    body = Channel("body", "temperature", "degC", 0.06, "linear")
+    seen = replace(seen, channels={"P": seen.channels["P"], "room": seen.channels["room"], "body": body})
+    terms = Term("power", "body", parse("share*P")), Term("air", "body", parse("hA*(room - body)"))
+    parameters = {"share": Parameter(0.9, "1", 0.0), "hA": Parameter(40.0, "W/K", 0.0)}
+    states = {"body": State("body", "degC", 25000.0, parse("room"), 0.3, 1 / 25000.0)}
+    one = Model("compressor", parameters, states, terms, {})
+    effects = [e for e in catalogue().values() if e.word in ("sensor_offset", "unmeasured_heat", "rezero")]
+
+    def taken_up() -> list[str]:
+        context = make_context(seen, one, ["r7", "r8"], ("body",), effects, after(seen))
+        return [h.effect.word for h in Search(context).run().best.hypotheses]
+
+    assert taken_up() == []
+    monkeypatch.setattr("discovery.diagnosis.context.perhaps_late", lambda _fit, _seen, grids, _enough: grids)
+    assert taken_up() != []
+
+
 def test_stamps_that_are_exact_stay_so() -> None:
     seen = campaign(light(3, 0.0), light(4, 0.0))
     context = make_context(seen, model(), ["r3", "r4"], ("coil", "frame"), [], after(seen))
