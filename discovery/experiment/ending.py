@@ -231,6 +231,10 @@ def _next(
         return str(diagnosis["next_experiment"]).rstrip(".")
     if not helps:
         return "record the inputs that drive the machine, and let each one move on its own"
+    roles = run.results.get("roles") or {}
+    if all(roles.get(output, "error") != "error" for output in run.outputs):
+        path = f"{run.folder}/models/{best}.toml"
+        return f"the model is {path}; no output is an error, so there is nothing to compensate"
     export = f"`discovery export {shlex.quote(str(run.folder))} --model {shlex.quote(str(best))} --to json`"
     if diagnosed_key(run) == best:
         return export
