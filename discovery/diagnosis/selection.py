@@ -173,7 +173,7 @@ class Search:
 
     def _refitted(self, start: Scored, others: Sequence[Hypothesis], pool: Sequence[Score]) -> Scored:
         """The best refit with one of some candidates added; `start` if none is better."""
-        own = [o.key for o in others]
+        own, pool = [o.key for o in others], not_twice(pool, others)
         keys = [frozenset((*own, claim.hypothesis.key)) for claim in pool]
         known = {*self.tried, *self.lost}
         fresh = {k: claim for k, claim in zip(keys, pool, strict=True) if k not in known}
@@ -209,6 +209,14 @@ def _alike(h: Hypothesis, claims: Sequence[Score]) -> list[Score]:
     words = (h.effect.word, *h.effect.confused_with)
     found = [next((c for c in claims if c.hypothesis.effect.word == word), None) for word in words]
     return [c for c in found if c is not None and c.odds > 0]
+
+
+def not_twice(claims: Sequence[Score], others: Sequence[Hypothesis]) -> list[Score]:
+    """Candidates without those that have a size in common with other effects: a jet that moves from one body
+    to a second one and from there to a third has one size at the second, and such terms one law at one body.
+    """
+    sizes = {name for other in others for name in other.amplitudes}
+    return [c for c in claims if sizes.isdisjoint(c.hypothesis.amplitudes)]
 
 
 def hopeful(claims: Sequence[Score], most: int, reached: float = -inf) -> list[Score]:
