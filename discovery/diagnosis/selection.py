@@ -212,8 +212,8 @@ def _alike(h: Hypothesis, claims: Sequence[Score]) -> list[Score]:
 
 
 def not_twice(claims: Sequence[Score], others: Sequence[Hypothesis]) -> list[Score]:
-    """Candidates without those that have a size in common with other effects: a jet that moves from one body
-    to a second one and from there to a third has one size at the second, and such terms one law at one body.
+    """Candidates that share no size with other effects. A jet that moves from body a to b, and one that moves
+    from b to c, have the same size at b: a model cannot hold both.
     """
     sizes = {name for other in others for name in other.amplitudes}
     return [c for c in claims if sizes.isdisjoint(c.hypothesis.amplitudes)]

@@ -108,7 +108,7 @@ class Ending:
                 f" in the recordings of the fit; but on the held-out ones {self.diagnosed} has "
                 f"{ratio:.0%} of the rms without a model"
             )
-        if self.repaired_ratio is not None and self.repaired_ratio > 1.0:
+        if self.repaired_ratio is not None and self.repaired_ratio > 1 / _BETTER:
             times = f"{self.repaired_ratio:.2f} times as large"
             but = f"; but the repair makes the rms on held-out recordings {times}"
         return f"verdict: {self.verdict}{effects}{but}"

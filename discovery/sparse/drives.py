@@ -25,9 +25,13 @@ class Inputs:
 
     by_role: dict[str, tuple[str, ...]]
     reference: float  # degC
-    gate: str | None  # expression, 0 to 1, of a flow that goes on and off in these recordings
+    gates: tuple[str, ...]  # an expression, 0 to 1, of each flow that goes on and off in these recordings
     bodies: tuple[str, ...] = ()  # inputs of no special role that are temperatures
-    gates: tuple[str, ...] = ()  # the same as `gate` for every flow
+
+    @property
+    def gate(self) -> str | None:
+        """The expression of the first flow."""
+        return next(iter(self.gates), None)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -76,7 +80,7 @@ def make_inputs(campaign: Campaign, recordings: Sequence[str], asked: Sequence[s
     others = by_role.get("other input", ())
     bodies = tuple(name for name in others if campaign.channels[name].unit in ("degC", "K"))
     reference = float(np.round(np.mean(air[0]), 1)) if air else 20.0
-    return Inputs(by_role, reference, next(iter(gates), None), bodies, gates)
+    return Inputs(by_role, reference, gates, bodies)
 
 
 def _known(campaign: Campaign, recording: str, name: str) -> NDArray[np.float64]:
