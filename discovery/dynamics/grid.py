@@ -238,7 +238,9 @@ def make_grid(
     stamps |= taken
     stamps[[0, -1]] = True
     rows = np.flatnonzero(stamps)
-    logged = {n: float(np.median(np.diff(s.time))) for n, s in samples.items() if len(s.time) > 1}
+    stamped_at = {n: s.time for n, s in samples.items()}
+    stamped_at |= {n: data.time[np.isfinite(read)] for n, read in zip(outputs, table.T, strict=False)}
+    logged = {n: float(np.median(np.diff(at))) for n, at in stamped_at.items() if len(at) > 1}
     spread = {name: s for name in (*samples, *outputs) if (s := campaign.channels[name].spread) > 0}
     read = np.flatnonzero(taken[rows])
     stamped = Grid(recording, data.time[rows], samples, outputs, read, table[taken], spread, logged=logged)

@@ -73,8 +73,10 @@ def beside_switches(grid: Grid) -> NDArray[np.bool_]:
 
 
 def _possible(grid: Grid) -> dict[str, float]:
-    """Logging interval in s of each held input that switches, where readings can follow a late stamp."""
-    spacing = float(np.median(np.diff(grid.time[grid.read]))) if len(grid.read) > 1 else np.inf
+    """Logging interval in s of each held input that switches, where an output was read as often, or nearly.
+    What counts is what was recorded: means over blocks of a coarsened grid follow a late stamp, too.
+    """
+    spacing = min((grid.logged[y] for y in grid.outputs if y in grid.logged), default=np.inf)
     return {
         name: grid.logged[name]
         for name, samples in grid.samples.items()

@@ -78,15 +78,25 @@ def with_intervals(problem: Problem, theta: Array, errors: Array) -> Model:
             # the common value of an event of one recording keeps it out of all others: it stays
             mean = not given or fitted <= given.keys()
             common = float(np.mean(list(values.values()))) if mean else p.value
+            spread = _spread(list(values.values())) if mean else 0.0
             kept = {name: ends for name, ends in p.intervals.items() if name != u.recording}
             intervals = kept | ({u.recording: interval} if interval else {})
             parameters[u.name] = replace(
-                p, values=values, value=common, low=None, high=None, intervals=intervals
+                p, values=values, value=common, low=None, high=None, intervals=intervals, spread=spread
             )
             continue
         low, high = interval or (None, None)
         parameters[u.name] = replace(p, value=value, low=low, high=high)
     return replace(model, parameters=parameters, states=_with_spreads(problem))
+
+
+def _spread(values: list[float]) -> float:
+    """Standard deviation of the value of one more recording about the mean of `values` (K,). Of a single one,
+    its own size is all that is known.
+    """
+    if len(values) == 1:
+        return abs(values[0])
+    return float(np.std(values, ddof=1) * np.sqrt(1 + 1 / len(values)))
 
 
 def _with_spreads(problem: Problem) -> dict[str, State]:

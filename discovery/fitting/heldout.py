@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +42,8 @@ def predict_recording(
     """Free run of a model on a recording, zeroed on its first reading as a controller would be.
 
     The start values are the declared ones, corrected by the first complete reading alone within their
-    spread (one Bayesian step); so are the offsets of inputs known only within a spread. No later reading is
-    used.
+    spread (one Bayesian step); so are the offsets of inputs known only within a spread, and the parameters of
+    which each recording has its own (the zero of a probe). No later reading is used.
 
     Args:
         outputs: measured channels.
@@ -68,17 +69,17 @@ def predict_recording(
     system = shifted(make_system(model, grid), begun)
     values = model.values(recording)
     noise = np.array(white) if white is not None else np.ones(len(outputs))
-    inputs, spreads = _unsure_starts(system, noise, known)
+    unsure = _unsure(system, noise, known)
     trajectory = simulate(system, values)
-    if not (spreads or inputs) or not len(grid.read):
+    if not any(unsure) or not len(grid.read):
         return trajectory
     residual = grid.readings - predict(trajectory)
-    shift = _shift(trajectory, residual[:1], noise, inputs, spreads)[0]
+    shift = iter(_shift(trajectory, residual[:1], noise, unsure)[0].tolist())
+    inputs, own, starts = ({name: next(shift) for name in part} for part in unsure)
     if inputs:
-        moved = dict(zip(inputs, shift[: len(inputs)].tolist(), strict=True))
-        system = shifted(system, begun | {name: begun.get(name, 0.0) + by for name, by in moved.items()})
-    moved = dict(zip(spreads, shift[len(inputs) :].tolist(), strict=True))
-    return simulate(system, values, start_values(system, values, moved), trajectory)
+        system = shifted(system, begun | {name: begun.get(name, 0.0) + by for name, by in inputs.items()})
+    values = values | {name: values[name] + by for name, by in own.items()}
+    return simulate(system, values, start_values(system, values, starts), trajectory)
 
 
 def from_known_starts(
@@ -99,36 +100,43 @@ def from_known_starts(
         known: inputs whose offsets are known in this recording.
         together: readings that count as one, as in the fit (`Fit.together`).
     """
-    inputs, spreads = _unsure_starts(run.system, white, known)
-    if not (spreads or inputs) or not len(residual):
+    unsure = _unsure(run.system, white, known)
+    if not any(unsure) or not len(residual):
         return residual
-    shift, moved = _shift(run, residual, white, inputs, spreads, together)
+    shift, moved = _shift(run, residual, white, unsure, together)
     return residual - moved @ shift
 
 
-def _unsure_starts(
-    system: System, white: Array, known: Collection[str]
-) -> tuple[tuple[str, ...], dict[str, float]]:
-    """Inputs with an offset that is not known, and the spread of each start that is not exact."""
+class Unsure(NamedTuple):
+    """What is not exactly known of a recording before its first reading, each with its spread."""
+
+    inputs: dict[str, float]  # their offsets
+    own: dict[str, float]  # parameters of which each recording has its own
+    starts: dict[str, float]
+
+
+def _unsure(system: System, white: Array, known: Collection[str]) -> Unsure:
+    """What the readings of a recording have to say; `known`: inputs whose offsets are known."""
     noise = dict(zip(system.grid.outputs, white, strict=True))
-    spreads = {n: sd for n, s in system.model.states.items() if (sd := _spread(system, s, noise)) > 0}
-    return tuple(name for name in uncertain(system) if name not in known), spreads
+    inputs = {name: system.grid.spread[name] for name in uncertain(system) if name not in known}
+    own = {
+        name: p.spread
+        for name, p in system.model.parameters.items()
+        if p.spread > 0 and not p.fixed and system.grid.recording not in p.values
+    }
+    starts = {n: sd for n, s in system.model.states.items() if (sd := _spread(system, s, noise)) > 0}
+    return Unsure(inputs, own, starts)
 
 
 def _shift(
-    run: Trajectory,
-    residual: Array,
-    white: Array,
-    inputs: Sequence[str],
-    spreads: Mapping[str, float],
-    together: float = 1.0,
+    run: Trajectory, residual: Array, white: Array, unsure: Unsure, together: float = 1.0
 ) -> tuple[Array, Array]:
-    """Most likely offsets of inputs and starts (K,) given the first rows of a residual (N, Y), and what the
-    outputs answer to each, (N, Y, K).
+    """Most likely shifts (K,) of what is not known, in its order, given the first rows of a residual (N, Y),
+    and what the outputs answer to each, (N, Y, K).
     """
     seen = np.isfinite(residual)
-    spread = np.array([*(run.system.grid.spread[n] for n in inputs), *spreads.values()])
-    moved = sensitivities(run, inputs, list(spreads))[: len(residual)]
+    spread = np.array([sd for part in unsure for sd in part.values()])
+    moved = sensitivities(run, [*unsure.inputs, *unsure.own], list(unsure.starts))[: len(residual)]
     c = (moved / white[None, :, None])[seen]
     gram = c.T @ c / together + np.diag(1 / spread**2)
     shift = np.linalg.solve(gram, c.T @ (residual / white)[seen] / together)

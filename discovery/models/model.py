@@ -19,7 +19,8 @@ class Parameter:
     """A number of the model: given, bounded or found.
 
     `value` is the start value before a fit and the estimate after it, `low` and `high` its 95 % interval.
-    With `per_recording` every recording has its own, kept in `values`, with its interval in `intervals`.
+    With `per_recording` every recording has its own, kept in `values`, with its interval in `intervals`;
+    `spread` is the standard deviation about `value` in a recording that no fit has seen.
     `prior` is what is known of it before a fit: mean and standard deviation.
     """
 
@@ -34,6 +35,7 @@ class Parameter:
     values: Mapping[str, float] = field(default_factory=dict)
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     prior: tuple[float, float] | None = None
+    spread: float = 0.0
 
     def at(self, recording: str) -> float:
         """Value in a recording; the common value where the recording has none of its own."""

@@ -42,6 +42,9 @@ class ParameterForm(Strict):
     values: dict[str, float] = Field(
         default_factory=dict, description="values by recording (written by a fit)"
     )
+    spread: float = Field(
+        0.0, ge=0, description="standard deviation about start in a recording that no fit has seen (by a fit)"
+    )
 
 
 class StateForm(Strict):
@@ -172,6 +175,7 @@ def _parameter(entry: ParameterForm, place: str) -> Parameter:
         entry.values,
         _intervals(entry),
         entry.prior,
+        entry.spread,
     )
 
 
@@ -243,6 +247,7 @@ def _parameter_entry(p: Parameter) -> dict[str, Any]:
     entry |= {"fixed": True} if p.fixed else {}
     entry |= {"prior": [number(one) for one in p.prior]} if p.prior else {}
     entry |= {"per": "recording"} if p.per_recording else {}
+    entry |= {"spread": number(p.spread)} if p.spread else {}
     entry |= _finite({"low": p.low and number(p.low), "high": p.high and number(p.high)})
     entry |= {"values": {key: number(value) for key, value in p.values.items()}} if p.values else {}
     for end, key in enumerate(("low", "high") if p.intervals else ()):
