@@ -23,7 +23,8 @@ from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
-COARSE = 60  # steps per recording in the first look
+COARSE = 60  # steps per recording in the first look for heat
+TOGETHER = 256  # jumps looked at at a time: their columns are large
 LEAST = 2 * MOST  # readings before and after a jump, and while heat acts: fewer may be wrong ones
 FINE = 8  # steps on each side of an edge in the second, closer look
 CLOSER = 6  # claims that get one
@@ -50,9 +51,8 @@ def place_events(
     runs = list(dict.fromkeys(str(h.recording) for h in claims))
     rough = [one for each in side_by_side(of_recording, runs) for one in each]
     rough.sort(key=lambda one: -one[0])
-    return [search.close(h, slab) for _, search, h, slab in rough[:CLOSER]] + [
-        h for _, _, h, _ in rough[CLOSER:]
-    ]
+    near, far = rough[:CLOSER], rough[CLOSER:]
+    return [search.close(h, slab) for _, search, h, slab in near] + [h for _, _, h, _ in far]
 
 
 class _Search:
@@ -64,7 +64,6 @@ class _Search:
         self.trajectory = seen.fit.trajectories[self.index]
         grid = self.trajectory.system.grid
         self.read = grid.time[grid.read]
-        self.every = max(1, len(self.read) // (2 * COARSE))
         self.known: dict[str, Projected] = {}
 
     def projected(self, columns: Array) -> Projected:
@@ -72,14 +71,14 @@ class _Search:
         return project_one(self.seen, self.setting, self.index, columns)
 
     def rough(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
-        """The claim at the best of evenly spread instants, with what share of them the readings leave, and
-        its log Bayes factor; None where the recording is too short.
+        """The claim at the best of evenly spread instants, or of all readings for a jump, with what share of
+        them the readings leave, and its log Bayes factor; None where the recording is too short.
         """
-        return self._rough_window(h, slab) if h.effect.search == "window" else self._rough_step(h, slab)
+        return self._rough_window(h, slab) if h.effect.search == "window" else self._step(h, slab)
 
     def close(self, h: Hypothesis, slab: Slab) -> Hypothesis:
         """The candidate at the best instants near its present ones."""
-        return self._close_window(h, slab) if h.effect.search == "window" else self._close_step(h, slab)
+        return self._close_window(h, slab) if h.effect.search == "window" else h
 
     def _rough_window(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
         """Heat at a body between two instants; it may begin before the recording and end after it."""
@@ -138,28 +137,21 @@ class _Search:
         out[upper] = _log_bayes(dot[upper], gram[upper], flat)
         return out
 
-    def _rough_step(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
-        """A jump of one output, or of all, at an instant."""
-        coarse = self.read[max(self.every, LEAST) : len(self.read) - LEAST : self.every]
-        if not len(coarse):
+    def _step(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+        """A jump of one output, or of all, at an instant. Every reading is tried: a filter that follows the
+        machine sees a jump in one or two readings only, and knows nothing of it some readings away.
+        """
+        instants = self.read[LEAST : len(self.read) - LEAST]
+        if not len(instants):
             return None
         (name,) = h.shapes
-        gains = self._steps(h, coarse, slab)
+        parts = range(0, len(instants), TOGETHER)
+        gains = np.concatenate([self._steps(h, instants[k : k + TOGETHER], slab) for k in parts])
         weight = float(log_sum_exp(gains) - np.max(gains)) - float(np.log(len(gains)))
-        best = float(coarse[int(np.argmax(gains))])
-        around = {
-            name: (best - float(np.ptp(coarse)) / len(coarse), best + float(np.ptp(coarse)) / len(coarse))
-        }
-        return float(np.max(gains)) + weight, replace(h.at({name: best}, weight), spans=around)
-
-    def _close_step(self, h: Hypothesis, slab: Slab) -> Hypothesis:
-        (name,) = h.shapes
-        centre = int(np.searchsorted(self.read, h.shapes[name]))
-        last = len(self.read) - LEAST
-        near = self.read[max(LEAST, centre - self.every) : min(centre + self.every + 1, last)]
-        gains = self._steps(h, near, slab)
-        best = float(near[int(np.argmax(gains))])
-        return replace(h.at({name: best}, h.log_weight), spans={name: _span(gains, near)})
+        best = {name: float(instants[int(np.argmax(gains))])}
+        return float(np.max(gains)) + weight, replace(
+            h.at(best, weight), spans={name: _span(gains, instants)}
+        )
 
     def _steps(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
         """Log Bayes factor of a jump at each of the instants."""
