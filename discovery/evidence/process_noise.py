@@ -41,7 +41,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class UnknownHeat:
-    """Heat of unknown cause at a state instead of its process noise: "none of these" (a latent force)."""
+    """Heat of unknown cause at a state, next to its process noise: "none of these" (a latent force)."""
 
     state: str
     heat: float  # W, or a rate
@@ -50,8 +50,10 @@ class UnknownHeat:
     place: tuple[int, int]  # on the grid of both
 
     def on_top_of(self, setting: Setting) -> Setting:
-        """A noise setting with it."""
-        noise = replace(setting.noise, force={self.state: (self.heat, self.share)})
+        """A noise setting with it. What is always there stays: less noise than usual is no unknown cause."""
+        usual = (setting.noise.heat or {}).get(self.state, 0.0), setting.noise.share
+        both = float(np.hypot(usual[0], self.heat)), float(np.hypot(usual[1], self.share))
+        noise = replace(setting.noise, force={self.state: both})
         return replace(setting, noise=noise, log_weight=setting.log_weight + self.log_weight)
 
 
