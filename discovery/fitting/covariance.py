@@ -78,7 +78,7 @@ def with_intervals(problem: Problem, theta: Array, errors: Array) -> Model:
             # the common value of an event of one recording keeps it out of all others: it stays
             mean = not given or fitted <= given.keys()
             common = float(np.mean(list(values.values()))) if mean else p.value
-            spread = _spread(list(values.values())) if mean else 0.0
+            spread = spread_elsewhere(list(values.values())) if mean else 0.0
             kept = {name: ends for name, ends in p.intervals.items() if name != u.recording}
             intervals = kept | ({u.recording: interval} if interval else {})
             parameters[u.name] = replace(
@@ -90,7 +90,7 @@ def with_intervals(problem: Problem, theta: Array, errors: Array) -> Model:
     return replace(model, parameters=parameters, states=_with_spreads(problem))
 
 
-def _spread(values: list[float]) -> float:
+def spread_elsewhere(values: list[float]) -> float:
     """Standard deviation of the value of one more recording about the mean of `values` (K,). Of a single one,
     its own size is all that is known.
     """

@@ -13,6 +13,7 @@ from discovery.diagnosis.crossvalidation import left_out
 from discovery.diagnosis.refit import MOVED, refit, score
 from discovery.diagnosis.scan import scan_model
 from discovery.diagnosis.scored import is_usual, scored, with_change, with_force
+from discovery.evidence.process_noise import unknown_heat
 from tests.diagnosis.parts import bare, claim_of, context_of, dry, scored_of, wetted
 from tests.machine import NOISE, campaign, changed, model, simulated
 
@@ -105,6 +106,16 @@ def test_heat_of_unknown_cause_may_have_any_size(monkeypatch: pytest.MonkeyPatch
     mean = np.max(alone) + np.log(np.mean(np.exp(np.array(alone) - np.max(alone))))
     assert found.evidence == pytest.approx(mean, abs=0.7)  # it keeps the likely settings, not all
     assert np.ptp(alone) > 10.0  # a wrong size explains nothing
+
+
+def test_less_noise_than_usual_is_no_unknown_cause() -> None:
+    """Heat of unknown cause adds to the variance that is always there, whatever its size and share."""
+    usual = dry().settings[-1]
+    before = ((usual.noise.heat or {})["table"], usual.noise.share)
+    for heat in unknown_heat("table", 1.0, (0.0, 30.0), (0.0, 0.8)):
+        after = (heat.on_top_of(usual).noise.force or {})["table"]
+        added = np.square(after) - np.square(before)
+        assert added == pytest.approx(np.square([heat.heat, heat.share]), abs=1e-9)
 
 
 def test_a_scan_sees_the_effect_and_what_would_stand_without_it() -> None:

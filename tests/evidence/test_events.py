@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
 
 from discovery.dynamics import make_grid
+from discovery.effects.candidates import Scene, candidates
+from discovery.effects.catalogue import catalogue
 from discovery.evidence.bayes import Slab, project, project_one, scan
 from discovery.evidence.events import _span, heat_steps, place_events
 from discovery.evidence.process_noise import Setting
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Noise, fit_model
-from discovery.recordings import Recording
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
 from tests import machine
 from tests.effects.sample import sample, trajectory
 from tests.machine import Array, Inputs
@@ -92,3 +98,39 @@ def test_a_jump_of_a_sensor_is_found_between_two_readings() -> None:
     assert low < 50000 <= high
     assert high - low < 4 * machine.EVERY
     assert scores[0].size[0] == pytest.approx(3.0, abs=0.3)
+
+
+def plate(seed: int, jump: int) -> Recording:
+    """Six hours of a plate with a time constant of 14 min, read every 15 s to 0.1 K. From a reading on, its
+    sensor shows 3 K more.
+    """
+    rng = np.random.default_rng(seed)
+    power = np.repeat(rng.choice([0.0, 50.0, 150.0], 18), 80)[:1439]
+    warm: Array = np.full(len(power), 21.0)
+    for k, heat in enumerate(power[:-1]):
+        warm[k + 1] = warm[k] + (heat / 1.4 + 21.0 - warm[k]) * (1 - np.exp(-15.0 * 1.4 / 1200.0))
+    read = warm + 0.1 * rng.standard_normal(len(warm)) + 3.0 * (np.arange(len(warm)) >= jump)
+    return Recording("r", 15.0 * np.arange(len(warm), dtype=float), {"P": power, "plate": read})
+
+
+@pytest.mark.parametrize("jump", [864, 1008])
+def test_a_jump_is_found_where_a_filter_forgets_it_after_some_readings(jump: int) -> None:
+    """With slow noise and process noise it shows in one innovation, and nothing six readings away."""
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "plate": Channel("plate", "temperature", "degC", 0.1, "linear"),
+    }
+    terms = Term("power", "plate", parse("P")), Term("air", "plate", parse("hA*(21 - plate)"))
+    states = {"plate": State("plate", "degC", 1200.0, parse("21"), 0.1, 1 / 1200.0)}
+    model = Model("plate", {"hA": Parameter(1.0, "W/K", 0.0)}, states, terms, {})
+    seen = Campaign("plate", channels, {"r": plate(3, jump)})
+    fit = fit_model(model, seen, ["r"], ["plate"])
+    noise = Noise(
+        ("plate",), (0.1,), slow=(0.3,), heat={"plate": 2.0}, share=0.02, slow_time=1800.0, heat_time=2700.0
+    )
+    scene = Scene(channels, ("plate",), ("r",), {"r": ("r",)}, {"P": 150.0}, frozenset(), 0.02, 0.02)
+    offsets = [e for word, e in catalogue().items() if word == "sensor_offset"]
+    claims = [h for h in candidates(model, offsets, scene) if h.outputs]
+    placed = place_events(Whitened(fit, 12), replace(SETTING, noise=noise), claims, [SLAB])
+    (instant,) = placed[0].shapes.values()
+    assert instant == 15.0 * jump

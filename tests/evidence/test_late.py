@@ -155,6 +155,15 @@ def test_it_is_asked_only_where_readings_show_a_shift() -> None:
     assert not any(g.unsure for g in context.grids.values())
 
 
+def test_readings_that_are_averaged_by_the_program_still_show_a_shift() -> None:
+    """What counts is how often a file has them: a long recording is averaged over blocks in the search."""
+    seen = campaign(light(5, 40.0))
+    context = make_context(seen, model(), ["r5"], ("coil", "frame"), [], after(seen))
+    blocks = make_grid(seen, "r5", ["P", "room"], ["coil", "frame"], coarse=160, most=170)
+    assert np.median(np.diff(blocks.time[blocks.read])) > 2 * INTERVAL
+    assert perhaps_late(context.baseline, seen, {"r5": blocks}, SHORT)["r5"].unsure == {"P": INTERVAL}
+
+
 def test_readings_beside_a_switch_that_may_be_late() -> None:
     grid = make_grid(campaign(light(6, 0.0)), "r6", ["P", "room"], ["coil", "frame"])
     assert not beside_switches(grid).any()

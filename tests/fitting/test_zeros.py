@@ -13,6 +13,7 @@ from scipy.stats import multivariate_normal
 from discovery.dynamics import make_grid, make_system, predict, sensitivities, simulate
 from discovery.dynamics.system import shifted
 from discovery.fitting import Fit, fit_model, predict_recording
+from discovery.fitting.covariance import spread_elsewhere
 from discovery.fitting.fit import likeliest_spread
 from discovery.fitting.ridge import fit_ridge
 from discovery.fitting.starts import warm_start
@@ -173,3 +174,34 @@ def test_the_stated_spread_of_a_zero_is_a_limit_and_no_estimate() -> None:
     true = [0.1 * WARM[name] + 3 * (c.recordings[name].values["room"][0] - 20) for name in FIT]
     assert spreads.pop() == pytest.approx(np.sqrt(np.mean(np.square(true))), rel=0.5)
     assert not spreads
+
+
+def shifts(campaign: Campaign, fitted: tuple[str, ...]) -> Array:
+    """Residual (R,) of a free run on an unseen recording, of a model with a zero for each recording."""
+    plain = gray()
+    zero = Parameter(0.0, "um", per_recording=True)
+    outputs = {"E": parse("gf*fast + gs*(slow - 20) + zero")}
+    own = replace(plain, parameters={**plain.parameters, "zero": zero}, outputs=outputs)
+    fit = fit_model(own, campaign, list(fitted), ["E"])
+    run = predict_recording(fit.model, campaign, "unseen", ["E"], fit.noise.white)
+    left: Array = (run.system.grid.readings - predict(run))[:, 0]
+    return left[np.isfinite(left)]
+
+
+@pytest.mark.parametrize("fitted", [("a", "b", "c"), ("a",)])
+def test_a_zero_that_is_a_parameter_of_each_recording_is_found_by_the_first_reading(
+    fitted: tuple[str, ...],
+) -> None:
+    """The zeros of the recordings differ by up to 140 um; from one recording, only its size is known."""
+    left = shifts(machine(0.0, ZEROS), fitted)
+    assert abs(left[0]) < 3 * NOISE
+    assert float(np.mean(left[-50:])) == pytest.approx(0.0, abs=0.05 * float(np.ptp(list(ZEROS.values()))))
+
+
+def test_the_spread_of_a_parameter_is_that_of_one_more_value_about_their_mean() -> None:
+    """Against draws: the mean square of a fifth value about the mean of four is var(1 + 1/4)."""
+    draws = np.random.default_rng(5).normal(3.0, 2.0, (20_000, 5))
+    true = np.sqrt(np.mean((draws[:, 4] - draws[:, :4].mean(axis=1)) ** 2))
+    found = np.sqrt(np.mean([spread_elsewhere(row[:4].tolist()) ** 2 for row in draws[:2000]]))
+    assert found == pytest.approx(true, rel=0.05)
+    assert spread_elsewhere([-7.0]) == 7.0

@@ -69,7 +69,10 @@ def test_a_file_becomes_what_it_says(tmp_path: Path) -> None:
 def test_the_intervals_of_each_recording_stand_in_the_file(tmp_path: Path) -> None:
     model = read_model(written(tmp_path, GOOD))
     own = dataclasses.replace(
-        model.parameters["loss"], values={"a": 0.2, "b": 0.4}, intervals={"a": (0.1, 0.3), "b": (0.35, 0.45)}
+        model.parameters["loss"],
+        values={"a": 0.2, "b": 0.4},
+        intervals={"a": (0.1, 0.3), "b": (0.35, 0.45)},
+        spread=0.17,
     )
     fitted = dataclasses.replace(model, parameters={**model.parameters, "loss": own})
     write_model(tmp_path / "again.toml", fitted)
