@@ -125,7 +125,11 @@ def _choices(variable: str, effect: Effect, model: Model, scene: Scene) -> list[
         if n in scene.largest
         and (scene.channels[n].unit in TEMPERATURES) == is_temperature
         and scene.channels[n].role in effect.roles
-        and (effect.place == "output" or scene.channels[n].role != "fluid flow" or _is_second(n, scene))
+        and (
+            effect.place in ("output", "deviation")
+            or scene.channels[n].role != "fluid flow"
+            or _is_second(n, scene)
+        )
     ]
 
 

@@ -33,7 +33,8 @@ Place = Literal[
     "error state",  # a state that is an error: its terms are rates
     "seat",  # a body as all errors see it; the formula is added to its temperature there
     "lever",  # a body; each error sees the formula with a lever of its own
-    "output",  # one error, all recordings
+    "output",  # one output, all recordings
+    "deviation",  # one output that is no temperature: what it shows beyond that is no heat
     "output of errors",  # the same, of a model whose states are errors
     "output of a recording",  # one error in one recording
     "input temperature",  # one recorded temperature, wherever the model uses it

@@ -99,10 +99,8 @@ def spots(
             yield from _of_inputs(model, parts, channels)
         case "error state":
             yield from (Spot((name,)) for name in parts.errors)
-        case "output of errors" if not parts.bodies:
-            yield from (Spot(outputs=(name,)) for name in outputs)
-        case "output" | "output of a recording":
-            yield from (Spot(outputs=(name,)) for name in outputs)
+        case "output" | "output of a recording" | "output of errors" | "deviation":
+            yield from (Spot(outputs=(name,)) for name in _alone(effect, parts, outputs, channels))
         case "seat" | "lever":
             for b in parts.bodies:
                 moved = tuple(y for y in outputs if b in names(model.outputs.get(y, Name(y))))
@@ -115,6 +113,18 @@ def spots(
                 yield Spot(terms=terms)
         case "recording" if len(outputs) > 1:
             yield Spot(outputs=outputs)
+
+
+def _alone(
+    effect: Effect, parts: Layout, outputs: tuple[str, ...], channels: Mapping[str, Channel]
+) -> tuple[str, ...]:
+    """Outputs of which one alone shows an effect."""
+    match effect.place:
+        case "output of errors" if parts.bodies:
+            return ()
+        case "deviation":
+            return tuple(n for n in outputs if not same_dimension(channels[n].unit, "degC"))
+    return outputs
 
 
 def _bodies(effect: Effect, parts: Layout) -> tuple[str, ...] | None:

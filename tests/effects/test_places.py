@@ -16,6 +16,7 @@ from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import TERM_PLACES
 from discovery.models import Model, read_model, write_model
+from discovery.recordings import Channel
 from discovery.terms import Term, evaluate, names, parse, substitute
 from tests.effects.sample import EVENT_ODDS, ODDS, claims, expand, inside, sample, scene, trajectory
 
@@ -168,6 +169,15 @@ def test_every_recorded_input_may_be_heat_a_path_or_a_factor() -> None:
     known = replace(model, terms=(*model.terms, Term("cut", "bed", parse("loss*cut"))))
     left = {(h.channels, h.states) for h in claims(known, catalogue()["input_heat"])}
     assert left == heat - {(("cut",), ("bed",))}
+
+
+def test_no_path_reaches_a_temperature_but_as_heat() -> None:
+    """An error may follow an input at once; a thermometer shows what its body takes up."""
+    model, channels = sample()
+    warm = {**channels, "motor": Channel("motor", "temperature", "degC", None, "linear")}
+    both = replace(scene(model, warm), outputs=("E_Y", "motor"))
+    found = candidates(model, [e for e in catalogue().values() if e.word == "input_path"], both)
+    assert {h.outputs for h in found} == {("E_Y",)}
 
 
 def test_two_channels_of_a_role_are_both_asked_for() -> None:
