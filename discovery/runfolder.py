@@ -8,8 +8,9 @@ import platform
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,19 @@ def default_folder(experiment: str) -> Path:
     'mill_ X axis_ 3_4'
     """
     return Path("runs") / re.sub(r"[^\w .+-]+", "_", experiment).lstrip(" ._+-")[:100].rstrip()
+
+
+def made_at(folder: Path, names: Sequence[str] = (RESULTS, DIAGNOSIS)) -> str:
+    """Day and time when the newest of these files in a run's folder was written; empty without one."""
+    made = [path.stat().st_mtime for name in names if (path := folder / name).is_file()]
+    return datetime.fromtimestamp(max(made)).strftime("%Y-%m-%d %H:%M") if made else ""
+
+
+def replacing(folder: Path, verb: str = "run") -> str:
+    """A sentence on what a run (or a diagnosis) replaces in a folder; empty where nothing is lost."""
+    what, name = ("run", RESULTS) if verb == "run" else ("diagnosis", DIAGNOSIS)
+    made = made_at(folder, [name])
+    return f"this replaces the {what} of {made} in {folder} (keep both with --out)" if made else ""
 
 
 def read_results(folder: Path) -> dict[str, Any]:

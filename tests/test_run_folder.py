@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import os
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -278,3 +280,22 @@ def test_the_folder_of_any_name_stands_in_runs(name: str) -> None:
     assert folder.name
     assert not folder.name.startswith(".")
     assert len(folder.name) <= 100
+
+
+def test_a_second_run_says_which_run_it_replaces_and_how_to_keep_both(folder: Path) -> None:
+    (folder / "experiment.toml").write_text(SHORT.replace("[models]", DRY + "[models]"))
+    out = folder / "out"
+
+    def said(verb: str) -> list[str]:
+        done = CliRunner().invoke(app, [verb, str(folder / "experiment.toml"), "--out", str(out)])
+        assert done.exit_code == 0, done.output
+        return [line for line in done.stderr.splitlines() if "replaces" in line]
+
+    assert said("run") == []
+    os.utime(out / "results.json", (stamp := datetime(2026, 3, 9, 14, 5).timestamp(), stamp))
+    os.utime(out / "diagnosis.json", (stamp := datetime(2026, 3, 10, 8, 0).timestamp(), stamp))
+    assert said("diagnose") == [
+        f"this replaces the diagnosis of 2026-03-10 08:00 in {out} (keep both with --out)"
+    ]
+    os.utime(out / "results.json", (stamp := datetime(2026, 3, 9, 14, 5).timestamp(), stamp))
+    assert said("run") == [f"this replaces the run of 2026-03-09 14:05 in {out} (keep both with --out)"]

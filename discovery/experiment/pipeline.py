@@ -27,7 +27,7 @@ from discovery.printed import counted
 from discovery.progress import Progress, silent
 from discovery.recordings.finding import Finding, folded
 from discovery.report import write_report
-from discovery.runfolder import default_folder, staged
+from discovery.runfolder import default_folder, replacing, staged
 from discovery.sparse.options import SparseOptions
 from discovery.targets import check_targets
 from discovery.threads import one_thread, side_by_side
@@ -56,7 +56,7 @@ def run(
             whatever else stands there stay.
         progress: called with what begins.
         force: use recordings that are wrong all the same.
-        tell: called with what is wrong with the recordings, a line each.
+        tell: called with what is wrong with the recordings and with what is replaced, a line each.
 
     Returns:
         The folder.
@@ -71,6 +71,8 @@ def run(
     folder = out or default_folder(experiment.name)
     if experiment.form.export:
         check_targets(experiment.form.export.to)
+    if lost := replacing(folder):
+        tell(lost)
     progress = with_time_left(progress, folder, experiment, began)
     with staged(folder) as temporary:
         begun = begin_roles(experiment)
@@ -217,6 +219,8 @@ def diagnose(
     experiment = replace(experiment, form=form.model_copy(update=alone))
     folder = out or default_folder(experiment.name)
     check_joins(folder, experiment, name)
+    if lost := replacing(folder, "diagnose"):
+        tell(lost)
     with staged(folder) as temporary:
         fitted = {name: fit_entry(experiment, name, entry, progress)}
         found = diagnosis(experiment, progress, fitted)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from discovery.report.printed import Against, Line, Printed, behind
 from discovery.report.ranking import cells, is_error, ranked, removed, rms_by_unit
 from discovery.report.run import Run, pretty_unit
 from discovery.report.text import listed, number, percent, words
-from discovery.runfolder import DIAGNOSIS, RESULTS
+from discovery.runfolder import made_at
 
 _MOST_DIFFERENCES = 8  # of two runs; the rest is counted
 _MOST_NAMES = 4  # in a list that is printed whole
@@ -189,8 +188,7 @@ def _about(run: Run) -> str:
             parts.append(
                 f"{said}: {', '.join(names) if len(names) <= _MOST_NAMES else f'{len(names)} recordings'}"
             )
-    made = [path.stat().st_mtime for name in (RESULTS, DIAGNOSIS) if (path := run.folder / name).exists()]
-    parts += [datetime.fromtimestamp(max(made)).strftime("%Y-%m-%d %H:%M")] if made else []
+    parts += [made] if (made := made_at(run.folder)) else []
     return " · ".join(parts)
 
 
