@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ from discovery.export.makedocument import exportable
 from discovery.export.ranges import sampled_inputs
 from discovery.export.stepper import Stepper
 from discovery.models import Model
+from discovery.models.units import differences
 from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
@@ -19,11 +22,11 @@ Array = NDArray[np.float64]
 COMPARED_EVERY = 600.0  # s
 
 
-def agreement(model: Model, campaign: Campaign, recording: str, step_s: float) -> dict[str, float]:
-    """Largest deviation [um] of the fixed step from `discovery.dynamics` over a recording.
+def agreement(model: Model, campaign: Campaign, recording: str, step_s: float) -> dict[str, dict[str, float]]:
+    """Largest deviation of the fixed step from `discovery.dynamics` over a recording, by the unit of outputs.
 
     Returns:
-        `integrator_um`: under the same inputs, held over each step. `held_inputs_um`: under the inputs as
+        `integrator`: under the same inputs, held over each step. `held_inputs`: under the inputs as
         `discovery.dynamics` reads them, temperatures straight between their stamps.
     """
     model = exportable(model, campaign)
@@ -36,8 +39,9 @@ def agreement(model: Model, campaign: Campaign, recording: str, step_s: float) -
         stepper.run(u[k - every : k])
         found.append(stepper.outputs(u[k]))  # as dynamics does: with the inputs of this instant
         marks.append(k * step_s)
+    units = [differences(campaign.channels[name].unit) for name in model.outputs]
     if not found:
-        return {"integrator_um": 0.0, "held_inputs_um": 0.0}
+        return {kind: dict.fromkeys(units, 0.0) for kind in ("integrator", "held_inputs")}
     ticks = np.arange(len(u), dtype=float) * step_s
     data = campaign.recordings[recording]
     held, straight = {}, {}
@@ -48,16 +52,26 @@ def agreement(model: Model, campaign: Campaign, recording: str, step_s: float) -
             data.time[known], data.values[name][known], campaign.channels[name].between == "linear"
         )
     return {
-        "integrator_um": _deviation(model, recording, held, np.array(marks), np.array(found)),
-        "held_inputs_um": _deviation(model, recording, straight, np.array(marks), np.array(found)),
+        kind: _largest(units, _deviation(model, recording, samples, np.array(marks), np.array(found)))
+        for kind, samples in (("integrator", held), ("held_inputs", straight))
     }
+
+
+def _largest(units: Sequence[str], deviation: Array) -> dict[str, float]:
+    """The largest deviation by unit, of those of each output (Y,)."""
+    found: dict[str, float] = {}
+    for unit, one in zip(units, deviation.tolist(), strict=True):
+        found[unit] = max(found.get(unit, 0.0), one)
+    return found
 
 
 def _deviation(
     model: Model, recording: str, samples: dict[str, Samples], marks: Array, found: Array
-) -> float:
+) -> Array:
+    """Largest deviation (Y,) of each output."""
     time = np.unique(np.concatenate([[0.0], marks, *(s.time[s.time <= marks[-1]] for s in samples.values())]))
     unread = np.full((len(marks), len(model.outputs)), np.nan)
     grid = Grid(recording, time, samples, tuple(model.outputs), np.searchsorted(time, marks), unread)
     values = {name: parameter.value for name, parameter in model.parameters.items()}
-    return float(np.max(np.abs(predict(simulate(make_system(model, grid), values)) - found)))
+    largest: Array = np.max(np.abs(predict(simulate(make_system(model, grid), values)) - found), axis=0)
+    return largest

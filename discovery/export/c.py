@@ -13,7 +13,7 @@ from discovery import __version__
 from discovery.export.c_guard import guard_source, real, settings
 from discovery.export.compiled import Compiled, Delay
 from discovery.export.document import Exported
-from discovery.export.guarding import compensated
+from discovery.export.guarding import compensated, without_offsets
 from discovery.export.identifiers import comment, formula, identifier, identifiers
 from discovery.export.kernel import LARGEST_NORM, LARGEST_SUBSTEPS, ORDER
 from discovery.export.program import Instruction, Program
@@ -108,6 +108,7 @@ def _title(exported: Exported) -> str:
         f"/* {comment(exported.model.name)}, revision {exported.revision}. Written by discovery "
         f"{__version__}; do not edit.\n"
         f" * sha256 of the exported model: {exported.seal.sha256}\n"
+        + "".join(f" * {comment(said)}.\n" for said in without_offsets(exported.outputs))
     )
 
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from discovery.errors import UsageError, UserError
 from discovery.export.agreement import agreement
 from discovery.export.c import c_files
-from discovery.export.document import Exported, from_document, read_document, render
+from discovery.export.document import Exported, Output, from_document, read_document, render
 from discovery.export.fmu import fmu_bytes, prove_fmu
+from discovery.export.guarding import without_offsets
 from discovery.export.identifiers import identifier
 from discovery.export.makedocument import make_document
 from discovery.export.ranges import sampled_inputs
@@ -23,6 +24,7 @@ from discovery.export.replay import (
     Proof,
     Reference,
     make_reference,
+    measured,
     prove_c,
     reference_files,
     replay_source,
@@ -49,18 +51,22 @@ class Export:
 
     files: tuple[Path, ...]
     proofs: tuple[Proof, ...]
-    agreement: Mapping[str, float] | None  # of the fixed step with discovery.dynamics, um
+    agreement: Mapping[str, Mapping[str, float]] | None  # of the fixed step with discovery.dynamics
+    outputs: tuple[Output, ...]
 
     def lines(self) -> list[str]:
         """What a user wants to know of it."""
         lines = [*(str(path) for path in self.files), *(str(proof) for proof in self.proofs)]
-        if self.agreement is None:
-            return lines
-        step = (
-            f"the fixed step is {self.agreement['integrator_um']:.2g} um from the fitted model under the "
-            f"same inputs, {self.agreement['held_inputs_um']:.2g} um where inputs are held over a step"
-        )
-        return [*lines, step]
+        if self.agreement is not None:
+            same, held = (
+                " and ".join(measured(value, unit) for unit, value in self.agreement[kind].items())
+                for kind in ("integrator", "held_inputs")
+            )
+            lines.append(
+                f"the fixed step is {same} from the fitted model under the same inputs, {held} where inputs "
+                "are held over a step"
+            )
+        return [*lines, *without_offsets(self.outputs)]
 
 
 def export_model(
@@ -116,7 +122,7 @@ def export_model(
     reference = make_reference(exported.compiled, inputs)
     files, proofs = _files(exported, data, reference, targets)
     write_files(out_dir, files)
-    return Export(tuple(out_dir / name for name in files), proofs, found)
+    return Export(tuple(out_dir / name for name in files), proofs, found, exported.outputs)
 
 
 def _files(
@@ -254,7 +260,7 @@ def export_document(
     files, proofs = _files(exported, data, reference, targets)
     out_dir = out_dir or path.with_suffix("")
     write_files(out_dir, files)
-    return Export(tuple(out_dir / name for name in files), proofs, None)
+    return Export(tuple(out_dir / name for name in files), proofs, None, exported.outputs)
 
 
 def _through_the_ranges(exported: Exported, hours: float = 12.0) -> Array:

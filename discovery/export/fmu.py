@@ -28,6 +28,7 @@ from discovery.export.replay import (
     LIMITS,
     Proof,
     Reference,
+    unit_of,
     within,
     write_files,
 )
@@ -147,7 +148,11 @@ def prove_fmu(exported: Exported, reference: Reference, version: int, data: byte
         deviation = float(np.max(np.abs(y - reference.y))) if len(y) == steps else float("nan")
     return within(
         Proof(
-            f"FMI {version}.0", deviation, LIMITS["double"], "validated and simulated with FMPy, " + _where()
+            f"FMI {version}.0",
+            deviation,
+            LIMITS["double"],
+            unit_of(exported),
+            "validated and simulated with FMPy, " + _where(),
         )
     )
 

@@ -6,9 +6,10 @@ A target without a clock of its own ticks once every step of the model. What it 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
-from discovery.export.document import Exported, Input
+from discovery.export.document import Exported, Input, Output
 
 TEMPERATURE_SPAN = 5.0  # K beyond the trained range that half of the fade covers at least
 FADE_FROM, FADE_TO = 0.5, 2.0  # spans beyond the trained range at which the gain begins to fall, and is 0
@@ -114,3 +115,13 @@ def times() -> dict[str, float]:
 def compensated(exported: Exported) -> list[int]:
     """Which outputs are compensated: those of role `error`."""
     return [k for k, output in enumerate(exported.outputs) if output.role == "error"]
+
+
+def without_offsets(outputs: Sequence[Output]) -> list[str]:
+    """A sentence where no output is an error, so that nothing can be compensated; else none."""
+    if any(output.role == "error" for output in outputs):
+        return []
+    names = ", ".join(output.name for output in outputs)
+    temperatures = all(output.role == "temperature" for output in outputs)
+    what = "are temperatures" if temperatures else "are no errors"
+    return [f"nothing compensates an error, there are no offsets: the outputs {what} ({names})"]

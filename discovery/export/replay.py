@@ -20,10 +20,11 @@ from discovery.export.compiled import Compiled
 from discovery.export.document import Exported
 from discovery.export.stepper import free_run
 from discovery.export.templated import templated
+from discovery.models.units import differences
 
 Array = NDArray[np.float64]
 
-LIMITS = {"double": 1e-9, "float": 1e-3}  # um
+LIMITS = {"double": 1e-9, "float": 1e-3}  # in the unit of each output
 LONGEST = 8640  # steps of a reference: a day at 10 s
 CFLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-O2")
 
@@ -38,20 +39,36 @@ class Reference:
 
 @dataclass(frozen=True)
 class Proof:
-    """What a replay found: largest deviation from the Python model in the unit of the outputs; None: not run,
-    and why.
+    """What a replay found: largest deviation from the Python model in the unit of the outputs (of any of them
+    where they have several); None: not run, and why.
     """
 
     target: str
     deviation: float | None
     limit: float
+    unit: str
     note: str = ""
 
     def __str__(self) -> str:
         if self.deviation is None:
             return f"{self.target}: not run, {self.note}"
         note = f", {self.note}" if self.note else ""
-        return f"{self.target}: {self.deviation:.2g} um from the Python model (limit {self.limit:g}){note}"
+        far = measured(self.deviation, self.unit)
+        return f"{self.target}: {far} from the Python model (limit {self.limit:g}){note}"
+
+
+def measured(deviation: float, unit: str) -> str:
+    """A deviation with its unit.
+
+    >>> measured(0.012, "K"), measured(3e-9, "1")
+    ('0.012 K', '3e-09')
+    """
+    return f"{deviation:.2g}{'' if unit == '1' else f' {unit}'}"
+
+
+def unit_of(exported: Exported) -> str:
+    """The units in which outputs can deviate, as a sentence names them: "um or um/m", "K"."""
+    return " or ".join(dict.fromkeys(differences(output.unit) for output in exported.outputs))
 
 
 def make_reference(compiled: Compiled, inputs: Array) -> Reference:
@@ -105,7 +122,9 @@ def prove_c(exported: Exported, reference: Reference) -> list[Proof]:
                 f"the C code in {kind} cannot be replayed",
                 (0, 1),
             )
-            proofs.append(within(Proof(f"C {kind}", float(done.split()[-1]), LIMITS[kind])))
+            proofs.append(
+                within(Proof(f"C {kind}", float(done.split()[-1]), LIMITS[kind], unit_of(exported)))
+            )
     return proofs
 
 
@@ -122,8 +141,8 @@ def within(proof: Proof) -> Proof:
     """
     if proof.deviation is not None and not proof.deviation <= proof.limit:
         raise UserError(
-            f"{proof.target} deviates by {proof.deviation:.3g} um from the Python model, more than "
-            f"{proof.limit:g}; nothing was exported: "
+            f"{proof.target} deviates by {measured(proof.deviation, proof.unit)} from the Python model, more "
+            f"than {proof.limit:g}; nothing was exported: "
             "simplify the model (very large or very stiff terms) or use another target"
         )
     return proof

@@ -17,7 +17,7 @@ CHANNELS = {
 RATE = 1e-3  # K/s of the room
 
 
-def found(hours: float, step_s: float) -> dict[str, float]:
+def found(hours: float, step_s: float) -> dict[str, dict[str, float]]:
     """y' = T/1000 while the room warms up all the time."""
     time = np.array([0.0, hours * 3600.0])
     values = {"T": RATE * time, "E": np.zeros(2)}
@@ -30,9 +30,9 @@ def found(hours: float, step_s: float) -> dict[str, float]:
 def test_inputs_that_are_held_lag_by_half_a_step(step_s: float, last: float) -> None:
     """What half a step of the slope adds up to by the last of the instants, about 10 min apart."""
     deviation = found(3601.0 / 3600.0, step_s)
-    assert deviation["integrator_um"] == pytest.approx(0.0, abs=1e-9)
-    assert deviation["held_inputs_um"] == pytest.approx(RATE * step_s / 2 * last / 1000.0, rel=1e-6)
+    assert deviation["integrator"]["um"] == pytest.approx(0.0, abs=1e-9)
+    assert deviation["held_inputs"]["um"] == pytest.approx(RATE * step_s / 2 * last / 1000.0, rel=1e-6)
 
 
 def test_where_there_is_nothing_to_compare_nothing_deviates() -> None:
-    assert found(0.1, 10.0) == {"integrator_um": 0.0, "held_inputs_um": 0.0}
+    assert found(0.1, 10.0) == {"integrator": {"um": 0.0}, "held_inputs": {"um": 0.0}}

@@ -357,6 +357,38 @@ def test_an_output_that_is_no_channel_is_not_compensated(
         ("E_A0C", "error", "um/m"),
     ]
     assert Compensator(back).names == ["E_Z0T", "E_A0C"]
-    assert (done.agreement or {})["integrator_um"] < 1e-3
+    assert set((done.agreement or {})["integrator"]) == {"um", "um/m"}
+    assert max((done.agreement or {})["integrator"].values()) < 1e-3
+    assert not any("nothing compensates" in line for line in done.lines())
     with pytest.raises(UserError, match="no output is a channel"):
         export_model(replace(model, outputs={"T_guess": parse("a")}), campaign, ["fit"], "json", tmp_path)
+
+
+def test_temperatures_are_exported_in_kelvin_and_compensate_nothing(
+    campaign: Campaign, tmp_path: Path
+) -> None:
+    from dataclasses import replace
+
+    rows = {
+        name: replace(campaign.channels[name], role="temperature", unit="degC") for name in ("E_Z0T", "E_A0C")
+    }
+    states = {"y": State("y", "degC", 1e4, parse("T_env"), 0.0, 1e-4)}
+    heat = (Term("heat", "y", parse("P_drive/10")), Term("air", "y", parse("2*(T_env - y)")))
+    outputs = {"E_Z0T": parse("y"), "E_A0C": parse("y + 1")}
+    bodies = Model("bodies", {}, states, heat, outputs)
+    targets = ["c", "st"] if HAS_GCC else ["st"]
+    warm = replace(campaign, channels={**campaign.channels, **rows})
+    done = export_model(bodies, warm, ["fit"], targets, tmp_path)
+    said = "nothing compensates an error, there are no offsets: the outputs are temperatures"
+    lines = done.lines()
+    assert lines[-1] == f"{said} (E_Z0T, E_A0C)"
+    assert not any(" um " in line for line in lines)
+    assert sum(" K from the Python model" in line for line in lines) == (4 if HAS_GCC else 2)
+    [step] = [line for line in lines if line.startswith("the fixed step is")]
+    assert step.count(" K ") == 2
+    heads = [*tmp_path.glob("c/bodies.h"), *tmp_path.glob("st/FB_bodies_*.st")]
+    assert len(heads) == (3 if HAS_GCC else 2)
+    for head in heads:
+        assert said in head.read_text()
+        assert "[degC]" in head.read_text()
+        assert "position of the axis" not in head.read_text()

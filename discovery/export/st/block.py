@@ -16,6 +16,7 @@ from discovery.export.guarding import (
     CONSTANTS,
     MEANING,
     compensated,
+    without_offsets,
 )
 from discovery.export.identifiers import comment, formula, identifier, identifiers
 from discovery.export.st.guards import settable
@@ -42,6 +43,9 @@ def st_text(exported: Exported, precision: str = "double") -> str:
         "block.st",
         TITLE=f"{comment(exported.model.name)}, revision {exported.revision}",
         VERSION=__version__,
+        OFFSETS=comment(
+            "; ".join(without_offsets(exported.outputs) or ["Add offset_... to the position of the axis"])
+        ),
         SEAL=exported.seal.sha256,
         NAME=name,
         KIND=kind,

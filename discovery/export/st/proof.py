@@ -13,7 +13,7 @@ import numpy as np
 from discovery.errors import UserError
 from discovery.export.document import Exported
 from discovery.export.identifiers import identifiers
-from discovery.export.replay import LIMITS, Proof, Reference, within
+from discovery.export.replay import LIMITS, Proof, Reference, unit_of, within
 from discovery.export.st.block import st_name, st_text
 from discovery.export.st.language import KINDS
 from discovery.export.st.reader import read_structured_text
@@ -39,7 +39,7 @@ def prove_st(exported: Exported, reference: Reference, spelling: Spelling = st_t
         note = f"read by discovery, first {min(STEPS, len(reference.u))} steps; {made}"
         name = "structured text" if spelling is st_text else "SCL"
         deviation = _replay(exported, reference, text, kind)
-        proofs.append(within(Proof(f"{name} {kind}", deviation, LIMITS[precision], note)))
+        proofs.append(within(Proof(f"{name} {kind}", deviation, LIMITS[precision], unit_of(exported), note)))
     return proofs
 
 
