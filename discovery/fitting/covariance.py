@@ -13,11 +13,15 @@ from discovery.models import Model, State
 Array = NDArray[np.float64]
 
 Z95 = 1.959963984540054  # standard deviations of a normal distribution: 95 % lie within
+NO_EFFECT = "no effect on any reading, so these recordings cannot determine it"
+NOT_SEPARATED = "not separated from other parameters by these recordings"
+WIDE = "not determined (95 % interval wider than the value)"
 _UNSEEN = 1e-4  # share of a column's length that the other unknowns leave; below it, it is not determined
 
 
 def covariance_of(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array, list[str]]:
-    """Gauss-Newton covariance (U, U) and a sentence for each parameter that the readings do not determine.
+    """Gauss-Newton covariance (U, U), and a sentence for each reason why readings leave parameters open,
+    with their names.
 
     Args:
         jacobian: (N, U) of whitened residuals and priors.
@@ -26,7 +30,7 @@ def covariance_of(problem: Problem, jacobian: Array, theta: Array) -> tuple[Arra
     low = problem.bounds[0]
     total = len(problem.unknowns)
     length = np.linalg.norm(jacobian, axis=0)
-    sentences = []
+    lost: dict[str, list[str]] = {reason: [] for reason in (NO_EFFECT, NOT_SEPARATED, WIDE)}
     seen = length > 0
     scaled = jacobian[:, seen] / length[seen]
     size, direction = np.linalg.eigh(scaled.T @ scaled)
@@ -39,11 +43,9 @@ def covariance_of(problem: Problem, jacobian: Array, theta: Array) -> tuple[Arra
     for i, u in enumerate(problem.unknowns):
         if u.is_nuisance:
             continue
-        where = f" in recording '{u.recording}'" if u.recording else ""
+        name = f"{u.name} in '{u.recording}'" if u.recording else u.name
         if not seen[i]:
-            sentences.append(
-                f"{u.name}{where} has no effect on any reading: it cannot be found from these recordings"
-            )
+            lost[NO_EFFECT].append(name)
             covariance[i, i] = np.inf
             continue
         k = int(np.searchsorted(index, i))
@@ -51,14 +53,12 @@ def covariance_of(problem: Problem, jacobian: Array, theta: Array) -> tuple[Arra
         error = np.sqrt(covariance[i, i])
         if share < _UNSEEN:
             covariance[i, i] = np.inf if blind[k] else covariance[i, i]
-            sentences.append(
-                f"{u.name}{where} cannot be separated from other parameters with these recordings"
-            )
+            lost[NOT_SEPARATED].append(name)
         elif error * Z95 > max(abs(theta[i]), 1e-12) and not (
             np.isfinite(low[i]) and theta[i] <= low[i] + 1e-9
         ):
-            sentences.append(f"{u.name}{where} is not determined: its 95 % interval is wider than its value")
-    return covariance, sentences
+            lost[WIDE].append(name)
+    return covariance, [f"{reason}: {', '.join(names)}" for reason, names in lost.items() if names]
 
 
 def with_intervals(problem: Problem, theta: Array, errors: Array) -> Model:

@@ -45,7 +45,7 @@ class Fit:
     noise: Noise
     trajectories: tuple[Trajectory, ...]
     cost: float  # half the sum of squared whitened residuals and priors
-    unidentified: tuple[str, ...]  # one sentence for each parameter that these recordings do not determine
+    unidentified: tuple[str, ...]  # a sentence for each reason why recordings do not determine parameters
     seconds: float
     together: float = 1.0  # readings that count as one against what is known of inputs with a spread
     ended_early: bool = False  # it would not have come near its goal
@@ -240,7 +240,7 @@ def fit_model(
 def _covariance(
     problem: Problem, solution: Solution, together: float, excess: float
 ) -> tuple[Array, list[str]]:
-    """Covariance (U, U) of the unknowns, and a sentence for each parameter that is not determined.
+    """Covariance (U, U) of the unknowns, and a sentence for each reason why parameters are not determined.
 
     Args:
         together: how many times the priors of nuisances were counted; here they count once.

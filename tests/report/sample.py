@@ -149,7 +149,7 @@ def results(scores: dict[str, dict[str, Any]]) -> dict[str, Any]:
         for name, (kind, _) in MODELS.items()
     }
     models["thermobalance"]["shares"] = {"drive loss": 0.55, "cutting fluid": 0.3, "air": 0.1}
-    models["thermobalance"]["notes"] = ["m is not determined: its 95 % interval is wider than its value"]
+    models["thermobalance"]["notes"] = ["not determined (95 % interval wider than the value): m"]
     models["discovered"]["search"] = {
         "path": [
             {
