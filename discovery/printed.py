@@ -19,3 +19,12 @@ def counted(count: int, word: str) -> str:
     ('1 state', '3 terms')
     """
     return f"{count} {word}{'s' * (count != 1)}"
+
+
+def sized(value: float, unit: str, digits: int = 3) -> str:
+    """The size of an effect with its unit; without a unit it is a share.
+
+    >>> sized(28.4, "W/K", 2), sized(0.284, "1", 2)
+    ('28 W/K', '28 %')
+    """
+    return f"{printed(100 * value, digits)} %" if unit == "1" else f"{printed(value, digits)} {unit}"

@@ -14,7 +14,7 @@ from discovery.diagnosis.when import in_words, instants
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Score
 from discovery.models import Model
-from discovery.printed import printed
+from discovery.printed import sized
 
 INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
 
@@ -123,8 +123,7 @@ def _smallest(found: Search) -> str:
         everywhere = len(seen) == len(claims) and len(places) > 1 and h.effect.place in _ANYWHERE
         where = _ANYWHERE[h.effect.place] if everywhere else f"at {'; '.join(places)}"
         unit = h.units.get(h.amplitudes[0], "1")
-        amount = printed(size, 2) if unit == "1" else f"{printed(size, 2)} {unit}"
-        texts.append(f"{word} of {amount}{speed} {where}")
+        texts.append(f"{word} of {sized(size, unit, 2)}{speed} {where}")
     return (
         "these recordings would have shown " + ", ".join(texts)
         if texts

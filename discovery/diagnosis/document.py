@@ -143,7 +143,7 @@ def _wrong_readings(d: Diagnosis) -> list[Physics]:
         return []
     entry, rows = catalogue()["outlier"], []
     for o in sorted(d.context.outliers, key=lambda o: -abs(o.size / o.noise))[:WRONG_READINGS]:
-        half = 1.96 * o.noise
+        half, unit = 1.96 * o.noise, d.context.campaign.channels[o.output].unit
         rows.append(
             Physics(
                 effect=entry.word,
@@ -151,13 +151,13 @@ def _wrong_readings(d: Diagnosis) -> list[Physics]:
                 states=[o.output],
                 recording=o.recording,
                 probability=0.98,
-                expression=f"{o.size:.4g} at {o.time:.0f} s",
+                expression=f"{o.size:.4g} {unit} at {o.time:.0f} s",
                 parameters={
                     "outlier": Size(
                         value=number(o.size),
                         low=number(o.size - half),
                         high=number(o.size + half),
-                        unit=d.context.campaign.channels[o.output].unit,
+                        unit=unit,
                     )
                 },
                 source=entry.source,

@@ -35,7 +35,7 @@ def lines_of(d: dict[str, Any]) -> list[str]:
     worse, unit = d["improvement"]["contradicted_by"], _unit(d["improvement"])
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
         after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
-        rms = f"rms {printed(i['rms_before'])} -> {after}{unit} ({_NOISE} {printed(i['noise_floor'])})"
+        rms = f"rms {printed(i['rms_before'])} -> {after}{unit} ({_NOISE} {printed(i['noise_floor'])}{unit})"
         lines.append(f"  held-out recording {run}: {rms}{', worse than without' if run in worse else ''}")
     if not d["physics"]:
         lines += _left(d["improvement"])
@@ -54,7 +54,7 @@ def _left(improvement: dict[str, Any]) -> list[str]:
     }
     unit = _unit(improvement)
     return [
-        f"  {which}: rms {printed(i['rms_before'])}{unit} ({_NOISE} {printed(i['noise_floor'])})"
+        f"  {which}: rms {printed(i['rms_before'])}{unit} ({_NOISE} {printed(i['noise_floor'])}{unit})"
         for which, i in runs.items()
         if i["rms_before"] is not None
     ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from discovery.evidence.bayes import Score
 from discovery.export.document import Exported
-from discovery.printed import printed
+from discovery.printed import printed, sized
 from discovery.runtime.changes import Change, Seen, Table
 from discovery.runtime.verdict import LEAST_ODDS, SURE, Explanation, before
 from discovery.runtime.wear import one_load
@@ -51,7 +51,7 @@ def unseen(
         spread = abs(claim.size[0] / claim.t)
         rare = max(0.5 * claim.t**2 - claim.gain, 0.0)  # what the width of the prior costs
         least = math.sqrt(2.0 * (SURE - h.log_odds + rare)) + ALMOST
-        found[name] = f"{printed(least * spread)} {h.units.get(h.amplitudes[0], '1')}"
+        found[name] = sized(least * spread, h.units.get(h.amplitudes[0], "1"))
     return {name: size for name, size in found.items() if size}
 
 

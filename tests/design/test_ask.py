@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 from discovery.design.next_experiment import STEPS, _designs, believed, next_experiment
-from discovery.design.question import APART, CONFIRM, aim, look_back
+from discovery.design.question import APART, CONFIRM, _smallest, aim, look_back
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.diagnose import diagnose
+from discovery.diagnosis.selection import Search
 from discovery.dynamics import make_grid
 from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.bayes import Score
 from discovery.fitting import Noise
 from discovery.models import Model, Parameter, State
 from discovery.printed import printed
@@ -202,8 +204,18 @@ def test_large_sizes_are_written_out() -> None:
     runs = [changed(simulated(s), speed=simulated(s).values["speed"] / 30) for s in (1, 2)]
     said = diagnose(model(), campaign(*runs), ["r1", "r2"]).question
     assert "would have shown" in said
-    assert not re.search(r" of [\d.e-]+ 1\b", said)  # a number alone has no unit
+    sizes = re.findall(r" of [\d.e-]+ (\S+)", said)
+    assert sizes == ["W/K", "W", "W", "W/K", "W/K"][: len(sizes)]
     assert "e+" not in said
+
+
+def test_a_size_without_a_unit_is_a_share() -> None:
+    """Of a model whose states are the errors, a second mass is a share of an error."""
+    errors = Model("errors", {}, {}, (), {name: parse("0.01*P_drive") for name in SEEN})
+    h = next(h for h in machine.claims(errors, "second_time_constant") if "E_Z" in h.shown)
+    seen = Score(h, 0.0, 2.0, (0.124,), 1.0, 0)
+    said = _smallest(cast(Search, SimpleNamespace(claims=[seen])))
+    assert said == "these recordings would have shown second_thermal_mass of 28 % at E_Z"
 
 
 def test_patterns_move_what_the_machine_has() -> None:
