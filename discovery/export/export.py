@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from discovery.errors import UsageError, UserError
 from discovery.export.agreement import agreement
 from discovery.export.c import c_files
-from discovery.export.document import Exported, Output, from_document, read_document, render
+from discovery.export.document import Exported, from_document, read_document, render
 from discovery.export.fmu import fmu_bytes, prove_fmu
-from discovery.export.guarding import without_offsets
 from discovery.export.identifiers import identifier
 from discovery.export.makedocument import make_document
 from discovery.export.ranges import sampled_inputs
@@ -31,6 +30,7 @@ from discovery.export.replay import (
     write_files,
 )
 from discovery.export.seal import open_seal
+from discovery.export.settling import beginning
 from discovery.export.st import KINDS, plcopen_text, prove_st, scl_text, st_name, st_text
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -52,7 +52,7 @@ class Export:
     files: tuple[Path, ...]
     proofs: tuple[Proof, ...]
     agreement: Mapping[str, Mapping[str, float]] | None  # of the fixed step with discovery.dynamics
-    outputs: tuple[Output, ...]
+    start: tuple[str, ...]  # what to know before the compensation starts
 
     def lines(self) -> list[str]:
         """What a user wants to know of it."""
@@ -66,7 +66,7 @@ class Export:
                 f"the fixed step is {same} from the fitted model under the same inputs, {held} where inputs "
                 "are held over a step"
             )
-        return [*lines, *without_offsets(self.outputs)]
+        return [*lines, *self.start]
 
 
 def export_model(
@@ -122,7 +122,7 @@ def export_model(
     reference = make_reference(exported.compiled, inputs)
     files, proofs = _files(exported, data, reference, targets)
     write_files(out_dir, files)
-    return Export(tuple(out_dir / name for name in files), proofs, found, exported.outputs)
+    return Export(tuple(out_dir / name for name in files), proofs, found, tuple(beginning(exported)))
 
 
 def _files(
@@ -260,7 +260,7 @@ def export_document(
     files, proofs = _files(exported, data, reference, targets)
     out_dir = out_dir or path.with_suffix("")
     write_files(out_dir, files)
-    return Export(tuple(out_dir / name for name in files), proofs, None, exported.outputs)
+    return Export(tuple(out_dir / name for name in files), proofs, None, tuple(beginning(exported)))
 
 
 def _through_the_ranges(exported: Exported, hours: float = 12.0) -> Array:

@@ -121,6 +121,14 @@ class Stepper:
         values = _run(self._tables.rates, np.asarray(u, dtype=float), self.x, self.delayed, self.plays, time)
         return values[: len(self.compiled.states)]
 
+    def jacobian(self, u: Array) -> Array:
+        """Slopes (n, n) of the rates in the states, at the present state under inputs u (U,) [per s]."""
+        time, n = self.count * self.compiled.step_s, len(self.compiled.states)
+        values = _run(self._tables.rates, np.asarray(u, dtype=float), self.x, self.delayed, self.plays, time)
+        found = np.zeros((n, n))
+        found[self._tables.row, self._tables.column] = values[n : n + len(self._tables.row)]
+        return found
+
     def step(self, u: Array) -> Array | None:
         """Outputs (Y,) after one step under inputs u (U,); None, and no change, where the step fails."""
         y = self.run(np.asarray(u, dtype=float)[None, :])

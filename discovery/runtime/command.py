@@ -122,6 +122,7 @@ def compensate_rows(
             now=first[0] if live else None, say=say,
             thinking=stack.enter_context(other_process()) if live and learn is not None else None,
         )  # fmt: skip
+        session.say_beginning()
         session.opens = partial(_output, session, out, live=live)
         asked, last = stack.enter_context(listening()), None
         asked.acknowledge = acknowledge

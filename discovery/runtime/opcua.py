@@ -263,6 +263,7 @@ def compensate_opcua(
             if out is not None:
                 at = session.resume_at if session.resumed is not None else None
                 session.opens = partial(_output, session, out, at)
+            session.say_beginning()
             found = await run_loop(link, session, seconds, asked)
             say(session.summary())
             return found

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from discovery.errors import UserError
 from discovery.export.document import Exported, render
+from discovery.export.settling import beginning
 from discovery.printed import counted
 from discovery.runtime.clock import Clock
 from discovery.runtime.compensator import Compensator, Settings, State, Tick
@@ -129,6 +130,12 @@ class Session:
             )
         if found is None:
             succeed(self.compensator, folder)
+
+    def say_beginning(self) -> None:
+        """Without a saved state: how long the start takes, before the first tick."""
+        if self.resumed is None and self.compensator.inherited is None:
+            for text in beginning(self.compensator.exported):
+                self.say(text)
 
     def tell(self, time: float, what: str, cause: str, remedy: str = "") -> None:
         """An event of the session: one line, and kept in the history."""

@@ -13,6 +13,7 @@ from discovery.export.document import Exported, from_document, render
 from discovery.export.makedocument import make_document
 from discovery.export.replay import CFLAGS
 from discovery.export.seal import open_seal
+from discovery.export.settling import beginning
 from discovery.export.st import st_text
 from discovery.fitting import fit_model
 from discovery.models import read_model
@@ -78,5 +79,15 @@ def test_the_figures_of_the_page_are_those_of_the_export(exported: Exported) -> 
     assert said
     assert (float(said[1]), float(said[2])) == (round(min(rates), 2), round(max(rates), 2))
     assert ends == [4 * 3600, 2 * 3600, 300, 8 * 3600]
-    for words in ("missing for 4 h", "COLD, for 8 h", "or wait 5 min", "`set.age` (300 s)"):
+    start, moves = beginning(exported)
+    for words in ("about 20 h, because the slowest time constant is 6.6 h", "COLD"):
+        assert words in start
+    assert "0.81 um (E_Z0T)" in moves
+    assert "1.4 um/m (E_A0C)" in moves
+    for words in (
+        "about 20 h, because the slowest time constant is 6.6 h",
+        "up to 0.81 um (the tilt: 1.4 um/m) in a tick of 10 s",
+    ):
+        assert words in " ".join(PAGE.split())
+    for words in ("missing for 4 h", "(COLD) lasts 8 h", "or wait 5 min", "`set.age` (300 s)"):
         assert words in " ".join(PAGE.split())
