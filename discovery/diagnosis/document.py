@@ -46,6 +46,7 @@ class _Claimed(TypedDict):
     effect: str
     states: list[str]
     recording: str | None
+    channels: list[str]
 
 
 def document(d: Diagnosis) -> DiagnosisDocument:
@@ -88,7 +89,12 @@ def number(value: float | None, digits: int = 5) -> Number:
 
 
 def _claim(h: Hypothesis) -> _Claimed:
-    return {"effect": h.effect.word, "states": list(h.places), "recording": h.recording}
+    return {
+        "effect": h.effect.word,
+        "states": list(h.places),
+        "recording": h.recording,
+        "channels": list(h.follows),
+    }
 
 
 def _stated_at(d: Diagnosis, h: Hypothesis) -> str | None:
@@ -187,7 +193,6 @@ def _considered(d: Diagnosis) -> list[Considered]:
         rows.append(
             Considered(
                 **_claim(c.hypothesis),
-                channels=list(c.hypothesis.channels),
                 instants_s=[round(t, 1) for t in found] if found else None,
                 log_evidence=number(c.gain, 4),
                 log_odds=number(c.odds, 4),

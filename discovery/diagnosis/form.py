@@ -26,6 +26,7 @@ class Claim(Strict):
     effect: str
     states: list[str] = Field(description="states it enters; for a measurement fault the output or input")
     recording: str | None = Field(None, description="the one in which it acts, or begins to act")
+    channels: list[str] = Field(default_factory=list, description="inputs that it follows")
 
 
 class Physics(Claim):
@@ -55,7 +56,6 @@ class Alternative(Claim):
 class Considered(Claim):
     """A candidate effect of the first scan, scored on the residual of the baseline."""
 
-    channels: list[str] = Field(default_factory=list, description="inputs that it follows")
     instants_s: list[float] | None = None
     log_evidence: Number
     log_odds: Number = Field(description="with the prior odds of its place")

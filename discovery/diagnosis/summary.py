@@ -67,9 +67,10 @@ def _unit(improvement: dict[str, Any]) -> str:
 
 
 def _place(claim: dict[str, Any]) -> str:
-    """Where an effect acts, in which recording."""
+    """Where an effect acts, from which input, in which recording."""
     states = claim.get("moved") or claim["states"]
     places = [f"at {', '.join(states)}"] if states else []
+    places += [f"from {', '.join(claim['channels'])}"] if claim.get("channels") else []
     return " ".join([*places, *([f"in {claim['recording']}"] if claim.get("recording") else [])])
 
 

@@ -52,8 +52,14 @@ class Hypothesis:
 
     @property
     def where(self) -> str:
-        """The places, or the recording of what concerns all of it."""
-        return ", ".join(self.places) or self.recording or "all recordings"
+        """The places, with the inputs that it follows, or the recording of what concerns all of it."""
+        follows = f" from {', '.join(self.follows)}" if self.follows else ""
+        return (", ".join(self.places) or self.recording or "all recordings") + follows
+
+    @property
+    def follows(self) -> tuple[str, ...]:
+        """Inputs that it follows; one that is its place is none of them."""
+        return tuple(name for name in self.channels if name not in self.places)
 
     @property
     def shifts_the_zero(self) -> bool:

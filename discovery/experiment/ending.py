@@ -210,6 +210,7 @@ def constants(run: Run, model: str) -> list[str]:
 
 def _effect(one: Mapping[str, Any]) -> str:
     where = ", ".join(one.get("moved") or one.get("states") or [])
+    where += f" from {', '.join(one['channels'])}" if one.get("channels") else ""
     sure = f" ({one['probability']:.0%})" if one.get("probability") is not None else ""
     return f"{one['effect']}{f' at {where}' if where else ''}{sure}"
 

@@ -242,9 +242,8 @@ def _grouped(found: Sequence[Mapping[str, Any]]) -> str:
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for one in found:
         alike = (words(str(one.get("effect"))), percent(one.get("probability")))
-        groups.setdefault(
-            alike if one.get("states") and not one.get("moved") else (*alike[:1], str(id(one))), []
-        ).append(one)
+        by_itself = not one.get("states") or one.get("moved") or one.get("channels")
+        groups.setdefault((*alike[:1], str(id(one))) if by_itself else alike, []).append(one)
     texts = []
     for group in groups.values():
         if len(group) == 1:
@@ -260,7 +259,8 @@ def _grouped(found: Sequence[Mapping[str, Any]]) -> str:
 def _placed(one: Mapping[str, Any]) -> str:
     states = listed([str(state) for state in one.get("moved") or one.get("states", [])])
     where = f" at {states}" if states else f" in {one['recording']}" if one.get("recording") else ""
-    return f"{words(str(one.get('effect', 'unknown')))}{where}"
+    follows = f" from {listed(one['channels'])}" if one.get("channels") else ""
+    return f"{words(str(one.get('effect', 'unknown')))}{where}{follows}"
 
 
 def _proof(diagnosis: Mapping[str, Any]) -> tuple[list[str], list[tuple[str, str]]]:

@@ -97,9 +97,14 @@ def _speed(size: Mapping[str, Any]) -> str:
 
 
 def _place(one: Mapping[str, Any]) -> str:
-    """Return bodies, recording and hours of an effect. A shifted clock only has a recording."""
+    """Return bodies, inputs, recording and hours of an effect. A shifted clock only has a recording."""
     places = listed(one.get("moved") or one.get("states") or [])
-    parts = [places, f"in {one['recording']}" if one.get("recording") else "", _hours(one)]
+    parts = [
+        places,
+        f"from {listed(one['channels'])}" if one.get("channels") else "",
+        f"in {one['recording']}" if one.get("recording") else "",
+        _hours(one),
+    ]
     return " ".join(part for part in parts if part) or "all inputs"
 
 

@@ -68,7 +68,7 @@ def new_physics(
 def name_of(claim: Score) -> str:
     """Effect and place in words, with the input that it follows."""
     h = claim.hypothesis
-    return f"{h.effect.word} at {h.where}" + (f" by {', '.join(h.channels)}" if h.channels else "")
+    return f"{h.effect.word} at {h.where}"
 
 
 def sizes_of(claim: Score) -> str:

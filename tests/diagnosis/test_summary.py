@@ -26,6 +26,8 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
         named("friction_speed", P_f={**number(0.686, 0.487, 0.905, "W"), "at": "1000 rpm"}),
         named("radiation", area=number(0.4, None, None, "m2"), power=number(4.0, 4.0, 4.0, "1")),
     ]
+    path = named("input_path", k=number(2.0, 1.0, 3.0, "K"))
+    physics += [{**path, "channels": [heater]} for heater in ("Q1", "Q2")]
     document: dict[str, Any] = {
         "verdict": "missing physics",
         "model": "m",
@@ -43,6 +45,8 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
         "  thermal_preload at T1, probability 0.90: k = 0.03 1/K (0.02 to 0.04), share = 0.5 (0.4 to 0.6)",
         "  friction_speed at T1, probability 0.90: P_f = 0.686 W at 1000 rpm (0.487 to 0.905)",
         "  radiation at T1, probability 0.90: power = 4",
+        "  input_path at T1 from Q1, probability 0.90: k = 2 K (1 to 3)",
+        "  input_path at T1 from Q2, probability 0.90: k = 2 K (1 to 3)",
     ]
 
 

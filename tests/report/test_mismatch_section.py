@@ -11,6 +11,7 @@ import pytest
 
 from discovery.challenge import scoring
 from discovery.diagnosis.thresholds import RIVAL
+from discovery.experiment.ending import ending
 from discovery.models import Parameter
 from discovery.report import equations, write_report
 from discovery.report.mismatch import NEAR, section, sizes
@@ -53,6 +54,23 @@ def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path
     assert "contradict" not in page
     assert "The repair removes none of this mismatch" in page
     assert "(improvement, 95 %: −0.1 to 0.2; may be chance)" in page
+
+
+def test_two_effects_of_one_place_are_told_apart_by_their_inputs(tmp_path: Path) -> None:
+    folder = sample.write_sample(tmp_path / "run")
+    path = folder / "diagnosis.json"
+    diagnosis = json.loads(path.read_text())
+    [found] = diagnosis["physics"]
+    diagnosis["physics"] = [
+        {**found, "effect": "input_path", "states": ["T0"], "channels": [name]} for name in ("Q1", "Q2")
+    ]
+    path.write_text(json.dumps(diagnosis))
+    page = write_report(folder).read_text("utf-8")
+    for name in ("Q1", "Q2"):
+        assert f"input path at T0 from {name} (98 % sure)" in page
+        assert f"Size of input path at T0 from {name}: " in page
+        assert f"T0 from {name}</td>" in page
+    assert f"input_path at T0 from Q1 ({found['probability']:.0%})" in ending(folder).effects
 
 
 def test_an_output_that_the_repair_makes_worse_is_named(tmp_path: Path) -> None:
