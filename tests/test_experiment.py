@@ -317,3 +317,29 @@ def test_a_model_that_runs_away_in_cross_validation_is_told_and_kept(
         assert entry["cross_validation"] == {}
         assert f"the fit of {name} diverges" in entry["notes"][0]
         assert set(entry["recordings"]) == {"a", "b", "c"}
+
+
+def test_a_limit_that_readings_press_against_can_be_changed_as_the_note_says(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The body has 0.72 1/h and a loss of 0.4; both limits stand in the way."""
+    (folder / "model.toml").write_text(
+        MODEL.replace('0.5, unit = "1", min = 0.0', '0.1, unit = "1", max = 0.2')
+    )
+    text = EXPERIMENT[: EXPERIMENT.index("[models]")]
+    (folder / "experiment.toml").write_text(
+        text + '[models]\nreduced = { kind = "reduced" }\none_body = { file = "model.toml" }\n'
+    )
+    monkeypatch.setattr("discovery.models.reduced.POLE_MAX", -2.0)
+    out = run(folder / "experiment.toml", folder / "out")
+    notes = {name: "\n".join(one["notes"]) for name, one in results_of(out)["models"].items()}
+    assert "loss is at its upper limit, 0.2: change the limit in model.toml; or" in notes["one_body"]
+    said = "copy models/reduced.toml of the results next to the experiment, change it there, and write "
+    assert "p1_E_Y0C is at its upper limit, -2 1/h: " in notes["reduced"]
+    assert said + '{ file = "reduced.toml" }' in notes["reduced"]
+    fitted = (out / "models" / "reduced.toml").read_text()
+    (folder / "reduced.toml").write_text(fitted.replace("max = -2.0", "max = -0.01"))
+    (folder / "experiment.toml").write_text(text + '[models]\nreduced = { file = "reduced.toml" }\n')
+    again = results_of(run(folder / "experiment.toml", folder / "again"))["models"]["reduced"]
+    assert again["values"]["p1_E_Y0C"]["value"] == pytest.approx(-0.72, rel=0.1)
+    assert not any("limit" in note for note in again["notes"])

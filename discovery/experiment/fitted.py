@@ -104,7 +104,7 @@ def judged(
         *fit.unidentified,
         *check_dimensions(model, experiment.campaign.channels),
     ]
-    notes += bound_notes(fit.model)
+    notes += bound_notes(fit.model, remedy_of_limits(experiment, name))
     notes += (report or {}).get("binding", ())
     notes += offset_notes(fit, experiment.campaign.channels)
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
@@ -142,16 +142,30 @@ def coarse_notes(fit: Fit) -> list[str]:
     ]
 
 
-def bound_notes(model: Model) -> list[str]:
+def remedy_of_limits(experiment: Experiment, name: str) -> str:
+    """Where the limits of a model of the experiment can be changed: in its file, or in a copy of the fitted
+    one, which becomes its file.
+    """
+    file = getattr(experiment.form.models.get(name), "file", None)
+    if file:
+        return f"change the limit in {file}"
+    return (
+        f"to change the limit, copy models/{name}.toml of the results next to the experiment, change it "
+        f'there, and write {{ file = "{name}.toml" }} for this model into [models]'
+    )
+
+
+def bound_notes(model: Model, remedy: str) -> list[str]:
     """A sentence for each number that stands at a bound other than zero: the readings ask for more."""
     notes = []
     for name, p in model.parameters.items():
         for bound, which in ((p.min, "lower"), (p.max, "upper")):
             near = _AT_BOUND * max(abs(bound), 1e-12) if np.isfinite(bound) else 0.0
+            unit = "" if p.unit == "1" else f" {p.unit}"
             if near and bound != 0 and not p.fixed and abs(p.value - bound) <= near:
                 notes.append(
-                    f"{name} is at its {which} limit, {bound:.4g} {p.unit}: change the limit in the model, "
-                    "or diagnose what the model lacks"
+                    f"{name} is at its {which} limit, {bound:.4g}{unit}: {remedy}; or diagnose what the "
+                    "model lacks"
                 )
     return notes
 
