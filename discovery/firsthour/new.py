@@ -11,6 +11,7 @@ from discovery.files import read_toml, write_atomic
 from discovery.firsthour.again import rewrite, touched
 from discovery.firsthour.asking import Ask, answered, doubt, questions, read_statements, with_statements
 from discovery.firsthour.celsius import in_celsius
+from discovery.firsthour.cooldown import cooldowns
 from discovery.firsthour.guess import FLUIDS, TEMPERATURES, Guess, drives
 from discovery.firsthour.joining import join_all
 from discovery.firsthour.measures import DEGREES
@@ -220,9 +221,10 @@ def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Gue
     lines += [f"  {header:{width}} -> {what:{inner}} {mark:1} {why}" for header, what, mark, why in rows]
     for quantity, (unit, values) in found.constants.items():
         lines.append(
-            f"  {quantity} in {unit} from the names of the files: "
+            f"  {quantity} in {unit} from the names of the files, held for the whole recording: "
             + ", ".join(f"{v:g}" for v in values.values())
         )
+    lines += cooldowns(found, guesses)
     warmed = any(
         one.role in FLUIDS or (one.role == "other input" and one.unit in DEGREES) for one in guesses.values()
     )

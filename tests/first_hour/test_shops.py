@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from openpyxl import Workbook
+from typer.testing import CliRunner
 
+from discovery.cli import app
 from discovery.firsthour.filenames import constants
 from discovery.firsthour.guess import Guess
 from discovery.firsthour.joining import join_all
@@ -170,3 +173,39 @@ def test_probes_that_are_set_to_zero_before_each_run(
 ) -> None:
     """A warmer machine at zero again, or the same machine elsewhere: the zero may be another one."""
     assert bool(lathe(tmp_path, zero=zero, warm=warm)) is own
+
+
+@pytest.mark.parametrize("errors", [False, True], ids=["temperatures", "with errors"])
+def test_a_cool_down_under_a_speed_of_the_name_is_said(tmp_path: Path, *, errors: bool) -> None:
+    """Three runs of 10 h. The fastest stops after 6 h; the room of the slowest falls by 6 K at night."""
+    hours = np.arange(0.0, 10.0, 0.05)
+    rng = np.random.default_rng(3)
+    for speed, stop, night in ((1000, 10.0, 6.0), (2000, 10.0, 0.0), (3000, 6.0, 0.0)):
+        warm = np.where(hours < stop, 1 - np.exp(-hours), (1 - np.exp(-stop)) * np.exp(stop - hours))
+        room = 22.0 - night * hours / 10.0 + rng.normal(0, 0.05, len(hours))
+        front = room + 0.004 * speed * warm + rng.normal(0, 0.1, len(hours))
+        rows = [
+            f"{3600 * t:.0f},{r:.2f},{f:.2f}" + (f",{2 * (f - 22):.2f}" if errors else "")
+            for t, r, f in zip(hours, room, front, strict=True)
+        ]
+        head = "time [s],T_room [degC],T_front [degC]" + (",E_Z [um]" if errors else "")
+        write(tmp_path / f"spindle_{speed}rpm.csv", head, *rows)
+    files = [f"spindle_{speed}rpm.csv" for speed in (1000, 3000, 2000)]
+    command = ["new", str(tmp_path / "machine"), "--quick"]
+    done = CliRunner().invoke(
+        app, [*command, *(x for name in files for x in ("--from", str(tmp_path / name)))]
+    )
+    assert done.exit_code == 0, done.output
+    assert (
+        "speed in rpm from the names of the files, held for the whole recording: 1000, 3000, 2000"
+        in done.output
+    )
+    [said] = [line for line in done.output.splitlines() if line.startswith("warning:")]
+    found = re.match(
+        r"warning: spindle_3000rpm: T_front .*cools down from (\S+) h on \(by (\d+)% of its rise\), but ",
+        said,
+    )
+    assert found, said
+    assert float(found[1]) == pytest.approx(6.0, abs=0.2)
+    assert int(found[2]) > 80
+    assert "speed = 3000 rpm of the file's name is held until the end" in said
