@@ -23,6 +23,8 @@ T = TypeVar("T")
 MOST_NODES = 30_000  # of a recording; with more, it is coarsened
 COARSE_NODES = 8_000  # of a coarsened one, about; as many at most for its inputs' switches
 LONGEST_BLOCK = 120.0  # s, about; a recording of weeks has more nodes than these for its sake
+USUAL = 0.25  # of the time: it passes in steps up to the usual one
+LONG = 2.0  # times the usual step: a longer one is divided for laws that are not linear
 MOVED = 0.1  # of its span: a held input that moves so far within a block of a coarsened grid divides it
 
 
@@ -80,6 +82,21 @@ class Grid:
         share = np.arange(parts) / parts
         inner = self.time[:-1, None] + share * self.step[:, None]
         return replace(self, time=np.append(inner, self.time[-1]), read=self.read * parts, known={})
+
+    def evened(self) -> Grid:
+        """The grid with steps divided that are far longer than those of a quarter of the time, as where
+        readings are missing and no input moves. At most twice as many nodes are added as there are. One of
+        means of readings stays as it is.
+        """
+        order = np.argsort(self.step)
+        passed = np.cumsum(self.step[order])
+        if self.means is not None or not passed.size:
+            return self
+        usual = float(self.step[order][np.searchsorted(passed, USUAL * passed[-1])])
+        time = _divided(self.time, LONG * usual)
+        if len(time) == len(self.time):
+            return self
+        return replace(self, time=time, read=np.searchsorted(time, self.time[self.read]), known={})
 
     @cached_property
     def step(self) -> Array:

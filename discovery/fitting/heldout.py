@@ -20,7 +20,7 @@ from discovery.dynamics import (
     simulate,
     start_values,
 )
-from discovery.dynamics.system import inputs_of, shifted, uncertain
+from discovery.dynamics.system import evened, inputs_of, shifted, uncertain
 from discovery.fitting.problem import read_spread
 from discovery.fitting.resolution import parts_needed
 from discovery.models import Model, State, expanded
@@ -57,6 +57,7 @@ def predict_recording(
     model = expanded(model, campaign.channels)
     if grid is None:
         grid = make_grid(campaign, recording, inputs_of(model, campaign, outputs), outputs)
+        grid = evened(make_system(model, grid)).grid
         run = predict_recording(model, campaign, recording, outputs, white, grid, known, zeros)
         parts = parts_needed(run, white) if white is not None else 1
         if parts == 1:

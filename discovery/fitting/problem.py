@@ -21,7 +21,7 @@ from discovery.dynamics import (
     start_values,
 )
 from discovery.dynamics.sensitivity import moved_in_time
-from discovery.dynamics.system import inputs_of, shifted, uncertain
+from discovery.dynamics.system import evened, inputs_of, shifted, uncertain
 from discovery.fitting.noise import Noise
 from discovery.models import Model, Parameter, State, expanded
 from discovery.recordings import Campaign
@@ -218,8 +218,9 @@ def make_problem(
     for recording in recordings:
         grid = grids.get(recording) if grids else None
         if grid is None or not set(inputs) <= set(grid.samples) or grid.outputs != tuple(outputs):
-            grid = make_grid(campaign, recording, inputs, outputs)
-        systems.append(make_system(model, grid.shifted({}) if grid.offset or grid.late else grid))
+            systems.append(evened(make_system(model, make_grid(campaign, recording, inputs, outputs))))
+        else:
+            systems.append(make_system(model, grid.shifted({}) if grid.offset or grid.late else grid))
     return Problem(model, tuple(systems), tuple(_unknowns(model, systems, recordings, priors or {}, belief)))
 
 

@@ -55,7 +55,7 @@ def make_rate_data(
     wanted = max(_IN_TIME_SCALE * longest / scale, readings_that_show(campaign, recordings, outputs))
     most = int(np.clip(wanted, _READINGS, _MOST))
     campaign = thinned(campaign, recordings, outputs, inputs, most)
-    grids = {r: make_grid(campaign, r, inputs, outputs, coarse=8 * most) for r in recordings}
+    grids = {r: make_grid(campaign, r, inputs, outputs, coarse=8 * most).evened() for r in recordings}
     times = [grids[r].time[grids[r].read] for r in recordings]
     return RateData(campaign, tuple(recordings), tuple(outputs), grids, make_blocks(times, blocks), scale)
 
