@@ -100,6 +100,7 @@ class PaperChapter(Strict):
     shows: list[str]
     does_not_show: list[str]
     tables: list[PaperTable]
+    failed: str | None = Field(None, description="why it could not be made")
 
 
 class ModelResults(Strict):

@@ -177,10 +177,13 @@ def paper_page(
     Args:
         further: what results.json holds of the roles.
     """
+    from discovery.paper.chapter import attempted
     from discovery.paper.page import role_chapter, write_page
 
     if further:
-        made = [*made, role_chapter(further["role_matrix"], experiment.campaign.channels)]
+        channels = experiment.campaign.channels
+        last = attempted("validation", lambda: role_chapter(further["role_matrix"], channels))
+        made = [*made, *([last] if last else [])]
     write_page(folder, experiment, made)
     return {"paper": {one.key: one.document() for one in made}}
 

@@ -33,6 +33,7 @@ def summary(folder: Path) -> Iterator[str]:
             yield ""
     yield from remarks(folder)
     if "paper" in results:
+        yield from (one["failed"] for one in results["paper"].values() if one.get("failed"))
         yield f"the paper, figure by figure: {folder / 'paper.html'}"
     yield f"{results['seconds']:.0f} s; the report: {folder / 'report.html'}"
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from discovery.errors import RunsAwayError, UserError
 from discovery.evaluation.paper import SOURCE
 from discovery.evaluation.rolematrix import left_out, matrix, not_seen, steadiness
 from discovery.evaluation.tables import Table
@@ -15,7 +15,7 @@ from discovery.experiment.fitted import Fitted
 from discovery.experiment.results import command_of
 from discovery.files import write_atomic
 from discovery.paper.active_figures import section_3, section_4
-from discovery.paper.chapter import Chapter, Material
+from discovery.paper.chapter import Chapter, Material, attempted
 from discovery.paper.film import equation_6, nozzle
 from discovery.paper.influences import budgets, equation_8
 from discovery.paper.left_nozzle import left_nozzle
@@ -65,10 +65,7 @@ def chapters(
     made = []
     for name, make in _IN_ORDER:
         progress(f"the paper: {name}")
-        try:
-            chapter = make(material)
-        except (RunsAwayError, UserError) as error:  # one figure less, not a run less
-            chapter = Chapter(name.replace(" ", "-"), f"{name}: not made", "", not_shown=(str(error),))
+        chapter = attempted(name, partial(make, material))
         if chapter is not None:
             made.append(chapter)
     return made
@@ -143,6 +140,7 @@ def write_page(folder: Path, experiment: Experiment, made: Sequence[Chapter]) ->
                 "charts": one.charts,
                 "shows": one.shows,
                 "not_shown": one.not_shown,
+                "failed": one.failed,
             }
             for one in made
         ],

@@ -97,6 +97,7 @@ def render(run: Run, runs: Printed | None = None, groups: Sequence[Run] = ()) ->
         "roles": sections.roles(run),
         "budgets": sections.budgets(run),
         "quality": sections.quality(run),
+        "not_made": [c["failed"] for c in (run.results.get("paper") or {}).values() if c.get("failed")],
         "reproduce": sections.reproduce(run),
     }
     return fill("page.html.j2", view, charts, _contents(view))
@@ -195,9 +196,10 @@ def _contents(view: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("residual", "Residuals"),
         ("budgets", "Heat and fluid"),
         ("quality", "The recordings"),
+        ("not_made", "Chapters not made"),
         ("reproduce", "Reproduce"),
     ]
-    anchors = {"summary": "comparison", "diagnosis": "mismatch"}
+    anchors = {"summary": "comparison", "diagnosis": "mismatch", "not_made": "not-made"}
     out = [("answer", "The answer")]
     for key, name in parts:
         if key == "groups":

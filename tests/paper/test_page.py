@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,12 @@ import pytest
 
 from discovery.errors import UserError
 from discovery.experiment import load_experiment, run
+from discovery.experiment.summary import summary
 from discovery.models import Parameter
+from discovery.paper import influences
 from discovery.paper.film import identified
 from discovery.paper.recalibration import features
-from tests.small import EXPERIMENT, write_small
+from tests.small import EXPERIMENT, results_of, write_small
 
 PAPER = """
 [models.apart]
@@ -88,6 +91,32 @@ def test_the_page_has_a_chapter_for_each_part(path: Path) -> None:
     rows = rows_of(made["section-3"], "Measured on the machine")
     left = {r[1]: r[8] for r in rows if r[0] == "E_Y0C"}
     assert left["c, compensated"] < 0.2 * left["c, uncompensated"]
+
+
+def test_a_chapter_that_cannot_be_made_is_one_sentence_and_the_run_stands(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (path.parent / "left.toml").write_text(EXPERIMENT)  # it has no [mismatch]
+    path.write_text(path.read_text() + 'left_nozzle = "left.toml"\n')
+
+    def broken(*_: Any) -> None:
+        raise KeyError("c")
+
+    monkeypatch.setattr(influences, "budget", broken)  # an error in the code, not in a file
+    out = run(path, path.parent / "out")
+    failed = {key: one["failed"] for key, one in results_of(out)["paper"].items() if "failed" in one}
+    assert list(failed) == ["left-nozzle-not-made", "budgets-not-made"]
+    nozzle, budgets = failed.values()
+    assert nozzle.startswith("The chapter “left nozzle” could not be made: ")
+    assert nozzle.endswith("left.toml: name the model to diagnose under [mismatch].")
+    assert "“budgets” could not be made: internal error KeyError('c') in test_page.py" in budgets
+    lines = list(summary(out))
+    for page in ((out / "paper.html").read_text(), (out / "report.html").read_text()):
+        for one in failed.values():
+            assert one in lines
+            assert one in unescape(page)
+    assert "Figure 2: temperatures" in (out / "paper.html").read_text()
+    assert "predicts best" in (out / "report.html").read_text()
 
 
 def test_a_model_that_the_page_names_must_be_there(path: Path) -> None:
