@@ -286,17 +286,30 @@ def _proof(diagnosis: Mapping[str, Any]) -> tuple[list[str], list[tuple[str, str
             for name, s in held.items()
         ]
         points.append(f"Free runs before → after the repair, on held-out recordings (rms): {listed(each)}.")
-    explained = improvement.get("explained")
+    points += _from_known_starts(held, unit)
     if improvement.get("contradicted_by"):
         points.append(
             "On these recordings the repaired model is worse than the original one. The named effect may fit "
             "only the recordings of the diagnosis. Do not use the repaired model. Fit more recordings in "
             "which each input moves on its own."
         )
-    elif explained is not None:
-        share = percent(explained) if explained >= 0.005 else "none"
-        points.append(f"The repair removes {share} of this mismatch, noise not counted.")
     return points, figures
+
+
+def _from_known_starts(held: Mapping[str, Mapping[str, Any]], unit: str) -> list[str]:
+    """The held-out recordings whose rms from known starts is larger after the repair."""
+    worse = []
+    for name, one in held.items():
+        before, after = one.get("from_known_starts") or (None, None)
+        said = f"{number(before)} → {number(after)}"
+        if before is not None and after is not None and after > before and number(before) != number(after):
+            worse.append(f"{said} {unit}".rstrip() + f" on {name}")
+    if not worse:
+        return []
+    return [
+        "With start values from all readings, not from the first one, the rms is larger after the repair: "
+        f"{listed(worse)}."
+    ]
 
 
 def _gain(one: Mapping[str, Any]) -> str:

@@ -169,7 +169,9 @@ def _gain(one: Mapping[str, Any]) -> str:
 
 def _outputs(run: Run, d: Mapping[str, Any]) -> Printed:
     detection, shares = d.get("detection") or {}, (d.get("location") or {}).get("outputs") or {}
-    noise, rms = detection.get("noise") or {}, detection.get("residual_rms") or {}
+    noise = detection.get("noise") or {}
+    runs = ((d.get("improvement") or {}).get("fit") or {}).get("outputs") or {}  # the runs of the table above
+    rms = {name: before for name, (before, _) in runs.items()}
     sharing = leads(run)
     rows = [
         Line(
@@ -183,8 +185,8 @@ def _outputs(run: Run, d: Mapping[str, Any]) -> Printed:
         for name in dict.fromkeys([*rms, *noise, *shares])
     ]
     return Printed(
-        "Mismatch by output",
-        ("Output", "Reading noise", "Residual, rms", *(["Share of the mismatch"] if sharing else [])),
+        "Mismatch by output: free runs of the fitted recordings before the repair",
+        ("Output", "Reading noise", "rms before", *(["Share of the mismatch"] if sharing else [])),
         tuple(rows),
     )
 

@@ -220,7 +220,11 @@ def diagnosed(hours: float) -> dict[str, Any]:
             {"effect": "conduction_path", "states": ["table", "b_corpus"], "log_evidence_below_best": 2.1}
         ],
         "improvement": {
-            "fit": {"rms_before": 0.61, "rms_after": 0.5},
+            "fit": {
+                "rms_before": 0.61,
+                "rms_after": 0.5,
+                "outputs": {"E_Y0C": (0.8, 0.5), "E_R0T": (0.3, 0.5)},
+            },
             "held_out": {"validation": {"rms_before": 0.6, "rms_after": 0.5}},
             "explained": 0.99,
         },
