@@ -15,6 +15,7 @@ from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
+from discovery.diagnosis.own import Searched, searched
 from discovery.diagnosis.posterior import Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, size_of, unit_of
 from discovery.diagnosis.refit import shape_priors, with_effects
@@ -71,6 +72,7 @@ class Diagnosis:
     curves: tuple[Curve, ...]
     question: str
     seconds: float
+    own: tuple[Searched, ...] = ()  # effects of the experiment file
 
     @property
     def repaired(self) -> Model | None:
@@ -203,7 +205,9 @@ def diagnose(
     if not verdict.named and after is not None:
         after = None
     verdict = unforeseen(verdict, proof, unit_of(campaign, outputs))
-    verdict = replace(verdict, reasons=(*verdict.reasons, *_reasons(context, verdict, read, proof, effects)))
+    mine = tuple(searched(found, verdict, effects))
+    further = _reasons(context, verdict, read, proof, effects, mine)
+    verdict = replace(verdict, reasons=(*verdict.reasons, *further))
     tell("locating")
     setting = found.baseline.settings[found.baseline.best]
     forces = latent_forces(found.baseline.seen, setting, context.floor)
@@ -226,6 +230,7 @@ def diagnose(
         curves=tuple(curves(found.baseline, shown[0])) if shown and verdict.word != NO_MISMATCH else (),
         question=ask(context, found, verdict),
         seconds=clock.perf_counter() - began,
+        own=mine,
     )
 
 
@@ -295,10 +300,12 @@ def _reasons(
     read: Sequence[str],
     proof: dict[str, Improvement],
     effects: Sequence[Effect],
+    mine: Sequence[Searched],
 ) -> list[str]:
     """Notes for the reader about the recordings and the effects of the experiment."""
     said = []
     if lost := ", ".join(r for r in read if r not in proof):
         said.append(f"the free run of the model diverges on {lost}, so the repair cannot be tested there")
     said += not_offered(context.model, context.scene, effects)
+    said += [one.sentence() for one in mine if not one.named]
     return [*said, *sentences(verdict.answer.fit)]

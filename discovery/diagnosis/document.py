@@ -20,6 +20,7 @@ from discovery.diagnosis.form import (
     LocationDocument,
     MissingHeat,
     Number,
+    OwnEffect,
     Physics,
     Size,
     Window,
@@ -63,6 +64,15 @@ def document(d: Diagnosis) -> DiagnosisDocument:
         alternatives=_alternatives([*d.verdict.named]),
         considered=_considered(d),
         closest=[Claim(**_claim(n.hypothesis)) for n in d.verdict.candidates],
+        own_effects=[
+            OwnEffect(
+                **_claim(one.hypothesis),
+                named=one.named,
+                log_evidence=number(one.gain, 4),
+                log_evidence_below_best=number(one.below, 4),
+            )
+            for one in d.own
+        ],
         improvement=_improvement(d),
         set_aside=[
             WrongReading(

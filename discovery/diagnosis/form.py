@@ -63,6 +63,14 @@ class Considered(Claim):
     share_that_a_refit_leaves: Number
 
 
+class OwnEffect(Claim):
+    """An effect of the experiment file that was searched, at its likeliest place."""
+
+    named: bool
+    log_evidence: Number = Field(description="over the model without any effect, to first order")
+    log_evidence_below_best: Number = Field(description="of the best refit with it; null if there is none")
+
+
 class Detection(Strict):
     """Residual of the baseline, and the noise that it is compared with."""
 
@@ -174,6 +182,9 @@ class DiagnosisDocument(Strict):
     alternatives: list[Alternative]
     considered: list[Considered]
     closest: list[Claim]
+    own_effects: list[OwnEffect] = Field(
+        default_factory=list, description="effects of the experiment file that have a place in the model"
+    )
     improvement: ImprovementDocument
     set_aside: list[WrongReading]
     missing_heat: MissingHeat | None

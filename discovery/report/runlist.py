@@ -166,15 +166,25 @@ def _score(run: Run, model: str | None) -> str:
 
 
 def _verdict(run: Run) -> str:
-    """Verdict of the diagnosis, with the effects that it names."""
+    """Verdict of the diagnosis, with the effects that it names, and those of one's own that it does not."""
     if not run.diagnosis:
         return "no diagnosis"
+    lost = [f"{words(word)} searched, not named" for word, named in _own(run).items() if not named]
+    return "; ".join([_named(run.diagnosis), *lost])
+
+
+def _own(run: Run) -> dict[str, bool]:
+    """The effects of the experiment file that were searched, and whether each is named."""
+    return {str(one["effect"]): bool(one["named"]) for one in (run.diagnosis or {}).get("own_effects") or []}
+
+
+def _named(diagnosis: Mapping[str, Any]) -> str:
     named = [
         f"{words(str(one['effect']))} ({percent(one.get('probability'))})"
-        for one in run.diagnosis.get("physics") or []
+        for one in diagnosis.get("physics") or []
     ]
     if not named:
-        return str(run.diagnosis.get("verdict", "unknown"))
+        return str(diagnosis.get("verdict", "unknown"))
     return listed(list(dict.fromkeys(named))).replace(" %", "\u00a0%")  # an effect at two places: once
 
 
@@ -206,6 +216,7 @@ def _facts(run: Run) -> dict[str, str]:
         "held out": ", ".join(results.get("held_out") or []),
         "outputs": ", ".join(run.outputs),
         "diagnosed": subject(run) if run.diagnosis else "",
+        "own effects": ", ".join(words(word) for word in _own(run)),
     }
     entries: Mapping[str, Mapping[str, Any]] = results.get("models", {})
     for name, entry in entries.items():

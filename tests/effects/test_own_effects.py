@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from discovery.diagnosis import Diagnosis
+from discovery.diagnosis.summary import summary
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.not_offered import not_offered
@@ -19,8 +21,11 @@ from discovery.errors import UserError
 from discovery.experiment import diagnose, load_experiment
 from discovery.experiment.modelfits import fit_entry
 from discovery.experiment.pipeline import diagnosis
+from discovery.experiment.summary import comparison
 from discovery.models import read_model, write_model
+from discovery.printed import printed
 from discovery.progress import silent
+from discovery.report.compare import load_runs
 from tests import machine
 from tests.machine import CHANNELS, Array, Inputs, model, simulated
 
@@ -120,6 +125,24 @@ def test_the_repaired_model_that_is_written_is_the_one_that_was_proved(tmp_path:
     unit = np.mean(np.square(list(noise.values())))
     rms = np.sqrt(np.mean([(s["rms"] / noise[y]) ** 2 for y, s in scores.items()]) * unit)
     assert said["improvement"]["held_out"]["r3"]["rms_after"] == pytest.approx(rms, rel=1e-3)
+
+
+def test_an_own_effect_that_loses_has_a_line_with_its_log_evidence(tmp_path: Path) -> None:
+    """The seal rubs; a second effect of the file, which follows the load, was searched as well."""
+    hum = RUB.replace("rub", "hum").replace("speed*exp(-time/t_free)", "load*exp(time/t_free)")
+    folder = diagnose(experiment(tmp_path, RUB + hum.replace("W/rpm", "1")), tmp_path / "out")
+    found = json.loads((folder / "diagnosis.json").read_text())
+    own_effects = {one["effect"]: one for one in found["own_effects"]}
+    assert {word: one["named"] for word, one in own_effects.items()} == {"rub": True, "hum": False}
+    evidence = printed(own_effects["hum"]["log_evidence"])
+    said = f"was searched, and not named: at motor it has a log evidence of {evidence}; a name needs 16"
+    assert f"Hum {said}" in (folder / "report.html").read_text()
+    assert any(f"hum {said}" in line for line in summary(folder))
+    other = shutil.copytree(folder, tmp_path / "before")
+    (other / "diagnosis.json").write_text(json.dumps(found | {"own_effects": [found["own_effects"][0]]}))
+    compared = "\n".join(comparison(load_runs([other, folder]))).replace("\u00a0", " ")
+    assert "rub (98 %); hum searched, not named" in compared
+    assert "own effects: rub → rub, hum" in compared
 
 
 @pytest.mark.parametrize(
