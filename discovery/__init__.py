@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from discovery.estimator import SparseDiscovery, discover
     from discovery.fitting import fit_model
     from discovery.frames import campaign_from_frames, prediction_frame, recording_frame
+    from discovery.latex import latex_table
     from discovery.models import read_model, write_model
     from discovery.notebook import RunResults, run
     from discovery.recordings import load_campaign
@@ -39,6 +40,7 @@ _HOME = {
     "diagnose": "diagnosis",
     "discover": "estimator",
     "fit_model": "fitting",
+    "latex_table": "latex",
     "load_campaign": "recordings",
     "prediction_frame": "frames",
     "read_model": "models",
@@ -58,6 +60,7 @@ __all__ = [
     "diagnose",
     "discover",
     "fit_model",
+    "latex_table",
     "load_campaign",
     "prediction_frame",
     "read_model",

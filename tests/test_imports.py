@@ -27,7 +27,7 @@ ORDER = (
     "design report export",
     "experiment runtime",
     "paper",
-    "challenge firsthour estimator notebook",
+    "challenge firsthour estimator latex notebook",
     "commands",
     "cli",
 )

@@ -279,12 +279,13 @@
     LaTeX: (rows) => {
       const safe = (cell) => cell.replace(/[\\&%$#_{}~^]/g, (c) => ({ "\\": "\\textbackslash{}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}" })[c] || `\\${c}`)
         .replaceAll("µ", "\\textmu{}").replaceAll("°", "\\textdegree{}").replaceAll("−", "$-$").replaceAll("→", "$\\to$").replaceAll("–", "--")
-        .replace(/[²³·×±σ\u00a0“”]/g, (c) => ({ "²": "$^2$", "³": "$^3$", "·": "$\\cdot$", "×": "$\\times$", "±": "$\\pm$", "σ": "$\\sigma$", "\u00a0": "~", "“": "``", "”": "''" })[c]);
+        .replace(/[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+/g, (run) => `$^{${[...run].map((c) => "-0123456789"["⁻⁰¹²³⁴⁵⁶⁷⁸⁹".indexOf(c)]).join("")}}$`)
+        .replace(/[·×±σ\u00a0“”]/g, (c) => ({ "·": "$\\cdot$", "×": "$\\times$", "±": "$\\pm$", "σ": "$\\sigma$", "\u00a0": "~", "“": "``", "”": "''" })[c]);
       const line = (row) => `${row.map(safe).join(" & ")} \\\\`;
       return ["\\begin{tabular}{l" + "r".repeat(rows[0].length - 1) + "}", "\\hline", line(rows[0]), "\\hline", ...rows.slice(1).map(line), "\\hline", "\\end{tabular}", ""].join("\n");
     },
   };
-  for (const table of document.querySelectorAll(".scroll > table:not(.terms)")) {
+  for (const table of document.querySelectorAll(".scroll > table")) {
     const caption = table.caption, title = caption ? caption.textContent.trim() : "table";
     if (!caption || !table.tHead) continue;
     const tools = document.createElement("span");
@@ -295,7 +296,7 @@
       button.setAttribute("aria-label", `Save as ${form}: ${title}`);
       button.addEventListener("click", () => {
         const part = (node) => (node.nodeName === "BR" ? " · " : node.textContent);
-        const text = (cell) => [...cell.childNodes].map(part).join("").replace(/\s+/g, " ").trim();
+        const text = (cell) => cell.dataset.text ?? [...cell.childNodes].map(part).join("").replace(/\s+/g, " ").trim();
         const rows = [...table.rows].map((row) => [...row.cells].map(text));
         const file = title.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60);
         save(`${file}.${form === "CSV" ? "csv" : "tex"}`, write(rows));

@@ -24,6 +24,11 @@ class Value:
     unit: str
     weak: bool = False  # the interval holds zero
 
+    @property
+    def plain(self) -> str:
+        """In one line of text, as a saved table holds it."""
+        return f"{self.name} = {self.value} {self.unit}".rstrip() + f" ({self.interval})"
+
 
 @dataclass(frozen=True)
 class Row:

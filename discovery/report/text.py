@@ -3,7 +3,30 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
+
+_RAISED = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"
+_LATEX = str.maketrans(
+    {
+        **{c: f"\\{c}" for c in "&%$#_{}"},
+        "\\": r"\textbackslash{}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "µ": r"\textmu{}",
+        "°": r"\textdegree{}",
+        "−": "$-$",
+        "→": r"$\to$",
+        "–": "--",
+        "·": r"$\cdot$",
+        "×": r"$\times$",
+        "±": r"$\pm$",
+        "σ": r"$\sigma$",
+        "\u00a0": "~",
+        "“": "``",
+        "”": "''",
+    }
+)
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -27,7 +50,18 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def _superscript(exponent: int) -> str:
-    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return str(exponent).translate(str.maketrans("-0123456789", _RAISED))
+
+
+def latex(text: str) -> str:
+    """A text of a table in LaTeX; `charts.js` does the same in the page.
+
+    >>> latex("a_1 & b: 5 %"), latex("1.2·10⁻⁵ W/m²"), latex("–")
+    ('a\\\\_1 \\\\& b: 5 \\\\%', '1.2$\\\\cdot$10$^{-5}$ W/m$^{2}$', '--')
+    """
+    escaped = text.translate(_LATEX)
+    plain = str.maketrans(_RAISED, "-0123456789")
+    return re.sub(f"[{_RAISED}]+", lambda found: f"$^{{{found[0].translate(plain)}}}$", escaped)
 
 
 def percent(share: float | None) -> str:

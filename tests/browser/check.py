@@ -143,7 +143,11 @@ def _saved(session: Browser) -> list[str]:
         " return [table.caption.firstChild.textContent, texts[k] || '', table.rows.length,"
         "  table.querySelectorAll('th .tag').length]})))"
     )
-    wrong = []
+    bare = session.run(
+        "return [...document.querySelectorAll('.scroll > table')].filter(t => t.tHead)"
+        ".filter(t => t.querySelectorAll('caption .tools button').length < 2).map(t => t.caption.textContent)"
+    )
+    wrong = [f"no buttons to save it: {title}" for title in bare]
     for title, text, rows, seconds in found:
         lines = list(csv.reader(io.StringIO(text)))
         if len(lines) != rows or sum(" · " in line[0] for line in lines) < seconds:
