@@ -14,7 +14,8 @@ from pathlib import Path
 
 from discovery.challenge.seal import CASES
 from discovery.files import write_atomic
-from discovery.progress import Progress
+from discovery.printed import counted
+from discovery.progress import Progress, time_left
 from discovery.threads import JOBS, NAMES
 
 SOLVED = "solved"
@@ -41,15 +42,24 @@ def solve_all(
     failures: dict[str, str] = {}
     if not todo:
         return failures
-    began, solved = clock.perf_counter(), len(cases) - len(todo)
+    began, solved = clock.perf_counter(), list[str]()
+
+    def so_far() -> str:
+        left = time_left(len(solved), len(todo), clock.perf_counter() - began)
+        return f"solved {len(cases) - len(todo) + len(solved)} of {len(cases)} cases{left}"
+
+    def one(case: str, left: Sequence[str]) -> str:
+        progress(f"solving {case} by {counted(len(left), 'method')}; {so_far()}")
+        return _one(folder, case, left)
+
     with ThreadPoolExecutor(jobs) as pool:
-        futures = {pool.submit(_one, folder, case, left): case for case, left in todo.items()}
+        futures = {pool.submit(one, case, left): case for case, left in todo.items()}
         try:
-            for done, future in enumerate(as_completed(futures), start=1):
+            for future in as_completed(futures):
                 if message := future.result():
                     failures[futures[future]] = message
-                rest = (clock.perf_counter() - began) / done * (len(todo) - done)
-                progress(f"solved {solved + done} of {len(cases)} cases, {_span(rest)} to go")
+                solved.append(futures[future])
+                progress(so_far())
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -92,7 +102,3 @@ def _single_thread() -> dict[str, str]:
     home = str(Path(discovery.__file__).parent.parent)
     paths = [home, *(p for p in [os.environ.get("PYTHONPATH")] if p)]
     return {**os.environ, **dict.fromkeys(NAMES, "1"), JOBS: "1", "PYTHONPATH": os.pathsep.join(paths)}
-
-
-def _span(seconds: float) -> str:
-    return f"{seconds / 60:.0f} min" if seconds >= 90 else f"{seconds:.0f} s"

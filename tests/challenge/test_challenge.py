@@ -180,6 +180,7 @@ def test_end_to_end_and_going_on(cases: Path, tmp_path: Path) -> None:
     challenge(out, jobs=1, baselines=False, progress=told.append)
     assert answer.stat().st_mtime_ns == stamp  # not solved a second time
     assert again.exists()
+    assert "solving case_2 by 1 method; solved 1 of 2 cases" in told  # before it is solved
     assert any(line.startswith("solved 2 of 2") for line in told)
     with pytest.raises(UserError, match="another challenge"):
         challenge(out, count=3, baselines=False)
