@@ -100,11 +100,16 @@ def explain(word: str) -> Iterator[str]:
 
 
 def _entry(effect: Effect) -> Iterator[str]:
+    from discovery.effects.reading import gives, meanings, shown_example
+
     size = effect.amplitude
     sign = {1: ", positive", -1: ", negative"}.get(size.sign, ", either sign")
     yield f"{effect.title} ({effect.word}; {effect.group})"
     yield ""
     yield f"  formula        {effect.formula}"
+    yield f"  gives          {gives(effect)}"
+    for k, said in enumerate(meanings(effect)):
+        yield f"  {'' if k else 'in which':13}  {said}"
     yield f"  acts on        {effect.place}{', or two linked ones' if effect.spreads else ''}"
     if size.fixed is None:
         usual = f"{size.name}, about {size.plausible:g} {size.unit}"
@@ -115,8 +120,7 @@ def _entry(effect: Effect) -> Iterator[str]:
     if effect.confused_with:
         yield f"  confused with  {_listed(effect.confused_with)}"
     for example in effect.examples:
-        values = ", ".join(f"{name} = {value:g}" for name, value in example.values.items())
-        yield f"  example        {values}: {example.expected:g}"
+        yield f"  example        {shown_example(effect, example)}"
     yield f"  source         {effect.source}"
 
 

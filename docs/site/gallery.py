@@ -43,6 +43,7 @@ def pages() -> dict[str, str | bytes]:
 
 
 def _entry(name: str, effect: Any, factor: float) -> Iterator[str]:
+    from discovery.effects.reading import gives, meanings, shown_example
     from discovery.report.mathml import expression, math
     from discovery.terms import parse
 
@@ -51,7 +52,10 @@ def _entry(name: str, effect: Any, factor: float) -> Iterator[str]:
     yield from (f"### {effect.title} {{ #{name} }}", "", f"`{effect.word}`: {_text(effect.signature)}.", "")
     formula = math(expression(parse(effect.formula)), block=True)
     yield from (f'<div style="overflow-x: auto">{formula}</div>', "")
-    yield from (f"| formula | `{effect.formula}` |", "|---|---|", f"| acts on | {effect.place} |")
+    yield from (f"| formula | `{effect.formula}` |", "|---|---|", f"| gives | {gives(effect)} |")
+    if known := "; ".join(_text(said) for said in meanings(effect)):
+        yield f"| in which | {known} |"
+    yield f"| acts on | {effect.place} |"
     if size.fixed is None:
         low, high = size.plausible / factor, size.plausible * factor
         unit = "" if size.unit == "1" else f" {size.unit}"
@@ -60,8 +64,7 @@ def _entry(name: str, effect: Any, factor: float) -> Iterator[str]:
     for shape in effect.shapes:
         yield f"| shape | `{shape.name}`: {_range(shape)} |"
     for example in effect.examples:
-        values = ", ".join(f"{key} = {value:g}" for key, value in example.values.items())
-        yield f"| example | {values} gives {example.expected:g} |"
+        yield f"| example | {_text(shown_example(effect, example))} |"
     if effect.confused_with:
         yield f"| looks like | {', '.join(f'`{word}`' for word in effect.confused_with)} |"
     yield from (

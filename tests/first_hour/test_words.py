@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -12,7 +13,9 @@ from typer.testing import CliRunner
 
 from discovery.cli import app
 from discovery.effects.catalogue import catalogue
+from discovery.effects.reading import gives
 from discovery.firsthour.schemas import schema
+from discovery.terms import names, parse
 
 ROOT = Path(__file__).parents[2]
 FILES = [
@@ -31,6 +34,26 @@ def test_every_effect_is_explained(word: str) -> None:
     assert result.exit_code == 0
     for part in (effect.title, effect.formula, effect.signature, effect.source, *effect.confused_with):
         assert part in result.output
+
+
+@pytest.mark.parametrize("key", sorted(catalogue()))
+def test_a_formula_can_be_read_alone(key: str) -> None:
+    """Every name of the formula has a meaning, and each example says what held before."""
+    effect = catalogue()[key]
+    output = CliRunner().invoke(app, ["explain", effect.word]).output
+    own = {effect.amplitude.name, *(shape.name for shape in effect.shapes)}
+    for name in names(parse(effect.formula)) - own:
+        assert f" {name}: " in output
+    for name, value in (pair for example in effect.examples for pair in example.before.items()):
+        assert re.search(rf"before that .*{name} = {value:g}\b", output)
+
+
+def test_the_flooded_gap_says_what_there_is_without_it() -> None:
+    output = CliRunner().invoke(app, ["explain", "flooded_gap"]).output
+    assert "a heat flow in W into body and out of other, added to all heat flows that the model has" in output
+    assert "flow = 0, t_gap = 600, other = 25, body = 22 for 600 s, before that flow = 1: 44.15 W" in output
+    (rings,) = [e for e in catalogue().values() if e.place == "driven and another"]
+    assert "out of other" not in gives(rings)  # the heat of friction leaves no body
 
 
 def test_a_mistaken_word_is_told_the_nearest() -> None:
