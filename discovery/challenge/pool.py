@@ -50,7 +50,10 @@ def solve_all(
 
     def one(case: str, left: Sequence[str]) -> str:
         progress(f"solving {case} by {counted(len(left), 'method')}; {so_far()}")
-        return _one(folder, case, left)
+        problem = _one(folder, case, left)
+        solved.append(case)
+        progress(so_far())
+        return problem
 
     with ThreadPoolExecutor(jobs) as pool:
         futures = {pool.submit(one, case, left): case for case, left in todo.items()}
@@ -58,8 +61,6 @@ def solve_all(
             for future in as_completed(futures):
                 if message := future.result():
                     failures[futures[future]] = message
-                solved.append(futures[future])
-                progress(so_far())
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

@@ -185,7 +185,7 @@ def _outputs(run: Run, d: Mapping[str, Any]) -> Printed:
         for name in dict.fromkeys([*rms, *noise, *shares])
     ]
     return Printed(
-        "Mismatch by output: free runs of the fitted recordings before the repair",
+        "Mismatch by output: free runs of the fitted recordings before the repair, not weighted",
         ("Output", "Reading noise", "rms before", *(["Share of the mismatch"] if sharing else [])),
         tuple(rows),
     )
