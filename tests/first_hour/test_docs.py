@@ -14,6 +14,9 @@ import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
+from discovery.experiment import load_experiment
+from discovery.experiment.modelfits import fit_entry
+from tests.small import EXPERIMENT, write_small
 
 ROOT = Path(__file__).parents[2]
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
@@ -78,6 +81,22 @@ def _the_readme_agrees_with(results: dict[str, Any]) -> None:
     at = {name: one["recordings"]["step_h1_up_090"]["T2"] for name, one in results["models"].items()}
     assert at["first_order"]["rms"] == pytest.approx(float(before[1]), rel=CLOSE)
     assert at["repaired"]["rms"] < float(rms[1])
+
+
+def test_the_keys_for_library_and_held_out_recording_do_what_the_readme_says(tmp_path: Path) -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    library = re.search(r"library = \[.+?\]", text)
+    assert library
+    assert "from `fit = [...]` to `held_out = [...]`" in " ".join(text.split())
+    write_small(tmp_path)
+    content = EXPERIMENT.replace('["a", "b"]', '["a"]').replace('["c"]', '["c", "b"]')
+    path = tmp_path / "experiment.toml"
+    path.write_text(content + f'found = {{ kind = "sindy", bootstraps = 0, {library[0]} }}\n')
+    experiment = load_experiment(path)
+    found = fit_entry(experiment, "found", experiment.form.models["found"])
+    assert found.model.terms
+    assert set(found.fit.residuals()) == {"a"}
+    assert set(found.predictions) == {"a", "b", "c"}
 
 
 def test_the_lines_for_a_notebook_run(
