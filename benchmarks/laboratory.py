@@ -106,18 +106,17 @@ def heated(capacity: float, loss: float) -> Rates:
     return lambda x, u, _: [(u["P"] - loss * (x[0] - u["T_amb"])) / capacity]
 
 
-ONE = free("hA", 1.0, "W/K") + free("g", 1.0, "1")
-AIR = ("T_b", "", "hA*(T_amb - T_b)")
-POWER = {"P": (HEAT, "W", 20.0, 150.0, 1100.0, 0.25)}
-
-
 def plate(rates: Rates | None = None, key: Mapping[str, Any] | None = None, **more: Any) -> Machine:
     """A plate that a recorded power heats."""
-    given: dict[str, Any] = {"outputs": {"T_b": (0.1, state(0))}, "states": {"T_b": 1200.0}} | more
-    terms = [("T_b", "", "g*P"), AIR]
-    return Machine(
-        POWER, rates, parameters=ONE, terms=terms, key=key or {"effect": None, "states": []}, **given
-    )
+    given: dict[str, Any] = {
+        "drives": {"P": (HEAT, "W", 20.0, 150.0, 1100.0, 0.25)},
+        "outputs": {"T_b": (0.1, state(0))},
+        "states": {"T_b": 1200.0},
+        "parameters": free("hA", 1.0, "W/K") + free("g", 1.0, "1"),
+        "terms": [("T_b", "", "g*P"), ("T_b", "", "hA*(T_amb - T_b)")],
+    }
+    nothing = {"effect": None, "states": []}
+    return Machine(rates=rates or heated(1200.0, 1.4), key=key or nothing, **(given | more))
 
 
 def _motor(x: Array, u: Values, acts: bool) -> Sequence[float]:
@@ -285,6 +284,7 @@ MACHINES: dict[str, Machine] = {
     "kiln": plate(
         _kiln,
         _of("radiation", "T_b", also=["natural_convection"]),
+        drives={"P": (HEAT, "W", 300.0, 2500.0, 1500.0, 0.25)},
         outputs={"T_b": (0.5, state(0))},
         states={"T_b": 4000.0},
     ),
