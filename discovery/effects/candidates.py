@@ -126,7 +126,7 @@ def _choices(variable: str, effect: Effect, model: Model, scene: Scene) -> list[
         and (scene.channels[n].unit in TEMPERATURES) == is_temperature
         and scene.channels[n].role in effect.roles
         and (
-            effect.place in ("output", "deviation")
+            effect.place.startswith("output")
             or scene.channels[n].role != "fluid flow"
             or _is_second(n, scene)
         )

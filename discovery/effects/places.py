@@ -99,7 +99,7 @@ def spots(
             yield from _of_inputs(model, parts, channels)
         case "error state":
             yield from (Spot((name,)) for name in parts.errors)
-        case "output" | "output of a recording" | "output of errors" | "deviation":
+        case "output" | "output of a recording" | "output of errors" | "output that is no temperature":
             yield from (Spot(outputs=(name,)) for name in _alone(effect, parts, outputs, channels))
         case "seat" | "lever":
             for b in parts.bodies:
@@ -122,7 +122,7 @@ def _alone(
     match effect.place:
         case "output of errors" if parts.bodies:
             return ()
-        case "deviation":
+        case "output that is no temperature":
             return tuple(n for n in outputs if not same_dimension(channels[n].unit, "degC"))
     return outputs
 

@@ -171,7 +171,7 @@ def _values(effect: Any) -> dict[str, Any]:
 
 def _label(effect: Any) -> str:
     """What the formula is, with its unit."""
-    if "output" in effect.place or effect.place in ("deviation", "recording"):
+    if "output" in effect.place or effect.place == "recording":
         return "added to the reading [µm]"
     if effect.place == "seat":
         return "added to the temperature [K]"
