@@ -140,7 +140,8 @@ def test_every_option_that_a_page_names_exists(page: str) -> None:
         if hasattr(command, "commands") and words:
             assert words[0].split("|")[0] in command.commands, f"{page}: discovery {verb} {words[0]}"
             command = command.commands[words[0].split("|")[0]]
-        known = {option for parameter in command.params for option in parameter.opts} | {"--help", "-h"}
+        options = [option for one in command.params for option in (*one.opts, *one.secondary_opts)]
+        known = {*options, "--help", "-h"}
         named = {word.strip("),.;:").split("=")[0] for word in words if word.startswith("--")}
         assert named <= known, f"{page}: discovery {verb} has no {', '.join(named - known)}"
 
