@@ -11,6 +11,7 @@ import argparse
 import csv
 import io
 import json
+import time as clock
 from pathlib import Path
 
 from tests.browser.driver import Browser, browser
@@ -54,13 +55,19 @@ def check(page: Path, axe: str, session: Browser, pictures: Path | None) -> list
     return wrong + _requests(session, page)
 
 
+DRAWN_S = 20.0  # a slow computer may take so long for all charts of a page
+_EMPTY = (
+    "const drawn = 'svg polyline, svg path, svg rect.bars';"
+    "return [...document.querySelectorAll('figure[data-chart]')]"
+    ".filter(f => f.offsetParent && !f.querySelector(drawn))"
+    ".map(f => f.dataset.chart)"
+)
+
+
 def _figures(session: Browser) -> list[str]:
-    empty = session.run(
-        "const drawn = 'svg polyline, svg path, svg rect.bars';"
-        "return [...document.querySelectorAll('figure[data-chart]')]"
-        ".filter(f => f.offsetParent && !f.querySelector(drawn))"
-        ".map(f => f.dataset.chart)"
-    )
+    until = clock.monotonic() + DRAWN_S  # charts are drawn when the browser has time for them
+    while (empty := session.run(_EMPTY)) and clock.monotonic() < until:
+        clock.sleep(0.2)
     bad = session.run(
         "return [...document.querySelectorAll('svg *')].filter(e => /NaN|Infinity/.test(e.outerHTML)).length"
     )
