@@ -58,8 +58,10 @@ class Hypothesis:
 
     @property
     def follows(self) -> tuple[str, ...]:
-        """Inputs that it follows; one that is its place is none of them."""
-        return tuple(name for name in self.channels if name not in self.places)
+        """Inputs that it follows, of an effect that may follow any of some roles; one that is its place is
+        none of them.
+        """
+        return tuple(n for n in self.channels if n not in self.places) if self.effect.roles else ()
 
     @property
     def shifts_the_zero(self) -> bool:

@@ -231,3 +231,9 @@ def test_an_effect_has_the_same_odds_at_however_many_places(word: str) -> None:
     for run in {h.recording for h in found if h.effect.is_event} or {None}:
         total = sum(exp(h.log_odds) for h in found if run is None or h.recording == run)
         assert total == pytest.approx(EVENT_ODDS if run else ODDS)
+
+
+def test_only_an_effect_that_may_follow_several_inputs_names_its_input() -> None:
+    path = expand(catalogue()["input_path"])
+    assert {h.where for h in path} >= {"E_Y from cut", "E_Z from rpm"}
+    assert all(" from " not in h.where for h in expand(catalogue()["fluid_convection"]))
