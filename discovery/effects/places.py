@@ -100,7 +100,7 @@ def spots(
         case "error state":
             yield from (Spot((name,)) for name in parts.errors)
         case "output" | "output of a recording" | "output of errors" | "output that is no temperature":
-            yield from (Spot(outputs=(name,)) for name in _alone(effect, parts, outputs, channels))
+            yield from (Spot(outputs=(name,)) for name in _single_outputs(effect, parts, outputs, channels))
         case "seat" | "lever":
             for b in parts.bodies:
                 moved = tuple(y for y in outputs if b in names(model.outputs.get(y, Name(y))))
@@ -115,7 +115,7 @@ def spots(
             yield Spot(outputs=outputs)
 
 
-def _alone(
+def _single_outputs(
     effect: Effect, parts: Layout, outputs: tuple[str, ...], channels: Mapping[str, Channel]
 ) -> tuple[str, ...]:
     """Outputs of which one alone shows an effect."""
