@@ -2,16 +2,22 @@
 
 Problems are small: threads inside a matrix product would only get in each other's way. The command says so
 before numpy is loaded. A script has loaded it by then, so whatever computes for long pins the libraries
-itself while it runs. What the user has set stays. The kernels release the lock of the interpreter, so that
-threads share everything and nothing is copied.
+itself while it runs. What the user has set stays.
+
+Half of a fit is Python, which the threads of one process cannot do side by side. So a command forks
+(`forked.py`). A process that has threads already cannot do that safely, a notebook or a worker of a cluster:
+there, fits are threads.
 """
 
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import ParamSpec, TypeVar
+
+from discovery.forked import can_fork, forked, is_child
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -46,8 +52,10 @@ def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
     What goes wrong first, in the order of the items, is raised; what has not begun by then does not begin.
     """
     count = min(jobs(), len(items))
-    if count < 2:
+    if count < 2 or is_child():
         return [work(item) for item in items]
+    if threading.active_count() == 1 and can_fork():
+        return forked(work, items, count)
     from concurrent.futures import ThreadPoolExecutor
 
     pool = ThreadPoolExecutor(count, thread_name_prefix=FIT)

@@ -14,7 +14,8 @@ import discovery
 
 ROOT = Path(discovery.__file__).parent
 ORDER = (
-    "__version__ errors naming printed progress threads",
+    "__version__ errors forked naming printed progress",
+    "threads",
     "schema extras limits",
     "files targets",
     "runfolder terms",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -94,3 +95,64 @@ def test_the_first_failure_in_the_order_of_the_items_is_raised(monkeypatch: pyte
     with pytest.raises(ValueError, match="0"):
         side_by_side(work, range(1000))
     assert len(begun) < 1000
+
+
+# In a process of its own: that of the tests has threads, and does not fork.
+FORKS = """
+import os, signal, sys, time
+from discovery.threads import side_by_side
+
+parent = os.getpid()
+
+def work(item):
+    if item == sys.argv[1]:
+        {what}
+    return item, os.getpid() == parent, side_by_side(lambda x: os.getpid() == parent, [1, 2])
+
+print(side_by_side(work, ["a", "b", "c"]), flush=True)
+"""
+
+
+def forks(what: str, item: str, **more: Any) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", FORKS.format(what=what), item],
+        env=os.environ | {JOBS: "2"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **more,
+    )
+
+
+def test_a_command_works_in_children_that_do_not_divide_their_work_again() -> None:
+    out, err = forks("pass", "none").communicate()
+    assert (eval(out), err) == ([(item, False, [False, False]) for item in "abc"], "")
+
+
+def test_what_a_child_that_was_ended_had_to_do_is_done_by_its_parent() -> None:
+    out, _ = forks("if os.getpid() != parent: os.kill(os.getpid(), signal.SIGKILL)", "b").communicate()
+    assert [(item, here) for item, here, _ in eval(out)] == [("a", False), ("b", True), ("c", False)]
+
+
+def test_what_goes_wrong_in_a_child_goes_wrong_in_its_parent() -> None:
+    out, err = forks("raise ValueError('the second')", "b").communicate()
+    assert (out, err.splitlines()[-1]) == ("", "ValueError: the second")
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_no_child_stays_behind(how: signal.Signals) -> None:
+    with forks("print(os.getpid(), flush=True); time.sleep(2)", "a", start_new_session=True) as parent:
+        assert parent.stdout is not None
+        child = int(parent.stdout.readline())
+        parent.send_signal(how)
+        parent.wait(10)
+        for _ in range(100):  # a child whose parent is killed is done with its item first
+            if not is_at_work(child):
+                return
+            time.sleep(0.1)
+        pytest.fail("a child stayed behind")
+
+
+def is_at_work(process: int) -> bool:
+    shown = subprocess.run(["ps", "-o", "stat=", "-p", str(process)], capture_output=True, text=True)
+    return shown.stdout.strip() not in ("", "Z", "Zs")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,11 +16,11 @@ from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
 from discovery.diagnosis.own import Searched, searched
-from discovery.diagnosis.posterior import Posterior, posterior
+from discovery.diagnosis.posterior import IN_PLAY, Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, size_of, unit_of
 from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
-from discovery.diagnosis.scored import Scored, with_change, with_force
+from discovery.diagnosis.scored import OF_FORCE, Scored, with_change, with_force
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import (
     NO_MISMATCH,
@@ -248,12 +248,17 @@ def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]
 def _unknown(context: Context, found: Search) -> list[Scored]:
     """Something of unknown cause at each state and in each output: alone, and with the best answer."""
     models = list({one.keys: one for one in (found.baseline, found.best)}.values())
+    goal = found.best.evidence - IN_PLAY
 
-    def at_each_place(one: Scored) -> list[Scored]:  # what it has whitened is kept from one place to the next
-        heat = [with_force(context, one, state) for state in context.floor]
-        return [*heat, *(with_change(context, one, output) for output in context.outputs)]
+    def acting(task: tuple[Scored, str, bool]) -> dict[str, Any]:  # what is not as in the model without it
+        one, where, heats = task
+        forced = (with_force if heats else with_change)(context, one, where, goal)
+        return {name: getattr(forced, name) for name in OF_FORCE}
 
-    return [forced for each in side_by_side(at_each_place, models) for forced in each]
+    places = [*((name, True) for name in context.floor), *((name, False) for name in context.outputs)]
+    tasks = [(one, *place) for one in models for place in places]
+    found_at = side_by_side(acting, tasks)
+    return [replace(one, **what) for (one, _, _), what in zip(tasks, found_at, strict=True)]
 
 
 def _repaired(

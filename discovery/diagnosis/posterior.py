@@ -20,6 +20,7 @@ from discovery.diagnosis.context import Context
 from discovery.diagnosis.scored import Scored
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.whitening import log_sum_exp
+from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -75,7 +76,7 @@ def posterior(context: Context, models: Collection[Scored], seed: int = 0) -> Po
     best = max(m.evidence for m in models)
     taking = sorted((m for m in models if m.evidence > best - FAR), key=lambda m: -m.evidence)[:MOST]
     draws = _draws(len(context.recordings), context.blocks, seed)
-    return Posterior(tuple(taking), np.array([_evidence(m, draws) for m in taking]))
+    return Posterior(tuple(taking), np.array(side_by_side(lambda m: _evidence(m, draws), taking)))
 
 
 def _draws(recordings: int, blocks: int, seed: int) -> Array:

@@ -32,6 +32,7 @@ from discovery.models import Model
 Array = NDArray[np.float64]
 
 KEPT = 4  # noise settings of a model, the most likely ones
+OF_FORCE = ("settings", "grams", "forced", "forced_state", "log_odds_force")  # what something unknown changes
 
 
 @dataclass(frozen=True)
@@ -192,12 +193,18 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     return _over_noise(context, bare)
 
 
-def _over_noise(context: Context, bare: Scored, forces: Sequence[UnknownHeat | UnknownChange] = ()) -> Scored:
+def _over_noise(
+    context: Context,
+    bare: Scored,
+    forces: Sequence[UnknownHeat | UnknownChange] = (),
+    goal: float = -inf,
+) -> Scored:
     """The score over the noise settings that matter, from the one of the fit on: a setting is asked for its
     neighbours until those that are kept have all been asked.
 
     Args:
         forces: what something of unknown cause may be like; all of it is integrated over, too.
+        goal: log evidence from which the score matters: below it, the most likely setting says enough.
     """
     # a force on top of form error that is larger than usual would be the same noise once more
     usual = {k for k, s in enumerate(context.settings) if not forces or is_usual(s)}
@@ -213,10 +220,14 @@ def _over_noise(context: Context, bare: Scored, forces: Sequence[UnknownHeat | U
         setting = forces[node[1]].on_top_of(setting) if forces else setting
         return replace(bare, settings=(setting,), grams=(bare.seen.grams(setting.noise),))
 
-    start = min(usual, key=lambda k: _distance(context.settings[k].noise, bare.fit.noise)), 0
+    begin = bare.noise if bare.settings else bare.fit.noise
+    start = min(usual, key=lambda k: _distance(context.settings[k].noise, begin)), 0
     kept, known, asked = {start: tried(start)}, {start}, set[tuple[int, int]]()
     while open_ends := [node for node in kept if node not in asked]:
         here = max(open_ends, key=lambda node: float(kept[node].levels[0]))
+        top = max(kept, key=lambda node: float(kept[node].levels[0]))
+        if top in asked and kept[top].evidence < goal:
+            break
         asked.add(here)
         fresh = [node for node in near(here) if node not in known]
         known.update(fresh)
@@ -249,18 +260,22 @@ def off_by(setting: Setting) -> float:
     return max(setting.noise.share, setting.noise.form, setting.level * thresholds.FLOOR)
 
 
-def with_force(context: Context, one: Scored, state: str) -> Scored:
-    """The same fit with heat of unknown cause at a state, of any size."""
+def with_force(context: Context, one: Scored, state: str, goal: float = -inf) -> Scored:
+    """The same fit with heat of unknown cause at a state, of any size; `goal`: the log evidence from which it
+    matters.
+    """
     forces = unknown_heat(state, context.floor[state], thresholds.UNKNOWN_HEAT, thresholds.UNKNOWN_SHARES)
     named = replace(one, forced=f"heat of unknown cause at {state}", forced_state=state)
-    return _over_noise(context, replace(named, log_odds_force=_odds_of_force(context)), forces)
+    return _over_noise(context, replace(named, log_odds_force=_odds_of_force(context)), forces, goal)
 
 
-def with_change(context: Context, one: Scored, output: str) -> Scored:
-    """The same fit with a slow change of an output, of unknown cause and any size that noise may have."""
+def with_change(context: Context, one: Scored, output: str, goal: float = -inf) -> Scored:
+    """The same fit with a slow change of an output, of unknown cause and any size that noise may have; `goal`
+    as in `with_force`.
+    """
     changes = unknown_change(output, [size for size in thresholds.SLOW if size >= 1.0])
     named = replace(one, forced=f"a slow change of {output} of unknown cause")
-    return _over_noise(context, replace(named, log_odds_force=_odds_of_force(context)), changes)
+    return _over_noise(context, replace(named, log_odds_force=_odds_of_force(context)), changes, goal)
 
 
 def _odds_of_force(context: Context) -> float:

@@ -180,7 +180,7 @@ class Search:
 
         def tried(claim: Score) -> Scored | None:
             one = attempt(self.context, start, others, claim, self.goal)
-            return one if one is not None and one.evidence > -inf else None  # the evidence is found here
+            return light(one) if one is not None and one.evidence > -inf else None
 
         found = dict(zip(fresh, side_by_side(tried, list(fresh.values())), strict=True))
         self.lost |= {key for key, one in found.items() if one is None}

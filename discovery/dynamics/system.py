@@ -37,6 +37,10 @@ class System:
         default_factory=dict, repr=False, compare=False
     )
 
+    def __getstate__(self) -> dict[str, object]:
+        """What another process gets: it compiles its terms itself, or has them."""
+        return {**self.__dict__, "programs": {}}
+
     def rates(
         self,
         values: Mapping[str, Value],

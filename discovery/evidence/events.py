@@ -42,17 +42,20 @@ def place_events(
     """
     seen.absorbed(setting.noise)  # once, before recordings are searched side by side
 
-    def of_recording(run: str) -> list[tuple[float, _Search, Hypothesis, Slab]]:
+    def of_recording(run: str) -> list[tuple[float, Hypothesis, Slab]]:
         search = _Search(seen, setting, run)
         its = [(h, slab) for h, slab in zip(claims, slabs, strict=True) if h.recording == run]
         tried = [(search.rough(h, slab), h, slab) for h, slab in its]
-        return [(found[0] + h.log_odds, search, found[1], slab) for found, h, slab in tried if found]
+        return [(found[0] + h.log_odds, found[1], slab) for found, h, slab in tried if found]
+
+    def closer(one: tuple[float, Hypothesis, Slab]) -> Hypothesis:
+        _, h, slab = one
+        return _Search(seen, setting, str(h.recording)).close(h, slab)
 
     runs = list(dict.fromkeys(str(h.recording) for h in claims))
     rough = [one for each in side_by_side(of_recording, runs) for one in each]
     rough.sort(key=lambda one: -one[0])
-    near, far = rough[:CLOSER], rough[CLOSER:]
-    return [search.close(h, slab) for _, search, h, slab in near] + [h for _, _, h, _ in far]
+    return [*side_by_side(closer, rough[:CLOSER]), *(h for _, h, _ in rough[CLOSER:])]
 
 
 class _Search:
