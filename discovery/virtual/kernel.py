@@ -36,7 +36,7 @@ def vapour(T: float) -> float:
     return float(np.exp(17.62 * T / (243.12 + T) - 17.62 * 22.0 / (243.12 + 22.0)))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def flow(form: int, T: float, S: float, g: float, p: Array) -> tuple[float, float, float]:
     """Flow of a law and its slopes in T and S; `p` holds the five numbers of shape."""
     a, b, c = p[0], p[1], p[2]
@@ -75,24 +75,32 @@ def flow(form: int, T: float, S: float, g: float, p: Array) -> tuple[float, floa
 
 
 @njit(cache=True, error_model="numpy")
-def _law(r: int, y: Array, on: Array, g: float, where: Ints, number: Array) -> tuple[float, float, float]:
+def _factors(on: Array, gate: Array, where: Ints, number: Array, factor: Array) -> None:
+    """Fills factor (R,): gate, size and switch of each law, which hold over a step."""
+    for r in range(len(where)):
+        factor[r] = gate[where[r, GATE]] * number[r, SIZE]
+        if where[r, SWITCH] >= 0:
+            factor[r] *= on[where[r, SWITCH]]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _law(r: int, y: Array, factor: Array, where: Ints, number: Array) -> tuple[float, float, float]:
     """Flow of law `r` and its slopes, film and switch included."""
-    factor = g * number[r, SIZE]
-    if where[r, SWITCH] >= 0:
-        factor *= on[where[r, SWITCH]]
-    if where[r, FILM] >= 0:
-        mass = max(0.0, y[where[r, FILM]])
-        factor *= mass / (mass + number[r, HALF])
-    return flow(where[r, FORM], y[where[r, INTO]], y[where[r, SOURCE]], factor, number[r, SHAPE:])
+    g, film, form = factor[r], where[r, FILM], where[r, FORM]
+    if film >= 0:
+        mass = max(0.0, y[film])
+        g *= mass / (mass + number[r, HALF])
+    T, S = y[where[r, INTO]], y[where[r, SOURCE]]
+    return flow(form, T, S, g, number[r, SHAPE:])
 
 
 @njit(cache=True, error_model="numpy")
-def _rates(y: Array, on: Array, gate: Array, where: Ints, number: Array, C: Array, dx: Array) -> None:
+def _rates(y: Array, factor: Array, where: Ints, number: Array, C: Array, dx: Array) -> None:
     """Fills dx (N,); y (N + M,) holds the nodes and then the series of the inputs."""
     dx[:] = 0.0
     N = len(dx)
     for r in range(len(where)):
-        q, _, _ = _law(r, y, on, gate[where[r, GATE]], where, number)
+        q, _, _ = _law(r, y, factor, where, number)
         i, j = where[r, INTO], where[r, LEAVES]
         if i < N:
             dx[i] += q / C[i]
@@ -102,13 +110,13 @@ def _rates(y: Array, on: Array, gate: Array, where: Ints, number: Array, C: Arra
 
 @njit(cache=True, error_model="numpy")
 def _system(
-    y: Array, on: Array, gate: Array, where: Ints, number: Array, C: Array, h: float, dx: Array, a: Array
+    y: Array, factor: Array, where: Ints, number: Array, C: Array, h: float, dx: Array, a: Array
 ) -> None:
     """Fills dx as `_rates` does and a = 1 - h J."""
     dx[:] = 0.0
     N = len(dx)
     for r in range(len(where)):
-        q, by_t, by_s = _law(r, y, on, gate[where[r, GATE]], where, number)
+        q, by_t, by_s = _law(r, y, factor, where, number)
         i, s, j, f = where[r, INTO], where[r, SOURCE], where[r, LEAVES], where[r, FILM]
         by_f = q * number[r, HALF] / (y[f] * (y[f] + number[r, HALF])) if f >= 0 and y[f] > 1e-12 else 0.0
         if i < N:
@@ -184,6 +192,7 @@ def march(
     nodes, switches = np.empty((n + 1, N)), np.empty((n + 1, len(on)))
     nodes[0], switches[0] = x, on
     y, now = np.empty(N + outside.shape[1]), on.copy()
+    factor = np.empty(len(where))
     a, k1, k2, at = np.zeros((N, N)), np.empty(N), np.empty(N), x.copy()
     for k in range(n):
         y[:N], y[N:] = at, outside[k]
@@ -192,16 +201,17 @@ def march(
             if abs(above) >= abs(band[s]):
                 now[s] = 1.0 if above > 0.0 else 0.0
         switches[k] = now
+        _factors(now, gates[k], where, number, factor)
         done, part = 0.0, h
         while done < h * (1.0 - 1e-9):
             part = min(part, h - done)
             y[:N] = at
             _clear(a, order, start, later)
-            _system(y, now, gates[k], where, number, C, GAMMA * part, k1, a)
+            _system(y, factor, where, number, C, GAMMA * part, k1, a)
             _factor(a, order, start, later)
             _solve(a, order, start, later, k1)
             y[:N] += part * k1
-            _rates(y, now, gates[k], where, number, C, k2)
+            _rates(y, factor, where, number, C, k2)
             k2 -= 2.0 * k1
             _solve(a, order, start, later, k2)
             worst = 0.0
@@ -223,9 +233,10 @@ def march(
 def flows(nodes: Array, switches: Array, where: Ints, number: Array, gates: Array, outside: Array) -> Array:
     """Flow of each law at the beginning of each step, (n, R)."""
     n, N = len(outside), nodes.shape[1]
-    out, y = np.empty((n, len(where))), np.empty(N + outside.shape[1])
+    out, factor, y = np.empty((n, len(where))), np.empty(len(where)), np.empty(N + outside.shape[1])
     for k in range(n):
         y[:N], y[N:] = nodes[k], outside[k]
+        _factors(switches[k], gates[k], where, number, factor)
         for r in range(len(where)):
-            out[k, r] = _law(r, y, switches[k], gates[k, where[r, GATE]], where, number)[0]
+            out[k, r] = _law(r, y, factor, where, number)[0]
     return out
