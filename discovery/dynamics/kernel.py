@@ -39,7 +39,16 @@ def _matmul(a, b, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _exponential(a, h, e, w0, w1):  # type: ignore[no-untyped-def]
+def _sum(factor, a, times, b, out):  # type: ignore[no-untyped-def]
+    """Fills out = factor (a + times b)."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            out[i, j] = factor * (a[i, j] + times * b[i, j])
+
+
+@njit(cache=True, nogil=True)
+def _exponential(a, h, room, e, w0, w1):  # type: ignore[no-untyped-def]
+    """Fills e, w0 and w1 (n, n); `room` (7, n, n) for what comes between."""
     n = a.shape[0]
     norm = 0.0
     for i in range(n):
@@ -57,13 +66,17 @@ def _exponential(a, h, e, w0, w1):  # type: ignore[no-untyped-def]
         norm *= 0.5
         halvings += 1
     # phi2 = sum m^i / (i + 2)! up to m^12 from m to m^4 (Paterson & Stockmeyer, SIAM J. Comput. 2, 1973)
-    m = a * (h / 2.0**halvings)
-    m2, m3, m4 = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    m, m2, m3, m4, phi1, phi2, work = room
+    part = h / 2.0**halvings
+    for i in range(n):
+        for j in range(n):
+            m[i, j] = a[i, j] * part
     _matmul(m, m, m2)
     _matmul(m, m2, m3)
     _matmul(m2, m2, m4)
-    phi2 = _TAYLOR[12] * m4
-    work = np.empty((n, n))
+    for i in range(n):
+        for j in range(n):
+            phi2[i, j] = _TAYLOR[12] * m4[i, j]
     for block in (8, 4, 0):
         for i in range(n):
             for j in range(n):
@@ -75,24 +88,22 @@ def _exponential(a, h, e, w0, w1):  # type: ignore[no-untyped-def]
             phi2[i, i] += _TAYLOR[block]
         if block:
             _matmul(m4, phi2, work)
-            phi2[:] = work
-    _matmul(m, phi2, work)
-    phi1 = work.copy()
+            phi2, work = work, phi2
+    _matmul(m, phi2, phi1)
     for i in range(n):
         phi1[i, i] += 1.0
-    _matmul(m, phi1, work)
-    e[:] = work
+    _matmul(m, phi1, e)
     for i in range(n):
         e[i, i] += 1.0
     for _ in range(halvings):
         _matmul(phi1, phi1, work)
-        phi2[:] = 0.25 * (work + 2.0 * phi2)
+        _sum(0.25, work, 2.0, phi2, phi2)
         _matmul(phi1, e, work)
-        phi1[:] = 0.5 * (work + phi1)
+        _sum(0.5, work, 1.0, phi1, phi1)
         _matmul(e, e, work)
         e[:] = work
     w1[:] = h * phi2
-    w0[:] = h * (phi1 - phi2)
+    _sum(h, phi1, -1.0, phi2, w0)
 
 
 @njit(cache=True, nogil=True)
@@ -128,6 +139,7 @@ def transitions(a, h):  # type: ignore[no-untyped-def]
     which = np.empty(count, np.int64)
     room = min(count, _ROOM)
     e, w0, w1 = np.empty((room, n, n)), np.empty((room, n, n)), np.empty((room, n, n))
+    between = np.empty((7, n, n))
     first = np.empty(count, np.int64)
     used = 0
     for k in range(count):
@@ -141,7 +153,7 @@ def transitions(a, h):  # type: ignore[no-untyped-def]
             room = min(count, 4 * room)
             e, w0, w1 = _wider(e, room), _wider(w0, room), _wider(w1, room)
         if found < 0:
-            _exponential(a[k], h[k], e[used], w0[used], w1[used])
+            _exponential(a[k], h[k], between, e[used], w0[used], w1[used])
             first[used] = k
             found = used
             used += 1

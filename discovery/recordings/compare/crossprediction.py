@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,10 +45,15 @@ class Reading:
     at: Array
     read: Array
 
-    @property
+    @cached_property
     def first(self) -> float:
         """What it starts from."""
         return float(np.median(self.read[:3]))
+
+    @cached_property
+    def movement(self) -> float:
+        """Standard deviation of what was read."""
+        return _std(self.read)
 
 
 @dataclass(frozen=True)
@@ -139,7 +145,7 @@ class CrossPrediction:
     def misfit(self, predicted: Prediction, y: str, reading: Reading) -> float:
         """rms of the residual of an output without its mean, in parts of the output's movement."""
         left = self.residual(predicted, y, reading)
-        return _std(left) / max(_std(reading.read), 0.25 * self.size[y], 1e-12)
+        return _std(left) / max(reading.movement, 0.25 * self.size[y], 1e-12)
 
     def usual_misfit(self, without: str, y: str) -> float:
         """Median misfit of other recordings, each predicted without itself and the one in question."""
