@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -100,7 +101,7 @@ def csv_gz(columns: Columns, decimals: Mapping[str, int], origin: str | None = N
 
 
 def _numbers(values: Array, decimals: int) -> list[str]:
-    return ["" if np.isnan(v) else f"{v:.{decimals}f}" for v in values.tolist()]
+    return ["" if math.isnan(v) else f"{v:.{decimals}f}" for v in values.tolist()]
 
 
 def _stamps(seconds: Array, origin: str) -> list[str]:

@@ -14,7 +14,7 @@ from hypothesis import strategies as some
 
 from discovery.errors import UserError
 from discovery.export.compiled import compile_model
-from discovery.export.document import from_document, read_document, render, write_document
+from discovery.export.document import _schema, from_document, read_document, render, write_document
 from discovery.export.makedocument import make_document
 from discovery.export.ranges import sampled_inputs
 from discovery.export.seal import Seal, open_seal, private_key, public_key, require_trusted
@@ -159,6 +159,22 @@ def altered(document: dict[str, Any], change: Any) -> dict[str, Any]:
 def test_mistakes_and_attacks_are_a_sentence(document: dict[str, Any], change: Any, sentence: str) -> None:
     with pytest.raises(UserError, match=sentence):
         from_document(altered(document, change), Seal("", None, None), "model.json")
+
+
+@pytest.mark.parametrize("wrong", [True, "1", None, [1.0], 1e301, -1e301])
+def test_one_wrong_number_in_a_long_list_is_named(document: dict[str, Any], wrong: Any) -> None:
+    """Lists of numbers are looked at as a whole; what is said is what the plain schema says."""
+    jsonschema = pytest.importorskip("jsonschema")
+    rows = [[1.0, 2, 0.0]] * 50
+    sound = altered(document, lambda d: d["knowledge"].update(rows=rows))
+    from_document(sound, Seal("", None, None), "model.json")
+    bad = altered(sound, lambda d: d["knowledge"]["rows"][40].__setitem__(1, wrong))
+    (plain,) = jsonschema.Draft202012Validator(_schema()).iter_errors(bad)
+    with pytest.raises(UserError) as found:
+        from_document(bad, Seal("", None, None), "model.json")
+    assert (
+        str(found.value) == f"model.json: key 'knowledge.rows.40.1': {plain.message}; export the model again"
+    )
 
 
 def test_a_tower_of_powers_ends_at_once(document: dict[str, Any]) -> None:
