@@ -20,7 +20,7 @@ from discovery.sparse.discover import discover
 from discovery.sparse.library import FilteredInputs
 from discovery.sparse.optimiser import SparseSearch
 from discovery.sparse.options import SparseOptions
-from discovery.sparse.plain import fit_plain, settings
+from discovery.sparse.plain import TEST_FUNCTIONS, Table, _weak_rows, fit_plain, settings
 
 Array = NDArray[np.float64]
 STEP, COUNT = 120.0, 1200
@@ -152,6 +152,23 @@ def test_constraints_are_lines_of_the_experiment() -> None:
     assert not any("P2" in one for one in terms(forbid=["P2"]))
     assert not any("P1" in one for one in terms(bounds={"P1": [float("-inf"), 0.0]}))
     assert any("P0" in one for one in terms(keep=["P0"]))
+
+
+@pytest.mark.filterwarnings("ignore::pysindy.utils._axes.AxesWarning")
+@pytest.mark.parametrize("degree", [1, 2])
+def test_weak_rows_are_those_of_the_library(degree: int) -> None:
+    """Bit for bit; its domains on a grid of times are drawn once for all degrees and signals."""
+    rng, time = np.random.default_rng(degree), np.linspace(0.0, 3.0, 300)
+    table = Table(time, rng.normal(size=(300, 2)), rng.normal(size=(300, 1)))
+    both = pysindy.AxesArray(np.column_stack([table.x, table.u]), {"ax_time": 0, "ax_coord": 1})
+    np.random.seed(7)  # noqa: NPY002
+    functions = pysindy.PolynomialLibrary(degree=degree, include_bias=True)
+    weak = pysindy.WeakPDELibrary(functions, spatiotemporal_grid=time, K=TEST_FUNCTIONS)
+    theta, target = weak.fit([both]).transform([both])[0], weak.convert_u_dot_integral(table.x)
+    found = _weak_rows(table, degree, 7)
+    np.testing.assert_array_equal(found[0], np.asarray(theta))
+    np.testing.assert_array_equal(found[1], np.asarray(target))
+    assert np.abs(_weak_rows(replace(table), degree, 8)[0] - found[0]).max() > 0.0
 
 
 @pytest.mark.parametrize("form", ["plain", "weak"])
