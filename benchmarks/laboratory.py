@@ -41,7 +41,7 @@ def room(rng: np.random.Generator, count: int) -> Array:
     """A room (N,) in degC that is heated now and then."""
     time = np.arange(count)
     wave = 0.8 * np.sin(2 * np.pi * time / 7200 + rng.uniform(0, 6))
-    return 21 + rng.normal() + wave + 0.3 * np.cumsum(rng.normal(size=count)) / np.sqrt(count)
+    return np.asarray(21 + rng.normal() + wave + 0.3 * np.cumsum(rng.normal(size=count)) / np.sqrt(count))
 
 
 def lagged(series: Array, tau: float) -> Array:
@@ -115,7 +115,7 @@ def plate(rates: Rates | None = None, key: Mapping[str, Any] | None = None, **mo
         "parameters": free("hA", 1.0, "W/K") + free("g", 1.0, "1"),
         "terms": [("T_b", "", "g*P"), ("T_b", "", "hA*(T_amb - T_b)")],
     }
-    nothing = {"effect": None, "states": []}
+    nothing: dict[str, Any] = {"effect": None, "states": []}
     return Machine(rates=rates or heated(1200.0, 1.4), key=key or nothing, **(given | more))
 
 
@@ -344,31 +344,35 @@ def recorded(machine: Machine, rng: np.random.Generator, run: str, acts: bool, l
 def write(folder: Path, seed: int) -> None:
     """All cases and their keys."""
     keys = {}
-    for i, (name, machine) in enumerate(MACHINES.items()):
-        for j, (kind, (acts, late)) in enumerate(KINDS.items()):
-            case = folder / f"{name}_{kind}"
-            case.mkdir(parents=True, exist_ok=True)
-            for k, run in enumerate("abc"):
-                rng = np.random.default_rng([seed, i, j, k])
-                recorded(machine, rng, run, acts, late).to_csv(case / f"{run}.csv", index=False)
-            roles = {n: f'role = "{d[0]}", unit = "{d[1]}"' for n, d in machine.drives.items()}
-            roles["T_amb"] = f'role = "{AMBIENT}", unit = "degC"'
-            for n, (noise, _) in machine.outputs.items():
-                role, unit = ("error", "um") if n in machine.errors else ("temperature", "degC")
-                roles[n] = f'role = "{role}", unit = "{unit}", noise = {noise}'
-            channels = "".join(f"{n} = {{ {text} }}\n" for n, text in roles.items())
-            runs = "".join(f'{run} = {{ file = "{run}.csv" }}\n' for run in "abc")
-            (case / "campaign.toml").write_text(
-                f'name = "{case.name}"\n[channels]\n{channels}[recordings]\n{runs}'
-            )
-            (case / "baseline.toml").write_text(machine.model(name))
-            (case / "experiment.toml").write_text(
-                f'name = "{case.name}"\ncampaign = "campaign.toml"\nfit = ["a", "b"]\nheld_out = ["c"]\n'
-                '[models]\nbaseline = { file = "baseline.toml" }\n[mismatch]\nmodel = "baseline"\n'
-            )
-            keys[case.name] = dict(machine.key) if acts else {"effect": None, "states": []}
-            print(f"wrote {case.name}", flush=True)
+    for name, machine in MACHINES.items():
+        for kind, (acts, _) in KINDS.items():
+            write_case(folder / f"{name}_{kind}", name, kind, seed)
+            keys[f"{name}_{kind}"] = dict(machine.key) if acts else {"effect": None, "states": []}
+            print(f"wrote {name}_{kind}", flush=True)
     (folder / "keys.json").write_text(json.dumps(keys, indent=1) + "\n")
+
+
+def write_case(case: Path, name: str, kind: str, seed: int) -> None:
+    """Recordings, model and experiment of one machine."""
+    machine, (acts, late) = MACHINES[name], KINDS[kind]
+    place = [*MACHINES].index(name), [*KINDS].index(kind)
+    case.mkdir(parents=True, exist_ok=True)
+    for k, run in enumerate("abc"):
+        rng = np.random.default_rng([seed, *place, k])
+        recorded(machine, rng, run, acts, late).to_csv(case / f"{run}.csv", index=False)
+    roles = {n: f'role = "{d[0]}", unit = "{d[1]}"' for n, d in machine.drives.items()}
+    roles["T_amb"] = f'role = "{AMBIENT}", unit = "degC"'
+    for n, (noise, _) in machine.outputs.items():
+        role, unit = ("error", "um") if n in machine.errors else ("temperature", "degC")
+        roles[n] = f'role = "{role}", unit = "{unit}", noise = {noise}'
+    channels = "".join(f"{n} = {{ {text} }}\n" for n, text in roles.items())
+    runs = "".join(f'{run} = {{ file = "{run}.csv" }}\n' for run in "abc")
+    (case / "campaign.toml").write_text(f'name = "{case.name}"\n[channels]\n{channels}[recordings]\n{runs}')
+    (case / "baseline.toml").write_text(machine.model(name))
+    (case / "experiment.toml").write_text(
+        f'name = "{case.name}"\ncampaign = "campaign.toml"\nfit = ["a", "b"]\nheld_out = ["c"]\n'
+        '[models]\nbaseline = { file = "baseline.toml" }\n[mismatch]\nmodel = "baseline"\n'
+    )
 
 
 def main() -> None:

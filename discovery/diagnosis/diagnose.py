@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from discovery.diagnosis.posterior import IN_PLAY, Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, size_of, unit_of
 from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
-from discovery.diagnosis.scored import OF_FORCE, Scored, with_change, with_force
+from discovery.diagnosis.scored import Scored, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import (
     NO_MISMATCH,
@@ -42,7 +42,7 @@ from discovery.evidence.latent_force import Force, latent_forces
 from discovery.fitting import Fit, fit_model
 from discovery.models import Model
 from discovery.recordings import Campaign
-from discovery.threads import one_thread, side_by_side
+from discovery.threads import one_thread
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -246,19 +246,9 @@ def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]
 
 
 def _unknown(context: Context, found: Search) -> list[Scored]:
-    """Something of unknown cause at each state and in each output: alone, and with the best answer."""
+    """The baseline and the best answer with something of unknown cause."""
     models = list({one.keys: one for one in (found.baseline, found.best)}.values())
-    goal = found.best.evidence - IN_PLAY
-
-    def acting(task: tuple[Scored, str, bool]) -> dict[str, Any]:  # what is not as in the model without it
-        one, where, heats = task
-        forced = (with_force if heats else with_change)(context, one, where, goal)
-        return {name: getattr(forced, name) for name in OF_FORCE}
-
-    places = [*((name, True) for name in context.floor), *((name, False) for name in context.outputs)]
-    tasks = [(one, *place) for one in models for place in places]
-    found_at = side_by_side(acting, tasks)
-    return [replace(one, **what) for (one, _, _), what in zip(tasks, found_at, strict=True)]
+    return with_unknown(context, models, found.best.evidence - IN_PLAY)
 
 
 def _repaired(

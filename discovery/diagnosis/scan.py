@@ -22,26 +22,36 @@ from discovery.fitting import Noise
 
 @dataclass(frozen=True)
 class Scan:
-    """Candidates scored on the residual of a model, best odds first, and on that without one effect."""
+    """Candidates scored on the residual of a model, best odds first, and on that without one effect.
+
+    `quiet`: as if there were little process noise, where the most likely process noise is larger than usual:
+    it may have absorbed the missing physics, and leaves nothing to any candidate.
+    """
 
     claims: tuple[Score, ...]
     without: Mapping[Key, tuple[Score, ...]]
+    quiet: tuple[Score, ...] = ()
 
 
 def scan_model(context: Context, current: Scored) -> Scan:
     """Score every effect at every place on the residual of a model."""
-    found = [h for h in context.candidates if h.key not in current.keys]
-    found = [h for h in found if h.effect.search != "single readings"]
+    offered = [h for h in context.candidates if h.key not in current.keys]
+    offered = [h for h in offered if h.effect.search != "single readings"]
     settings = _in_play(context, current)
-    events = [h for h in found if h.effect.search in ("window", "step")]
+    events = [h for h in offered if h.effect.search in ("window", "step")]
     placed = place_events(current.seen, settings[0], events, [context.slab([h]) for h in events])
     moved = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
-    shaped = [one for h in found if h.effect.search == "shapes" for one in with_shapes(h)]
+    shaped = [one for h in offered if h.effect.search == "shapes" for one in with_shapes(h)]
     every = [*shaped, *placed, *moved]
     own = [_without(current, h) for h in current.hypotheses]
-    first, *others = scan(current.seen, settings, every, context.slab(every), own)
-    by_effect = zip(current.hypotheses, others, strict=True)
-    return Scan(tuple(first), {h.key: tuple(claims) for h, claims in by_effect})
+    found = scan(current.seen, settings, every, context.slab(every), own)
+    by_effect = zip(current.hypotheses, found.without, strict=True)
+    coarse = not is_usual(current.settings[current.best])
+    return Scan(
+        tuple(found.claims),
+        {h.key: tuple(claims) for h, claims in by_effect},
+        tuple(found.quiet) if coarse else (),
+    )
 
 
 def _alike(h: Hypothesis, other: Hypothesis) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +29,18 @@ from discovery.evidence.whitening import Grams, Whitened, log_sum_exp
 from discovery.fitting import Fit, Noise
 from discovery.fitting.covariance import Z95
 from discovery.models import Model
+from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
 KEPT = 4  # noise settings of a model, the most likely ones
-OF_FORCE = ("settings", "grams", "forced", "forced_state", "log_odds_force")  # what something unknown changes
+_OF_FORCE = (
+    "settings",
+    "grams",
+    "forced",
+    "forced_state",
+    "log_odds_force",
+)  # what something unknown changes
 
 
 @dataclass(frozen=True)
@@ -51,6 +59,7 @@ class Scored:
     slab: Slab
     sizes: NDArray[np.intp]
     at: Array  # (A,) the amplitudes where the fit stands
+    outside: bool = False  # a shape presses against the end of its range: another law acts
     forced: str = ""  # what of unknown cause acts, too
     forced_state: str = ""  # the state that it heats
     log_odds_force: float = 0.0
@@ -128,7 +137,7 @@ class Scored:
 
     def drawn(self, k: int, weights: Array | None = None, widths: Array | None = None) -> Array:
         """(D,) `level` under a noise setting for many draws at once; arguments as in `Grams.marginal`."""
-        if (self.sizes < 0).any():  # what presses against zero does not act
+        if self.outside or (self.sizes < 0).any():  # what presses against zero does not act
             return np.full(1 if weights is None else len(weights), -inf)
         found = []
         forms = self.grams[k].marginals(self.sizes, self._own_forms, weights, widths)
@@ -180,6 +189,9 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     place = {u.name: i for i, u in enumerate(fit.problem.unknowns) if not u.is_nuisance}
     index = np.array([place[name] for h in free for name in h.amplitudes], dtype=np.intp)
     moving = {int(i): k for k, i in enumerate(seen.moving)}
+    shapes = [
+        name for h in chosen for name, s in zip(h.shapes, h.effect.shapes, strict=True) if not s.instant
+    ]
     bare = Scored(
         tuple(chosen),
         fit,
@@ -189,6 +201,7 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
         context.slab(free) if free else Slab(np.zeros(0), np.zeros(0), np.zeros(0)),
         np.array([moving.get(int(i), -1) for i in index], dtype=np.intp),
         fit.theta[index],
+        any(place[name] not in moving for name in shapes),
     )
     return _over_noise(context, bare)
 
@@ -276,6 +289,22 @@ def with_change(context: Context, one: Scored, output: str, goal: float = -inf) 
     changes = unknown_change(output, [size for size in thresholds.SLOW if size >= 1.0])
     named = replace(one, forced=f"a slow change of {output} of unknown cause")
     return _over_noise(context, replace(named, log_odds_force=_odds_of_force(context)), changes, goal)
+
+
+def with_unknown(context: Context, models: Sequence[Scored], goal: float) -> list[Scored]:
+    """Each model with something of unknown cause, at each state and in each output in turn; `goal` as in
+    `with_force`.
+    """
+
+    def acting(task: tuple[Scored, str, bool]) -> dict[str, Any]:
+        one, where, heats = task
+        forced = (with_force if heats else with_change)(context, one, where, goal)
+        return {name: getattr(forced, name) for name in _OF_FORCE}  # the rest is as in the model without it
+
+    places = [*((name, True) for name in context.floor), *((name, False) for name in context.outputs)]
+    tasks = [(one, *place) for one in models for place in places]
+    found = side_by_side(acting, tasks)
+    return [replace(one, **what) for (one, _, _), what in zip(tasks, found, strict=True)]
 
 
 def _odds_of_force(context: Context) -> float:

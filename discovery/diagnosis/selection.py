@@ -118,10 +118,14 @@ class Search:
         """The best refit with one of the best candidates; `current` if none is better. Candidates that run
         away or press against zero give way to the next.
         """
-        own, claims = current.keys, self.scanned(current).claims
+        own, scan = current.keys, self.scanned(current)
+
+        def left(claims: Sequence[Score]) -> list[Score]:
+            return [c for c in claims if own | {c.hypothesis.key} not in self.lost]
+
         while True:
-            left = [c for c in claims if own | {c.hypothesis.key} not in self.lost]
-            before, best = len(self.lost), self._refitted(current, current.hypotheses, hopeful(left, REFITS))
+            pool = [*hopeful(left(scan.claims), REFITS), *hopeful(left(scan.quiet), RIVALS)]
+            before, best = len(self.lost), self._refitted(current, current.hypotheses, pool)
             if best is not current or len(self.lost) == before:
                 return best
 

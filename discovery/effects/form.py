@@ -79,6 +79,7 @@ DRIVING = (  # roles of the inputs that an error may follow by a law of its own
 
 _RATIO = 3.0  # between neighbouring values of a shape in a search: signatures of both are much alike
 _REACH = 2.0  # standard deviations of a prior that a search covers
+_FARTHEST = 4.0  # ... and beyond which a law is another one
 _HALVES = 6  # cells on either side of zero, each half as wide as the next: down to a thirtieth of the spread
 
 
@@ -160,8 +161,12 @@ class Shape:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """What the value may be at all."""
-        return (0.0, inf) if self.factor or self.instant or self.middle is None else (-inf, inf)
+        """What the value may be at all: a law whose exponent lies far outside its range is another law."""
+        if self.middle is None or self.instant:
+            return 0.0, inf
+        if not self.factor:
+            return -inf, inf
+        return self.middle * self.factor**-_FARTHEST, self.middle * self.factor**_FARTHEST
 
 
 @dataclass(frozen=True)

@@ -160,19 +160,32 @@ class Without:
     columns: NDArray[np.intp]
 
 
+@dataclass(frozen=True)
+class Scores:
+    """Candidates scored on the residual of a fit, best odds first; `without`: on that without one of its
+    effects, to first order, for each of them; `quiet`: on that of the fit, as if the last noise setting were
+    the only one.
+    """
+
+    claims: list[Score]
+    without: list[list[Score]]
+    quiet: list[Score]
+
+
 def scan(
     seen: Whitened,
     settings: Sequence[Setting],
     hypotheses: Sequence[Hypothesis],
     slab: Slab,
     without: Sequence[Without] = (),
-) -> list[list[Score]]:
-    """Score every candidate on the residual of a fit, best odds first; then on the residual without one of
-    its effects, to first order, for each of `without`.
+) -> Scores:
+    """Score every candidate on the residual of a fit.
 
     Args:
+        settings: noise settings to integrate over, the one with least process noise last.
         hypotheses: claims at all their shape values.
         slab: prior of each amplitude, in their order.
+        without: effects of the fit to be taken out, one at a time.
     """
     runs = seen.fit.trajectories
     batches = _batches(hypotheses)
@@ -202,7 +215,9 @@ def scan(
         for i, part in enumerate(parts):
             part.append(_joined([piece[i] for piece in pieces]))
         levels[:, k] = [view.level - float(log.sum()) + setting.log_weight for view in gone]
-    return [ranked(hypotheses, slab, level, part) for level, part in zip(levels, parts, strict=True)]
+    first, *others = [ranked(hypotheses, slab, *both) for both in zip(levels, parts, strict=True)]
+    quiet = ranked(hypotheses, slab, levels[0, -1:], parts[0][-1:]) if len(settings) > 1 else first
+    return Scores(first, others, quiet)
 
 
 def _batches(hypotheses: Sequence[Hypothesis]) -> list[Sequence[Hypothesis]]:

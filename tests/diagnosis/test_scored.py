@@ -12,7 +12,7 @@ from discovery.diagnosis import thresholds
 from discovery.diagnosis.crossvalidation import left_out
 from discovery.diagnosis.refit import MOVED, refit, score
 from discovery.diagnosis.scan import scan_model
-from discovery.diagnosis.scored import is_usual, scored, with_change, with_force
+from discovery.diagnosis.scored import is_usual, scored, with_change, with_force, with_unknown
 from discovery.evidence.process_noise import unknown_heat
 from tests.diagnosis.parts import bare, claim_of, context_of, dry, scored_of, wetted
 from tests.machine import NOISE, campaign, changed, model, simulated
@@ -77,6 +77,23 @@ def test_a_latent_force_explains_what_is_missing_and_nothing_else() -> None:
     odds = np.log(thresholds.ODDS / (len(dry().floor) + len(dry().outputs)))
     assert lacking.prior - bare().prior == pytest.approx(odds)
     assert lacking.forced_state == "table"
+
+
+def test_what_cannot_matter_is_integrated_only_near_its_best_noise() -> None:
+    """A goal that nothing reaches costs at most a unit or two; one that all reach costs nothing."""
+    whole = with_unknown(dry(), [bare()], -np.inf)
+    rough = with_unknown(dry(), [bare()], np.inf)
+    places = [*dry().floor, *dry().outputs]
+    assert [one.forced.split()[-1] for one in whole[: len(dry().floor)]] == places[: len(dry().floor)]
+    assert len(whole) == len(rough) == len(places)
+    for one, other in zip(whole, rough, strict=True):
+        assert one.forced == other.forced
+        assert 0.0 <= one.evidence - other.evidence < 3.0
+    assert whole[places.index("table")].evidence == with_force(dry(), bare(), "table").evidence
+
+
+def test_a_shape_at_the_end_of_its_range_is_another_law() -> None:
+    assert replace(wetted(), outside=True).evidence == -np.inf
 
 
 def test_an_output_may_change_for_a_cause_that_no_body_shows() -> None:

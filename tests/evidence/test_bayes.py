@@ -160,7 +160,7 @@ def test_a_scan_integrates_everything_that_a_refit_could_absorb() -> None:
     words = ("fluid_convection", "air_convection", "flooded_gap")
     claims = machine.claims(baseline, *words, recordings=["r1"])
     prior_of = slab(8.0, sign=1.0, count=len(claims))
-    (found,) = scan(whitened, [Setting(noise, 0.0, 1.0, (0, 0, 0, 0))], claims, prior_of)
+    found = scan(whitened, [Setting(noise, 0.0, 1.0, (0, 0, 0, 0))], claims, prior_of).claims
 
     belief, slope = fit.problem.prior_rows(fit.theta, fit.together)
     measured = fit.trajectories[0].system.grid.measured

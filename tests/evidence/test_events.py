@@ -73,7 +73,7 @@ def test_heat_of_some_hours_is_found_where_and_when_it_acted() -> None:
     placed = place_events(seen, SETTING, claims, [SLAB] * len(claims))
     assert len(placed) == len(claims)
     count = sum(len(h.amplitudes) for h in placed)
-    (scores,) = scan(seen, [SETTING], placed, SLAB.take(np.zeros(count, dtype=np.intp)))
+    scores = scan(seen, [SETTING], placed, SLAB.take(np.zeros(count, dtype=np.intp))).claims
     h = scores[0].hypothesis
     assert (h.states, h.recording) == (("bed",), "r2")
     on, off = h.shapes.values()
@@ -91,7 +91,7 @@ def test_a_jump_of_a_sensor_is_found_between_two_readings() -> None:
     claims = machine.claims(machine.model(), "sensor_offset")
     placed = place_events(seen, SETTING, claims, [Slab(*(np.array([v]) for v in (3.0, 4.0, 0.0)))] * 6)
     slab = Slab(np.full(6, 3.0), np.full(6, 4.0), np.zeros(6))
-    (scores,) = scan(seen, [SETTING], placed, slab)
+    scores = scan(seen, [SETTING], placed, slab).claims
     h = scores[0].hypothesis
     assert (h.outputs, h.recording) == (("E_Z",), "r2")
     ((low, high),) = h.spans.values()
