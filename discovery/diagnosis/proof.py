@@ -44,8 +44,8 @@ class Improvement:
     `unsure` is what the uncertainty of the parameters adds on a recording that no fit has seen. `low` and
     `high` bound the improvement of the rms (before - after) by block bootstrap, 95 %; `outputs` has the plain
     rms of each output before and after, in its unit. `after` is infinite where the repaired model runs away.
-    `started`: the rms before and after, and the upper bound of the improvement, from the starts that all
-    readings of a recording show. What a body that no sensor reads begins with is no merit of a model;
+    `started`: the rms before and after, and the bounds of the improvement, from the starts that all readings
+    of a recording show. What a body that no sensor reads begins with is no merit of a model;
     whatever is decided is decided by these.
     """
 
@@ -56,7 +56,7 @@ class Improvement:
     high: float
     outputs: Mapping[str, tuple[float, float]]
     unsure: float = 0.0
-    started: tuple[float, float, float] | None = None  # None: as before, after and high
+    started: tuple[float, float, float, float] | None = None  # None: as before, after, low and high
 
     @property
     def judged(self) -> tuple[float, float]:
@@ -78,7 +78,12 @@ class Improvement:
     @property
     def contradicts(self) -> bool:
         """Whether the recording is predicted worse than without the repair, beyond chance."""
-        return (self.started[2] if self.started else self.high) < 0
+        return (self.started[3] if self.started else self.high) < 0
+
+    @property
+    def sure(self) -> bool:
+        """Whether the recordings are predicted better than without the repair, beyond chance."""
+        return (self.started[2] if self.started else self.low) > 0
 
 
 @dataclass(frozen=True)
@@ -166,11 +171,11 @@ def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement
     }
     started = _rms(np.concatenate([b for b, _ in judged]))
     if lost:
-        return Improvement(_rms(before), inf, floor, -inf, -inf, each, unsure, (started, inf, -inf))
+        return Improvement(_rms(before), inf, floor, -inf, -inf, each, unsure, (started, inf, -inf, -inf))
     low, high = _bounds([(r.before, r.after) for r in runs if r.after is not None])
     sure = [(b, a) for b, a in judged if a is not None]
     ended = _rms(np.concatenate([a for _, a in sure]))
-    decided = (started, ended, _bounds(sure)[1])
+    decided = (started, ended, *_bounds(sure))
     return Improvement(_rms(before), _rms(after), floor, low, high, each, unsure, decided)
 
 

@@ -6,7 +6,7 @@ seen, and if no law of physics forbids it. Held-out recordings may withdraw a na
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, log, sqrt
 
@@ -16,7 +16,7 @@ from discovery.diagnosis.crossvalidation import left_out
 from discovery.diagnosis.posterior import Posterior
 from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.refit import score
-from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.scored import Scored, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.vetoes import vetoed
 from discovery.effects.hypothesis import Hypothesis, Key
@@ -75,26 +75,41 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     matters = gain >= thresholds.MATTERS
     probable = [n for n in candidates if matters and n.together >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
-    sure = _needed(context, found, answer, [n for n in probable if n.hypothesis.key not in refused])
+    least = by_chance(found.gain)
+    sure = _needed(
+        [n for n in probable if n.hypothesis.key not in refused],
+        least,
+        lambda some, goal: _alone(context, found, answer, some, found.best.evidence - goal),
+    )
     named, idle = _proved(context, found, answer, sure)
     reasons = [*refused.values(), *idle.values()]
     # what changes no free run outside the fit is not lacking either
     rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
     best = max(rest, key=lambda m: m.evidence)
     alone = _alone(context, found, answer, named) if matters else answer.evidence
-    # names hold next to effects that are not sure, but not next to something that no effect explains; without
-    # names, something is missing only if its cause is unknown, or an effect improves runs outside the fit
+    # names hold next to effects that are not sure, and next to something that no effect explains if they add
+    # as much beside it; without names, something is missing only if its cause is unknown, or an effect
+    # improves runs outside the fit
     without = max(m.evidence for m in rest if not m.forced) if named else alone
     if best.evidence - without > thresholds.SHORT and (
         named or best.forced or not _idle_all(context, found, answer, candidates)
     ):
-        if best.forced:
-            reasons.append(f"{best.forced} explains more than effects do")
-        reasons.append(
-            "the effects that are sure enough explain too little: the best model of all has "
-            f"{best.evidence - alone:.0f} more log evidence"
+        # unrecorded heat for some hours is heat of unknown cause itself
+        laws = [n for n in named if n.hypothesis.effect.search != "window"]
+        named = tuple(
+            _needed(laws, least, lambda some, goal: _unknown_beside(context, found, answer, some, goal))
         )
-        named = ()
+        if named:
+            reasons.append(
+                f"beside what is named, {best.forced} acts, or the laws that are named are not quite right: "
+                f"with it, the model has {best.evidence - without:.0f} more log evidence"
+            )
+        else:
+            reasons += [f"{best.forced} explains more than effects do"] if best.forced else []
+            reasons.append(
+                "the effects that are sure enough explain too little: the best model of all has "
+                f"{best.evidence - alone:.0f} more log evidence"
+            )
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
     every = (*reasons, *_apart(found, answer, unsure))
     if named:
@@ -130,7 +145,7 @@ def _idle_all(context: Context, found: Search, answer: Scored, candidates: Seque
 def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None:
     """Why left-out recordings do not support an effect; None if they do."""
     outside = proofs[h.key]
-    if outside is None or outside.explained >= thresholds.MATTERS:
+    if outside is None or (outside.sure and outside.explained >= thresholds.MATTERS):
         return None
     old, new = outside.judged
     rms = f"{printed(old)} without it, {printed(new)} with it"
@@ -140,24 +155,33 @@ def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None
     )
 
 
-def _needed(context: Context, found: Search, answer: Scored, chosen: Sequence[Named]) -> list[Named]:
-    """Effects that are all needed: each adds evidence to a model of the others, and more than chance does
-    next to large effects.
+def _needed(
+    chosen: Sequence[Named], least: float, level: Callable[[Sequence[Named], float], float]
+) -> list[Named]:
+    """Effects that are all needed: each adds at least so much evidence to a model of the others.
+
+    Args:
+        level: log evidence of a model with some effects; it need not be exact below its second argument.
     """
     kept = list(chosen)
-    least = by_chance(found.gain)
     while kept:
-        whole = _alone(context, found, answer, kept)
-        reach = least + found.best.evidence - whole
-        levels = {
-            n.hypothesis.key: _alone(context, found, answer, [o for o in kept if o is not n], reach)
-            for n in kept
-        }
+        whole = level(kept, -inf)
+        levels = {n.hypothesis.key: level([o for o in kept if o is not n], whole - least) for n in kept}
         last = max(kept, key=lambda n: levels[n.hypothesis.key])
         if not whole - levels[last.hypothesis.key] < least:
             break
         kept.remove(last)
     return kept
+
+
+def _unknown_beside(
+    context: Context, found: Search, answer: Scored, chosen: Sequence[Named], goal: float
+) -> float:
+    """Log evidence of a model with only these effects and something of unknown cause; it need not be exact
+    below a goal.
+    """
+    model = _only(context, found, answer, chosen)
+    return -inf if model is None else max(m.evidence for m in with_unknown(context, [model], goal))
 
 
 def by_chance(gain: float, least: float = thresholds.SHORT) -> float:

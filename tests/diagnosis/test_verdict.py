@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import sqrt
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -113,6 +114,16 @@ def _nothing_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verdict, "left_out", lambda _, __, chosen: dict.fromkeys(h.key for h in chosen))
 
 
+@pytest.fixture(autouse=True)
+def _unknown_heat_explains_everything(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever effects act beside it."""
+
+    def alike(_: Context, models: Sequence[Model], __: float) -> list[Model]:
+        return [replace(m, evidence=1000.0) for m in models]
+
+    monkeypatch.setattr(verdict, "with_unknown", alike)
+
+
 def said(
     found: Tried,
     words: dict[str, float],
@@ -202,6 +213,28 @@ def test_heat_that_no_effect_explains_refutes_names(gain: float, unknown: float,
     assert verdict.word == word
     if word == "unexplained":
         assert verdict.reasons[0] == "heat of unknown cause at bed explains more than effects do"
+
+
+@pytest.mark.parametrize(
+    ("adds", "word"), [(1.5 * sqrt(400.0) + 0.1, "missing physics"), (1.5 * sqrt(400.0) - 0.1, "unexplained")]
+)
+@pytest.mark.parametrize("h", [FLUID, SUN])
+def test_a_law_that_adds_as_much_beside_heat_of_unknown_cause_is_named(
+    h: Hypothesis, adds: float, word: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """1.5 standard deviations of 200 units. Heat for some hours is heat of unknown cause itself."""
+    found = Tried([Model((h,), 200.0), Model((), 0.0)])
+    monkeypatch.setattr(
+        verdict,
+        "with_unknown",
+        lambda _, models, __: [replace(m, evidence=300.0 if m.hypotheses else 300.0 - adds) for m in models],
+    )
+    unknown = Model((h,), 300.0, forced="heat of unknown cause at bed")
+    answer = said(found, {h.effect.word: 0.95}, unknown=unknown)
+    assert answer.word == (word if h is FLUID else "unexplained")
+    if answer.named:
+        assert "beside what is named, heat of unknown cause at bed acts" in answer.reasons[0]
+        assert "100 more log evidence" in answer.reasons[0]
 
 
 @pytest.mark.parametrize(("more", "word"), [(-0.1, "missing physics"), (0.1, "unexplained")])
@@ -294,7 +327,7 @@ def test_what_is_not_sure_is_missing_only_if_it_improves_free_runs_outside_the_f
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     for after, word in ((1.0, "no mismatch"), (0.5, "unexplained")):
-        proof = Improvement(1.0, after, 0.5, -1.0, 1.0, {})
+        proof = Improvement(1.0, after, 0.5, 0.5 - 0.6 * after, 1.0, {})
         monkeypatch.setattr(verdict, "left_out", lambda _, __, chosen, p=proof: {h.key: p for h in chosen})
         found = said(WET, {"fluid_convection": 0.5})
         assert (found.word, found.named) == (word, ())
@@ -303,7 +336,7 @@ def test_what_is_not_sure_is_missing_only_if_it_improves_free_runs_outside_the_f
 
 def test_what_changes_no_free_run_is_not_lacking(monkeypatch: pytest.MonkeyPatch) -> None:
     """The other one adds 50 to the evidence and nothing to free runs: the first one is named alone."""
-    proofs = {FLUID.key: Improvement(1.0, 0.5, 0.5, -1.0, 1.0, {}), FRICTION.key: None}
+    proofs = {FLUID.key: Improvement(1.0, 0.5, 0.5, 0.4, 0.6, {}), FRICTION.key: None}
     idle = Improvement(1.0, 1.0, 0.5, -1.0, 1.0, {})
     monkeypatch.setattr(
         verdict, "left_out", lambda _, __, chosen: {h.key: proofs[h.key] or idle for h in chosen}
@@ -316,13 +349,19 @@ def test_what_changes_no_free_run_is_not_lacking(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize(
-    ("after", "word"), [(2.0, "unexplained"), (1.0, "unexplained"), (0.5, "missing physics")]
+    ("after", "low", "word"),
+    [
+        (2.0, -1.1, "unexplained"),
+        (1.0, -0.1, "unexplained"),
+        (0.5, -0.1, "unexplained"),
+        (0.5, 0.1, "missing physics"),
+    ],
 )
 def test_a_name_has_to_matter_on_recordings_left_out(
-    after: float, word: str, monkeypatch: pytest.MonkeyPatch
+    after: float, low: float, word: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where one rms is before: worse, no better, and better by 0.87 reading noises."""
-    proof = Improvement(1.0, after, 0.5, -1.0, 1.0, {})
+    """Where one rms is before: worse, no better, and better by 0.87 reading noises, by chance and beyond."""
+    proof = Improvement(1.0, after, 0.5, low, 1.0, {})
     monkeypatch.setattr(verdict, "left_out", lambda _, __, chosen: {h.key: proof for h in chosen})
     found = said(WET, {"fluid_convection": 0.98})
     assert found.word == word
