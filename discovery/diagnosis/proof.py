@@ -81,6 +81,12 @@ class Improvement:
         return (self.started[3] if self.started else self.high) < 0
 
     @property
+    def mostly(self) -> bool:
+        """Whether the repair explains more of what was left before than it leaves."""
+        before, after = self.judged
+        return 2 * after**2 < before**2
+
+    @property
     def sure(self) -> bool:
         """Whether the recordings are predicted better than without the repair, beyond chance."""
         return (self.started[2] if self.started else self.low) > 0

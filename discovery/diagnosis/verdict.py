@@ -81,21 +81,21 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
         least,
         lambda some, goal: _alone(context, found, answer, some, found.best.evidence - goal),
     )
-    named, idle = _proved(context, found, answer, sure)
+    named, idle, proofs = _proved(context, found, answer, sure)
     reasons = [*refused.values(), *idle.values()]
-    # what changes no free run outside the fit is not lacking either
-    rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & idle.keys()]
+    # what changes no free run outside the fit is not lacking either; what may do so by chance can be
+    nothing = {key for key in idle if not _changes(proofs[key])}
+    rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & nothing]
     best = max(rest, key=lambda m: m.evidence)
     alone = _alone(context, found, answer, named) if matters else answer.evidence
-    # names hold next to effects that are not sure, and next to something that no effect explains if they add
-    # as much beside it; without names, something is missing only if its cause is unknown, or an effect
-    # improves runs outside the fit
+    # names hold next to effects that are not sure, and next to something that no effect explains if they
+    # explain more than they leave, and add as much beside it; without names, something is missing only if its
+    # cause is unknown, or an effect improves runs outside the fit
     without = max(m.evidence for m in rest if not m.forced) if named else alone
     if best.evidence - without > thresholds.SHORT and (
         named or best.forced or not _idle_all(context, found, answer, candidates)
     ):
-        # unrecorded heat for some hours is heat of unknown cause itself
-        laws = [n for n in named if n.hypothesis.effect.search != "window"]
+        laws = [n for n in named if (proof := proofs[n.hypothesis.key]) and proof.mostly]
         named = tuple(
             _needed(laws, least, lambda some, goal: _unknown_beside(context, found, answer, some, goal))
         )
@@ -122,30 +122,40 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
 
 def _proved(
     context: Context, found: Search, answer: Scored, chosen: Sequence[Named]
-) -> tuple[tuple[Named, ...], dict[Key, str]]:
-    """Effects that improve free runs outside the fit, and why each other one is not named."""
+) -> tuple[tuple[Named, ...], dict[Key, str], dict[Key, Improvement | None]]:
+    """Effects that improve free runs outside the fit, why each other one is not named, and what each changes
+    there.
+    """
     kept, idle = tuple(chosen), dict[Key, str]()
+    proofs = dict[Key, Improvement | None]()
     while kept:
         whole = _only(context, found, answer, kept) or answer
-        proofs = left_out(context, whole, [n.hypothesis for n in kept])
+        proofs |= left_out(context, whole, [n.hypothesis for n in kept])
         more = {n.hypothesis.key: text for n in kept if (text := _idle(n.hypothesis, proofs))}
         if not more:
             break
         idle |= more
         kept = tuple(n for n in kept if n.hypothesis.key not in more)
-    return kept, idle
+    return kept, idle, proofs
 
 
 def _idle_all(context: Context, found: Search, answer: Scored, candidates: Sequence[Named]) -> bool:
     """Whether no effect of the answer, sure or not, improves free runs outside the fit."""
-    kept, _ = _proved(context, found, answer, candidates)
+    kept, *_ = _proved(context, found, answer, candidates)
     return not kept
+
+
+def _changes(outside: Improvement | None) -> bool:
+    """Whether an effect improves free runs outside the fit by as much as matters, be it by chance; true where
+    nothing can be left out.
+    """
+    return outside is None or outside.explained >= thresholds.MATTERS
 
 
 def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None:
     """Why left-out recordings do not support an effect; None if they do."""
     outside = proofs[h.key]
-    if outside is None or (outside.sure and outside.explained >= thresholds.MATTERS):
+    if outside is None or (outside.sure and _changes(outside)):
         return None
     old, new = outside.judged
     rms = f"{printed(old)} without it, {printed(new)} with it"
