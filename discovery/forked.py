@@ -10,6 +10,7 @@ import gc
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import current_process
@@ -36,38 +37,44 @@ def forked(work: Callable[[T], R], items: Sequence[T], count: int) -> list[R]:
         What goes wrong first, in the order of the items; what has not begun by then does not begin.
     """
     context = get_context("fork")
-    gc.freeze()  # a child that looks for garbage among what it shares would copy all of it
     ends: list[Connection[int, Any]] = []
     children = []
-    for _ in range(count):
-        here, there = context.Pipe()
-        child = context.Process(target=_work, args=(work, items, there, (*ends, here)), daemon=True)
-        child.start()
-        there.close()
-        ends.append(here)
-        children.append(child)
-    gc.unfreeze()
+    gc.freeze()  # a child that looks for garbage among what it shares would copy all of it
     try:
-        return _dealt(work, items, ends)
+        for _ in range(count):
+            here, there = context.Pipe()
+            child = context.Process(target=_work, args=(work, items, there, (*ends, here)), daemon=True)
+            child.start()
+            there.close()
+            ends.append(here)
+            children.append(child)
+        found = _dealt(len(items), ends)
     finally:
-        for end, child in zip(ends, children, strict=True):
+        gc.unfreeze()
+        for end in ends:
             end.close()
+        for child in children:
             child.kill()
             child.join()
+    # a child that the system has ended, for want of memory, leaves its item to its parent
+    return [found[index] if index in found else work(item) for index, item in enumerate(items)]
 
 
-def _dealt(work: Callable[[T], R], items: Sequence[T], ends: Sequence[Connection[int, Any]]) -> list[R]:
-    """What the children find: each gets the next item when it is done with the one before."""
-    found: dict[int, R] = {}
+def _dealt(count: int, ends: Sequence[Connection[int, Any]]) -> dict[int, Any]:
+    """What the children find, by the index of the item: each gets the next one when it is done with the one
+    before.
+    """
+    found: dict[int, Any] = {}
     failed: dict[int, BaseException] = {}
-    left = iter(range(len(items)))
+    left = iter(range(count))
     busy: dict[Connection[int, Any], int] = {}
 
     def deal(end: Connection[int, Any]) -> None:
         index = None if failed else next(left, None)
         if index is not None:
-            end.send(index)
-            busy[end] = index
+            with suppress(OSError):  # the child has ended
+                end.send(index)
+                busy[end] = index
 
     for end in ends:
         deal(end)
@@ -77,8 +84,7 @@ def _dealt(work: Callable[[T], R], items: Sequence[T], ends: Sequence[Connection
             index = busy.pop(end)
             try:
                 good, what = end.recv()
-            except EOFError:  # the system has ended the child, for want of memory
-                found[index] = work(items[index])
+            except (EOFError, OSError):  # the child has ended
                 continue
             if good:
                 found[index] = what
@@ -87,7 +93,7 @@ def _dealt(work: Callable[[T], R], items: Sequence[T], ends: Sequence[Connection
             deal(end)
     if failed:
         raise failed[min(failed)]
-    return [found[index] for index in range(len(items))]
+    return found
 
 
 def _work(

@@ -134,6 +134,12 @@ def test_what_a_child_that_was_ended_had_to_do_is_done_by_its_parent() -> None:
     assert [(item, here) for item, here, _ in eval(out)] == [("a", False), ("b", True), ("c", False)]
 
 
+def test_a_parent_whose_children_were_all_ended_does_the_rest() -> None:
+    what = "pass\n    if os.getpid() != parent: os.kill(os.getpid(), signal.SIGKILL)"
+    out, _ = forks(what, "none").communicate()
+    assert [(item, here) for item, here, _ in eval(out)] == [(item, True) for item in "abc"]
+
+
 def test_what_goes_wrong_in_a_child_goes_wrong_in_its_parent() -> None:
     out, err = forks("raise ValueError('the second')", "b").communicate()
     assert (out, err.splitlines()[-1]) == ("", "ValueError: the second")

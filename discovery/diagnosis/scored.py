@@ -34,13 +34,8 @@ from discovery.threads import side_by_side
 Array = NDArray[np.float64]
 
 KEPT = 4  # noise settings of a model, the most likely ones
-_OF_FORCE = (
-    "settings",
-    "grams",
-    "forced",
-    "forced_state",
-    "log_odds_force",
-)  # what something unknown changes
+# what something of unknown cause changes of a score
+_OF_FORCE = ("settings", "grams", "forced", "forced_state", "log_odds_force")
 
 
 @dataclass(frozen=True)

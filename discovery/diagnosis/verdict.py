@@ -101,7 +101,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
         )
         if named:
             reasons.append(
-                f"beside what is named, {best.forced} acts, or the laws that are named are not quite right: "
+                f"{best.forced} acts as well, or the named laws are not exact: "
                 f"with it, the model has {best.evidence - without:.0f} more log evidence"
             )
         else:

@@ -244,7 +244,7 @@ def test_a_law_that_explains_most_is_named_beside_heat_of_unknown_cause(
     answer = said(found, {"fluid_convection": 0.95}, unknown=unknown)
     assert answer.word == word
     if answer.named:
-        assert "beside what is named, heat of unknown cause at bed acts" in answer.reasons[0]
+        assert "heat of unknown cause at bed acts as well" in answer.reasons[0]
         assert "100 more log evidence" in answer.reasons[0]
 
 
