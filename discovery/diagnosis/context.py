@@ -20,6 +20,7 @@ from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import model_form
 from discovery.evidence.late import perhaps_late
+from discovery.evidence.noisy import log_likelihood, perhaps_noisy, smoothed
 from discovery.evidence.outliers import Outlier, find_outliers, without
 from discovery.evidence.process_noise import (
     Prior,
@@ -138,12 +139,17 @@ def make_context(
         grids = thinned(without(whole, outliers))
         fit = fitted(grids, fit)
         white = reading_noise(fit, stated, floor, process_prior())
+    grids = perhaps_noisy(fit, campaign, grids, white, thresholds.SHORT)
+    if any(g.noisy for g in grids.values()):
+        plain = [s.noise for s in _settings(white, floor, grids) if s.is_plain]
+        both = [(fitted(one, fit), one) for one in (grids, smoothed(grids))]
+        fit, grids = max(both, key=lambda one: log_likelihood(one[0], plain))
     form, laws = model_form(fit, np.array(white.white))
     spreads = fit.problem.start_spreads()
     own = {n: replace(s, start_sd=spreads.get(n, s.start_sd)) for n, s in model.states.items()}
     scene = make_scene(campaign, model, recordings, outputs, after)
     model = replace(model, states=own)  # how far states begin from their starts is found once
-    noises = settings(white, floor, process_prior(), any(g.unsure for g in grids.values()))
+    noises = _settings(white, floor, grids)
     return Context(
         campaign,
         model,
@@ -167,8 +173,12 @@ def with_noise_of(context: Context, fit: Fit) -> Context:
     """The context with the reading noise of a better fit, if the campaign states none."""
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
     white = reading_noise(fit, stated, context.floor, process_prior())
-    unsure = any(g.unsure for g in context.grids.values())
-    return replace(context, settings=settings(white, context.floor, process_prior(), unsure))
+    return replace(context, settings=_settings(white, context.floor, context.grids))
+
+
+def _settings(white: Noise, floor: Mapping[str, float], grids: Mapping[str, Grid]) -> tuple[Setting, ...]:
+    unsure, noisy = any(g.unsure for g in grids.values()), any(g.noisy for g in grids.values())
+    return settings(white, floor, process_prior(), unsure, noisy)
 
 
 def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:

@@ -37,7 +37,7 @@ from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis
 from discovery.effects.not_offered import not_offered
 from discovery.errors import RunsAwayError, UserError
-from discovery.evidence.late import sentences
+from discovery.evidence import late, noisy
 from discovery.evidence.latent_force import Force, latent_forces
 from discovery.fitting import Fit, fit_model
 from discovery.models import Model
@@ -303,4 +303,5 @@ def _reasons(
         said.append(f"the free run of the model diverges on {lost}, so the repair cannot be tested there")
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
-    return [*said, *sentences(verdict.answer.fit)]
+    answer = verdict.answer
+    return [*said, *late.sentences(answer.fit), *noisy.sentences(answer.fit, answer.noise)]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory, predict, sensitivities
 from discovery.errors import RunsAwayError
+from discovery.evidence.noisy import with_noise
 from discovery.evidence.outliers import find_outliers, without
 from discovery.evidence.process_noise import noise_in_free_runs
 from discovery.fitting import Fit, Noise, from_known_starts, predict_recording
@@ -140,7 +141,7 @@ def free_runs(
         found[run] = FreeRuns(
             first * scale,
             None if then is None else then * scale,
-            one * noise_in_free_runs(new or old, noise),
+            one * noise_in_free_runs(with_noise(campaign, new or old), noise),
             1 / scale,
             one * _unsure(new or old, white, known) if known else 0.0,
             (_started(before, old, first) * scale, started),

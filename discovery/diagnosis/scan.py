@@ -84,7 +84,7 @@ def _in_play(context: Context, current: Scored) -> list[Setting]:
     noise may have absorbed the missing physics.
     """
     best = current.settings[current.best]
-    other = next(s for s in context.settings if s.place == (*best.place[:2], 0, 0, 0))
+    other = next(s for s in context.settings if s.place == (*best.place[:-3], 0, 0, 0))
     return [best] if other.place == best.place else [best, other]
 
 

@@ -250,12 +250,12 @@ def _over_noise(
 
 
 def _distance(one: Noise, other: Noise) -> float:
-    """Distance of two noise settings in slow noise, form error, unrecorded heat and jitter."""
+    """Distance of two noise settings in slow noise, form error, unrecorded heat and inputs."""
     slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
     form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
     here, there = (sum((noise.heat or {}).values()) for noise in (one, other))
     heat = abs(here - there) / max(here + there, 1e-300)
-    return slow + form + heat + abs(one.jitter - other.jitter)
+    return slow + form + heat + abs(one.jitter - other.jitter) + abs(one.rough - other.rough)
 
 
 def is_usual(setting: Setting) -> bool:

@@ -47,6 +47,7 @@ class Grid:
     offset: Mapping[str, float] = field(default_factory=dict)
     unsure: Mapping[str, float] = field(default_factory=dict)  # s, of held channels perhaps logged late
     late: Mapping[str, float] = field(default_factory=dict)  # s, which `ends` has them earlier than stamped
+    noisy: Mapping[str, Samples] = field(default_factory=dict)  # noise of channels: its sd, per root of Hz
     instants: int = 0  # nodes that there were before it was coarsened; 0: it was not
     logged: Mapping[str, float] = field(default_factory=dict)  # s, median distance of the stamps of a channel
     means: Means | None = None  # where readings are means of several

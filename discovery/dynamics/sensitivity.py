@@ -59,7 +59,7 @@ def sensitivities(
     system = trajectory.system
     owners = count if count is not None else max((c.owner for c in candidates), default=-1) + 1
     first = len(parameters) + len(starts)
-    moved = _moved_terms(trajectory, parameters) if parameters else []
+    moved = moved_terms(trajectory, parameters) if parameters else []
     if grown is not None:
         ends = interleaved(grown[:-1], grown[1:])
         moved = [replace(piece, series=ends * piece.series) for piece in moved]
@@ -136,8 +136,8 @@ def _in_terms(trajectory: Trajectory, parameters: Sequence[str]) -> frozenset[st
     return frozenset(parameters).difference(trajectory.system.grid.outputs)
 
 
-def _moved_terms(trajectory: Trajectory, parameters: Sequence[str]) -> list[Column]:
-    """How each term moves with each parameter in it; owners count the parameters."""
+def moved_terms(trajectory: Trajectory, parameters: Sequence[str]) -> list[Column]:
+    """How each term moves with each parameter (or channel) in it; owners count the parameters."""
     system, wanted = trajectory.system, _in_terms(trajectory, parameters)
     env = trajectory.at_ends()
     return [

@@ -1,4 +1,4 @@
-"""Noise that is always there: process noise that grows with the flows, slow sensor noise, late switches.
+"""Noise that is always there: process noise that grows with the flows, slow sensor noise, wrong inputs.
 
     s_i(t)^2 = (level floor_i)^2 + (share flow_i(t))^2
 
@@ -19,6 +19,7 @@ from discovery.dynamics import Column, Trajectory, sensitivities
 from discovery.dynamics.trajectory import answers, flows
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Fit, Noise
+from discovery.fitting.impulses import impulse_variance
 from discovery.fitting.noise import resolution
 
 Array = NDArray[np.float64]
@@ -36,7 +37,12 @@ class Setting:
     noise: Noise
     log_weight: float
     level: float  # of the heat that nobody records
-    place: tuple[int, ...]  # on the grid of jitters, slow noises, levels, shares and form errors
+    place: tuple[int, ...]  # on the grid of jitters, noisy inputs, slow noises, levels, shares, form errors
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it has no slow noise, and the least of errors that grow with the flows."""
+        return not any(self.place[2:3] + self.place[4:])
 
 
 @dataclass(frozen=True)
@@ -126,17 +132,20 @@ def flow_sizes(trajectories: Sequence[Trajectory]) -> dict[str, float]:
     return found
 
 
-def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: bool) -> tuple[Setting, ...]:
+def settings(
+    white: Noise, floor: Mapping[str, float], prior: Prior, unsure: bool, noisy: bool
+) -> tuple[Setting, ...]:
     """The noise settings that evidence is integrated over.
 
     Args:
         white: reading noise and the two time constants.
         floor: of each state, from `floors`.
         unsure: inputs may be logged late, each switch by another time, or all by the same.
+        noisy: inputs may be recorded with noise.
     """
-    jitters = (0.0, JITTER) if unsure else (0.0,)
     axes = (
-        [(jitter, 1.0) for jitter in jitters],
+        [(jitter, 1.0) for jitter in ((0.0, JITTER) if unsure else (0.0,))],
+        [(rough, 1.0) for rough in ((0.0, 1.0) if noisy else (0.0,))],
         list(prior.slow.items()),
         list(prior.levels.items()),
         list(prior.shares.items()),
@@ -146,10 +155,11 @@ def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: boo
     total = float(np.prod([sum(weight for _, weight in axis) for axis in axes]))
     found = []
     for place in np.ndindex(*(len(axis) for axis in axes)):
-        jitter, slow, level, share, _ = (axis[k][0] for axis, k in zip(axes, place, strict=True))
+        jitter, rough, slow, level, share, _ = (axis[k][0] for axis, k in zip(axes, place, strict=True))
         form, edge = forms[place[-1]]
         weight = np.prod([axis[k][1] for axis, k in zip(axes, place, strict=True)])
-        noise = replace(_noise(white, floor, level, share, slow, jitter), form=form, edge=edge)
+        noise = _noise(white, floor, level, share, slow)
+        noise = replace(noise, jitter=jitter, rough=rough, form=form, edge=edge)
         found.append(Setting(noise, float(np.log(weight / total)), level, place))
     return tuple(found)
 
@@ -189,15 +199,12 @@ def unknown_change(output: str, times: Sequence[float]) -> tuple[UnknownChange, 
     return tuple(UnknownChange(output, size, weight, (i, 0)) for i, size in enumerate(times))
 
 
-def _noise(
-    white: Noise, floor: Mapping[str, float], level: float, share: float, slow: float, jitter: float
-) -> Noise:
+def _noise(white: Noise, floor: Mapping[str, float], level: float, share: float, slow: float) -> Noise:
     return replace(
         white,
         slow=tuple(slow * w for w in white.white) if slow else (),
         heat={name: level * value for name, value in floor.items()} if level else None,
         share=share,
-        jitter=jitter,
     )
 
 
@@ -239,7 +246,7 @@ def _white_with(
     """White level (Y,) of unit innovations with given slow and process noise, and its -log likelihood."""
     white, cost = np.array(start.white), np.inf
     for _ in range(4):
-        noise = _noise(replace(start, white=tuple(white)), floor, level, level * prior.share, slow, 0.0)
+        noise = _noise(replace(start, white=tuple(white)), floor, level, level * prior.share, slow)
         squares, counts, cost = np.zeros(len(white)), np.zeros(len(white)), 0.0
         for part, residual in zip(seen.filters, seen.residuals, strict=True):
             z, log = part.whitened(noise, residual[:, :, None])
@@ -256,10 +263,11 @@ def _white_with(
 
 
 def noise_in_free_runs(trajectory: Trajectory, noise: Noise) -> float:
-    """rms of a free run from reading noise, slow noise and process noise, in reading noises."""
+    """rms of a free run from reading noise, slow noise, process noise and inputs, in reading noises."""
     white = np.array(noise.white)
     slow = np.array(noise.slow or np.zeros(len(white)))
     variance = np.tile(1.0 + (slow / white) ** 2, (len(trajectory.system.grid.read), 1))
+    variance = variance + impulse_variance(trajectory, noise) / white**2
     system, size = trajectory.system, flows(trajectory)
     middle = 0.5 * (system.grid.time[1:] + system.grid.time[:-1])
     edges = np.linspace(system.grid.time[0], system.grid.time[-1], _BLOCKS + 1)

@@ -8,8 +8,8 @@ model around a trajectory,
 so a Kalman filter whitens residuals and sensitivity columns alike in one pass (Sarkka & Solin, Applied
 Stochastic Differential Equations, 2019, ch. 10) and gives the likelihood of the variances. `w` is held
 between readings, because its time constant is hours and readings come in minutes. Its size s(t) follows the
-flow through the body (`Noise`): a time-varying gain without a further state. An input that switches a little
-before or after its stamp gives an impulse at the bodies, each time a different one.
+flow through the body (`Noise`): a time-varying gain without a further state. Inputs that are recorded a
+little wrong give impulses at the bodies (`impulses.py`).
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from discovery.dynamics import Trajectory
 from discovery.dynamics.kernel import between, driven
 from discovery.dynamics.prediction import output_matrix
-from discovery.dynamics.sensitivity import moved_in_time
 from discovery.dynamics.trajectory import flows
+from discovery.fitting.impulses import added, late_switches, noisy_inputs
 from discovery.fitting.noise import Noise
 
 Array = NDArray[np.float64]
@@ -152,7 +152,8 @@ class Filter:
     h: Array
     step: Array
     measured: NDArray[np.bool_]
-    jumps: Array  # covariance of impulses between readings for a jitter of one, none where none can be
+    late: Array  # covariance of impulses between readings for a jitter of one, none where none can be
+    noisy: Array  # the same for noise of inputs as large as they are rough
     last: dict[str, tuple[Noise, Any]] = field(default_factory=dict, repr=False)
 
     def gains(self, noise: Noise) -> tuple[Array, Array]:
@@ -162,10 +163,8 @@ class Filter:
         if "gains" not in self.last or self.last["gains"][0] != noise:
             heat, slow, response, decays = self._parts(noise)
             white = self.trajectory.system.grid.sd(noise.white)
-            jumps = self.jumps if noise.jitter else self.jumps[:0]
-            found = _gains(
-                self.f, response, self.h, self.measured, white, slow, heat, *decays, noise.jitter**2 * jumps
-            )
+            jumps = added([(noise.jitter, self.late), (noise.rough, self.noisy)])
+            found = _gains(self.f, response, self.h, self.measured, white, slow, heat, *decays, jumps)
             self.last["gains"] = (noise, found)
         known: tuple[Array, Array] = self.last["gains"][1]
         return known
@@ -230,29 +229,9 @@ def make_filter(trajectory: Trajectory) -> Filter:
         output_matrix(trajectory),
         np.diff(system.grid.time[read]),
         system.grid.measured,
-        _jumps(trajectory),
+        late_switches(trajectory),
+        noisy_inputs(trajectory),
     )
-
-
-def _jumps(trajectory: Trajectory) -> Array:
-    """Covariance (R - 1, n, n) of what the states get between two readings where each switch comes before or
-    after its stamp by as much as the input may be logged late; empty where no input may.
-    """
-    system, n = trajectory.system, len(trajectory.system.states)
-    channels = tuple(system.grid.late)
-    if not channels:
-        return np.zeros((0, n, n))
-    impulse = np.zeros((len(channels), len(system.grid.step), n))
-    for piece in moved_in_time(trajectory, channels):
-        size = np.broadcast_to(piece.series, (2 * len(system.grid.step),)).reshape(-1, 2).mean(axis=1)
-        size = size * system.grid.step * system.grid.unsure[channels[piece.owner]]
-        for state, sign in ((piece.into, 1.0), (piece.source, -1.0)):
-            if state:
-                i = system.states.index(state)
-                impulse[piece.owner, :, i] += sign * system.scale[i] * size
-    sums = np.zeros((len(system.grid.time), n, n))
-    np.cumsum(np.einsum("cki,ckj->kij", impulse, impulse), axis=0, out=sums[1:])
-    return np.diff(sums[system.grid.read], axis=0)
 
 
 def whiten(trajectory: Trajectory, noise: Noise, data: Array, part: Filter | None = None) -> Array:

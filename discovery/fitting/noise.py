@@ -36,11 +36,12 @@ class Noise:
     form: float = 0.0  # share by which a law of the model is off at an operating point, whenever it is there
     edge: float = 0.0  # share of a flow that enters a neighbour of its body, or shows before all of its body
     jitter: float = 0.0  # of single switches of inputs that may be logged late, as a share of `Grid.unsure`
+    rough: float = 0.0  # noise of the recorded inputs, as a share of `Grid.noisy`
 
     @property
     def is_white(self) -> bool:
         """Whether whitening is a plain division."""
-        return not any(self.slow) and not any((self.heat or {}).values()) and not self.jitter
+        return not (any(self.slow) or any((self.heat or {}).values()) or self.jitter or self.rough)
 
 
 def white_noise(
