@@ -69,7 +69,8 @@ class Context:
     belief: float | None
     outliers: tuple[Outlier, ...]  # set aside
     form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
-    laws: int  # of these, the first, that are of laws and not of edges
+    kinds: tuple[int, int, int]  # of these: of laws, of places, of zeros of thermometers
+    thermometers: tuple[str, ...]  # that the model uses or shows
     sizes: Sizes  # prior of amplitudes, along the baseline; the same under every reading noise
 
     @property
@@ -144,7 +145,8 @@ def make_context(
         plain = [s.noise for s in _settings(white, floor, grids) if s.is_plain]
         both = [(fitted(one, fit), one) for one in (grids, smoothed(grids))]
         fit, grids = max(both, key=lambda one: log_likelihood(one[0], plain))
-    form, laws = model_form(fit, np.array(white.white))
+    thermometers = _thermometers(fit, campaign)
+    form, kinds = model_form(fit, np.array(white.white), thermometers)
     spreads = fit.problem.start_spreads()
     own = {n: replace(s, start_sd=spreads.get(n, s.start_sd)) for n, s in model.states.items()}
     scene = make_scene(campaign, model, recordings, outputs, after)
@@ -164,9 +166,15 @@ def make_context(
         belief,
         tuple(outliers),
         tuple(form),
-        laws,
+        kinds,
+        thermometers,
         Sizes(model, fit.trajectories, noises[0].noise),
     )
+
+
+def _thermometers(fit: Fit, campaign: Campaign) -> tuple[str, ...]:
+    used = dict.fromkeys([*sorted({*fit.model.inputs, *fit.model.start_names}), *fit.problem.outputs])
+    return tuple(n for n in used if n in campaign.channels and campaign.channels[n].unit == "degC")
 
 
 def with_noise_of(context: Context, fit: Fit) -> Context:

@@ -196,7 +196,7 @@ def diagnose(
     noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     runs = free_runs(campaign, fit, before, after or before, noise)
-    known = (alone if after else found.baseline).known()
+    known = (alone if after else found.baseline).known().beside(context.thermometers, thresholds.AIR)
     runs |= free_runs(campaign, read, before, after or before, noise, known)
     fitting = improvement([runs[r] for r in fit if r in runs], outputs)
     proof = {r: improvement([runs[r]], outputs) for r in read if r in runs}

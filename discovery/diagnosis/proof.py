@@ -12,6 +12,7 @@ from math import copysign, hypot, inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from discovery.dynamics import Trajectory, predict, sensitivities
 from discovery.errors import RunsAwayError
@@ -36,6 +37,10 @@ class Known:
 
     names: tuple[str, ...]
     covariance: Array
+
+    def beside(self, sensors: Sequence[str], sd: float) -> Known:
+        """The same and the zeros of some sensors, each off by `sd`."""
+        return Known((*self.names, *sensors), block_diag(self.covariance, sd**2 * np.eye(len(sensors))))
 
 
 @dataclass(frozen=True)

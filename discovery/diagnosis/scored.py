@@ -177,9 +177,9 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     """The score of a fit with a set of effects."""
     own = effect_form(fit.trajectories, chosen)
     extra = tuple(np.concatenate(parts, axis=2) for parts in zip(context.form, own, strict=True))
-    model, effects = context.form[0].shape[2], own[0].shape[2]
-    spread = np.concatenate([np.ones(model), np.full(effects, thresholds.FORM)])
-    seen = Whitened(fit, context.blocks, extra, spread, (context.laws, model - context.laws))
+    spreads = 1.0, 1.0, thresholds.AIR, thresholds.FORM
+    spread = np.repeat(spreads, [*context.kinds, own[0].shape[2]])
+    seen = Whitened(fit, context.blocks, extra, spread, context.kinds)
     free = [h for h in chosen if h.effect.amplitude.fixed is None]
     place = {u.name: i for i, u in enumerate(fit.problem.unknowns) if not u.is_nuisance}
     index = np.array([place[name] for h in free for name in h.amplitudes], dtype=np.intp)

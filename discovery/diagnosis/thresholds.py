@@ -13,7 +13,7 @@ from __future__ import annotations
 
 # --- process noise: what a lumped model misses everywhere -------------------------------------------------
 FLOOR = 0.02  # of the largest rms flow of the model, at level one: heat at a body that nobody records
-AIR = 0.1  # K: the air at a body differs from the air that is measured, at level one; it adds to this heat
+AIR = 0.1  # K: the air at a body differs from what is measured, at level one; zeros of thermometers are off
 LEVELS = {0.1: 0.15, 0.3: 0.35, 1.0: 0.3, 2.0: 0.12, 5.0: 0.06, 10.0: 0.02}  # of this heat, with weights
 SHARE = 0.08  # off by more than this share of its flows a lumped model is coarse
 SHARES = {0.02: 0.5, 0.08: 0.35, 0.25: 0.12, 0.8: 0.03}  # of what flows through a body, off from hour to hour

@@ -137,12 +137,14 @@ class Shape:
     factor: float = 0.0
     spread: float = 0.0
     instant: bool = False
+    least: float = 0.0  # what the recordings can show of a time constant
 
     def within(self, shortest: float, longest: float) -> Shape:
         """The shape for recordings that show time constants from `shortest` to `longest` [s]."""
         if self.middle is not None:
             return self
-        return replace(self, middle=sqrt(shortest * longest), factor=(longest / shortest) ** (0.5 / _REACH))
+        middle, factor = sqrt(shortest * longest), (longest / shortest) ** (0.5 / _REACH)
+        return replace(self, middle=middle, factor=factor, least=middle * factor**-_REACH)
 
     @property
     def values(self) -> tuple[tuple[float, float], ...]:
@@ -166,7 +168,7 @@ class Shape:
             return 0.0, inf
         if not self.factor:
             return -inf, inf
-        return self.middle * self.factor**-_FARTHEST, self.middle * self.factor**_FARTHEST
+        return max(self.least, self.middle * self.factor**-_FARTHEST), self.middle * self.factor**_FARTHEST
 
 
 @dataclass(frozen=True)

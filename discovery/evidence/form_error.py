@@ -34,13 +34,15 @@ DEPTH = 1 / 3  # of its Biot number: share of its rise by which a plate is warme
 INNER = (0.05, 0.2)  # of the time constant of a body: how fast the place that an output sees may answer
 
 
-def model_form(fit: Fit, white: Array) -> tuple[list[Array], int]:
+def model_form(fit: Fit, white: Array, sensors: Sequence[str]) -> tuple[list[Array], tuple[int, int, int]]:
     """By recording, what the readings (R, Y, M) show more for form errors of the whole model of a share of
     one: the directions, each as likely as any other (unit normal), that hold nearly all of what the
-    parameters of the fit do not absorb. The number of those that are laws; the rest are places.
+    parameters of the fit do not absorb. After them, what they show more for each sensor whose zero is off by
+    one in all recordings. The numbers of those that are laws, places, and zeros.
 
     Args:
         white: (Y,) reading noise, in which directions are compared.
+        sensors: channels that the model uses or shows.
     """
     runs = fit.trajectories
     own = _stacked(runs, [fit.problem.jacobian(t) for t in runs], white)
@@ -49,7 +51,9 @@ def model_form(fit: Fit, white: Array) -> tuple[list[Array], int]:
         _directions(columns, _stacked(runs, columns, white), basis, most)
         for columns, most in ((_laws(runs), LAWS), ([place_columns(run) for run in runs], PLACES))
     ]
-    return [np.concatenate(pair, axis=2) for pair in zip(*kept, strict=True)], kept[0][0].shape[2]
+    kept.append([sensitivities(run, sensors) for run in runs])
+    laws, places, zeros = (columns[0].shape[2] for columns in kept)
+    return [np.concatenate(one, axis=2) for one in zip(*kept, strict=True)], (laws, places, zeros)
 
 
 def _laws(runs: Sequence[Trajectory]) -> list[Array]:
@@ -118,14 +122,10 @@ def inner_columns(run: Trajectory) -> Array:
 
 
 def _outputs_of(run: Trajectory, state: str) -> list[int]:
-    """Indices of the outputs that a state is a part of. A state that is read itself is the place that its
-    sensor sees, and not the mean of a body.
-    """
+    """Indices of the outputs that a state is a part of."""
     shown = run.system.model.outputs
     return [
-        y
-        for y, name in enumerate(run.system.grid.outputs)
-        if name in shown and state in names(shown[name]) and shown[name] != Name(state)
+        y for y, name in enumerate(run.system.grid.outputs) if state in names(shown.get(name, Name(name)))
     ]
 
 

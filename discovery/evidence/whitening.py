@@ -170,7 +170,7 @@ class Whitened:
     blocks: int  # of time in each recording
     extra: tuple[Array, ...] = ()  # by recording (R, Y, E): what may act with coefficients ...
     spread: Array = field(default_factory=lambda: np.zeros(0))  # (E,) ... that are known to be about zero
-    form: tuple[int, int] = (0, 0)  # of them, the first: form errors of laws, then of edges, of a model
+    form: tuple[int, ...] = (0, 0)  # of them, the first: form errors of laws, then of edges, of a model; more
     last: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def absorbed(self, noise: Noise) -> Absorbed:
@@ -275,7 +275,7 @@ class Whitened:
         """What multiplies the columns (1 + U,) under the form error of a noise."""
         scale = np.ones(1 + len(self.moving) + len(self.spread))
         first = 1 + len(self.moving)
-        laws, edges = self.form
+        laws, edges, *_ = self.form
         scale[first : first + laws] = noise.form
         scale[first + laws : first + laws + edges] = noise.edge
         return scale
