@@ -82,9 +82,9 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
         lambda some, goal: _alone(context, found, answer, some, found.best.evidence - goal),
     )
     named, idle, proofs = _proved(context, found, answer, sure)
-    reasons = [*refused.values(), *idle.values()]
     # what changes no free run outside the fit is not lacking either; what may do so by chance can be
     nothing = {key for key in idle if not _changes(proofs[key])}
+    reasons = [*refused.values(), *(text for key, text in idle.items() if key not in nothing)]
     rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & nothing]
     best = max(rest, key=lambda m: m.evidence)
     alone = _alone(context, found, answer, named) if matters else answer.evidence
@@ -111,13 +111,14 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
                 f"{best.evidence - alone:.0f} more log evidence"
             )
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
-    every = (*reasons, *_apart(found, answer, unsure))
+    further = (*(idle[key] for key in nothing), *_apart(found, answer, unsure))
+    every = (*reasons, *further)
     if named:
         kinds = {n.hypothesis.effect.is_physics for n in named}
         return Verdict(MISSING if True in kinds else FAULT, answer, named, (), every)
     if reasons:
         return Verdict(UNEXPLAINED, answer, (), candidates, every)
-    return _nothing(context, found, answer, candidates)
+    return _nothing(context, found, answer, candidates, further)
 
 
 def _proved(
@@ -295,16 +296,18 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
     return replace(verdict, word=word, reasons=(*verdict.reasons, reason))
 
 
-def _nothing(context: Context, found: Search, answer: Scored, candidates: tuple[Named, ...]) -> Verdict:
+def _nothing(
+    context: Context, found: Search, answer: Scored, candidates: tuple[Named, ...], further: tuple[str, ...]
+) -> Verdict:
     """Verdict without a name: "no mismatch", or "unexplained" if the model is so coarse that process noise
-    explains any residual.
+    explains any residual. `further`: about effects that are not named.
     """
     if coarse := _coarse(found):
-        return Verdict(UNEXPLAINED, answer, (), candidates, coarse)
+        return Verdict(UNEXPLAINED, answer, (), candidates, (*coarse, *further))
     if context.outliers:
         reason = f"only {len(context.outliers)} single wrong readings were found"
         return Verdict(FAULT, answer, (), (), (reason,))
-    return Verdict(NO_MISMATCH, answer, (), (), _apart(found, answer, candidates))
+    return Verdict(NO_MISMATCH, answer, (), (), further)
 
 
 def _coarse(found: Search) -> tuple[str, ...]:
