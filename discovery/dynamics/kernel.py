@@ -8,6 +8,9 @@ solved exactly:
 
 so it is exact for linear terms under held or straight inputs however stiff the bodies are, and of second
 order otherwise. No code is compiled per model.
+
+Arrays are copied number by number: what numba compiles for an assignment to a part of an array, with its
+message for shapes that do not fit, takes it five seconds.
 """
 
 from __future__ import annotations
@@ -39,6 +42,14 @@ def _matmul(a, b, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def copy(a, out):  # type: ignore[no-untyped-def]
+    """Fills out = a, both (n, m)."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            out[i, j] = a[i, j]
+
+
+@njit(cache=True, nogil=True)
 def _sum(factor, a, times, b, out):  # type: ignore[no-untyped-def]
     """Fills out = factor (a + times b)."""
     for i in range(a.shape[0]):
@@ -57,16 +68,17 @@ def _exponential(a, h, room, e, w0, w1):  # type: ignore[no-untyped-def]
             row += abs(a[i, j]) * h
         norm = max(norm, row)
     if not norm < 1e12:  # also NaN: let it through, the caller checks the trajectory
-        e[:] = np.nan
-        w0[:] = np.nan
-        w1[:] = np.nan
+        for i in range(n):
+            for j in range(n):
+                e[i, j] = w0[i, j] = w1[i, j] = np.nan
         return
     halvings = 0
     while norm > 0.5:
         norm *= 0.5
         halvings += 1
     # phi2 = sum m^i / (i + 2)! up to m^12 from m to m^4 (Paterson & Stockmeyer, SIAM J. Comput. 2, 1973)
-    m, m2, m3, m4, phi1, phi2, work = room
+    m, m2, m3, m4 = room[0], room[1], room[2], room[3]
+    phi1, phi2, work = room[4], room[5], room[6]
     part = h / 2.0**halvings
     for i in range(n):
         for j in range(n):
@@ -101,8 +113,10 @@ def _exponential(a, h, room, e, w0, w1):  # type: ignore[no-untyped-def]
         _matmul(phi1, e, work)
         _sum(0.5, work, 1.0, phi1, phi1)
         _matmul(e, e, work)
-        e[:] = work
-    w1[:] = h * phi2
+        copy(work, e)
+    for i in range(n):
+        for j in range(n):
+            w1[i, j] = h * phi2[i, j]
     _sum(h, phi1, -1.0, phi2, w0)
 
 
@@ -120,7 +134,8 @@ def _equal(a, j, k):  # type: ignore[no-untyped-def]
 def _wider(some, room):  # type: ignore[no-untyped-def]
     """Matrices (U, n, n) with room for more of them."""
     out = np.empty((room, some.shape[1], some.shape[2]))
-    out[: some.shape[0]] = some
+    for u in range(some.shape[0]):
+        copy(some[u], out[u])
     return out
 
 
@@ -187,7 +202,8 @@ def trajectory(which, e, w0, w1, g0, g1, start):  # type: ignore[no-untyped-def]
     """States (K + 1, n) from the start and the forcing at both ends of each interval, g0 and g1 (K, n)."""
     count, n = g0.shape
     x = np.empty((count + 1, n))
-    x[0] = start
+    for i in range(n):
+        x[0, i] = start[i]
     for k in range(count):
         u = which[k]
         for i in range(n):
@@ -221,7 +237,7 @@ def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_sca
     new = np.empty((n, m))
     r = 0
     while r < read.shape[0] and read[r] == 0:
-        out[r] = s
+        copy(s, out[r])
         r += 1
     for k in range(count):
         if r >= read.shape[0]:
@@ -252,7 +268,7 @@ def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_sca
                     new[q, c] -= (w0[u, q, i] * a + w1[u, q, i] * b) * scale
         s, new = new, s
         while r < read.shape[0] and read[r] == k + 1:
-            out[r] = s
+            copy(s, out[r])
             r += 1
     return out
 
@@ -265,10 +281,12 @@ def between(which, e, read):  # type: ignore[no-untyped-def]
     f = np.empty((count, n, n))
     work = np.empty((n, n))
     for r in range(count):
-        f[r] = np.eye(n)
+        for i in range(n):
+            for j in range(n):
+                f[r, i, j] = 1.0 if i == j else 0.0
         for k in range(read[r], read[r + 1]):
             _matmul(e[which[k]], f[r], work)
-            f[r] = work
+            copy(work, f[r])
     return f
 
 
@@ -279,10 +297,9 @@ def driven(which, e, w0, w1, read, gain):  # type: ignore[no-untyped-def]
     """
     n = e.shape[1]
     count = read.shape[0] - 1
-    b = np.empty((count, n, n))
+    b = np.zeros((count, n, n))
     work = np.empty((n, n))
     for r in range(count):
-        b[r] = 0.0
         for k in range(read[r], read[r + 1]):
             u = which[k]
             _matmul(e[u], b[r], work)

@@ -18,7 +18,8 @@ def moved(values, base, far):  # type: ignore[no-untyped-def]
             if abs(values[k, c] - last[c]) > far:
                 found[k] = True
         if found[k] or base[k]:
-            last[:] = values[k]
+            for c in range(values.shape[1]):
+                last[c] = values[k, c]
     return found
 
 

@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from discovery.dynamics.kernel import copy
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
@@ -34,7 +36,7 @@ def filtered(left, right, step, read, taus, start):  # type: ignore[no-untyped-d
     decay, ramp = np.empty(m), np.empty(m)
     r = 0
     while r < read.shape[0] and read[r] == 0:
-        out[r] = s
+        copy(s, out[r])
         r += 1
     before = -1.0
     for k in range(count):
@@ -52,6 +54,6 @@ def filtered(left, right, step, read, taus, start):  # type: ignore[no-untyped-d
             for i in range(m):
                 s[d, i] = a + decay[i] * (s[d, i] - a) + ramp[i] * rise
         while r < read.shape[0] and read[r] == k + 1:
-            out[r] = s
+            copy(s, out[r])
             r += 1
     return out

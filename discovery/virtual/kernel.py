@@ -75,6 +75,13 @@ def flow(form: int, T: float, S: float, g: float, p: Array) -> tuple[float, floa
 
 
 @njit(cache=True, error_model="numpy")
+def _copy(a: Array, out: Array) -> None:
+    """Fills the first numbers of out: an assignment to a part of an array takes numba seconds to compile."""
+    for i in range(len(a)):
+        out[i] = a[i]
+
+
+@njit(cache=True, error_model="numpy")
 def _factors(on: Array, gate: Array, where: Ints, number: Array, factor: Array) -> None:
     """Fills factor (R,): gate, size and switch of each law, which hold over a step."""
     for r in range(len(where)):
@@ -190,29 +197,32 @@ def march(
     """
     n, N = len(outside), len(x)
     nodes, switches = np.empty((n + 1, N)), np.empty((n + 1, len(on)))
-    nodes[0], switches[0] = x, on
     y, now = np.empty(N + outside.shape[1]), on.copy()
     factor = np.empty(len(where))
     a, k1, k2, at = np.zeros((N, N)), np.empty(N), np.empty(N), x.copy()
+    _copy(x, nodes[0])
     for k in range(n):
-        y[:N], y[N:] = at, outside[k]
+        _copy(at, y)
+        _copy(outside[k], y[N:])
         for s in range(len(now)):
             above = (y[sensor[s]] - target[k, s]) * np.sign(band[s])
             if abs(above) >= abs(band[s]):
                 now[s] = 1.0 if above > 0.0 else 0.0
-        switches[k] = now
+        _copy(now, switches[k])
         _factors(now, gates[k], where, number, factor)
         done, part = 0.0, h
         while done < h * (1.0 - 1e-9):
             part = min(part, h - done)
-            y[:N] = at
+            _copy(at, y)
             _clear(a, order, start, later)
             _system(y, factor, where, number, C, GAMMA * part, k1, a)
             _factor(a, order, start, later)
             _solve(a, order, start, later, k1)
-            y[:N] += part * k1
+            for i in range(N):
+                y[i] += part * k1[i]
             _rates(y, factor, where, number, C, k2)
-            k2 -= 2.0 * k1
+            for i in range(N):
+                k2[i] -= 2.0 * k1[i]
             _solve(a, order, start, later, k2)
             worst = 0.0
             for i in range(N):
@@ -220,12 +230,13 @@ def march(
             if worst > 1.0 and part > h / SMALLEST:
                 part *= 0.25
                 continue
-            at += part * (1.5 * k1 + 0.5 * k2)
+            for i in range(N):
+                at[i] += part * (1.5 * k1[i] + 0.5 * k2[i])
             done += part
             if worst < 0.25:
                 part *= 4.0
-        nodes[k + 1] = at
-    switches[n] = now
+        _copy(at, nodes[k + 1])
+    _copy(now, switches[n])
     return nodes, switches
 
 
@@ -235,7 +246,8 @@ def flows(nodes: Array, switches: Array, where: Ints, number: Array, gates: Arra
     n, N = len(outside), nodes.shape[1]
     out, factor, y = np.empty((n, len(where))), np.empty(len(where)), np.empty(N + outside.shape[1])
     for k in range(n):
-        y[:N], y[N:] = nodes[k], outside[k]
+        _copy(nodes[k], y)
+        _copy(outside[k], y[N:])
         _factors(switches[k], gates[k], where, number, factor)
         for r in range(len(where)):
             out[k, r] = _law(r, y, factor, where, number)[0]
