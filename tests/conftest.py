@@ -1,4 +1,6 @@
-"""Before numpy is imported: one thread a process, so that the tests can run side by side."""
+"""Before numpy is imported: one thread and one fit at a time in a process, so that the tests can run side by
+side.
+"""
 
 from __future__ import annotations
 
@@ -39,6 +41,7 @@ LONG = (
 
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+os.environ.setdefault("DISCOVERY_JOBS", "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
 gc.disable()  # while tests are collected: all that is imported stays
 
