@@ -9,7 +9,6 @@ for thermal error compensation).
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from contextlib import suppress
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import BaseModel
+from pydantic_core import to_json
 
 from discovery.errors import UserError
 from discovery.export.document import Exported
@@ -187,7 +187,7 @@ class Learner:
     def kept(self, compensator: Compensator) -> bytes:
         """The file of what was seen."""
         kept = {name: getattr(self.seen, name) for name in ROWS} | {name: getattr(self, name) for name in OWN}
-        return json.dumps(kept | {"model": compensator.exported.seal.sha256}).encode()
+        return to_json(kept | {"model": compensator.exported.seal.sha256}, inf_nan_mode="constants")
 
     def load(self, compensator: Compensator, folder: Path) -> None:
         """Go on with what was seen before a restart, if it is of the same model."""

@@ -39,13 +39,14 @@ Expression = Number | Name | Apply
 
 def names(expression: Expression) -> frozenset[str]:
     """Names that the expression uses."""
-    match expression:
-        case Name(id=name):
-            return frozenset((name,))
-        case Apply(arguments=arguments):
-            return frozenset().union(*(names(argument) for argument in arguments))
-        case _:
-            return frozenset()
+    found, left = set(), [expression]
+    while left:
+        one = left.pop()
+        if isinstance(one, Name):
+            found.add(one.id)
+        elif isinstance(one, Apply):
+            left += one.arguments
+    return frozenset(found)
 
 
 def substitute(expression: Expression, replacements: Mapping[str, Expression]) -> Expression:
