@@ -102,7 +102,7 @@ def _facts(world: World) -> Key:
         "also_true": [
             {"effect": lack.effect, "states": list(lack.states), "rms_over_noise": round(rms, 3)}
             | ({"also": list(also)} if (also := EFFECTS[lack.effect].also) else {})
-            for lack, rms in world.lacks()
+            for lack, rms in world.lacks
         ],
     }
 

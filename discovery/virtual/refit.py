@@ -11,7 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discovery.dynamics import System, make_grid, make_system, predict, sensitivities, simulate, start_values
+from discovery.dynamics import (
+    System,
+    Trajectory,
+    make_grid,
+    make_system,
+    predict,
+    sensitivities,
+    simulate,
+    start_values,
+)
 from discovery.dynamics.system import inputs_of
 from discovery.errors import RunsAwayError
 from discovery.models import Model, expanded
@@ -103,14 +112,14 @@ def campaign_of(machine: Machine, recordings: Mapping[str, Columns]) -> Campaign
 
 
 class _Problem:
-    """Residual and slopes of one trial, run once for both."""
+    """Residual and slopes of a trial, which is run once for both."""
 
     def __init__(self, systems: Sequence[System], model: Model, sigma: Array) -> None:
         self.systems, self.model, self.sigma = systems, model, sigma
         values = model.values()
         self.size = {name: abs(values[name]) or 1.0 for name in model.free}
         self.states = [name for name, state in model.states.items() if not state.memory]
-        self.latest: tuple[Array, Array, Array] | None = None
+        self.latest: tuple[Array, list[Trajectory | None]] | None = None
 
     @property
     def start(self) -> Array:
@@ -132,36 +141,46 @@ class _Problem:
         return {name: x * size for (name, size), x in pairs}
 
     def residual(self, theta: Array) -> Array:
-        return self._run(theta)[0]
+        return np.concatenate(
+            [
+                np.full(s.grid.readings.size, _FAR)
+                if run is None
+                else ((predict(run) - s.grid.readings) / self.sigma).ravel()
+                for s, run in zip(self.systems, self._runs(theta), strict=True)
+            ]
+        )
 
     def jacobian(self, theta: Array) -> Array:
-        return self._run(theta)[1]
-
-    def _run(self, theta: Array) -> tuple[Array, Array]:
-        if self.latest is not None and np.array_equal(self.latest[2], theta):
-            return self.latest[0], self.latest[1]
         P, S = len(self.size), len(self.states)
-        own_values = self.values(theta)
-        values = self.model.values() | own_values
         inner = np.array(list(self.size.values()))
-        residuals, slopes = [], []
-        for k, system in enumerate(self.systems):
-            own = slice(P + k * S, P + (k + 1) * S)
-            start = start_values(system, values)
-            start[[system.states.index(name) for name in self.states]] += theta[own]
+        slopes = []
+        for k, (system, run) in enumerate(zip(self.systems, self._runs(theta), strict=True)):
             rows = system.grid.readings.size
             wide = np.zeros((rows, len(theta)))
-            try:
-                trajectory = simulate(system, values, start)
-                residuals.append(((predict(trajectory) - system.grid.readings) / self.sigma).ravel())
-                dy = sensitivities(trajectory, list(self.size), self.states) / self.sigma[:, None]
+            if run is not None:
+                dy = sensitivities(run, list(self.size), self.states) / self.sigma[:, None]
                 wide[:, :P] = dy[:, :, :P].reshape(rows, P) * inner
-                wide[:, own] = dy[:, :, P:].reshape(rows, S)
-            except RunsAwayError:
-                residuals.append(np.full(rows, _FAR))
+                wide[:, P + k * S : P + (k + 1) * S] = dy[:, :, P:].reshape(rows, S)
             slopes.append(wide)
         together = np.concatenate(slopes)
         size = np.linalg.norm(together, axis=0)
         together[:, size < _SEEN * size.max(initial=0.0)] = 0.0
-        self.latest = np.concatenate(residuals), together, theta.copy()
-        return self.latest[0], self.latest[1]
+        return together
+
+    def _runs(self, theta: Array) -> list[Trajectory | None]:
+        """Free runs at a trial; None for one that runs away."""
+        if self.latest is not None and np.array_equal(self.latest[0], theta):
+            return self.latest[1]
+        P, S = len(self.size), len(self.states)
+        values = self.model.values() | self.values(theta)
+        runs: list[Trajectory | None] = []
+        for k, system in enumerate(self.systems):
+            start = start_values(system, values)
+            own = theta[P + k * S : P + (k + 1) * S]
+            start[[system.states.index(name) for name in self.states]] += own
+            try:
+                runs.append(simulate(system, values, start))
+            except RunsAwayError:
+                runs.append(None)
+        self.latest = theta.copy(), runs
+        return runs

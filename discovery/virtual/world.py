@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -72,6 +73,7 @@ class World:
         """Rms over noise that the first step of a refit leaves of a change."""
         return float(np.sqrt(np.mean(self.fitted.left(self.change(machine)) ** 2)))
 
+    @cached_property
     def lacks(self) -> list[tuple[Lack, float]]:
         """Laws that the baseline lacks in silence, each with the rms over noise that a refit leaves of it.
 
