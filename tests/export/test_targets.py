@@ -20,13 +20,11 @@ from discovery.models import Model, State
 from discovery.models.modelfile import write_model
 from discovery.recordings import Campaign
 from discovery.terms import Term, parse
-from tests.export.conftest import HAS_GCC, needs_gcc
+from tests.export.conftest import HAS_GCC, make_campaign, make_model, needs_gcc
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from tests.export.conftest import make_campaign, make_model
-
     if not HAS_GCC:
         pytest.skip("no C compiler (gcc) is installed")
     place = tmp_path_factory.mktemp("export")
@@ -320,13 +318,12 @@ def test_a_controller_needs_no_reading_to_start(campaign: Campaign, tmp_path: Pa
 
 @needs_gcc
 @pytest.mark.parametrize("name", ["replay", "Replay", "instance", "fmi2", "fmi3", "math"])
-def test_a_model_may_have_the_name_of_a_file_beside_it(
-    campaign: Campaign, model: Model, tmp_path: Path, name: str
-) -> None:
+def test_a_model_may_have_the_name_of_a_file_beside_it(tmp_path: Path, name: str) -> None:
     """Every file that was proved stands there: the C files compile as they were written."""
-    from dataclasses import replace
-
-    done = export_model(replace(model, name=name), campaign, ["fit"], ["c", "fmu", "fmu3"], tmp_path)
+    body = State("a", "degC", 1e4, parse("T_env"), 0.5, 1e-4)
+    air = Term("air", "a", parse("2*(T_env - a) + 0.1*P_drive"))
+    model = Model(name, {}, {"a": body}, (air,), {"E_Z0T": parse("2*(a - 22)")})
+    done = export_model(model, make_campaign(1.0), ["fit"], ["c", "fmu", "fmu3"], tmp_path)
     assert {proof.target for proof in done.proofs} == {"C double", "C float", "FMI 2.0", "FMI 3.0"}
     sources = sorted(path.name for path in (tmp_path / "c").glob("*.c"))
     assert len(sources) == 2

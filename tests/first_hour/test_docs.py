@@ -7,6 +7,7 @@ import json
 import re
 import shlex
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,12 @@ import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
+from discovery.diagnosis import Diagnosis, diagnose
 from discovery.experiment import load_experiment
 from discovery.experiment.modelfits import fit_entry
+from discovery.fitting import Fit
+from discovery.models import Model
+from discovery.recordings import Campaign
 from tests.small import EXPERIMENT, write_small
 
 ROOT = Path(__file__).parents[2]
@@ -52,7 +57,22 @@ def _agrees(printed: str, line: str) -> bool:
     return all(abs(float(a) - float(b)) <= CLOSE * abs(float(b)) + 1e-12 for a, b in pairs)
 
 
-def test_the_tutorial_prints_what_it_says(place: Path) -> None:
+def _once(diagnose: Callable[..., Diagnosis]) -> Callable[..., Diagnosis]:
+    """The same question is answered once: `discovery run` asks what `discovery diagnose` has asked before."""
+    answers: dict[str, Diagnosis] = {}
+
+    def answered(model: Model, campaign: Campaign, *rest: Any, fitted: Fit, **more: Any) -> Diagnosis:
+        read = {r: {n: v.tolist() for n, v in one.values.items()} for r, one in campaign.recordings.items()}
+        asked = repr((model, campaign.channels, read, rest, fitted.model, fitted.noise))
+        if asked not in answers:
+            answers[asked] = diagnose(model, campaign, *rest, fitted=fitted, **more)
+        return answers[asked]
+
+    return answered
+
+
+def test_the_tutorial_prints_what_it_says(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("discovery.diagnosis.diagnose", _once(diagnose))
     commands = 0
     for block in _blocks("docs/tutorial.md", "console"):
         first, *expected = block.splitlines()
