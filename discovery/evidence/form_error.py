@@ -122,10 +122,14 @@ def inner_columns(run: Trajectory) -> Array:
 
 
 def _outputs_of(run: Trajectory, state: str) -> list[int]:
-    """Indices of the outputs that a state is a part of."""
+    """Indices of the outputs that a state is a part of. A state that is read itself is the place that its
+    sensor sees, and not the mean of a body.
+    """
     shown = run.system.model.outputs
     return [
-        y for y, name in enumerate(run.system.grid.outputs) if state in names(shown.get(name, Name(name)))
+        y
+        for y, name in enumerate(run.system.grid.outputs)
+        if name in shown and state in names(shown[name]) and shown[name] != Name(state)
     ]
 
 
