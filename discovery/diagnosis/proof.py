@@ -143,10 +143,11 @@ def free_runs(
         first = readings - predict(old)
         then = None if new is None else readings - predict(new)
         started = None if new is None or then is None else _started(after, new, then) * scale
+        last = with_noise(campaign, new or old) if noise.rough else new or old
         found[run] = FreeRuns(
             first * scale,
             None if then is None else then * scale,
-            one * noise_in_free_runs(with_noise(campaign, new or old), noise),
+            one * noise_in_free_runs(last, noise),
             1 / scale,
             one * _unsure(new or old, white, known) if known else 0.0,
             (_started(before, old, first) * scale, started),
