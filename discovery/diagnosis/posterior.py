@@ -91,5 +91,5 @@ def _evidence(model: Scored, draws: Array) -> Array:
     """Log evidence (D,) of a model on each draw, over noise settings and prior widths."""
     order = np.argsort(-model.levels)[:SETTINGS]
     near = [int(k) for k in order if model.levels[k] > model.levels[order[0]] - IN_PLAY]
-    pieces = [model.drawn(k, draws, np.full(len(draws), wide)) for k in near for wide in WIDTHS]
-    return np.asarray(log_sum_exp(np.array(pieces))) - float(np.log(len(WIDTHS))) + model.prior
+    pieces = np.concatenate([model.drawn(k, draws, WIDTHS) for k in near])
+    return log_sum_exp(pieces) - float(np.log(len(WIDTHS))) + model.prior

@@ -116,7 +116,7 @@ class Scored:
 
     def level(self, k: int) -> float:
         """Log marginal likelihood under one noise setting."""
-        return float(self.drawn(k)[0])
+        return float(self.drawn(k)[0, 0])
 
     def _forms(self, k: int) -> tuple[Grams, ...]:
         """Without and with form errors of the effects."""
@@ -130,17 +130,18 @@ class Scored:
         """
         return self.seen.spread[sum(self.seen.form) :]
 
-    def drawn(self, k: int, weights: Array | None = None, widths: Array | None = None) -> Array:
-        """(D,) `level` under a noise setting for many draws at once; arguments as in `Grams.marginal`."""
+    def drawn(self, k: int, weights: Array | None = None, widths: Sequence[float] = (1.0,)) -> Array:
+        """(W, D) `level` under a noise setting for many draws at once; arguments as in `Grams.marginal`."""
         if self.outside or (self.sizes < 0).any():  # what presses against zero does not act
-            return np.full(1 if weights is None else len(weights), -inf)
+            return np.full((len(widths), 1 if weights is None else len(weights)), -inf)
         found = []
         forms = self.grams[k].marginals(self.sizes, self._own_forms, weights, widths)
         for level, step, covariance in forms:
             level = level + self.settings[k].log_weight - float(np.log(len(forms)))
             for j in range(len(self.sizes)):
-                one = self.slab.take(np.full(len(level), j))
-                level = level + one.average(self.at[j] + step[:, j], covariance[:, j, j])
+                one = self.slab.take(np.full(level.size, j))
+                mean, variance = self.at[j] + step[..., j], covariance[..., j, j]
+                level = level + one.average(mean.ravel(), variance.ravel()).reshape(level.shape)
                 level = level + 0.5 * np.log(2 * np.pi)
             found.append(level)
         return np.asarray(log_sum_exp(np.array(found)))

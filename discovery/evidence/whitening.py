@@ -28,30 +28,58 @@ Ints = NDArray[np.intp]
 
 _AT_BOUND = 1e-6
 _UNSEEN = 1e-20  # of the largest entry of the normal equations
-_ROUNDING = 1e-10  # of the diagonal, added to it: no factor fails in the last digits
+_ROUNDING = 1e-10  # of the diagonal, added to it
 _TOGETHER = 16  # draws at a time: so many normal equations stay near the processor
-_REMEMBERED = 8  # normal equations of the last noises; they differ in form errors next, and are large
+_REMEMBERED = 8  # rows under the last noises; they differ in form errors next, and are large
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Whitened rows (N, C) by recording, in the order of time, of the C columns of all `size` that act there;
+    `blocks`: where each block of time begins among them, and where the last one ends; `logdet` (B,) by block.
+    """
+
+    size: int
+    rows: tuple[Array, ...]
+    columns: tuple[Ints, ...]
+    blocks: tuple[Ints, ...]
+    logdet: Array
+
+    @cached_property
+    def sums(self) -> Array:
+        """The normal equations (size, size) of all rows."""
+        found = np.zeros((self.size, self.size))
+        for rows, columns in zip(self.rows, self.columns, strict=True):
+            found[np.ix_(columns, columns)] += rows.T @ rows
+        return found
+
+    def by_block(self) -> Array:
+        """The normal equations (B, size, size) of each block. They are large, and few noises need them."""
+        found = np.zeros((len(self.logdet), self.size, self.size))
+        pieces = iter(found)
+        for rows, columns, edges in zip(self.rows, self.columns, self.blocks, strict=True):
+            place = np.ix_(columns, columns)
+            for a, b in pairwise(edges.tolist()):
+                next(pieces)[place] = rows[a:b].T @ rows[a:b]
+        return found
 
 
 @dataclass(frozen=True)
 class Grams:
     """A fit under one noise setting. Columns are the residual, then the unknowns that do not press against a
-    bound: `blocks` (B, 1 + U, 1 + U) and `logdet` (B,) by block, `prior` (1 + U, 1 + U) of the priors,
-    `constant` what their densities add. `scale` (1 + U,) multiplies the columns: form errors of any share are
-    the same blocks.
+    bound: `rows` of the readings, `prior` (1 + U, 1 + U) of the priors, `constant` what their densities add.
+    `scale` (1 + U,) multiplies the columns: form errors of any share are the same rows.
     """
 
     noise: Noise
-    blocks: Array
-    logdet: Array
+    rows: Rows
     prior: Array
     constant: float
     scale: Array
-    sums: Array | None = field(default=None, repr=False)  # (1 + U, 1 + U) of the blocks, where it is known
 
     def level(self) -> float:
         """Log-likelihood with all unknowns integrated out."""
-        return float(self.marginal(np.zeros(0, dtype=np.intp))[0][0])
+        return float(self.marginal(np.zeros(0, dtype=np.intp))[0][0, 0])
 
     def solved(self) -> tuple[float, Array, Array]:
         """The level, the step (U,) from where the fit stands to its optimum under this noise, and the
@@ -59,7 +87,7 @@ class Grams:
         """
         every = np.arange(self.prior.shape[0] - 1)
         levels, steps, covariances = self.marginal(every)
-        return float(levels[0]), steps[0], covariances[0]
+        return float(levels[0, 0]), steps[0, 0], covariances[0, 0]
 
     @property
     def ahead(self) -> float:
@@ -67,40 +95,28 @@ class Grams:
         _, step, covariance = self.solved()
         return 0.5 * float(step @ np.linalg.solve(covariance, step)) if len(step) else 0.0
 
-    @cached_property
-    def whole(self) -> Array:
-        """The normal equations (1 + U, 1 + U) of all blocks, without priors, before `scale`."""
-        return self.sums if self.sums is not None else self.blocks.sum(axis=0)
-
     def without(self, extra: Array) -> Grams:
         """The same without the last columns, whose coefficients have the spreads `extra` (E,)."""
         kept = self.prior.shape[0] - len(extra)
         constant = self.constant + float(np.sum(np.log(extra)))
-        return Grams(
-            self.noise,
-            self.blocks[:, :kept, :kept],
-            self.logdet,
-            self.prior[:kept, :kept],
-            constant,
-            self.scale[:kept],
-            self.whole[:kept, :kept],
-        )
+        return Grams(self.noise, self.rows, self.prior[:kept, :kept], constant, self.scale[:kept])
 
     def marginal(
-        self, sizes: Ints, weights: Array | None = None, widths: Array | None = None
+        self, sizes: Ints, weights: Array | None = None, widths: Sequence[float] = (1.0,)
     ) -> tuple[Array, Array, Array]:
-        """Log-likelihoods (D,) with all unknowns integrated out, for several draws at once; the step (D, A)
-        of some unknowns from where the fit stands to the optimum, and their covariance (D, A, A) there.
+        """Log-likelihoods (W, D) with all unknowns integrated out, for several draws at once; the step
+        (W, D, A) of some unknowns from where the fit stands to the optimum, and their covariance
+        (W, D, A, A) there.
 
         Args:
             sizes: (A,) indices of the unknowns.
             weights: (D, B) how often each block counts; default each once.
-            widths: (D,) of the priors, relative to what they are.
+            widths: (W,) of the priors, relative to what they are.
         """
         return self.marginals(sizes, np.zeros(0), weights, widths)[-1]
 
     def marginals(
-        self, sizes: Ints, extra: Array, weights: Array | None = None, widths: Array | None = None
+        self, sizes: Ints, extra: Array, weights: Array | None = None, widths: Sequence[float] = (1.0,)
     ) -> list[tuple[Array, Array, Array]]:
         """As `marginal`: without the last columns, whose coefficients have the spreads `extra` (E,), and with
         them; once, where there are none.
@@ -114,52 +130,52 @@ class Grams:
         others = np.setdiff1d(np.arange(count - 1 - more), sizes)
         order = np.concatenate([1 + others, 1 + last, 1 + np.asarray(sizes, dtype=np.intp), [0]])
         first = len(others)
-        draws = next((len(one) for one in (weights, widths) if one is not None), 1)
-        wide = np.ones(draws) if widths is None else widths
-        volume, corner = np.empty(draws), np.empty((draws, count - first, count - first))
-        placed, outer = np.ix_(order, order), np.outer(self.scale[order], self.scale[order])
-        prior = self.prior[placed]
-        whole = (self.whole if weights is None else self.blocks)[..., placed[0], placed[1]] * outer
-        diagonal = np.arange(count)
-        for begin in range(0, draws, _TOGETHER):
+        pieces = self.rows.sums[None] if weights is None else self.rows.by_block()
+        whole = pieces.reshape(len(pieces), -1)[:, np.add.outer(order * self.rows.size, order).ravel()]
+        whole *= np.outer(self.scale[order], self.scale[order]).ravel()
+        prior = self.prior[np.ix_(order, order)].ravel()
+        often = np.ones((1, 1)) if weights is None else weights
+        volume = np.empty((len(widths), len(often)))
+        corner = np.empty((*volume.shape, count - first, count - first))
+        for begin in range(0, len(often), _TOGETHER):
             some = slice(begin, begin + _TOGETHER)
-            total = prior / wide[some, None, None] ** 2
-            total += (
-                whole
-                if weights is None
-                else (weights[some] @ whole.reshape(len(whole), -1)).reshape(-1, count, count)
-            )
-            scale = _scales(np.einsum("dii->di", total))
-            total /= scale[:, :, None]
-            total /= scale[:, None, :]
-            total[:, diagonal, diagonal] += _ROUNDING
-            chol = np.linalg.cholesky(total)
-            sizes_of = np.einsum("dii->di", chol) * scale
-            volume[some] = np.sum(np.log(sizes_of[:, :first]), axis=1)
-            corner[some] = scale[:, first:, None] * chol[:, first:, first:]
-        dets = -float(self.logdet.sum()) if weights is None else -weights @ self.logdet
+            total = often[some] @ whole
+            for k, wide in enumerate(widths):
+                chol = _factor((total + prior / wide**2).reshape(-1, count, count))
+                volume[k, some] = np.sum(np.log(np.einsum("dii->di", chol)[:, :first]), axis=1)
+                corner[k, some] = chol[:, first:, first:]
+        dets = -float(self.rows.logdet.sum()) if weights is None else -weights @ self.rows.logdet
+        wider = np.log(widths)[:, None]
         found = []
         if more:
-            rest = corner[:, more:]  # without the form errors
-            bare = np.linalg.cholesky(rest @ rest.transpose(0, 2, 1))
-            widened = np.count_nonzero(np.diag(self.prior)[1:-more]) * np.log(wide)
+            rest = corner[:, :, more:]  # without the form errors
+            bare = np.linalg.cholesky(rest @ rest.swapaxes(2, 3))
+            widened = np.count_nonzero(np.diag(self.prior)[1:-more]) * wider
             constant = self.constant + float(np.sum(np.log(extra)))
             found.append(_concluded(bare, few, dets - volume + constant - widened))
-        volume = volume + np.sum(np.log(np.einsum("dii->di", corner[:, :more, :more])), axis=1)
-        widened = np.count_nonzero(np.diag(self.prior)[1:]) * np.log(wide)
-        found.append(_concluded(corner[:, more:, more:], few, dets - volume + self.constant - widened))
+        volume = volume + np.sum(np.log(np.diagonal(corner[:, :, :more, :more], 0, 2, 3)), axis=2)
+        widened = np.count_nonzero(np.diag(self.prior)[1:]) * wider
+        found.append(_concluded(corner[:, :, more:, more:], few, dets - volume + self.constant - widened))
         return found
 
 
+def _factor(matrices: Array) -> Array:
+    """Cholesky factors of normal equations (D, U, U), changed so that none fails in the last digits."""
+    diagonals = np.einsum("dii->di", matrices)
+    least = _UNSEEN * diagonals.max(axis=1, initial=1e-300)
+    diagonals += _ROUNDING * np.maximum(diagonals, least[:, None])
+    return np.asarray(np.linalg.cholesky(matrices))
+
+
 def _concluded(corner: Array, few: int, level: Array) -> tuple[Array, Array, Array]:
-    """Level, step and covariance of `marginal` from the corner (D, A + 1, A + 1) of the factor, and the level
-    without what the corner adds.
+    """Level, step and covariance of `marginal` from the corner (W, D, A + 1, A + 1) of the factor, and the
+    level without what the corner adds.
     """
-    own, along = corner[:, :few, :few], corner[:, few, :few]
+    own, along, left = corner[..., :few, :few], corner[..., few, :few], corner[..., few, few]
     root = np.linalg.inv(own)
-    step = np.einsum("dji,dj->di", root, along)
-    level = level - np.sum(np.log(np.einsum("dii->di", own)), axis=1) - 0.5 * corner[:, few, few] ** 2
-    return level, step, np.einsum("dji,djk->dik", root, root)
+    step = np.einsum("wdji,wdj->wdi", root, along)
+    level = level - np.sum(np.log(np.diagonal(own, 0, 2, 3)), axis=2) - 0.5 * left**2
+    return level, step, root.swapaxes(2, 3) @ root
 
 
 @dataclass(frozen=True)
@@ -303,31 +319,26 @@ class Whitened:
         """The fit under one noise setting, as normal equations by block."""
         unit = _unit(noise)
         known = self.last.setdefault("grams", [])
-        same: tuple[Array, Array] | None = next((pieces for other, pieces in known if other == unit), None)
+        same: Rows | None = next((rows for other, rows in known if other == unit), None)
         if same is None:
-            same = self._blocks(unit)
+            same = self._under(unit)
             known.append((unit, same))
             del known[:-_REMEMBERED]
         prior, constant = self.prior
-        return Grams(noise, *same, prior, constant, self._scale(noise))
+        return Grams(noise, same, prior, constant, self._scale(noise))
 
-    def _blocks(self, unit: Noise) -> tuple[Array, Array]:
-        """Normal equations (B, 1 + U, 1 + U) and log determinants (B,) by block of time."""
+    def _under(self, unit: Noise) -> Rows:
+        """The rows with a form error of one, recording by recording."""
+        parts = [self._part(k, unit) for k in range(len(self.filters))]
+        edges = []
+        for k, here in enumerate(self.places):  # readings stand in the order of time
+            numbers = np.arange(k * self.blocks, (k + 1) * self.blocks + 1)
+            edges.append(np.searchsorted(self.block[here], numbers))
+        dets = [
+            log[a:b].sum() for (_, log), e in zip(parts, edges, strict=True) for a, b in pairwise(e.tolist())
+        ]
         size = self.jacobians[0].shape[2] + 1
-        pieces = np.zeros((self.blocks * len(self.filters), size, size))
-        dets = np.zeros(len(pieces))
-        for k, (here, columns) in enumerate(zip(self.places, self.acting, strict=True)):
-            rows, log = self._part(k, unit)
-            first = k * self.blocks  # readings stand in the order of time
-            own = slice(first, first + self.blocks)
-            edges = np.searchsorted(self.block[here], np.arange(first, first + self.blocks + 1)).tolist()
-            products = np.array([rows[a:b].T @ rows[a:b] for a, b in pairwise(edges)])
-            runs = _runs(columns)
-            for from_row, to_row in runs:
-                for from_column, to_column in runs:
-                    pieces[own, to_row, to_column] = products[:, from_row, from_column]
-            dets[own] = [log[a:b].sum() for a, b in pairwise(edges)]
-        return pieces, dets
+        return Rows(size, tuple(rows for rows, _ in parts), tuple(self.acting), tuple(edges), np.array(dets))
 
 
 @dataclass(frozen=True)
@@ -360,15 +371,6 @@ def absorbed(rows: Array, prior: Array) -> Absorbed:
     return Absorbed(rows[:, 0], rows[:, 1:] @ root, slope, -0.5 * quadratic - volume)
 
 
-def _runs(columns: Ints) -> list[tuple[slice, slice]]:
-    """Ascending columns (C,) as runs without a gap: where each stands among them, and in all. Slices are
-    copied ten times as fast as what an index picks.
-    """
-    ends = np.flatnonzero(np.diff(columns) > 1) + 1
-    edges = [0, *ends.tolist(), len(columns)]
-    return [(slice(a, b), slice(int(columns[a]), int(columns[b - 1]) + 1)) for a, b in pairwise(edges)]
-
-
 def _unit(noise: Noise) -> Noise:
     """A noise with form errors of one: they are columns, and no filter depends on them."""
     return replace(noise, form=1.0, edge=1.0)
@@ -377,12 +379,6 @@ def _unit(noise: Noise) -> Noise:
 def _scale(diagonal: Array) -> Array:
     """What makes the diagonal of normal equations one; what no reading sees is kept from dividing by zero."""
     return np.asarray(np.sqrt(np.maximum(diagonal, _UNSEEN * diagonal.max(initial=1e-300))))
-
-
-def _scales(diagonals: Array) -> Array:
-    """As `_scale`, of several (D, U)."""
-    least = _UNSEEN * diagonals.max(axis=1, initial=1e-300)
-    return np.asarray(np.sqrt(np.maximum(diagonals, least[:, None])))
 
 
 def log_sum_exp(values: Array, axis: int = 0) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -40,8 +40,8 @@ class Known:
     def levels(self) -> Array:
         return np.array([self.evidence - self.prior])
 
-    def drawn(self, _: int, draws: Array, widths: Array) -> Array:
-        return np.asarray(draws @ self.per_block + [self.at_width.get(float(w), 0.0) for w in widths])
+    def drawn(self, _: int, draws: Array, widths: Sequence[float]) -> Array:
+        return np.add.outer([self.at_width.get(w, 0.0) for w in widths], draws @ self.per_block)
 
 
 def known(*models: Known, draws: Array | None = None) -> Posterior:
@@ -117,8 +117,8 @@ def test_each_block_once_is_what_was_scored() -> None:
     for one in (bare(), wetted()):
         blocks = dry().blocks * len(dry().recordings)
         for k in range(len(one.levels)):
-            drawn = one.drawn(k, np.ones((1, blocks)), np.ones(1))
-            assert drawn[0] == pytest.approx(one.levels[k], abs=0.01)
+            drawn = one.drawn(k, np.ones((1, blocks)))
+            assert drawn[0, 0] == pytest.approx(one.levels[k], abs=0.01)
 
 
 def test_the_same_models_give_the_same_posterior() -> None:

@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 from statsmodels.tsa.statespace.kalman_filter import KalmanFilter
 
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
-from discovery.evidence.whitening import Grams, absorbed
+from discovery.evidence.whitening import Grams, Rows, absorbed
 from discovery.fitting import Noise
 from discovery.fitting.kalman import make_filter
 from discovery.fitting.noise import resolution, white_noise
@@ -157,11 +157,11 @@ def rows_of(seed: int, count: int = 60, unknowns: int = 3) -> tuple[Array, Array
 
 def grams_of(rows: Array, spread: Array, block: Array) -> Grams:
     logs = np.linspace(-0.5, 0.5, len(rows))
-    pieces = np.array([rows[block == b].T @ rows[block == b] for b in range(6)])
     logdet = np.array([logs[block == b].sum() for b in range(6)])
+    size = 1 + len(spread)
+    whole = Rows(size, (rows,), (np.arange(size),), (np.searchsorted(block, np.arange(7)),), logdet)
     prior = np.diag([0.0, *(spread**-2.0)])
-    constant = -float(np.sum(np.log(spread)))
-    return Grams(Noise(("y",), (1.0,)), pieces, logdet, prior, constant, np.ones(1 + len(spread)))
+    return Grams(Noise(("y",), (1.0,)), whole, prior, -float(np.sum(np.log(spread))), np.ones(size))
 
 
 def test_a_level_is_the_density_of_the_readings_with_all_unknowns_integrated_out() -> None:
@@ -193,20 +193,20 @@ def test_draws_count_blocks_as_often_as_they_came() -> None:
     for k, often in enumerate(weights):
         again = np.repeat(np.arange(len(rows)), often[block].astype(int))
         one = grams_of(rows[again], spread, block[again])
-        one = replace(one, logdet=grams_of(rows, spread, block).logdet * often)
-        expected, at, covariance = one.solved()
-        assert level[k] == pytest.approx(expected, abs=1e-5)
-        assert step[k] == pytest.approx(at[[2, 0]], abs=1e-6)
-        assert variance[k] == pytest.approx(covariance[np.ix_([2, 0], [2, 0])], rel=1e-6)
+        logdet = grams_of(rows, spread, block).rows.logdet * often
+        expected, at, covariance = replace(one, rows=replace(one.rows, logdet=logdet)).solved()
+        assert level[0, k] == pytest.approx(expected, abs=1e-5)
+        assert step[0, k] == pytest.approx(at[[2, 0]], abs=1e-6)
+        assert variance[0, k] == pytest.approx(covariance[np.ix_([2, 0], [2, 0])], rel=1e-6)
 
 
 def test_a_wider_prior_is_that_prior() -> None:
     rows, spread, block = rows_of(8)
-    level, step, _ = grams_of(rows, spread, block).marginal(np.arange(3), widths=np.array([1.0, 3.0]))
+    level, step, _ = grams_of(rows, spread, block).marginal(np.arange(3), widths=(1.0, 3.0))
     expected, at, _ = grams_of(rows, 3 * spread, block).solved()
-    assert level[1] == pytest.approx(expected)
-    assert step[1] == pytest.approx(at)
-    assert abs(level[1] - level[0]) > 0.1
+    assert level[1, 0] == pytest.approx(expected)
+    assert step[1, 0] == pytest.approx(at)
+    assert abs(level[1, 0] - level[0, 0]) > 0.1
 
 
 def test_columns_that_are_taken_out_leave_the_model_without_them() -> None:
@@ -221,7 +221,7 @@ def test_one_factor_gives_what_a_model_is_without_its_last_columns_and_with_them
     rows, spread, block = rows_of(9)
     whole, sizes = grams_of(rows, spread, block), np.array([0])
     draws = np.random.default_rng(0).multinomial(6, np.full(6, 1 / 6), 40).astype(float)
-    widths = np.random.default_rng(1).choice([0.5, 2.0], 40)
+    widths = (0.5, 2.0)
     both = whole.marginals(sizes, spread[1:], draws, widths)
     alone = [one.marginal(sizes, draws, widths) for one in (whole.without(spread[1:]), whole)]
     for found, expected in zip(both, alone, strict=True):
@@ -229,7 +229,22 @@ def test_one_factor_gives_what_a_model_is_without_its_last_columns_and_with_them
             assert a == pytest.approx(b, rel=1e-7)
 
 
-def test_form_errors_of_any_share_are_the_same_blocks() -> None:
+def test_recordings_with_other_columns_add_up_in_their_places() -> None:
+    """What acts in one recording only is nothing in another one."""
+    rows, spread, block = rows_of(5)
+    rows[block >= 3, 2] = 0.0
+    whole, none = grams_of(rows, spread, block), np.zeros(0, dtype=np.intp)
+    first, second = rows[block < 3], rows[block >= 3][:, [0, 1, 3]]
+    edges = np.searchsorted(block, np.arange(7))
+    columns = np.arange(4), np.array([0, 1, 3])
+    apart = Rows(4, (first, second), columns, (edges[:4], edges[3:] - edges[3]), whole.rows.logdet)
+    draws = np.array([[1.0, 0.0, 2.0, 1.0, 3.0, 0.0]])
+    for weights in (None, draws):
+        level = replace(whole, rows=apart).marginal(none, weights)[0]
+        assert level == pytest.approx(whole.marginal(none, weights)[0])
+
+
+def test_form_errors_of_any_share_are_the_same_rows() -> None:
     """A column scaled by a share, with a coefficient of about one, is the column with one of that share."""
     rows, spread, block = rows_of(7)
     scaled = replace(grams_of(rows, spread, block), scale=np.array([1.0, 1.0, 1.0, 0.2]))
