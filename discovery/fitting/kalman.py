@@ -22,7 +22,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
-from discovery.dynamics.kernel import between, driven
+from discovery.dynamics.kernel import between, copy, driven
 from discovery.dynamics.prediction import output_matrix
 from discovery.dynamics.trajectory import flows
 from discovery.fitting.impulses import added, late_switches, noisy_inputs
@@ -32,56 +32,82 @@ Array = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
-def _propagate(f, b, heat_decay, slow_decay, x, top):  # type: ignore[no-untyped-def]
-    """Rows of x (states, heats, slow noises) one reading on, in place; `top` is room for the states' rows."""
-    n, nh = b.shape
+def _product(a, x, out):  # type: ignore[no-untyped-def]
+    """Fills out (n, m) = a x with the first rows of x, four at a time: so sums stay in registers."""
+    n, q = a.shape
     m = x.shape[1]
     for i in range(n):
         for c in range(m):
-            top[i, c] = 0.0
-        for j in range(n):
+            out[i, c] = 0.0
+        j = 0
+        while j + 4 <= q:
+            a0, a1, a2, a3 = a[i, j], a[i, j + 1], a[i, j + 2], a[i, j + 3]
             for c in range(m):
-                top[i, c] += f[i, j] * x[j, c]
-        for j in range(nh):
+                out[i, c] += a0 * x[j, c] + a1 * x[j + 1, c] + a2 * x[j + 2, c] + a3 * x[j + 3, c]
+            j += 4
+        for k in range(j, q):
             for c in range(m):
-                top[i, c] += b[i, j] * x[n + j, c]
-    x[:n] = top
-    x[n : n + nh] *= heat_decay
-    x[n + nh :] *= slow_decay
+                out[i, c] += a[i, k] * x[k, c]
 
 
 @njit(cache=True, nogil=True)
-def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, jumps):  # type: ignore[no-untyped-def]
+def _propagate(way, decay, x, top):  # type: ignore[no-untyped-def]
+    """Rows of x (states, heats, slow noises) one reading on, in place; `top` is room for the states' rows."""
+    n = top.shape[0]
+    _product(way, x, top)
+    copy(top, x)
+    for i in range(n, x.shape[0]):
+        for c in range(x.shape[1]):
+            x[i, c] *= decay[i]
+
+
+@njit(cache=True, nogil=True)
+def _moved_on(way, decay, fresh, jumps, p, top):  # type: ignore[no-untyped-def]
+    """Covariance p of states, heats and slow noises one reading on, in place; `fresh`: their variances."""
+    n, q = way.shape
+    size = p.shape[0]
+    _product(way, p, top)
+    for i in range(n):
+        for j in range(i, size):
+            if j < n:
+                total = jumps[i, j]
+                for k in range(q):
+                    total += top[i, k] * way[j, k]
+            else:
+                total = top[i, j] * decay[j]
+            p[i, j] = p[j, i] = total
+    for i in range(n, size):
+        for j in range(n, size):
+            p[i, j] *= decay[i] * decay[j]
+        p[i, i] += fresh[i] * (1.0 - decay[i] ** 2)
+
+
+@njit(cache=True, nogil=True)
+def _gains(ways, decays, h, measured, white, fresh, nv, jumps):  # type: ignore[no-untyped-def]
     """Kalman gains (R, Y, size) and standard deviations (R, Y) of the innovations.
 
     They do not depend on the data: columns that are whitened later under the same noise share them.
+
+    Args:
+        fresh: (size,) variances of heats and slow noises, of states zero.
+        nv: outputs with slow noise, all or none.
     """
     readings, outs, n = h.shape
-    nh, nv = heat.shape[0], slow.shape[0]
-    size = n + nh + nv
+    size = fresh.shape[0]
     p = np.zeros((size, size))
-    for i in range(nh):
-        p[n + i, n + i] = heat[i] ** 2
-    for j in range(nv):
-        p[n + nh + j, n + nh + j] = slow[j] ** 2
+    for i in range(size):
+        p[i, i] = fresh[i]
     gains, roots = np.zeros((readings, outs, size)), np.ones((readings, outs))
     ph = np.zeros(size)
-    top_p = np.zeros((n, size))
+    top = np.zeros((n, size))
+    none = np.zeros((n, n))
     for r in range(readings):
         if r > 0:
-            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], p, top_p)
-            p = p.T.copy()  # symmetric: the other side is the same step on the transpose
-            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], p, top_p)
-            if len(jumps):
-                p[:n, :n] += jumps[r - 1]
-            for j in range(nh):
-                p[n + j, n + j] += heat[j] ** 2 * (1.0 - heat_decay[r - 1] ** 2)
-            for j in range(nv):
-                p[n + nh + j, n + nh + j] += slow[j] ** 2 * (1.0 - slow_decay[r - 1] ** 2)
+            _moved_on(ways[r - 1], decays[r - 1], fresh, jumps[r - 1] if len(jumps) else none, p, top)
         for y in range(outs):  # white noise is independent by output: update one at a time
             if not measured[r, y]:
                 continue
-            own = n + nh + y if nv else -1  # a reading shows the states and its own slow noise
+            own = size - nv + y if nv else -1  # a reading shows the states and its own slow noise
             for i in range(size):
                 ph[i] = p[own, i] if nv else 0.0
             for j in range(n):
@@ -100,46 +126,54 @@ def _gains(f, b, h, measured, white, slow, heat, slow_decay, heat_decay, jumps):
 
 
 @njit(cache=True, nogil=True)
-def _whitened(f, b, h, measured, gains, roots, nv, slow_decay, heat_decay, data):  # type: ignore[no-untyped-def]
-    """Whitened data, a row for each of the readings that were measured, by gains from `_gains`.
-
-    `nv`: outputs with slow noise, all or none.
-    """
+def _whitened(ways, decays, h, measured, gains, roots, nv, data):  # type: ignore[no-untyped-def]
+    """Whitened data, a row for each of the readings that were measured, by gains from `_gains`."""
     readings, outs, n = h.shape
     m, size = data.shape[2], gains.shape[2]
     z = np.zeros((size, m))
     out = np.empty((np.count_nonzero(measured), m))
-    top_z = np.zeros((n, m))
+    top = np.zeros((n, m))
     made = 0
     for r in range(readings):
         if r > 0:
-            _propagate(f[r - 1], b[r - 1], heat_decay[r - 1], slow_decay[r - 1], z, top_z)
+            _propagate(ways[r - 1], decays[r - 1], z, top)
         for y in range(outs):
             if not measured[r, y]:
                 continue
             row = out[made]
             made += 1
-            row[:] = data[r, y]
+            for c in range(m):
+                row[c] = data[r, y, c]
             if nv:
-                slow = z[size - nv + y]
                 for c in range(m):
-                    row[c] -= slow[c]
+                    row[c] -= z[size - nv + y, c]
             for j in range(n):
                 factor = h[r, y, j]
                 if factor != 0.0:
-                    state = z[j]
                     for c in range(m):
-                        row[c] -= factor * state[c]
+                        row[c] -= factor * z[j, c]
             for i in range(size):
                 gain = gains[r, y, i]
                 if gain != 0.0:
-                    part = z[i]
                     for c in range(m):
-                        part[c] += gain * row[c]
+                        z[i, c] += gain * row[c]
             root = 1.0 / roots[r, y]
             for c in range(m):
                 row[c] *= root
     return out
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """What a noise makes of a filter: the way (R - 1, n, n + heats) of states from one reading to the next,
+    decays (R - 1, size) of heats and slow noises and their variances (size,), of states zero; how many of
+    them are slow noises.
+    """
+
+    ways: Array
+    decays: Array
+    fresh: Array
+    slow: int
 
 
 @dataclass(frozen=True)
@@ -161,39 +195,36 @@ class Filter:
         columns of one search after another, are whitened alike.
         """
         if "gains" not in self.last or self.last["gains"][0] != noise:
-            heat, slow, response, decays = self._parts(noise)
+            one = self._parts(noise)
             white = self.trajectory.system.grid.sd(noise.white)
             jumps = added([(noise.jitter, self.late), (noise.rough, self.noisy)])
-            found = _gains(self.f, response, self.h, self.measured, white, slow, heat, *decays, jumps)
+            found = _gains(one.ways, one.decays, self.h, self.measured, white, one.fresh, one.slow, jumps)
             self.last["gains"] = (noise, found)
         known: tuple[Array, Array] = self.last["gains"][1]
         return known
 
-    def _parts(self, noise: Noise) -> tuple[Array, Array, Array, tuple[Array, Array]]:
-        """Levels of the forces and slow noises that are not zero, responses to these forces, both decays."""
+    def _parts(self, noise: Noise) -> _Parts:
         if "parts" not in self.last or self.last["parts"][0] != noise:
             self.last["parts"] = (noise, self._made(noise))
-        made: tuple[Array, Array, Array, tuple[Array, Array]] = self.last["parts"][1]
+        made: _Parts = self.last["parts"][1]
         return made
 
-    def _made(self, noise: Noise) -> tuple[Array, Array, Array, tuple[Array, Array]]:
+    def _made(self, noise: Noise) -> _Parts:
         t, heat = self.trajectory, noise.heat or {}
         system = t.system
         there = np.array([heat.get(name, 0.0) > 0 for name in system.states])
         own = [(noise.force or {}).get(name, (heat.get(name, 0.0), noise.share)) for name in system.states]
         floor, share = np.array(own).reshape(-1, 2).T
-        gain = np.hypot(floor, share * self.flow) * system.scale * there
-        read = system.grid.read.astype(np.int64)
-        response = driven(t.which, t.e, t.w0, t.w1, read, gain) if there.any() else np.zeros((0, 0, 0))
-        slow = np.array(noise.slow or ())
-        return (
-            np.ones(int(there.sum())),
-            slow if slow.any() else np.zeros(0),
-            np.ascontiguousarray(response[:, :, there])
-            if there.any()
-            else np.zeros((max(len(read) - 1, 0), len(system.states), 0)),
-            (np.exp(-self.step / noise.slow_time), np.exp(-self.step / noise.heat_time)),
-        )
+        ways = self.f
+        if there.any():
+            gain = np.sqrt(floor**2 + (share * self.flow) ** 2) * system.scale * there
+            response = driven(t.which, t.e, t.w0, t.w1, system.grid.read.astype(np.int64), gain)
+            ways = np.concatenate([self.f, response[:, :, there]], axis=2)
+        slow = np.array(noise.slow) if any(noise.slow) else np.zeros(0)
+        counts = len(system.states), int(there.sum()), len(slow)
+        decays = np.exp(-self.step[:, None] / [np.inf, noise.heat_time, noise.slow_time])
+        fresh = np.concatenate([np.zeros(counts[0]), np.ones(counts[1]), slow**2])
+        return _Parts(ways, np.repeat(decays, counts, axis=1), fresh, counts[2])
 
     def whitened(self, noise: Noise, data: Array) -> tuple[Array, Array]:
         """Columns (measured readings, M) of data (R, Y, M), whitened, and the logarithm (measured readings,)
@@ -202,19 +233,9 @@ class Filter:
         if noise.is_white:
             white = self.trajectory.system.grid.sd(noise.white)[self.measured]
             return data[self.measured] / white[:, None], np.log(white)
-        _, slow, response, decays = self._parts(noise)
-        gains, roots = self.gains(noise)
-        out = _whitened(
-            self.f,
-            response,
-            self.h,
-            self.measured,
-            gains,
-            roots,
-            len(slow),
-            *decays,
-            np.ascontiguousarray(data),
-        )
+        one, (gains, roots) = self._parts(noise), self.gains(noise)
+        columns = np.ascontiguousarray(data)
+        out = _whitened(one.ways, one.decays, self.h, self.measured, gains, roots, one.slow, columns)
         return out, np.log(roots[self.measured])
 
 
