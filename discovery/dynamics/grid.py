@@ -107,12 +107,12 @@ class Grid:
     @cached_property
     def ends(self) -> dict[str, Array]:
         """Channels and `time` at the interval ends, each (2(T - 1),)."""
-        late = {
-            name: np.repeat(self.samples[name].means(self.time + by), 2)
-            for name, by in self.late.items()
-            if name in self.samples
-        }
+        late = {name: self.held(name, by) for name, by in self.late.items() if name in self.samples}
         return self._moved(self._once("ends", _at_ends, self.time, self.samples) | late)
+
+    def held(self, name: str, late: float) -> Array:
+        """A channel at the interval ends (2(T - 1),), logged seconds late: its mean over each interval."""
+        return np.repeat(self.samples[name].means(self.time + late), 2)
 
     @cached_property
     def nodes(self) -> dict[str, Array]:

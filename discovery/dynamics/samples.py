@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,15 +30,24 @@ class Samples:
         if self.linear:
             return np.interp(time, self.time, self.value)
         index = np.searchsorted(self.time, time, side="right" if side == "right" else "left") - 1
-        return self.value[np.clip(index, 0, None)]
+        return self.value[np.maximum(index, 0)]
 
     def integral(self, time: Array) -> Array:
         """Integral of a channel from its first stamp."""
-        mean = 0.5 * (self.value[:-1] + self.value[1:]) if self.linear else self.value[:-1]
-        sums = np.concatenate(([0.0], np.cumsum(mean * np.diff(self.time))))
-        index = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, None)
+        index = np.maximum(np.searchsorted(self.time, time, side="right") - 1, 0)
         last = 0.5 * (self.value[index] + self.at(time)) if self.linear else self.value[index]
-        return np.asarray(sums[index] + last * (time - self.time[index]))
+        return np.asarray(self._sums[index] + last * (time - self.time[index]))
+
+    @cached_property
+    def _sums(self) -> Array:
+        """Integral up to each stamp (N,)."""
+        mean = 0.5 * (self.value[:-1] + self.value[1:]) if self.linear else self.value[:-1]
+        return np.concatenate(([0.0], np.cumsum(mean * np.diff(self.time))))
+
+    @cached_property
+    def _changes(self) -> NDArray[np.intp]:
+        """How often the value has changed up to each stamp (N,)."""
+        return np.concatenate(([0], np.cumsum(np.diff(self.value) != 0)))
 
     def averaged(self, nodes: Array, shown: Callable[[Samples], Array] | None = None) -> Samples:
         """The channel by its means: over each interval between nodes (T,) where it is held, around each node
@@ -62,8 +72,8 @@ class Samples:
         """Mean between each two edges; exactly the value where it stays one, so that what is constant in the
         recording is constant to the last bit and equal intervals share their transition matrices.
         """
-        changes = np.concatenate(([0], np.cumsum(np.diff(self.value) != 0)))
-        first = np.clip(np.searchsorted(self.time, edges[:-1], side="right") - 1, 0, None)
+        changes = self._changes
+        first = np.maximum(np.searchsorted(self.time, edges[:-1], side="right") - 1, 0)
         # straight lines reach to the stamp behind the edge
         last = np.searchsorted(self.time, edges[1:], side="left") - (0 if self.linear else 1)
         same = changes[first] == changes[np.clip(last, 0, len(changes) - 1)]

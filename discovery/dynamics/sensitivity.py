@@ -115,17 +115,19 @@ def moved_in_time(trajectory: Trajectory, late: Sequence[str]) -> list[Column]:
     By differences: where a channel is held, its mean over an interval is a straight line of the shift but
     where a step comes past a node, and expressions with memory are no case of their own.
     """
-    system, now = trajectory.system, trajectory.system.grid.late
+    system, grid = trajectory.system, trajectory.system.grid
+    ends = trajectory.at_ends() if late else {}
     found = []
     for owner, channel in enumerate(late):
-        width = _PART * system.grid.unsure[channel]
+        width = _PART * grid.unsure[channel]
         sides = []
         for by in (width, -width):
-            moved = shifted(system, system.grid.offset, {**now, channel: now[channel] + by})
-            sides.append((moved, {**trajectory.at_ends(), channel: moved.grid.ends[channel]}))
+            when = {**grid.late, channel: grid.late[channel] + by}
+            there = grid.held(channel, when[channel]) + grid.offset.get(channel, 0.0)
+            sides.append((shifted(system, grid.offset, when).ends, {**ends, channel: there}))
         for term in system.model.terms:
             if channel in names(term.expression):
-                above, below = (evaluate(term.expression, env, memory=s.ends).value for s, env in sides)
+                above, below = (evaluate(term.expression, env, memory=m).value for m, env in sides)
                 change = np.asarray((above - below) / (2 * width))
                 found.append(Column(owner, term.into, change, term.source))
     return found

@@ -42,10 +42,11 @@ def start_values(
                 f"which recording '{system.grid.recording}' does not give"
             ) from None
     free = balanced(system)
-    out = _balanced(system, values, out, free)
+    late = memories(system, free)
+    if not moved or late != free:  # memories are settled once all others have moved
+        out = _balanced(system, values, out, free)
     if moved:
         by = starts_follow(system) @ np.array([moved.get(name, 0.0) for name in system.states])
-        late = memories(system, free)
         out = _balanced(system, values, out + by, late)
         out[late] += by[late]
     return out
@@ -115,7 +116,7 @@ def _balanced(system: System, values: Mapping[str, float], start: Array, free: S
     """The start values (n,) with some states in the balance of their terms, given the others."""
     names = [system.states[i] for i in free]
     before = 1.0
-    for _ in range((1 if system.affine else _ROUNDS) if free else 0):
+    for _ in range((1 if system.affine_in(tuple(names)) else _ROUNDS) if free else 0):
         rates, slopes = rates_at_start(system, values, start, names, free)
         if not (np.isfinite(rates).all() and np.isfinite(slopes).all()):
             raise RunsAwayError(

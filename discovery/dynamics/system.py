@@ -37,6 +37,8 @@ class System:
         default_factory=dict, repr=False, compare=False
     )
 
+    lines: dict[tuple[str, ...], bool] = field(default_factory=dict, repr=False, compare=False)
+
     def __getstate__(self) -> dict[str, object]:
         """What another process gets: it compiles its terms itself, or has them."""
         return {**self.__dict__, "programs": {}}
@@ -55,13 +57,20 @@ class System:
             self.programs[wrt, some] = compiled(tuple(t.expression for t in taken), wrt)
         return self.programs[wrt, some].run(values, memory)
 
+    def affine_in(self, states: tuple[str, ...]) -> bool:
+        """Whether no term has a curve in some states together, whatever the others are."""
+        if states not in self.lines:
+            together = frozenset(states)
+            self.lines[states] = all(degree(term.expression, together) <= 1 for term in self.model.terms)
+        return self.lines[states]
+
     @cached_property
     def first(self) -> tuple[dict[str, Value], Memory]:
-        """Channels at both ends of the first interval, and the memory of it, for what is asked of the first
+        """Channels at the begin of the first interval, and the memory of it, for what is asked of the first
         instant alone.
         """
-        ends: dict[str, Value] = {name: series[:2] for name, series in self.grid.ends.items()}
-        return ends, Memory(first_interval(self.grid), True)
+        begin: dict[str, Value] = {name: float(series[0]) for name, series in self.grid.ends.items()}
+        return begin, Memory(first_interval(self.grid), True)
 
     def between(self, begin: int, end: int) -> System:
         """The system from one node to another, without readings; what remembers inputs begins there."""

@@ -10,7 +10,7 @@ moves faster than they come are noisy in the same way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,18 +24,18 @@ from discovery.fitting.noise import Noise
 Array = NDArray[np.float64]
 
 
-def added(parts: Sequence[tuple[float, Array]]) -> Array:
+def added(parts: Sequence[tuple[float, Callable[[], Array]]]) -> Array:
     """Covariance (R - 1, n, n) of all impulses together, each some times as large as known; empty where there
     are none.
     """
-    found = [size**2 * covariance for size, covariance in parts if size and len(covariance)]
+    found = [size**2 * covariance for size, made in parts if size and len(covariance := made())]
     return np.sum(found, axis=0) if found else np.zeros((0, 0, 0))
 
 
 def impulse_variance(trajectory: Trajectory, noise: Noise) -> Array:
     """Variance (R, Y) of the outputs of a free run from inputs that are recorded a little wrong."""
-    parts = [(noise.jitter, late_switches), (noise.rough, noisy_inputs)]
-    jumps = added([(size, made(trajectory)) for size, made in parts if size])
+    late, noisy = (lambda: late_switches(trajectory)), (lambda: noisy_inputs(trajectory))
+    jumps = added([(noise.jitter, late), (noise.rough, noisy)])
     shown = np.zeros(trajectory.system.grid.readings.shape)
     if len(jumps):
         read = trajectory.system.grid.read.astype(np.int64)

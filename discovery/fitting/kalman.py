@@ -15,6 +15,7 @@ little wrong give impulses at the bodies (`impulses.py`).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -186,9 +187,17 @@ class Filter:
     h: Array
     step: Array
     measured: NDArray[np.bool_]
-    late: Array  # covariance of impulses between readings for a jitter of one, none where none can be
-    noisy: Array  # the same for noise of inputs as large as they are rough
     last: dict[str, tuple[Noise, Any]] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def late(self) -> Array:
+        """Covariance of impulses between readings for a jitter of one, none where none can be."""
+        return late_switches(self.trajectory)
+
+    @cached_property
+    def noisy(self) -> Array:
+        """The same for noise of inputs as large as they are rough."""
+        return noisy_inputs(self.trajectory)
 
     def gains(self, noise: Noise) -> tuple[Array, Array]:
         """What `_gains` gives under a noise. The last one is kept: a residual and its sensitivities, or the
@@ -197,7 +206,7 @@ class Filter:
         if "gains" not in self.last or self.last["gains"][0] != noise:
             one = self._parts(noise)
             white = self.trajectory.system.grid.sd(noise.white)
-            jumps = added([(noise.jitter, self.late), (noise.rough, self.noisy)])
+            jumps = added([(noise.jitter, lambda: self.late), (noise.rough, lambda: self.noisy)])
             found = _gains(one.ways, one.decays, self.h, self.measured, white, one.fresh, one.slow, jumps)
             self.last["gains"] = (noise, found)
         known: tuple[Array, Array] = self.last["gains"][1]
@@ -250,8 +259,6 @@ def make_filter(trajectory: Trajectory) -> Filter:
         output_matrix(trajectory),
         np.diff(system.grid.time[read]),
         system.grid.measured,
-        late_switches(trajectory),
-        noisy_inputs(trajectory),
     )
 
 

@@ -315,19 +315,20 @@ def _slope_below(x: Any, y: Any) -> Any:
     return -x / (y * y)
 
 
+_PRODUCTS = (2.0, 3.0, 4.0)
+
+
 def _power(x: Any, p: Any) -> Any:
-    # numpy's power takes ten times as long as the products
-    return x * x if _is(p, 2.0) else x * x * x if _is(p, 3.0) else np.power(x, p)
-
-
-def _is(p: Any, number: float) -> bool:
-    return np.ndim(p) == 0 and p == number
+    if np.ndim(p) or p not in _PRODUCTS:
+        return np.power(x, p)
+    square = x * x  # numpy's power takes ten times as long as products
+    return square if p == 2.0 else square * x if p == 3.0 else square * square
 
 
 def _power_slope(x: Any, p: Any) -> Any:
     # 0**p has no slope to speak of for 0 < p < 1; a finite one keeps Newton steps finite.
-    if _is(p, 2.0) or _is(p, 3.0):
-        return p * _power(x, p - 1.0)
+    if np.ndim(p) == 0 and p in _PRODUCTS:
+        return p * (x if p == 2.0 else _power(x, p - 1.0))
     floor = np.where(np.abs(x) < 1e-9, 1e-9, x)
     return p * np.power(floor, p - 1.0)
 
