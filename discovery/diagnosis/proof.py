@@ -12,7 +12,6 @@ from math import copysign, hypot, inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from discovery.dynamics import Trajectory, predict, sensitivities
 from discovery.errors import RunsAwayError
@@ -40,7 +39,10 @@ class Known:
 
     def beside(self, sensors: Sequence[str], sd: float) -> Known:
         """The same and the zeros of some sensors, each off by `sd`."""
-        return Known((*self.names, *sensors), block_diag(self.covariance, sd**2 * np.eye(len(sensors))))
+        count = len(self.names)
+        covariance = sd**2 * np.eye(count + len(sensors))
+        covariance[:count, :count] = self.covariance
+        return Known((*self.names, *sensors), covariance)
 
 
 @dataclass(frozen=True)

@@ -172,8 +172,13 @@ class Grid:
         before, here, behind = (
             shown[place] for place in self._once("looked at", _looked_at, self.time, self.read)[1]
         )
-        left, right = self.means.neighbours.reshape(2, *here.shape[:2], *[1] * (here.ndim - 2))
-        return np.asarray(here + left * (before - here) + right * (behind - here))
+        shares = self.means.neighbours.reshape(2, *here.shape[:2], *[1] * (here.ndim - 2))
+        for share, other in zip(shares, (before, behind), strict=True):  # large: without a sum beside them
+            other -= here
+            other *= share
+        here += before
+        here += behind
+        return np.asarray(here)
 
     @cached_property
     def measured(self) -> NDArray[np.bool_]:

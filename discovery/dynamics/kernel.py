@@ -215,7 +215,26 @@ def trajectory(which, e, w0, w1, g0, g1, start):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_scale, left, right, read):  # type: ignore[no-untyped-def]
+def product(a, x, out):  # type: ignore[no-untyped-def]
+    """Fills out (n, m) = a x with the first rows of x, four at a time: so sums stay in registers."""
+    n, q = a.shape
+    m = x.shape[1]
+    for i in range(n):
+        for c in range(m):
+            out[i, c] = 0.0
+        j = 0
+        while j + 4 <= q:
+            a0, a1, a2, a3 = a[i, j], a[i, j + 1], a[i, j + 2], a[i, j + 3]
+            for c in range(m):
+                out[i, c] += a0 * x[j, c] + a1 * x[j + 1, c] + a2 * x[j + 2, c] + a3 * x[j + 3, c]
+            j += 4
+        for k in range(j, q):
+            for c in range(m):
+                out[i, c] += a[i, k] * x[k, c]
+
+
+@njit(cache=True, nogil=True)
+def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_scale, size, read):  # type: ignore[no-untyped-def]
     """Sensitivities of the states at the reading instants.
 
     Args:
@@ -224,13 +243,13 @@ def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_sca
         owner: (P,) column that a piece of forcing belongs to.
         into, into_scale: (P,) state that the piece enters and its scale (1/C).
         source, source_scale: (P,) state that it leaves (-1: none) and its scale.
-        left, right: (K, P) size of the piece at the ends of each interval.
+        size: (P, 2K) of the piece at the ends of each interval.
         read: (R,) ascending node indices.
 
     Returns:
         (R, n, M)
     """
-    count, pieces = left.shape
+    pieces, count = size.shape[0], size.shape[1] // 2
     n, m = start.shape
     out = np.empty((read.shape[0], n, m))
     s = start.copy()
@@ -243,17 +262,10 @@ def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_sca
         if r >= read.shape[0]:
             break
         u = which[k]
-        for i in range(n):
-            for c in range(m):
-                new[i, c] = e[u, i, 0] * s[0, c]
-            for j in range(1, n):
-                factor = e[u, i, j]
-                if factor != 0.0:
-                    for c in range(m):
-                        new[i, c] += factor * s[j, c]
+        product(e[u], s, new)
         for p in range(pieces):
-            a = left[k, p]
-            b = right[k, p]
+            a = size[p, 2 * k]
+            b = size[p, 2 * k + 1]
             if a == 0.0 and b == 0.0:
                 continue
             c = owner[p]

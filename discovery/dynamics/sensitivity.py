@@ -68,9 +68,9 @@ def sensitivities(
     place = {name: i for i, name in enumerate(system.states)}
     into = np.array([place[piece.into] for piece in pieces], dtype=np.int64)
     source = np.array([place[p.source] if p.source else -1 for p in pieces], dtype=np.int64)
-    steps = len(system.grid.step)
-    series = [np.broadcast_to(piece.series, (2 * steps,)) for piece in pieces]
-    stacked = np.array(series).reshape(len(series), steps, 2)
+    size = np.empty((len(pieces), 2 * len(system.grid.step)))
+    for k, piece in enumerate(pieces):
+        size[k] = piece.series
     nodes = system.grid.looked_at
     begin = _start_slopes(trajectory, parameters, starts, first + owners)
     if grown is not None:
@@ -86,11 +86,10 @@ def sensitivities(
         system.scale[into],
         source,
         system.scale[source],
-        np.ascontiguousarray(stacked[:, :, 0].T),
-        np.ascontiguousarray(stacked[:, :, 1].T),
+        size,
         nodes.astype(np.int64),
     )
-    dy: Array = np.einsum("ryn,rnm->rym", output_matrix(trajectory, nodes), s)
+    dy: Array = output_matrix(trajectory, nodes) @ s
     for y, partials in enumerate(_shown_by_outputs(trajectory, parameters)):
         zero = system.grid.outputs[y]
         shown = partials | ({zero: 1.0} if zero in parameters else {})

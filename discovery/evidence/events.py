@@ -68,6 +68,7 @@ class _Search:
         grid = self.trajectory.system.grid
         self.read = grid.time[grid.read]
         self.known: dict[str, Projected] = {}
+        self.jumps: dict[str, tuple[Array, Array]] = {}
 
     def projected(self, columns: Array) -> Projected:
         """Columns (R, Y, M) of the recording, seen through what a refit absorbs."""
@@ -148,26 +149,32 @@ class _Search:
         if not len(instants):
             return None
         (name,) = h.shapes
-        parts = range(0, len(instants), TOGETHER)
-        gains = np.concatenate([self._steps(h, instants[k : k + TOGETHER], slab) for k in parts])
+        gains = np.zeros(len(instants))
+        for k, output in enumerate(h.shown):
+            one = slab.take(np.full(len(instants), min(k, len(slab.median) - 1)))
+            gains += _log_bayes(*self._jumps(output, instants), one)
         weight = float(log_sum_exp(gains) - np.max(gains)) - float(np.log(len(gains)))
         best = {name: float(instants[int(np.argmax(gains))])}
         return float(np.max(gains)) + weight, replace(
             h.at(best, weight), spans={name: _span(gains, instants)}
         )
 
-    def _steps(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
-        """Log Bayes factor of a jump at each of the instants."""
-        outputs = self.trajectory.system.grid.outputs
-        steps = (self.read[:, None] >= instants[None, :]).astype(float)
-        count, total = len(instants), np.zeros(len(instants))
-        for k, output in enumerate(h.shown):
-            columns = np.zeros((len(self.read), len(outputs), count))
-            columns[:, outputs.index(output), :] = steps
-            part = self.projected(columns)
-            one = slab.take(np.full(count, min(k, len(slab.median) - 1)))
-            total += _log_bayes(part.dot, np.maximum(part.gram, 1e-30), one)
-        return total
+    def _jumps(self, output: str, instants: Array) -> tuple[Array, Array]:
+        """Inner products of a jump of an output at each of all instants, with the residual and with itself.
+        They are the same for all claims.
+        """
+        if output not in self.jumps:
+            outputs = self.trajectory.system.grid.outputs
+            parts = []
+            for k in range(0, len(instants), TOGETHER):
+                steps = self.read[:, None] >= instants[None, k : k + TOGETHER]
+                columns = np.zeros((len(self.read), len(outputs), steps.shape[1]))
+                columns[:, outputs.index(output), :] = steps
+                part = self.projected(columns)
+                parts.append((part.dot, np.maximum(part.gram, 1e-30)))
+            dot, gram = (np.concatenate(one) for one in zip(*parts, strict=True))
+            self.jumps[output] = dot, gram
+        return self.jumps[output]
 
 
 def _log_bayes(dot: Array, gram: Array, slab: Slab) -> Array:

@@ -18,7 +18,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from discovery.dynamics import Grid, Trajectory
 from discovery.dynamics.samples import Samples, read_samples
@@ -32,6 +31,7 @@ from discovery.recordings import Campaign
 Array = NDArray[np.float64]
 
 NEAR = 31  # samples, of which the noise of one in the middle is the median
+_TOGETHER = 10_000  # medians at a time
 GAUSS = 0.6745 * np.sqrt(6)  # median of the second differences of white noise, over its standard deviation
 
 
@@ -105,10 +105,17 @@ def spectral(samples: Samples, stated: float | None = None) -> Samples:
         stated: standard deviation of the noise of a sample, if the campaign states it.
     """
     second = np.abs(np.diff(np.pad(samples.value, 1, mode="reflect"), 2)) / GAUSS
-    near = median_filter(second, NEAR, mode="nearest")
+    near = _medians(second)
     step = np.diff(samples.time)
     sd = near if stated is None else np.full(len(near), stated)
     return Samples(samples.time, sd * np.sqrt(np.append(step, step[-1])), False)
+
+
+def _medians(values: Array) -> Array:
+    """Median of the values (N,) near each one; at both ends, the last one counts for those behind it."""
+    near = sliding_window_view(np.pad(values, NEAR // 2, mode="edge"), NEAR)
+    parts = np.array_split(near, len(near) // _TOGETHER + 1)  # a long recording does not fit into memory
+    return np.concatenate([np.median(part, axis=1) for part in parts])
 
 
 def with_noise(campaign: Campaign, run: Trajectory) -> Trajectory:

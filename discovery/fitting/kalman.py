@@ -23,7 +23,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
-from discovery.dynamics.kernel import between, copy, driven
+from discovery.dynamics.kernel import between, copy, driven, product
 from discovery.dynamics.prediction import output_matrix
 from discovery.dynamics.trajectory import flows
 from discovery.fitting.impulses import added, late_switches, noisy_inputs
@@ -33,29 +33,10 @@ Array = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
-def _product(a, x, out):  # type: ignore[no-untyped-def]
-    """Fills out (n, m) = a x with the first rows of x, four at a time: so sums stay in registers."""
-    n, q = a.shape
-    m = x.shape[1]
-    for i in range(n):
-        for c in range(m):
-            out[i, c] = 0.0
-        j = 0
-        while j + 4 <= q:
-            a0, a1, a2, a3 = a[i, j], a[i, j + 1], a[i, j + 2], a[i, j + 3]
-            for c in range(m):
-                out[i, c] += a0 * x[j, c] + a1 * x[j + 1, c] + a2 * x[j + 2, c] + a3 * x[j + 3, c]
-            j += 4
-        for k in range(j, q):
-            for c in range(m):
-                out[i, c] += a[i, k] * x[k, c]
-
-
-@njit(cache=True, nogil=True)
 def _propagate(way, decay, x, top):  # type: ignore[no-untyped-def]
     """Rows of x (states, heats, slow noises) one reading on, in place; `top` is room for the states' rows."""
     n = top.shape[0]
-    _product(way, x, top)
+    product(way, x, top)
     copy(top, x)
     for i in range(n, x.shape[0]):
         for c in range(x.shape[1]):
@@ -67,7 +48,7 @@ def _moved_on(way, decay, fresh, jumps, p, top):  # type: ignore[no-untyped-def]
     """Covariance p of states, heats and slow noises one reading on, in place; `fresh`: their variances."""
     n, q = way.shape
     size = p.shape[0]
-    _product(way, p, top)
+    product(way, p, top)
     for i in range(n):
         for j in range(i, size):
             if j < n:
