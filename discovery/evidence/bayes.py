@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.process_noise import Setting
-from discovery.evidence.signatures import signatures
+from discovery.evidence.signatures import Claims
 from discovery.evidence.whitening import Absorbed, Whitened, absorbed, log_sum_exp
 from discovery.fitting import Noise
 from discovery.threads import side_by_side
@@ -189,7 +189,12 @@ def scan(
     """
     runs = seen.fit.trajectories
     batches = _batches(hypotheses)
-    columns = side_by_side(lambda batch: [signatures(t, batch) for t in runs], batches)
+
+    def shown_by(batch: Sequence[Hypothesis]) -> list[Array]:
+        claims = Claims.of(batch, runs[0].system.model)
+        return [claims.signatures(t) for t in runs]
+
+    columns = side_by_side(shown_by, batches)
     back = [np.stack([w.shown[k] for w in without], axis=2) for k in range(len(runs))] if without else []
     levels = np.zeros((1 + len(without), len(settings)))
     parts: list[list[Products]] = [[] for _ in levels]

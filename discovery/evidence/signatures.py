@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, sensitivities
 from discovery.effects.hypothesis import Hypothesis
-from discovery.terms import Expression, evaluate, names
+from discovery.models import Model
+from discovery.terms import Expression, Program, Term, evaluate, names, program_of
 
 Array = NDArray[np.float64]
 
@@ -20,40 +22,55 @@ def signatures(trajectory: Trajectory, hypotheses: Sequence[Hypothesis]) -> Arra
     To first order in the amplitude: bodies answer through the model's own dynamics, memories (lag, delay,
     play) are taken along the present trajectory. What does not act in this recording is zero.
     """
-    system = trajectory.system
-    run = system.grid.recording
-    total = sum(len(h.amplitudes) for h in hypotheses)
-    ends = trajectory.at_ends()
-    first = np.minimum(
-        2 * system.grid.read, 2 * len(system.grid.step) - 1
-    )  # of the step that a reading begins
-    columns: list[Column] = []
-    direct: list[tuple[int, int, Array]] = []
-    owner = 0
-    for h in hypotheses:
-        if not h.acts_in(run):
-            owner += len(h.amplitudes)
-            continue
-        values = h.values(run)
-        for term in h.terms:
-            series = evaluate(term.expression, {**ends, **values}, memory=system.ends).value
-            mine = owner
-            if len(h.amplitudes) > 1:
-                used = names(term.expression)
-                mine += next((k for k, name in enumerate(h.amplitudes) if name in used), 0)
-            columns.append(Column(mine, term.into, np.asarray(series, dtype=float), term.source))
-        if h.shown:
-            for k, (name, expression) in enumerate(h.shows(system.model).items()):
-                column = owner + (k if len(h.amplitudes) > 1 else 0)
-                # along the ends of the steps: what is held is held there, also for a memory of it
-                series = evaluate(expression, {**ends, **values}, memory=system.ends).value
-                whole = np.broadcast_to(np.asarray(series, dtype=float), (2 * len(system.grid.step),))
-                direct.append((column, system.grid.outputs.index(name), whole[first]))
-        owner += len(h.amplitudes)
-    out = sensitivities(trajectory, (), (), columns, count=total)
-    for column, y, series in direct:
-        out[:, y, column] += series
-    return out
+    return Claims.of(hypotheses, trajectory.system.model).signatures(trajectory)
+
+
+@dataclass(frozen=True)
+class Claims:
+    """Hypotheses for several recordings: what they add to states and outputs, computed together. Effects at
+    several places, or with several shapes, have much in common.
+    """
+
+    count: int  # of amplitudes
+    terms: tuple[tuple[Hypothesis, int, Term], ...]  # amplitude whose they are
+    shown: tuple[tuple[Hypothesis, int, str], ...]  # amplitude and output
+    program: Program  # series of the terms, then of what is shown
+
+    @staticmethod
+    def of(hypotheses: Sequence[Hypothesis], model: Model) -> Claims:
+        """The claims for a model."""
+        terms, shown, series, changes, owner = [], [], [], [], 0
+        for h in hypotheses:
+            numbers = h.values(h.acting[0] if h.acting else "")
+            own, several = range(owner, owner + len(h.amplitudes)), len(h.amplitudes) > 1
+            for term in h.terms:
+                used = names(term.expression) if several else frozenset()
+                mine = next((k for k, name in zip(own, h.amplitudes, strict=True) if name in used), owner)
+                terms.append((h, mine, term))
+                series.append((term.expression, numbers))
+            for k, (name, change) in enumerate(h.shows(model).items() if h.shown else ()):
+                shown.append((h, owner + k if several else owner, name))
+                changes.append((change, numbers))
+            owner = own.stop
+        return Claims(owner, tuple(terms), tuple(shown), program_of([*series, *changes]))
+
+    def signatures(self, trajectory: Trajectory) -> Array:
+        """As the function of that name."""
+        system = trajectory.system
+        run, steps = system.grid.recording, len(system.grid.step)
+        found = [one.value for one in self.program.run(trajectory.at_ends(), system.ends)]
+        columns = [
+            Column(mine, term.into, np.asarray(series), term.source)
+            for (h, mine, term), series in zip(self.terms, found, strict=False)
+            if h.acts_in(run)
+        ]
+        out = sensitivities(trajectory, (), (), columns, count=self.count)
+        # along the ends of the steps: what is held is held there, also for a memory of it
+        first = np.minimum(2 * system.grid.read, 2 * steps - 1)  # of the step that a reading begins
+        for (h, mine, name), series in zip(self.shown, found[len(self.terms) :], strict=True):
+            if h.acts_in(run):
+                out[:, system.grid.outputs.index(name), mine] += np.broadcast_to(series, (2 * steps,))[first]
+        return out
 
 
 def heat_rms(trajectory: Trajectory, expression: Expression) -> float:

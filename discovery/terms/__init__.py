@@ -1,7 +1,7 @@
 """Terms: safe expressions with exact derivatives, the letters every model is written in."""
 
 from discovery.terms.delays import delays_at
-from discovery.terms.dual import Dual, Program, compiled, evaluate
+from discovery.terms.dual import Dual, Program, compiled, evaluate, program_of
 from discovery.terms.expression import Apply, Expression, Name, Number, degree, names, rewrite, substitute
 from discovery.terms.parsing import parse
 from discovery.terms.printing import text
@@ -21,6 +21,7 @@ __all__ = [
     "evaluate",
     "names",
     "parse",
+    "program_of",
     "rewrite",
     "substitute",
     "text",

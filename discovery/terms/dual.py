@@ -6,7 +6,7 @@ nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Protocol
@@ -119,6 +119,7 @@ class _Builder:
 
     def __init__(self, wrt: frozenset[str]) -> None:
         self.wrt = wrt
+        self.numbers: Mapping[str, float] = {}  # names that stand for numbers
         self.loads: dict[str, int] = {}
         self.constants: dict[float, int] = {}
         self.known: dict[tuple[object, ...], int] = {}
@@ -154,6 +155,17 @@ class _Builder:
         one = self.constant(1.0)
         return b if a == one else a if b == one else self.call(np.multiply, a, b)
 
+    def program(self, nodes: Iterable[_Node]) -> Program:
+        """All operations, for the values and derivatives of some nodes."""
+        return Program(
+            tuple((place, name) for name, place in self.loads.items()),
+            tuple((place, np.float64(value)) for value, place in self.constants.items()),
+            tuple(self.operations),
+            frozenset(self.memories),
+            self.size,
+            tuple((node.value, tuple(node.partials.items())) for node in nodes),
+        )
+
     def chain(self, value: int, pieces: list[tuple[int, _Node]]) -> _Node:
         """Chain rule: sum of (outer derivative) times (inner partials)."""
         partials: dict[str, int] = {}
@@ -167,6 +179,8 @@ class _Builder:
         match expression:
             case Number(value=number):
                 return _Node(self.constant(float(number)))
+            case Name(id=name) if name in self.numbers:
+                return _Node(self.constant(self.numbers[name]))
             case Name(id=name):
                 return _Node(self.load(name), {name: self.constant(1.0)} if name in self.wrt else {})
             case Apply(function="delay", arguments=(Name(id=channel), seconds)):
@@ -264,15 +278,15 @@ class _Builder:
 def compiled(expressions: tuple[Expression, ...], wrt: frozenset[str]) -> Program:
     """The program of several expressions, equal parts of them shared."""
     build = _Builder(wrt)
-    nodes = [build.node(expression) for expression in expressions]
-    return Program(
-        tuple((place, name) for name, place in build.loads.items()),
-        tuple((place, np.float64(value)) for value, place in build.constants.items()),
-        tuple(build.operations),
-        frozenset(build.memories),
-        build.size,
-        tuple((node.value, tuple(node.partials.items())) for node in nodes),
-    )
+    return build.program([build.node(expression) for expression in expressions])
+
+
+def program_of(expressions: Iterable[tuple[Expression, Mapping[str, float]]]) -> Program:
+    """The program of several expressions, without derivatives, some names of each at numbers of its own."""
+    build, nodes = _Builder(frozenset()), []
+    for expression, build.numbers in expressions:
+        nodes.append(build.node(expression))
+    return build.program(nodes)
 
 
 def _compared(function: Callable[..., Any]) -> Callable[..., Any]:
