@@ -77,15 +77,13 @@ class Slab:
 
     def _wide(self, mean: Array, sd: Array) -> Array:
         wide = np.full(len(mean), -np.inf)
-        step = _FINE[1] - _FINE[0]
-        size = self.median * self.factor ** _FINE[:, None]
-        prior = np.exp(-0.5 * _FINE[:, None] ** 2) * step / np.sqrt(2 * np.pi)
+        size = self.median / sd * self.factor ** _FINE[:, None]
+        prior = np.log((_FINE[1] - _FINE[0]) / (2 * np.pi * sd)) - 0.5 * _FINE[:, None] ** 2
         for sign in (1.0, -1.0):
-            share = np.where(self.sign == 0, 0.5, (self.sign == sign).astype(float))
-            z = (sign * size - mean) / sd
-            with np.errstate(divide="ignore"):  # what has the wrong sign cannot be
-                part = np.log(prior * share) - 0.5 * z**2 - np.log(sd * np.sqrt(2 * np.pi))
-            wide = np.logaddexp(wide, log_sum_exp(part))
+            can = np.flatnonzero(self.sign != -sign)  # what has the wrong sign cannot be
+            part = prior[:, can] - 0.5 * (sign * size[:, can] - mean[can] / sd[can]) ** 2
+            share = np.where(self.sign[can] == 0, np.log(0.5), 0.0)
+            wide[can] = np.logaddexp(wide[can], share + log_sum_exp(part))
         return wide
 
 

@@ -131,7 +131,8 @@ class Grams:
         order = np.concatenate([1 + others, 1 + last, 1 + np.asarray(sizes, dtype=np.intp), [0]])
         first = len(others)
         pieces = self.rows.sums[None] if weights is None else self.rows.by_block()
-        whole = pieces.reshape(len(pieces), -1)[:, np.add.outer(order * self.rows.size, order).ravel()]
+        places = np.add.outer(order * self.rows.size, order).ravel()
+        whole = np.take(pieces.reshape(len(pieces), -1), places, axis=1)
         whole *= np.outer(self.scale[order], self.scale[order]).ravel()
         prior = self.prior[np.ix_(order, order)].ravel()
         often = np.ones((1, 1)) if weights is None else weights
