@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.dynamics import Trajectory
 from discovery.errors import RunsAwayError
 from discovery.fitting.noise import Noise, roughness, white_noise
 from discovery.fitting.problem import Problem
@@ -21,23 +22,26 @@ _BEGINS = 0.05  # of what a state moves in a recording, how far from its start i
 _SMALL = 0.01  # of the spread of readings: the least noise to begin with, where none is stated
 
 
-def gains_first(problem: Problem, theta: Array, noise: Noise) -> Array:
-    """Where a fit begins once the gains of inputs are right for everything else.
+def gains_first(
+    problem: Problem, theta: Array, noise: Noise, runs: tuple[Trajectory, ...]
+) -> tuple[Array, tuple[Trajectory, ...]]:
+    """Where a fit begins once the gains of inputs are right for everything else, and the free runs there.
 
     Outputs are linear in them, so one step finds them. With gains that are wrong by orders, a fit bends rates
     and rooms to what the gains miss, and does not come back.
     """
     gains = _gains(problem.model)
     if not gains:
-        return theta
+        return theta, runs
     held = tuple(
         u if u.name in gains and not u.is_nuisance else replace(u, low=float(x), high=float(x))
         for u, x in zip(problem.unknowns, theta, strict=True)
     )
     try:
-        return solve(replace(problem, unknowns=held), theta, noise, "linear", 1, 0.0).theta
+        found = solve(replace(problem, unknowns=held), theta, noise, "linear", 1, 0.0, runs=runs)
     except RunsAwayError:
-        return theta
+        return theta, runs
+    return found.theta, found.trajectories
 
 
 def _gains(model: Model) -> set[str]:
@@ -51,7 +55,7 @@ def _gains(model: Model) -> set[str]:
 
 
 def first_noise(
-    problem: Problem, theta: Array, stated: Mapping[str, float | None], least: Sequence[float]
+    problem: Problem, runs: Sequence[Trajectory], stated: Mapping[str, float | None], least: Sequence[float]
 ) -> Noise:
     """The first noise: the residual at the start of the fit, but not more than the roughness of the readings.
 
@@ -59,7 +63,7 @@ def first_noise(
     """
     single = [system.grid.single for system in problem.systems]
     rough = [_rough([r[:, j][np.isfinite(r[:, j])] for r in single]) for j in range(len(problem.outputs))]
-    left = [problem.residual(problem.run(s, theta)) * s.grid.per_reading for s in problem.systems]
+    left = [problem.residual(run) * run.system.grid.per_reading for run in runs]
     begun = white_noise(problem.outputs, stated, left, least)
     white = [
         stated[name] or max(min(a, b) if np.isfinite(a) else b, floor)
@@ -76,12 +80,11 @@ def _rough(readings: Sequence[Array]) -> float:
     return max(roughness(readings), _SMALL * float(np.std(spread)) if len(spread) else 0.0)
 
 
-def first_spreads(problem: Problem, theta: Array) -> dict[str, float]:
+def first_spreads(problem: Problem, runs: Sequence[Trajectory]) -> dict[str, float]:
     """A first guess of how far states begin from their start that are neither read nor given a spread: a
     share of what they move.
     """
     asked = [u for u in problem.unknowns if u.spread == "fitted" and u.is_start]
-    runs = [problem.run(s, theta) for s in problem.systems] if asked else []
     moved: dict[str, float] = {}
     for run in runs:
         for u in (u for u in asked if u.recording == run.system.grid.recording):

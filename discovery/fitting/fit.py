@@ -19,7 +19,7 @@ from discovery.fitting.kalman import innovations
 from discovery.fitting.noise import Noise, readings_as_one, resolution, white_noise
 from discovery.fitting.problem import FORMER, Prior, Problem, make_problem
 from discovery.fitting.resolution import resolved
-from discovery.fitting.solve import Loss, Solution, solve
+from discovery.fitting.solve import Loss, Solution, free_runs, solve
 from discovery.models import Model
 from discovery.recordings import Campaign
 from discovery.threads import one_thread
@@ -175,13 +175,14 @@ def fit_model(
     began = clock.perf_counter()
     problem = make_problem(model, campaign, recordings, outputs, grids, priors, belief)
     stated = {name: campaign.channels[name].noise for name in problem.outputs}
-    theta = _beginning(problem, guess or {}, begin)
+    theta = np.clip(_beginning(problem, guess or {}, begin), *problem.bounds)
     least = resolution([system.grid.single for system in problem.systems])
+    runs = free_runs(problem, theta)
     if not guess and begin is None:
-        theta = gains_first(problem, theta, noise or first_noise(problem, theta, stated, least))
-    current = noise or first_noise(problem, theta, stated, least)
+        theta, runs = gains_first(problem, theta, noise or first_noise(problem, runs, stated, least), runs)
+    current = noise or first_noise(problem, runs, stated, least)
     nuisance = any(u.is_nuisance for u in problem.unknowns)
-    problem = problem.spread(current, first_spreads(problem, theta))
+    problem = problem.spread(current, first_spreads(problem, runs))
     together = 1.0
     rounds = _ROUNDS if noise is None or nuisance else 1
     unknown = noise is None and any(stated[name] is None for name in problem.outputs)
@@ -190,7 +191,9 @@ def fit_model(
     for k in range(_MOST):
         last = (k >= rounds - 1 and not unknown) or settled or k == _MOST - 1
         most = max_rounds if last or (k == 0 and not unknown) else min(_ROUGH, max_rounds)
-        solution = solve(problem, theta, current, loss, most, tolerance, together, goal, solution)
+        solution = solve(
+            problem, theta, current, loss, most, tolerance, together, goal, solution, () if solution else runs
+        )
         theta = solution.theta
         if not np.isfinite(solution.jacobian).all():
             raise RunsAwayError(f"the sensitivities of model '{model.name}' to its parameters are not finite")

@@ -66,6 +66,7 @@ def solve(
     together: float = 1.0,
     goal: float = inf,
     last: Solution | None = None,
+    runs: tuple[Trajectory, ...] = (),
 ) -> Solution:
     """Find the unknowns (U,) of the smallest cost under a noise, from `theta` (U,).
 
@@ -80,6 +81,7 @@ def solve(
         goal: the cost that is good enough to matter: a search that would not reach it at the pace of its last
             steps ends.
         last: where the same problem ended under another noise or other priors; what stands there is used.
+        runs: free runs at `theta`, where they are known.
 
     Raises:
         RunsAwayError: the model does not stay finite where the search begins.
@@ -87,7 +89,10 @@ def solve(
     low, high = problem.bounds
     x = np.clip(theta, low, high)
     known = last if last is not None and np.array_equal(last.theta, x) else None
-    runs = known.trajectories if known else _trajectories(problem, x, None)
+    if known:
+        runs = known.trajectories
+    elif not runs or not np.array_equal(x, theta):
+        runs = free_runs(problem, x)
     filters = _filters(runs, noise)
     now = _whitened(problem, x, noise, together, runs, filters)
     cost, damping = _cost(now.residual, loss), _DAMPING
@@ -96,7 +101,7 @@ def solve(
     course, done, late = [cost], len(x) == 0, False
     for left in range(max_rounds if len(x) else 0, 0, -1):
         weight, slope = _weights(now.residual, loss)
-        rows = jacobian * weight[:, None]
+        rows = jacobian if loss == "linear" else jacobian * weight[:, None]
         gram, gradient = rows.T @ rows, jacobian.T @ slope
         found = None
         while damping < _HOPELESS:
@@ -106,7 +111,7 @@ def solve(
             if np.all(np.abs(change) <= _STILL * (1.0 + np.abs(x))):
                 break
             try:
-                runs = _trajectories(problem, moved, now)
+                runs = free_runs(problem, moved, now.trajectories)
                 trial = _whitened(problem, moved, noise, together, runs, filters)
             except RunsAwayError:
                 trial = None
@@ -145,9 +150,9 @@ def cost_under(problem: Problem, theta: Array, trajectories: Sequence[Trajectory
     return _cost(now.residual, "linear")
 
 
-def _trajectories(problem: Problem, x: Array, near: _Run | None) -> tuple[Trajectory, ...]:
-    """Free runs at a place; `near`: a run close by, to begin from."""
-    known = {t.system.grid.recording: t for t in near.trajectories} if near else {}
+def free_runs(problem: Problem, x: Array, near: tuple[Trajectory, ...] = ()) -> tuple[Trajectory, ...]:
+    """Free runs at a place (U,); `near`: those of a place close by, to begin from."""
+    known = {t.system.grid.recording: t for t in near}
     return tuple(problem.run(s, x, known.get(s.grid.recording)) for s in problem.systems)
 
 
