@@ -81,6 +81,7 @@ def test_a_fit_shows_itself(fit: Fit) -> None:
     assert f"T1 {np.sqrt(np.nanmean(left[:, 0] ** 2)):.3g}" in fit.summary()
     assert len(fit.plot().axes) == 2
     assert "b1" in fit._repr_html_()
+    assert repr(fit) == fit.summary()  # all that it holds would be megabytes
 
 
 def test_a_diagnosis_shows_itself(diagnosis: Diagnosis) -> None:
@@ -88,6 +89,7 @@ def test_a_diagnosis_shows_itself(diagnosis: Diagnosis) -> None:
     frame = diagnosis.to_frame()
     assert set(frame["effect"]) == {p.effect for p in document.physics} == {"conduction_path"}
     assert diagnosis.summary().startswith(f"{document.verdict} in ")
+    assert repr(diagnosis) == diagnosis.summary()
     bars = [bar.get_height() for bar in diagnosis.plot().axes[0].patches if isinstance(bar, Rectangle)]
     assert bars[0] == document.improvement.fit.rms_before
     assert re.search(r"\br2\b", diagnosis._repr_html_())

@@ -125,6 +125,9 @@ class Diagnosis:
 
         return plot(self.document())
 
+    def __repr__(self) -> str:
+        return self.summary()
+
     def _repr_html_(self) -> str:
         table = self.to_frame().to_html(index=False, float_format="{:.4g}".format)
         return f"<pre>{escape(self.summary())}</pre>{table}"

@@ -117,6 +117,9 @@ class Fit:
 
         return plot(self)
 
+    def __repr__(self) -> str:
+        return self.summary()
+
     def _repr_html_(self) -> str:
         return self.to_frame().to_html(float_format="{:.4g}".format)
 
