@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import re
 import shlex
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +19,7 @@ from discovery.experiment.modelfits import fit_entry
 from discovery.fitting import Fit
 from discovery.models import Model
 from discovery.recordings import Campaign
+from tests.heaters import thinned
 from tests.small import EXPERIMENT, write_small
 
 ROOT = Path(__file__).parents[2]
@@ -123,14 +122,7 @@ def test_the_lines_for_a_notebook_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """On every second reading of the heaters, in less than half the time."""
-    board = tmp_path / "datasets" / "tclab"
-    board.mkdir(parents=True)
-    for path in (ROOT / "datasets" / "tclab").glob("*.csv.gz"):
-        header, *rows = gzip.decompress(path.read_bytes()).splitlines(keepends=True)
-        (board / path.name).write_bytes(gzip.compress(b"".join([header, *rows[::2]])))
-    shutil.copy(ROOT / "datasets" / "tclab" / "campaign.toml", board)
-    (tmp_path / "experiments").symlink_to(ROOT / "experiments")
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.chdir(thinned(tmp_path))
     names: dict[str, object] = {}
     for block in _blocks("docs/python.md", "python"):
         exec(compile(block, "docs/python.md", "exec"), names)
