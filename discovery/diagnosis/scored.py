@@ -134,17 +134,15 @@ class Scored:
         """(W, D) `level` under a noise setting for many draws at once; arguments as in `Grams.marginal`."""
         if self.outside or (self.sizes < 0).any():  # what presses against zero does not act
             return np.full((len(widths), 1 if weights is None else len(weights)), -inf)
-        found = []
         forms = self.grams[k].marginals(self.sizes, self._own_forms, weights, widths)
-        for level, step, covariance in forms:
-            level = level + self.settings[k].log_weight - float(np.log(len(forms)))
-            for j in range(len(self.sizes)):
-                one = self.slab.take(np.full(level.size, j))
-                mean, variance = self.at[j] + step[..., j], covariance[..., j, j]
-                level = level + one.average(mean.ravel(), variance.ravel()).reshape(level.shape)
-                level = level + 0.5 * np.log(2 * np.pi)
-            found.append(level)
-        return np.asarray(log_sum_exp(np.array(found)))
+        level, step, covariance = (np.array(one) for one in zip(*forms, strict=True))
+        count = len(self.sizes)
+        if count:
+            mean, variance = self.at + step, np.diagonal(covariance, 0, -2, -1)
+            every = self.slab.take(np.tile(np.arange(count), level.size))
+            sizes = every.average(mean.ravel(), variance.ravel()).reshape(mean.shape)
+            level = level + sizes.sum(axis=-1) + 0.5 * count * float(np.log(2 * np.pi))
+        return log_sum_exp(level) + self.settings[k].log_weight - float(np.log(len(forms)))
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """The 95 % interval of a parameter under the most likely noise; None where it is at a bound."""

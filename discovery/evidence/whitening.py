@@ -275,7 +275,7 @@ class Whitened:
     def joined(self) -> list[Array]:
         """Residuals and sensitivities by recording, (R, Y, C) of the C columns that act there."""
         return [
-            np.concatenate([r[:, :, None], j[:, :, columns[1:] - 1]], axis=2)
+            np.ascontiguousarray(np.concatenate([r[:, :, None], j[:, :, columns[1:] - 1]], axis=2))
             for r, j, columns in zip(self.residuals, self.jacobians, self.acting, strict=True)
         ]
 

@@ -183,15 +183,14 @@ class _Builder:
                 return _Node(self.constant(self.numbers[name]))
             case Name(id=name):
                 return _Node(self.load(name), {name: self.constant(1.0)} if name in self.wrt else {})
-            case Apply(function="delay", arguments=(Name(id=channel), seconds)):
-                return self._delay(channel, self.node(seconds))
-            case Apply(function="lag", arguments=(inner, tau)):
-                # a model's own lags are states (models.expanded); these are those of candidates
-                return _Node(self.call(_lagged, self.node(inner).value, self.node(tau).value, memory=True))
-            case Apply(function="play", arguments=(inner, width)):
-                return self._play(self.node(inner), self.node(width))
             case Apply(function=function, arguments=arguments):
-                return self._apply(function, [self.node(argument) for argument in arguments])
+                if function == "delay" and isinstance(arguments[0], Name):
+                    return self._delay(arguments[0].id, self.node(arguments[1]))
+                of = [self.node(argument) for argument in arguments]
+                if function == "lag":
+                    # a model's own lags are states (models.expanded); these are those of candidates
+                    return _Node(self.call(_lagged, of[0].value, of[1].value, memory=True))
+                return self._play(*of) if function == "play" else self._apply(function, of)
 
     def _delay(self, channel: str, seconds: _Node) -> _Node:
         both = self.call(_delayed(channel), seconds.value, memory=True)
