@@ -234,11 +234,12 @@ def product(a, x, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_scale, size, read):  # type: ignore[no-untyped-def]
+def columns(which, ways, start, owner, into, into_scale, source, source_scale, size, read):  # type: ignore[no-untyped-def]
     """Sensitivities of the states at the reading instants.
 
     Args:
-        which, e, w0, w1: from `transitions`.
+        which: from `transitions`.
+        ways: (U, n, 3n) e, w0 and w1 of it, next to each other.
         start: (n, M) sensitivities at the first node.
         owner: (P,) column that a piece of forcing belongs to.
         into, into_scale: (P,) state that the piece enters and its scale (1/C).
@@ -252,35 +253,33 @@ def columns(which, e, w0, w1, start, owner, into, into_scale, source, source_sca
     pieces, count = size.shape[0], size.shape[1] // 2
     n, m = start.shape
     out = np.empty((read.shape[0], n, m))
-    s = start.copy()
+    z = np.zeros((3 * n, m))  # states, then forcing at the left end of the interval, then at the right end
     new = np.empty((n, m))
+    copy(start, z)
     r = 0
     while r < read.shape[0] and read[r] == 0:
-        copy(s, out[r])
+        copy(start, out[r])
         r += 1
     for k in range(count):
         if r >= read.shape[0]:
             break
-        u = which[k]
-        product(e[u], s, new)
+        for i in range(n, 3 * n):
+            for c in range(m):
+                z[i, c] = 0.0
         for p in range(pieces):
-            a = size[p, 2 * k]
-            b = size[p, 2 * k + 1]
-            if a == 0.0 and b == 0.0:
-                continue
             c = owner[p]
-            i = into[p]
-            scale = into_scale[p]
-            for q in range(n):
-                new[q, c] += (w0[u, q, i] * a + w1[u, q, i] * b) * scale
-            i = source[p]
-            if i >= 0:
-                scale = source_scale[p]
-                for q in range(n):
-                    new[q, c] -= (w0[u, q, i] * a + w1[u, q, i] * b) * scale
-        s, new = new, s
+            left, right = size[p, 2 * k], size[p, 2 * k + 1]
+            i = n + into[p]
+            z[i, c] += left * into_scale[p]
+            z[i + n, c] += right * into_scale[p]
+            i = n + source[p]
+            if i >= n:
+                z[i, c] -= left * source_scale[p]
+                z[i + n, c] -= right * source_scale[p]
+        product(ways[which[k]], z, new)
+        copy(new, z)
         while r < read.shape[0] and read[r] == k + 1:
-            copy(s, out[r])
+            copy(new, out[r])
             r += 1
     return out
 

@@ -77,9 +77,7 @@ def sensitivities(
         begin[:, : len(parameters)] *= grown[0]
     s = kernel.columns(
         trajectory.which,
-        trajectory.e,
-        trajectory.w0,
-        trajectory.w1,
+        np.concatenate([trajectory.e, trajectory.w0, trajectory.w1], axis=2),
         begin,
         np.array(owner, dtype=np.int64),
         into,
