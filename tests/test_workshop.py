@@ -8,14 +8,16 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from typer.testing import CliRunner
 
 from benchmarks.workshop.__main__ import main
 from benchmarks.workshop.machines import CASES
+from discovery.cli import app
 from discovery.effects.catalogue import catalogue
 
 
-def _files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, bytes]:
-    monkeypatch.setattr(sys, "argv", ["workshop", str(folder), "laser_a"])
+def _files(folder: Path, monkeypatch: pytest.MonkeyPatch, case: str = "laser_a") -> dict[str, bytes]:
+    monkeypatch.setattr(sys, "argv", ["workshop", str(folder), case])
     main()
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
@@ -49,3 +51,14 @@ def test_keys_name_effects_of_the_catalogue_at_states_of_the_model() -> None:
         for part in case.key.get("effects", [case.key]):
             assert part["effect"] in {None, "out of catalogue", *catalogue()}, name
             assert set(part["states"]) <= set(case.machine.states), name
+
+
+@pytest.mark.parametrize("case", ["gearbox_a", "robot_d"])
+def test_the_clock_of_a_machine_that_is_not_linear_is_not_blamed(
+    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Recordings that predict each other to 20 % like any factor, and say nothing about a clock."""
+    _files(tmp_path, monkeypatch, case)
+    done = CliRunner().invoke(app, ["check", str(tmp_path / case / "campaign.toml")])
+    assert done.exit_code == 0
+    assert "clock" not in done.output
