@@ -30,6 +30,7 @@ from discovery.diagnosis.verdict import (
     idle,
     refuted,
     runs_away,
+    unfinished,
     unforeseen,
 )
 from discovery.effects.catalogue import catalogue
@@ -204,10 +205,11 @@ def diagnose(
     fitting = improvement([runs[r] for r in fit if r in runs], outputs)
     proof = {r: improvement([runs[r]], outputs) for r in read if r in runs}
     each = [improvement([one], outputs) for one in runs.values()]
-    verdict = refuted(idle(found, verdict, each), proof)
+    unit = unit_of(campaign, outputs)
+    verdict = refuted(unfinished(idle(found, verdict, each), fitting, unit), proof)
     if not verdict.named and after is not None:
         after = None
-    verdict = unforeseen(verdict, proof, unit_of(campaign, outputs))
+    verdict = unforeseen(verdict, proof, unit)
     mine = tuple(searched(found, verdict, effects))
     further = _reasons(context, verdict, read, proof, effects, mine)
     verdict = replace(verdict, reasons=(*verdict.reasons, *further))

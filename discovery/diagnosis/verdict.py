@@ -279,15 +279,39 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     )
 
 
+def unfinished(verdict: Verdict, fitting: Improvement, unit: str) -> Verdict:
+    """The verdict with its names withdrawn where the repaired model misses the recordings that it was fitted
+    to by more than noise makes likely, and leaves more than it explains: the cause is another one.
+    """
+    if not verdict.named or fitting.mostly or not _misses(fitting, fitting.judged[1]):
+        return verdict
+    reason = (
+        "the effects that are sure enough leave more than they explain: free runs on the fitted recordings "
+        f"still miss by {_size(fitting, fitting.judged[1])} {unit}"
+    )
+    return replace(
+        verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
+    )
+
+
+def _misses(run: Improvement, rms: float) -> bool:
+    """Whether free runs miss their readings by more than noise and the fit make likely."""
+    return rms > thresholds.MISSED * run.expected
+
+
+def _size(run: Improvement, rms: float) -> str:
+    return f"{printed(rms)} ({printed(run.expected)} expected)"
+
+
 def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) -> Verdict:
     """The verdict where unseen recordings show what the recordings to fit do not: free runs miss their
     readings by more than noise and the uncertainty of the parameters make likely.
     """
     rms = {run: i.judged[1 if verdict.named else 0] for run, i in proof.items()}
-    missed = [run for run, i in proof.items() if rms[run] > thresholds.MISSED * i.expected]
+    missed = [run for run, i in proof.items() if _misses(i, rms[run])]
     if not missed:
         return verdict
-    sizes = ", ".join(f"{printed(rms[r])} on {r} ({printed(proof[r].expected)} expected)" for r in missed)
+    sizes = ", ".join(f"{_size(proof[r], rms[r])} on {r}" for r in missed)
     reason = (
         "from any start, free runs on held-out recordings miss more than noise and the fit explain: "
         f"rms {sizes} {unit}; something acts there that the recordings to fit do not show"

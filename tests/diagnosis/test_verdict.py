@@ -17,7 +17,7 @@ from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import SHORT
-from discovery.diagnosis.verdict import Verdict, decide, idle, refuted, runs_away, unforeseen
+from discovery.diagnosis.verdict import Verdict, decide, idle, refuted, runs_away, unfinished, unforeseen
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis, Key
 
@@ -466,7 +466,7 @@ def test_what_only_unseen_recordings_show_is_unexplained() -> None:
     assert unforeseen(nothing, {"r3": near}, "um") is nothing
     other = unforeseen(nothing, {"r3": near, "r4": far}, "um")
     assert other.word == "unexplained"
-    assert "rms 2.1 on r4 (1 expected) um" in other.reasons[-1]
+    assert "rms 2.1 (1 expected) on r4 um" in other.reasons[-1]
     better = Improvement(2.1, 0.5, 0.8, 0.0, 0.0, {}, unsure=0.6)  # a repair whose names were withdrawn
     assert unforeseen(nothing, {"r4": better}, "um").word == "unexplained"
     named = said(WET, {"fluid_convection": 0.9})
@@ -474,6 +474,21 @@ def test_what_only_unseen_recordings_show_is_unexplained() -> None:
     kept = unforeseen(named, {"r4": far}, "um")
     assert (kept.word, kept.named) == (named.word, named.named)
     assert "held-out recordings" in kept.reasons[-1]
+
+
+def test_names_that_leave_more_than_they_explain_are_withdrawn() -> None:
+    """Of 4.9 a repair leaves 3.9 where noise is 1.6; one that leaves 3.4 explains half of the squares, and
+    one that leaves 3.1 may leave noise alone.
+    """
+    named = said(WET, {"fluid_convection": 0.9})
+    poor, half, noisy = (
+        Improvement(old, new, 1.6, 0.1, 2.0, {}) for old, new in ((4.9, 3.9), (4.9, 3.4), (4.0, 3.1))
+    )
+    withdrawn = unfinished(named, poor, "um")
+    assert (withdrawn.word, withdrawn.named, withdrawn.candidates) == ("unexplained", (), named.named)
+    assert "miss by 3.9 (1.6 expected) um" in withdrawn.reasons[0]
+    assert unfinished(named, half, "um") is named
+    assert unfinished(named, noisy, "um") is named
 
 
 def test_one_recording_of_another_machine_is_told_and_refutes_nothing() -> None:
