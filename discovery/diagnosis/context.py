@@ -93,6 +93,14 @@ class Context:
         """The noise settings next to each one, by index."""
         return neighbours([s.place for s in self.settings])
 
+    @property
+    def unused_readings(self) -> list[str]:
+        """Channels that were measured and that the model gives, but that are no outputs."""
+        given = dict.fromkeys([*self.model.states, *self.model.outputs])
+        measured = {n for n, c in self.campaign.channels.items() if c.measured}
+        recorded = set(recorded_inputs(self.campaign, self.recordings, self.outputs))
+        return [n for n in given if n in measured & recorded]
+
     @cached_property
     def candidates(self) -> list[Hypothesis]:
         """Every effect at every place of the model where it can act."""

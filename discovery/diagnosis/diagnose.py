@@ -306,6 +306,10 @@ def _reasons(
     said = []
     if lost := ", ".join(r for r in read if r not in proof):
         said.append(f"the free run of the model diverges on {lost}, so the repair cannot be tested there")
+    if idle_readings := ", ".join(context.unused_readings):
+        said.append(
+            f"the readings of {idle_readings} take no part: list them under `outputs` of the experiment"
+        )
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
     answer = verdict.answer

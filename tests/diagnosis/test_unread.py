@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from discovery import UserError, diagnose
-from discovery.recordings import Recording
+from discovery.diagnosis.context import Context
+from discovery.models import Model, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
 from tests.diagnosis.parts import document
 from tests.machine import SEEN, campaign, changed, model, simulated
 
@@ -37,3 +43,17 @@ def test_an_unseen_recording_without_readings_proves_nothing() -> None:
     found = document(diagnose(model(wet=False), runs, ["r1", "r2"], ["r3"]))
     assert found["improvement"]["held_out"] == {}
     assert not any("runs away" in reason for reason in found["reasons"])
+
+
+def test_a_temperature_that_is_measured_and_no_output_is_found() -> None:
+    """Of two bodies only the first is an output: the sensor of the second one takes no part."""
+    channels = {n: Channel(n, "temperature", "degC", 0.02, "linear") for n in ("near", "far", "room")}
+    states = {n: State(n, "degC", 20_000.0, parse("20")) for n in ("near", "far", "inside")}
+    bodies = Model("two bodies", {}, states, (Term("link", "near", parse("far - near"), source="far"),), {})
+    values = dict.fromkeys(channels, np.full(3, 20.0))
+    seen = Campaign("bench", channels, {"a": Recording("a", np.arange(3.0), values)})
+    near = SimpleNamespace(campaign=seen, model=bodies, recordings=("a",), outputs=("near",))
+    unused: Any = Context.unused_readings
+    assert unused.fget(near) == ["far"]
+    near.outputs = ("near", "far")
+    assert unused.fget(near) == []
