@@ -1,12 +1,15 @@
 """A clock that runs fast makes all responses of its recording slow; a poor model makes those of all odd."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from discovery.recordings.campaign import Channel
+from discovery.recordings.compare import pace as of_clocks
 from discovery.recordings.compare.agreement import disagreements
+from discovery.recordings.compare.crossprediction import CrossPrediction
 from discovery.recordings.compare.seen import Seen
 
 CHANNELS = {
@@ -37,3 +40,20 @@ def test_a_clock_that_runs_at_another_pace(pace: float, said: str | None) -> Non
         [one] = found
         assert (one.recording, one.repair.kind) == ("odd", "pace")
         assert said in one.repair.what
+
+
+@pytest.mark.parametrize(("silent", "count"), [(("run3",), 1), (("run1", "run2", "run3"), 0)])
+def test_a_recording_that_nothing_predicts_is_no_judge(
+    silent: tuple[str, ...], count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that says nothing hides no clock; one judge alone convicts none."""
+    gained = of_clocks._gained
+
+    def nothing(
+        known: CrossPrediction, name: str, factor: float, without: Sequence[str] = ()
+    ) -> tuple[float, float, float, float]:
+        return (0.0, 0.0, 0.0, 0.0) if name in silent else gained(known, name, factor, without)
+
+    monkeypatch.setattr(of_clocks, "_gained", nothing)
+    found = disagreements([*(heated(f"run{k}", k) for k in range(4)), heated("odd", 9, 1.2)], CHANNELS)
+    assert [one.repair.kind for one in found] == ["pace"] * count
