@@ -19,21 +19,21 @@ WIDE = "not determined (95 % interval wider than the value)"
 _UNSEEN = 1e-4  # share of a column's length that the other unknowns leave; below it, it is not determined
 
 
-def covariance_of(problem: Problem, jacobian: Array, theta: Array) -> tuple[Array, list[str]]:
+def covariance_of(problem: Problem, gram: Array, theta: Array) -> tuple[Array, list[str]]:
     """Gauss-Newton covariance (U, U), and a sentence for each reason why readings leave parameters open,
     with their names.
 
     Args:
-        jacobian: (N, U) of whitened residuals and priors.
+        gram: (U, U) normal equations of whitened residuals and priors.
         theta: (U,) where the fit ended.
     """
     low = problem.bounds[0]
     total = len(problem.unknowns)
-    length = np.linalg.norm(jacobian, axis=0)
+    length = np.sqrt(np.diag(gram))
     lost: dict[str, list[str]] = {reason: [] for reason in (NO_EFFECT, NOT_SEPARATED, WIDE)}
     seen = length > 0
-    scaled = jacobian[:, seen] / length[seen]
-    size, direction = np.linalg.eigh(scaled.T @ scaled)
+    scaled = gram[np.ix_(seen, seen)] / np.outer(length[seen], length[seen])
+    size, direction = np.linalg.eigh(scaled)
     known = size > 1e-12 * size.max(initial=0.0)
     inverse = (direction[:, known] / size[known]) @ direction[:, known].T
     blind = np.sum(direction[:, ~known] ** 2, axis=1) > 1e-6  # part of a combination that nothing determines

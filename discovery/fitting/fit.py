@@ -198,7 +198,7 @@ def fit_model(
             problem, theta, current, loss, most, tolerance, together, goal, solution, () if solution else runs
         )
         theta = solution.theta
-        if not np.isfinite(solution.jacobian).all():
+        if not np.isfinite(solution.gram).all():
             raise RunsAwayError(f"the sensitivities of model '{model.name}' to its parameters are not finite")
         if last or solution.ended_early:
             break
@@ -214,7 +214,7 @@ def fit_model(
             alone = [innovations(t, current, r) for t, r in zip(solution.trajectories, left, strict=True)]
             before, together = together, readings_as_one(alone)
             settled = settled and abs(np.log(together / before)) < 0.1
-            spreads = _found_spreads(problem, solution.jacobian, theta, together)
+            spreads = _found_spreads(problem, solution.gram, theta, together)
             settled = settled and all(abs(np.log(new / old)) < 0.1 for new, old in spreads.values())
             problem = problem.spread(current, {name: new for name, (new, _) in spreads.items()})
         if settled and solution.converged:
@@ -252,7 +252,7 @@ def _covariance(
         together: how many times the priors of nuisances were counted; here they count once.
         excess: factor on the variance of the readings.
     """
-    covariance, lost = covariance_of(problem, solution.jacobian, solution.theta)
+    covariance, lost = covariance_of(problem, solution.gram, solution.theta)
     times = np.sqrt([together if u.is_nuisance else 1.0 for u in problem.unknowns])
     return covariance * excess * np.outer(times, times), lost
 
@@ -279,7 +279,7 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
 
 
 def _found_spreads(
-    problem: Problem, jacobian: Array, theta: Array, together: float
+    problem: Problem, gram: Array, theta: Array, together: float
 ) -> dict[str, tuple[float, float]]:
     """By state: the spread of its starts that makes them most likely, and the one before. By output with a
     zero of its own in each recording: the same of its zeros.
@@ -289,7 +289,7 @@ def _found_spreads(
     asked = {u.name for u in problem.unknowns if u.spread == "fitted"}
     if not asked:
         return {}
-    covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+    covariance = np.linalg.pinv(gram, hermitian=True)
     found = {}
     for name in asked:
         mine = [i for i, u in enumerate(problem.unknowns) if u.name == name and u.spread == "fitted"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -100,7 +101,13 @@ class Problem:
 
     def concerns(self, system: System) -> list[int]:
         """Indices of the unknowns that act in a recording."""
-        return [i for i, u in enumerate(self.unknowns) if u.recording in (None, system.grid.recording)]
+        return self._acting.get(system.grid.recording, self._acting[None])
+
+    @cached_property
+    def _acting(self) -> dict[str | None, list[int]]:
+        """By recording that has unknowns of its own; None: in any other one."""
+        own = {None, *(u.recording for u in self.unknowns)}
+        return {name: [i for i, u in enumerate(self.unknowns) if u.recording in (None, name)] for name in own}
 
     def spread(self, noise: Noise, found: Mapping[str, float] | None = None) -> Problem:
         """The problem with the priors of its start values as a noise has them.
@@ -173,13 +180,19 @@ class Problem:
 
     def jacobian(self, trajectory: Trajectory) -> Array:
         """dy/d(unknowns) of a recording, (R, Y, U), zero for unknowns of other recordings."""
+        dy = self.slopes(trajectory)
+        out = np.zeros((*dy.shape[:2], len(self.unknowns)))
+        out[:, :, self.concerns(trajectory.system)] = dy
+        return out
+
+    def slopes(self, trajectory: Trajectory) -> Array:
+        """dy/d(unknowns that act in a recording), (R, Y, C), in the order of `concerns`."""
         system = trajectory.system
         mine = self.concerns(system)
         late = [i for i in mine if self.unknowns[i].is_late]
         starts = [i for i in mine if self.unknowns[i].is_start]
         # sensitivities() takes the channel of an offset like a parameter
         parameters = [i for i in mine if i not in starts and i not in late]
-        ordered = [*parameters, *starts, *late]
         dy = sensitivities(
             trajectory,
             [self.unknowns[i].name for i in parameters],
@@ -187,9 +200,7 @@ class Problem:
             moved_in_time(trajectory, [self.unknowns[i].name for i in late]),
             len(late),
         )
-        out = np.zeros((*dy.shape[:2], len(self.unknowns)))
-        out[:, :, ordered] = dy
-        return out
+        return dy[:, :, np.argsort([*parameters, *starts, *late])]
 
 
 def make_problem(

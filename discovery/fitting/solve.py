@@ -38,11 +38,11 @@ class Solution:
 
     theta: Array  # (U,)
     trajectories: tuple[Trajectory, ...]
-    jacobian: Array  # (N, U) of whitened residuals and priors
+    gram: Array  # (U, U) normal equations of whitened residuals and priors
     cost: float  # half the sum of their squares
     converged: bool = True  # no step helps any more; else the rounds were used up
     ended_early: bool = False  # it would not have come near its goal
-    slopes: tuple[Array, ...] = ()  # by recording (R, Y, U): sensitivities of the outputs, not whitened
+    slopes: tuple[Array, ...] = ()  # by recording (R, Y, C): sensitivities of the outputs, not whitened
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,8 @@ class _Run:
 
 
 Filters = tuple[Filter | None, ...]
+# the unknowns (C,) that act in each recording, and how its whitened residual (N, C) moves with them
+Jacobian = list[tuple[list[int], Array]]
 
 
 def solve(
@@ -100,9 +102,7 @@ def solve(
     jacobian = _jacobian(problem, x, noise, together, now, filters, slopes)
     course, done, late = [cost], len(x) == 0, False
     for left in range(max_rounds if len(x) else 0, 0, -1):
-        weight, slope = _weights(now.residual, loss)
-        rows = jacobian if loss == "linear" else jacobian * weight[:, None]
-        gram, gradient = rows.T @ rows, jacobian.T @ slope
+        gram, gradient = _normal(jacobian, now.residual, len(x), loss)
         found = None
         while damping < _HOPELESS:
             moved = np.clip(x + _step(x, gram, gradient, damping, low, high), low, high)
@@ -140,7 +140,8 @@ def solve(
         if done or late:
             break
     square = float(now.residual @ now.residual)
-    return Solution(x, now.trajectories, jacobian, 0.5 * square, done, late, slopes)
+    gram = _normal(jacobian, now.residual, len(x), "linear")[0]
+    return Solution(x, now.trajectories, gram, 0.5 * square, done, late, slopes)
 
 
 def cost_under(problem: Problem, theta: Array, trajectories: Sequence[Trajectory], noise: Noise) -> float:
@@ -176,7 +177,7 @@ def _whitened(
 
 
 def _slopes(problem: Problem, trajectories: tuple[Trajectory, ...]) -> tuple[Array, ...]:
-    return tuple(problem.jacobian(t) for t in trajectories)
+    return tuple(problem.slopes(t) for t in trajectories)
 
 
 def _jacobian(
@@ -187,12 +188,26 @@ def _jacobian(
     run: _Run,
     filters: Filters,
     slopes: tuple[Array, ...],
-) -> Array:
+) -> Jacobian:
+    """How the residual moves: of each recording, then of the priors."""
     parts = [
-        whiten(t, noise, -slope, part)
+        (problem.concerns(t.system), whiten(t, noise, -slope, part))
         for t, slope, part in zip(run.trajectories, slopes, filters, strict=True)
     ]
-    return np.concatenate([*parts, problem.prior_rows(x, together)[1]])
+    return [*parts, (list(range(len(x))), problem.prior_rows(x, together)[1])]
+
+
+def _normal(jacobian: Jacobian, residual: Array, unknowns: int, loss: Loss) -> tuple[Array, Array]:
+    """Normal equations (U, U) and the slope (U,) of the cost."""
+    weight, slope = _weights(residual, loss)
+    gram, gradient, done = np.zeros((unknowns, unknowns)), np.zeros(unknowns), 0
+    for acting, rows in jacobian:
+        here = slice(done, done + len(rows))
+        gradient[acting] += rows.T @ slope[here]
+        weighted = rows if loss == "linear" else rows * weight[here, None]
+        gram[np.ix_(acting, acting)] += weighted.T @ weighted
+        done = here.stop
+    return gram, gradient
 
 
 def _step(x: Array, gram: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:

@@ -201,7 +201,8 @@ def told(theta: list[float], columns: list[list[float]]) -> tuple[Array, list[st
     """Covariance and sentences for `a` (not below 0), `g` and `k` at theta, of a start that plays no part."""
     problem = make_problem(model(), campaign(recording(0)), ["r0"])
     assert [u.name for u in problem.unknowns] == ["a", "g", "k", "y"]
-    return covariance_of(problem, np.column_stack([*columns, [0.0] * 4]), np.array([*theta, 0.0]))
+    jacobian = np.column_stack([*columns, [0.0] * 4])
+    return covariance_of(problem, jacobian.T @ jacobian, np.array([*theta, 0.0]))
 
 
 def test_a_number_that_its_interval_drowns_is_named_unless_it_lies_at_its_bound() -> None:
