@@ -203,8 +203,9 @@ def _shown_beyond(
     here = replace(h, shapes={n: sizes[n] for n in h.shapes})
     added = signatures(run, [here]) @ np.array([sizes[n] for n in h.amplitudes])
     points = _points(run, scales, h.states[0] if h.states else "", index, count)
-    at_readings = [p[np.minimum(2 * read, len(p) - 1)] for p in points]
-    return np.stack([added * p[:, None] for p in at_readings], axis=2)
+    at_readings = [p[np.minimum(2 * read, len(p) - 1), None, None] for p in points]
+    none = np.zeros((*added.shape, 0))  # where no input and no state moves
+    return np.concatenate([none, *(added[:, :, None] * p for p in at_readings)], axis=2)
 
 
 def _pieces(run: Trajectory, term: Term, points: Sequence[Array], first: int) -> list[Column]:

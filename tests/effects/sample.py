@@ -149,10 +149,16 @@ def expand(effect: Effect, without: Collection[str] = ()) -> list[Hypothesis]:
     return claims(errors() if effect.place in OF_ERRORS else model, effect, channels)
 
 
-def trajectory(model: Model, recording: str = "two") -> Trajectory:
-    """Free run of a model of the sample machine."""
+def trajectory(model: Model, recording: str = "two", still: bool = False) -> Trajectory:
+    """Free run of a model of the sample machine; `still`: no input moves."""
     inputs = [n for n in CHANNELS if not n.startswith("E_")]
-    grid = make_grid(campaign(), recording, inputs, ("E_Y", "E_Z"))
+    recorded = campaign()
+    if still:
+        one = recorded.recordings[recording]
+        values = {name: np.full(len(one.time), one.values[name][0]) for name in inputs}
+        held = replace(one, values={**one.values, **values})
+        recorded = replace(recorded, recordings={recording: held})
+    grid = make_grid(recorded, recording, inputs, ("E_Y", "E_Z"))
     return simulate(make_system(model, grid), model.values(recording))
 
 

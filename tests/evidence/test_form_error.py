@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from discovery.dynamics import Trajectory, make_grid, make_system, predict, simulate
-from discovery.evidence.form_error import INNER, inner_columns, place_columns
+from discovery.effects.catalogue import Effect, catalogue
+from discovery.evidence.form_error import INNER, effect_form, inner_columns, place_columns
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
+from tests.effects.sample import expand, inside, machine_for, trajectory
 
 Array = NDArray[np.float64]
 
@@ -56,3 +58,13 @@ def test_places_explain_what_lumping_a_bar_of_two_cells_leaves(run: Trajectory) 
     rest = left - columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
     assert np.std(left) > 1.0
     assert np.std(rest) < 0.1 * np.std(left)
+
+
+@pytest.mark.parametrize("effect", catalogue().values(), ids=list(catalogue()))
+def test_a_step_test_shows_no_operating_points(effect: Effect) -> None:
+    """One recording in which no input moves: an effect may be off where its body moves, or nowhere."""
+    for h in {h.key: inside(h) for h in expand(effect)}.values():
+        run = trajectory(h.added_to(machine_for(effect), dict.fromkeys(h.amplitudes, 0.1)), still=True)
+        (columns,) = effect_form([run], [h])
+        assert columns.shape[:2] == run.system.grid.readings.shape
+        assert np.isfinite(columns).all()
