@@ -45,7 +45,8 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "~temp ~temperature ~temperatur temperaturen ~temperatura temperatures temps ~温度 ~气温 ~気温 ~온도 "
         "~температура ~темп",
     ),
-    ("temp", {"temperature": 5}, "t ti tc thermo ~thermocouple ~thermoelement rtd pt100 pt1000 ntc ~熱電対"),
+    ("temp", {"temperature": 5}, "t ti tc te tt thermo ~thermocouple ~thermoelement rtd"),
+    ("temp", {"temperature": 5}, "pt100 pt1000 ntc ~熱電対"),
     ("temp", {"temperature": 6}, "~水温 ~油温 ~液温 ~體溫 ~表面温"),
     ("temp", {"temperature": 3}, "indoor indoors sensor ~fuehler ~センサ"),
     (
@@ -83,6 +84,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         {"flow": 6},
         "flow ~flow_rate ~durchfluss ~volumenstrom ~volume_stream ~流量 ~유량 debit ~portata ~caudal ~расход",
     ),
+    ("flow", {"flow": 3}, "ft"),  # ISA tags: FT110 sends a flow, TT140 a temperature
     ("pump", {"flow": 6}, "pump ~pumpe pumps ~ポンプ ~泵 ~펌프 pompe ~pompa bomba ~насос ~pomp cerpadlo"),
     (
         "speed",
@@ -100,7 +102,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "power",
         {"power": 6},
         "power p pw watt watts ~leistung ~wirkleistung ~電力 ~消費電力 ~功率 ~전력 puissance potenza "
-        "potencia ~vermogen moc vykon effekt ~мощность q ph",
+        "potencia ~vermogen moc vykon effekt ~мощность q ph qh qheat",
     ),
     (
         "heat",
@@ -146,8 +148,16 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "pressure",
         {"other": 7},
         "pressure ~druck ~圧力 ~压力 ~압력 pression pressione presion ~vibration ~schwingung ~振動 "
-        "~振动 acceleration accel co2 ~solar irradiance ~日射 wind ~leitfaehigkeit ~conductivity",
+        "~振动 acceleration accel co2 wind ~leitfaehigkeit ~conductivity",
     ),
+    (
+        "irradiance",
+        {"other": 7},
+        "~irradiance ~irradiation ~radiation ~einstrahlung ~globalstrahlung irrad insolation "
+        "ghi dni dhi poa gti ~日射",
+    ),
+    ("sun", {"other": 4}, "~solar sol isol sun sonne"),
+    ("angle", {"other": 6}, "~azimut zenith elevation altitude declination aoi angle ~winkel"),
     (
         "efficiency",
         {"other": 6},
@@ -230,7 +240,7 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
 
 # names that are formulas rather than words
 _FORMS: tuple[tuple[str, Mapping[str, float], str], ...] = (
-    ("error", {"displacement": 6}, r"\be ?[xyzabcr]\d?[0a-z]*\b"),
+    ("error", {"displacement": 6}, r"\be ?[xyzabcr](\d[a-z]*|[abcsxyz]{0,2})\b"),  # of ISO 230, not "east"
     ("inlet", {"fluid": 6}, r"\b(hot|cold|water|steam|shell|tube|feed|primary|secondary) in(let)?\b"),
     ("disp", {"displacement": 4}, r"\b(d|delta) ?[xyz](?![^\W\d_])"),
     ("disp", {"displacement": 2, "position": 2}, r"\b[xyz](?![^\W\d_])"),

@@ -75,6 +75,16 @@ CASES = [
     ("incubator temp", "", np.linspace(59, 61, 50), "temperature", "degC"),
     ("Ta", "", np.linspace(2, 14, 50), "ambient temperature", "degC"),
     ("yTi1", "", np.linspace(19, 24, 50), "temperature", "degC"),
+    ("east", "", np.linspace(20, 60, 50), "temperature", "degC"),
+    ("HX_ExhOut", "", np.linspace(20, 60, 50), "temperature", "degC"),
+    ("Exosun", "", np.linspace(-44, 44, 50), "other input", "1"),
+    ("EXX", "", np.linspace(0, 20, 50), "error", "um"),
+    ("TT140", "", np.linspace(2, 95, 50), "temperature", "degC"),
+    ("te_in", "", np.linspace(280, 322, 50), "temperature", "K"),
+    ("Solar_flow_rate", "", np.linspace(15, 25, 50), "fluid flow", "l/min"),
+    ("I_sol", "", np.linspace(0, 900, 50), "other input", "1"),
+    ("zenith", "", np.linspace(64, 160, 50), "other input", "1"),
+    ("Qh", "", np.arange(50) % 2 * 1920.0, "heat load", "W"),
 ]
 
 
