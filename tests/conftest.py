@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 # These take twenty seconds or more each. They come first: whoever is done with short ones takes more of them.
 LONG = (
     "test_the_tutorial_prints_what_it_says",
-    "test_free_runs_out_of_phase_do_not_hide_the_law",
     "test_a_true_first_answer_in_two_commands",
     "test_killed_at_any_instant_it_returns_to_the_same_offsets[instants0]",
     "test_the_cutting_fluid_is_found_by_a_model_of_the_dry_machine",
