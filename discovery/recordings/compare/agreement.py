@@ -49,6 +49,7 @@ _POOR = (
     0.5  # of the movement: what others predict no better has causes that nobody recorded, and says nothing
 )
 _TWO_AGREES = 0.4  # of the movement itself
+_APART = 2.0  # times the usual movement: others do not know how what begins so far away goes on
 _BEGINS = 5.0  # K: by so much more a temperature begins elsewhere than in any other recording
 _FREE_AGREES = 0.3  # of the movement: a drift or an offset of any size fits a little of a poor prediction
 # how much larger the gain of a less usual damage must be to go before a usual one
@@ -128,7 +129,8 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
             least = _INVERTED
         whole = b > _FAR * limit and a < _BACK * limit and gain > _WHOLE and not two
         # an offset of free size and place fits a little of anything: it has to explain the whole
-        if agrees and (whole or (gain > least and repair.kind != "offset")):
+        helps = agrees and (whole or (gain > least and repair.kind != "offset"))
+        if helps and not any(_begins_apart(known, repair, y) for y in touched):
             found.append((gain - 2 * _DOUBT[repair.kind], Disagreement(one.name, repair, b, a, limit, gain)))
     return found
 
@@ -145,6 +147,15 @@ def _begins_elsewhere(known: CrossPrediction, one: Seen, repair: Repair) -> bool
             if then > now + _BEGINS:
                 return True
     return False
+
+
+def _begins_apart(known: CrossPrediction, repair: Repair, y: str) -> bool:
+    """Return whether an output begins far from where it begins in any other recording, also after a repair:
+    none of them says how it goes on from there.
+    """
+    made = repair.made
+    reading = readings_of(made, y) if y in repair.channels else known.readings[made.name, y]
+    return reading is not None and known.begins_apart(made.name, y, reading) > _APART
 
 
 def _first(one: Seen, name: str) -> float:

@@ -82,7 +82,8 @@ class CrossPrediction:
         self.recordings = {one.name: one for one in recordings}
         self.channels = channels
         self.inputs, self.outputs, self.taus = list(inputs), list(outputs), list(taus)
-        self.has_room = any(channels[name].role == "ambient temperature" for name in inputs)
+        rooms = [channels[name] for name in inputs if channels[name].role == "ambient temperature"]
+        self.has_room = any(not room.spread for room in rooms)  # one with a spread is a guess
         self.responses = {
             one.name: (known or {}).get(one.name) or self.responses_of(one) for one in recordings
         }
@@ -157,6 +158,11 @@ class CrossPrediction:
             if predicted.theta and reading is not None:
                 found.append(self.misfit(predicted, y, reading))
         return max(float(np.median(found)) if found else 0.0, LEAST)
+
+    def begins_apart(self, name: str, y: str, reading: Reading) -> float:
+        """How far an output begins from where it begins in any other recording, in parts of its movement."""
+        others = [r.first for (n, of), r in self.readings.items() if of == y and n != name and r is not None]
+        return min((abs(reading.first - first) for first in others), default=0.0) / max(self.size[y], 1e-12)
 
     def with_any(self, changed: set[str]) -> list[str]:
         """Inputs and products that hold one of some inputs."""
