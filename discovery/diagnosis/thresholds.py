@@ -22,7 +22,7 @@ FORMS = {(0.0, 0.0): 0.25, (0.0, 0.1): 0.25, (0.025, 0.1): 0.25, (0.08, 0.1): 0.
 SLOW = {0.0: 0.35, 0.3: 0.35, 1.0: 0.2, 3.0: 0.08, 10.0: 0.02}  # slow noise of outputs, in reading noises
 FORM = 0.2  # of the flow of a named effect, at each operating point: no law is quite that of nature
 UNKNOWN_HEAT = (1.0, 3.0, 10.0, 30.0)  # "none of these": times the unrecorded heat of a body ...
-UNKNOWN_SHARES = (0.0, 0.25, 0.8)  # ... and share of what flows through it; each pair is as likely
+UNKNOWN_SHARES = (0.0, *(share for share in SHARES if share > SHARE))  # ... and of its flows; pairs alike
 
 # --- effects ----------------------------------------------------------------------------------------------
 BELIEF = 0.5  # log of the factor within which the start values of a hand-built model are believed
