@@ -45,6 +45,14 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 gc.disable()  # while tests are collected: all that is imported stays
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Workers compile in turn."""
+    if hasattr(config, "workerinput"):
+        from tests.kernels import compile_in_turn
+
+        compile_in_turn()
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Long tests first, all others in their order."""
     items.sort(key=lambda item: LONG.index(item.name) if item.name in LONG else len(LONG))

@@ -168,9 +168,9 @@ def test_killed_at_any_instant_it_returns_to_the_same_offsets(
     model_file: Path, tmp_path: Path, instants: tuple[float, ...]
 ) -> None:
     """The command itself, killed with -9 again and again, against one that was left alone."""
-    source = tmp_path / "two_days.csv"
+    source = tmp_path / "a_day.csv"
     with gzip.open(Path(__file__).parents[2] / "datasets" / "nmv5000" / "validation.csv.gz", "rt") as rows:
-        source.write_text("".join(itertools.islice(rows, 3200)))
+        source.write_text("".join(itertools.islice(rows, 1600)))
 
     def command(folder: str) -> list[str]:
         return [
@@ -205,7 +205,7 @@ def test_killed_at_any_instant_it_returns_to_the_same_offsets(
     subprocess.run(command("killed"), check=True)
 
     whole, again = ((tmp_path / f"{name}.csv").read_text().splitlines() for name in ("whole", "killed"))
-    assert len(whole) > 15_000
+    assert len(whole) > 7_500
     assert [row.split(",")[0] for row in again] == [
         row.split(",")[0] for row in whole
     ]  # none lost or doubled
