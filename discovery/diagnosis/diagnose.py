@@ -312,5 +312,9 @@ def _reasons(
         )
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
+    if (
+        verdict.word == UNEXPLAINED
+    ):  # what a fit finds of its inputs may stand for the cause that nobody knows
+        return said
     answer = verdict.answer
     return [*said, *late.sentences(answer.fit), *noisy.sentences(answer.fit, answer.noise)]

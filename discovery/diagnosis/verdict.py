@@ -111,7 +111,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
                 f"{best.evidence - alone:.0f} more log evidence"
             )
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
-    further = (*(idle[key] for key in nothing), *_apart(found, answer, unsure))
+    further = (*(idle[key] for key in nothing), *_apart(found, answer, unsure, least, matters))
     every = (*reasons, *further)
     if named:
         kinds = {n.hypothesis.effect.is_physics for n in named}
@@ -344,25 +344,30 @@ def _coarse(found: Search) -> tuple[str, ...]:
     )
 
 
-def _apart(found: Search, answer: Scored, rest: Sequence[Named]) -> tuple[str, ...]:
-    """A sentence for each effect of the answer that is not sure enough to be named, with its rival."""
+def _apart(
+    found: Search, answer: Scored, rest: Sequence[Named], least: float, matters: bool
+) -> tuple[str, ...]:
+    """A sentence for each effect of the answer that is not sure enough to be named, with its rival.
+
+    Args:
+        least: log evidence that a name has to add.
+        matters: whether the answer changes free runs at all.
+    """
     sentences = []
     for n in rest:
         added = _added(found, answer, n.hypothesis)
+        evidence = (
+            f"{printed(added)} of the {printed(least)} that a name needs" if added < least else f"{added:.0f}"
+        )
         sentence = (
             f"{n.hypothesis.effect.word} at {n.hypothesis.where} is possible but not sure enough to be named "
-            f"(probability {n.probability:.2f}, log evidence {added:.0f}{_lacking(added)})"
+            f"(probability {n.probability:.2f}, log evidence {evidence})"
         )
         if n.rivals and n.rivals[0].below < added:
             other, below = n.rivals[0].hypothesis, n.rivals[0].below
             sentence += f"; {other.effect.word} at {other.where} instead has {below:.1f} less"
-        sentences.append(sentence)
+        sentences.append(sentence if matters else f"{sentence}; it does too little for free runs")
     return tuple(sentences)
-
-
-def _lacking(added: float) -> str:
-    """What a name has to add, where this is what an effect lacks."""
-    return f" of the {thresholds.SHORT:g} that a name needs" if added < thresholds.SHORT else ""
 
 
 def _added(found: Search, answer: Scored, h: Hypothesis) -> float:

@@ -34,6 +34,7 @@ Place = Literal[
     "seat",  # a body as all errors see it; the formula is added to its temperature there
     "lever",  # a body; each error sees the formula with a lever of its own
     "output",  # one output, all recordings
+    "output of a state",  # the same, of a state of the model: where none is, the body itself lags
     "output that is no temperature",  # the same; what a thermometer shows beyond the model is heat
     "output of errors",  # the same, of a model whose states are errors
     "output of a recording",  # one error in one recording

@@ -99,8 +99,9 @@ def spots(
             yield from _of_inputs(model, parts, channels)
         case "error state":
             yield from (Spot((name,)) for name in parts.errors)
-        case "output" | "output of a recording" | "output of errors" | "output that is no temperature":
-            yield from (Spot(outputs=(name,)) for name in _single_outputs(effect, parts, outputs, channels))
+        case place if place.startswith("output"):
+            single = _single_outputs(effect, model, parts, outputs, channels)
+            yield from (Spot(outputs=(name,)) for name in single)
         case "seat" | "lever":
             for b in parts.bodies:
                 moved = tuple(y for y in outputs if b in names(model.outputs.get(y, Name(y))))
@@ -116,10 +117,17 @@ def spots(
 
 
 def _single_outputs(
-    effect: Effect, parts: Layout, outputs: tuple[str, ...], channels: Mapping[str, Channel]
+    effect: Effect,
+    model: Model,
+    parts: Layout,
+    outputs: tuple[str, ...],
+    channels: Mapping[str, Channel],
 ) -> tuple[str, ...]:
     """Outputs of which one alone shows an effect."""
     match effect.place:
+        case "output of a state":
+            states = {*parts.bodies, *parts.errors}
+            return tuple(n for n in outputs if states & names(model.outputs.get(n, Name(n))))
         case "output of errors" if parts.bodies:
             return ()
         case "output that is no temperature":

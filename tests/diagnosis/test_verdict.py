@@ -174,7 +174,7 @@ def test_a_name_needs_evidence_of_its_own() -> None:
     assert [n.hypothesis for n in found.named] == [FLUID]
     assert found.reasons == (
         f"friction_speed at {FRICTION.where} is possible but not sure enough to be named "
-        "(probability 0.95, log evidence 24)",
+        "(probability 0.95, log evidence 23.5 of the 23.6 that a name needs)",
     )
     both = pair(FLUID, FRICTION, 123.7, 100.0, 30.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
@@ -261,7 +261,9 @@ def test_names_hold_next_to_unsure_effects_that_explain_as_much_as_an_unknown_ca
 
 @pytest.mark.parametrize(("by", "word"), [(-0.01, "no mismatch"), (0.01, "missing physics")])
 def test_what_does_not_matter_in_free_runs_is_no_mismatch(by: float, word: str) -> None:
-    assert said(WET, {"fluid_convection": 0.95}, gain=thresholds.MATTERS + by).word == word
+    found = said(WET, {"fluid_convection": 0.95}, gain=thresholds.MATTERS + by)
+    assert found.word == word
+    assert any(r.endswith("it does too little for free runs") for r in found.reasons) is not bool(found.named)
 
 
 def test_heat_that_no_effect_explains_counts_though_the_effects_change_no_free_run() -> None:

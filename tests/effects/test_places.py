@@ -53,6 +53,15 @@ def test_a_fluid_that_is_late_already_is_later() -> None:
     assert np.allclose(found, expected, rtol=0, atol=1e-9)
 
 
+def test_what_lags_in_a_model_without_states_is_the_body() -> None:
+    """No sensor: a model that answers at once has no body whose time constant a lag could add to."""
+    outputs = {"E_Y": parse("0.02*drive"), "E_Z": parse("0.01*drive")}
+    still = Model("regression", {}, {}, (), outputs)
+    assert claims(still, catalogue()["sensor_lag"]) == []
+    assert {h.outputs for h in claims(still, catalogue()["second_time_constant"])} == {("E_Y",), ("E_Z",)}
+    assert {h.outputs for h in claims(sample()[0], catalogue()["sensor_lag"])} == {("E_Y",), ("E_Z",)}
+
+
 @pytest.mark.parametrize("word", [w for w, e in catalogue().items() if e.place in REPLACING])
 def test_what_stands_for_a_late_channel_is_written_read_and_simulated(word: str, tmp_path: Path) -> None:
     baseline = late(DELAYS)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -95,6 +97,20 @@ def test_switches_off_the_grid_of_the_logger_are_no_missing_physics(monkeypatch:
     assert found(seen) == ()
     monkeypatch.setattr("discovery.evidence.process_noise.JITTER", 0.0)
     assert found(seen) != ()
+
+
+@pytest.mark.parametrize(("word", "said"), [("missing physics", ["late"]), ("unexplained", [])])
+def test_what_may_stand_for_an_unknown_cause_is_not_said(
+    word: str, said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A resin that cures once gave "P_heater is logged 35 s early", which no clock was."""
+    module = import_module("discovery.diagnosis.diagnose")
+    monkeypatch.setattr(module.late, "sentences", lambda _: ["late"])
+    monkeypatch.setattr(module.noisy, "sentences", lambda *_: [])
+    monkeypatch.setattr(module, "not_offered", lambda *_: [])
+    context = SimpleNamespace(unused_readings=[], model=None, scene=None)
+    answer = SimpleNamespace(fit=None, noise=None)
+    assert module._reasons(context, SimpleNamespace(word=word, answer=answer), [], {}, [], []) == said
 
 
 def heavy(seed: int) -> Recording:
