@@ -14,9 +14,10 @@ _TRIED = 200  # stamps that are looked at
 _ROUGH = 0.2  # of a part: a stamp that is rounded more roughly says nothing
 _MOST = 6.0  # log odds that digits are worth
 # log odds before anything is seen: who writes no unit mostly means seconds
-_PRIOR = {"s": 0.0, "min": -1.5, "h": -2.5, "ms": -3.5, "d": -5.0}
+_PRIOR = {"s": 0.0, "min": -2.0, "h": -2.5, "ms": -3.5, "d": -5.0}
 _LENGTH = (np.log(5 * _HOUR), np.log(4.0))  # of a recording [s]: median and spread, both of the logarithm
 _STEP = (np.log(15.0), np.log(10.0))  # of a logger [s]
+_SMALL = 0.7  # correlation of the two: what answers quickly is recorded for a short time
 _ANSWER = (np.log(0.5 * _HOUR), np.log(4.0))  # s that a temperature needs for a third of its range
 # the same of what is not thermal: a spring, a tank, a motor, a cell
 _OTHERS = ((np.log(300.0), np.log(30.0)), (np.log(0.1), np.log(100.0)), (np.log(10.0), np.log(100.0)))
@@ -65,14 +66,18 @@ def time_odds(
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
     length = float(values[-1] - values[0])
     answers = [a for series in moving if (a := _answer(series, values)) is not None]
+    answer = float(np.median(answers)) if answers else None
     odds = {}
     for unit, prior in _PRIOR.items():
         scale = SECONDS[unit]
         kinds = [
             np.log(max(chance, 1e-12))
-            + _density(length * scale, of_length)
             + 0.5 * _density(step * scale, of_step)
-            + (_density(float(np.median(answers)) * scale, of_answer) if answers else 0.0)
+            + (
+                _density(length * scale, of_length)
+                if answer is None
+                else _both(length * scale, of_length, answer * scale, of_answer)
+            )
             for chance, (of_length, of_step, of_answer) in (
                 (thermal, (_LENGTH, _STEP, _ANSWER)),
                 (1.0 - thermal, _OTHERS),
@@ -121,6 +126,13 @@ def _answer(series: Array, clock: Array) -> float | None:
         if np.percentile(np.abs(x[lag:] - x[:-lag]), 95) > span / 3:
             return float(np.median(t[lag:] - t[:-lag]))
     return None
+
+
+def _both(a: float, about_a: tuple[float, float], b: float, about_b: tuple[float, float]) -> float:
+    """Logarithm of the density of two log-normal values that are small or large together."""
+    p, q = ((np.log(max(v, 1e-12)) - m) / s for v, (m, s) in ((a, about_a), (b, about_b)))
+    far = (p**2 + q**2 - 2 * _SMALL * p * q) / (1 - _SMALL**2)
+    return float(-0.5 * far - 0.5 * np.log(1 - _SMALL**2) - np.log(about_a[1] * about_b[1]))
 
 
 def _density(value: float, about: tuple[float, float]) -> float:
