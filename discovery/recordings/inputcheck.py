@@ -86,7 +86,8 @@ def _findings(
     do = f"{bridge} is used there; fill it in, or split the recording"
     if first == 0:
         do = "the first known value is used there; cut the beginning off"
-    yield Finding("warning", file, int(columns.lines[first]), what + more(len(gaps)), do)
+    kind = f"gap {gaps}"  # columns that are empty in the same rows share a line
+    yield Finding("warning", file, int(columns.lines[first]), what + more(len(gaps)), do, kind, channel.name)
 
 
 def inside(gaps: list[tuple[int, int]], size: int) -> NDArray[np.bool_]:
@@ -104,9 +105,18 @@ def _alone(
     readings: NDArray[np.bool_],
     uncovered: Mapping[str, NDArray[np.bool_]],
 ) -> Iterator[Finding]:
-    rows = {one: np.flatnonzero(readings & empty) for one, empty in uncovered.items()}
-    for one, alone in rows.items():
-        if alone.size:
-            what = f"'{one}' is not known at {alone.size} of {readings.sum()} readings of '{name}'"
-            do = f"record '{one}' as long as the readings, or leave these readings out"
-            yield Finding("warning", file, int(columns.lines[alone[0]]), what, do)
+    together: dict[bytes, list[str]] = {}
+    for one, empty in uncovered.items():
+        together.setdefault((readings & empty).tobytes(), []).append(one)
+    for names in together.values():
+        rows = np.flatnonzero(readings & uncovered[names[0]])
+        if rows.size:
+            said = ", ".join(f"'{one}'" for one in names)
+            what = (
+                f"{said} {'is' if len(names) == 1 else 'are'} not known at {rows.size} of {readings.sum()} "
+            )
+            do = f"record {'it' if len(names) == 1 else 'them'} as long as the readings, or leave these out"
+            kind = f"alone {names}"
+            yield Finding(
+                "warning", file, int(columns.lines[rows[0]]), f"{what}readings of '{name}'", do, kind, name
+            )
