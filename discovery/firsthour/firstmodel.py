@@ -89,6 +89,7 @@ def _temperature(
         heat, per = (f"{load}**2", f"{unit}**2") if squared(guesses[load]) else (load, unit)
         # a load that is counted below zero, as a discharge is, may warm all the same
         least = "" if guesses[load].below_zero and heat == load else "0.0"
+        per = f"({per})" if "/" in per else per  # of an irradiance
         gain = block.parameter(f"gain_{output}_{load}", "0.0", f"K/{per}/s", least=least)
         block.term(f"{load} warms {output}", output, f"{gain}*{heat}")
     for fan in [name for name, one in guesses.items() if one.quantity == "fan"] if room else []:

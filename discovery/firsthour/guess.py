@@ -15,8 +15,8 @@ from discovery.firsthour.odds import likely, probabilities
 from discovery.firsthour.shapes import Shape, shape
 from discovery.firsthour.table import Column
 from discovery.firsthour.unitodds import error_odds, flow_odds, load_odds, speed_odds, temperature_odds, usual
-from discovery.firsthour.vocabulary import fold
-from discovery.recordings.units import UnitError, conversion
+from discovery.firsthour.vocabulary import fold, words_of
+from discovery.recordings.units import UnitError, conversion, parse_unit
 
 Array = NDArray[np.float64]
 
@@ -25,6 +25,7 @@ _SENT = 0.85  # that what a controller sends is what heats
 NEXT = 0.02  # of an answer worth offering
 FLUIDS = ("fluid temperature", "coolant temperature")
 TEMPERATURES = ("ambient temperature", *FLUIDS, "temperature")
+SUN = "sun"  # irradiance: it warms what it falls on
 CURRENTS, VOLTAGES = ("A", "mA", "kA"), ("V", "mV", "kV")
 
 
@@ -58,6 +59,20 @@ class Guess:
         return replace(self, why=f"{self.why}; {why}", chance=min(self.chance, 0.7), **changes)  # type: ignore[arg-type]
 
 
+def is_irradiance(name: str, unit: str) -> bool:
+    """Whether a channel is the power of the sun on an area, by its name or its unit.
+
+    >>> is_irradiance("poa_irradiance", ""), is_irradiance("roof", "W/m²"), is_irradiance("humidity", "%")
+    (True, True, False)
+    """
+    if any(word.gloss == "irradiance" for word in words_of(name)):
+        return True
+    try:
+        return parse_unit(unit).is_compatible_with(parse_unit("W/m**2"))
+    except ValueError:
+        return False
+
+
 def guess(column: Column, hints: Sequence[tuple[str, Mapping[str, float]]] = ()) -> Guess:
     """Role and unit of a column by itself."""
     found = evidence_of(column, hints)
@@ -86,7 +101,8 @@ def guessed(column: Column, found: Evidence, alike: Sequence[Evidence]) -> Guess
     why = found.why(role)
     if found.quantity() == "signal":  # what a controller sends may heat, or not
         chance = min(chance, _SENT)
-    one = Guess(role, "1", why, chance, rivals=rivals, quantity=found.quantity())
+    quantity = SUN if is_irradiance(column.header, unit or "") else found.quantity()
+    one = Guess(role, "1", why, chance, rivals=rivals, quantity=quantity)
     if unit is not None:
         return _with_unit(one, unit, named is not None, column.unit)
     if spelled:
@@ -97,9 +113,10 @@ def guessed(column: Column, found: Evidence, alike: Sequence[Evidence]) -> Guess
 
 
 def drives(guesses: Mapping[str, Guess]) -> list[str]:
-    """What warms a machine: its heat loads, else its currents and speeds, else its voltages."""
+    """What warms a machine: its heat loads, else its currents and speeds, else its voltages; and the sun."""
     causes = {name: one for name, one in guesses.items() if one.role not in ("error", "other output")}
-    return _stated(causes) or [name for name, one in causes.items() if one.unit in VOLTAGES]
+    machine = _stated(causes) or [name for name, one in causes.items() if one.unit in VOLTAGES]
+    return machine + [name for name, one in causes.items() if one.role == OTHER and one.quantity == SUN]
 
 
 def squared(one: Guess) -> bool:

@@ -18,6 +18,7 @@ from discovery.firsthour.measures import DEGREES
 from discovery.firsthour.plan import Plan, plan, predicted
 from discovery.firsthour.recorded import Recorded, never_moves, recorded
 from discovery.firsthour.room import unknown_room
+from discovery.firsthour.shapes import shape
 from discovery.firsthour.table import OwnTable, read_tables
 from discovery.firsthour.tableguess import sensors_as_inputs
 from discovery.firsthour.texts import campaign_text, clock_doubt, csv_text
@@ -82,8 +83,8 @@ def new(
     if not outputs:
         raise UserError(
             f"{sources[0]}: no column looks like a measured temperature or error; say which one is to be "
-            f'predicted, as in --is "{found.seen[-1].header}=other output,{found.seen[-1].unit or "V"}" or '
-            '--is "CH1=error,um"'
+            f'predicted, as in --is "{_example(found)}=temperature,degC" or "...=error,um"; the '
+            f"columns are {', '.join(column.header for column in found.seen)}"
         )
     runs = list(found.recordings.values())
     air, about_room = unknown_room(runs[:-1], guesses, outputs)
@@ -121,6 +122,13 @@ def new(
         "",
         *_next(folder, guesses, found),
     ]
+
+
+def _example(found: Recorded) -> str:
+    """Header of the column that answers most slowly: a person sees at once how to name one of the own."""
+    forms = {column.header: shape(column.values) for column in found.seen}
+    jumps = {name: form.jump for name, form in forms.items() if form is not None and form.span > 0}
+    return min(jumps, key=lambda name: jumps[name], default=found.seen[-1].header)
 
 
 def _set_to_zero(errors: Iterable[str], before: Plan, after: Plan) -> str:

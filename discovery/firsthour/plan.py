@@ -15,7 +15,7 @@ from discovery.files import read_toml, write_atomic
 from discovery.firsthour.choosing import CANDIDATES, NOT_TRIED, Score, choose
 from discovery.firsthour.explain import FIRST_MODELS
 from discovery.firsthour.firstmodel import first_model, usual_inputs
-from discovery.firsthour.guess import FLUIDS, Guess, drives
+from discovery.firsthour.guess import FLUIDS, SUN, Guess, drives, is_irradiance
 from discovery.firsthour.inputs import strongest
 from discovery.firsthour.texts import experiment_text
 from discovery.firsthour.vocabulary import words_of
@@ -114,8 +114,10 @@ def _moves(campaign: Campaign, fit: Sequence[str], name: str) -> bool:
 
 def _as_guess(name: str, form: ChannelForm, campaign: Campaign, fit: Sequence[str]) -> Guess:
     """A channel of the campaign, said by a person or guessed before."""
-    words = words_of(name)
-    quantity = "fan" if any(w.gloss == "fan" for w in words) else "flow" if form.role == "fluid flow" else ""
+    fan = any(word.gloss == "fan" for word in words_of(name))
+    quantity = "fan" if fan else "flow" if form.role == "fluid flow" else ""
+    if is_irradiance(name, form.unit):
+        quantity = SUN
     below = 0.0
     if form.role == "heat load":
         known = np.concatenate([campaign.recordings[r].values.get(name, np.empty(0)) for r in fit])

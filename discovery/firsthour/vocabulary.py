@@ -154,9 +154,9 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
         "irradiance",
         {"other": 7},
         "~irradiance ~irradiation ~radiation ~einstrahlung ~globalstrahlung irrad insolation "
-        "ghi dni dhi poa gti ~日射",
+        "i_sol ghi dni dhi poa gti ~日射",
     ),
-    ("sun", {"other": 4}, "~solar sol isol sun sonne"),
+    ("sun", {"other": 4}, "~solar sol sun sonne"),
     ("angle", {"other": 6}, "~azimut zenith elevation altitude declination aoi angle ~winkel"),
     (
         "efficiency",
