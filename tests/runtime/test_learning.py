@@ -17,7 +17,7 @@ def test_wear_is_followed_in_the_loop_and_an_unchanged_machine_is_left_alone(
     exported: Exported, tmp_path: Path, lost: float, follows: bool
 ) -> None:
     key = private_key(tmp_path / "key.pem")
-    plan = Plan([], [], 96.0)
+    plan = Plan([], [], 60.0)
     happening = world(plan, 4300, faults=False, ageing=False, lost=lost)
     found = live(
         exported, happening, plan, tmp_path, faults=False, learn=lambda: Learner(key), save_every_s=3600.0

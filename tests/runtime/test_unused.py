@@ -103,7 +103,7 @@ def test_an_input_that_does_nothing_stays_out(exported: Exported, quiet: Campaig
 
 def test_the_running_loop_takes_an_input_in(exported: Exported, tmp_path: Path) -> None:
     """Signed, and only after a shadow run with measured errors."""
-    plan = Plan([], [], 96.0)
+    plan = Plan([], [], 72.0)
     happening = world(plan, 4300, faults=False, ageing=False)
     speed, slow = fan(happening.times, 3)
     moved = happening.errors.copy(), happening.probed.copy()
