@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from math import isnan
 from pathlib import Path
 
 import numpy as np
@@ -103,8 +104,8 @@ def write_campaign(
     folder.mkdir(parents=True, exist_ok=True)
     channels = {name: {"role": role, "unit": unit} for name, (role, unit) in roles.items()}
     for name, frame in frames.items():
-        header, rows = ",".join(frame), zip(*frame.values(), strict=True)
-        lines = [",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in rows]
+        header, rows = ",".join(frame), zip(*(one.tolist() for one in frame.values()), strict=True)
+        lines = [",".join("" if isnan(v) else f"{v:.9g}" for v in row) for row in rows]
         (folder / f"{name}.csv").write_text("\n".join([header, *lines]) + "\n")
     recordings = {name: {"file": f"{name}.csv"} for name in frames}
     (folder / "campaign.toml").write_text(

@@ -83,11 +83,16 @@ def simulated(seed: int, begin: Begin = "cold") -> Simulated:
             x = x + before.random() * steady
         states = np.empty((n, bodies))
         dt = np.diff(t, append=t[-1] + step)
+        dry = link - np.diag(loss + link.sum(axis=1))
+        heat = np.outer(room, loss) + (gain @ power).T + np.outer(flow * fluid, wet)
+        long = np.minimum(dt, 0.3 / loss.max())
+        between, driven = (
+            long[:, None, None] * (dry - flow[:, None, None] * np.diag(wet)),
+            long[:, None] * heat,
+        )
         for k in range(n):
             states[k] = x
-            rate = loss * (room[k] - x) + link @ x - link.sum(axis=1) * x + gain @ power[:, k]
-            rate = rate + wet * flow[k] * (fluid[k] - x)
-            x = x + rate * min(dt[k], 0.3 / loss.max())
+            x = x + between[k] @ x + driven[k]
         frame: dict[str, Array] = {"time": np.asarray(t, dtype=np.float64)}
         if has_room:
             frame["T_env"] = np.round(room + rng.normal(0, 0.05, n), 2)
