@@ -237,7 +237,7 @@ def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdic
         return verdict
     reason = (
         "the surest effects change free runs too little to matter (rms lower by "
-        f"{printed(100 * _lower(runs))} % on average over the recordings)"
+        f"{100 * _lower(runs):.1f} % on average over the recordings)"
     )
     reasons = (reason, *_coarse(found), *verdict.reasons)
     word = UNEXPLAINED if _coarse(found) else NO_MISMATCH
