@@ -17,8 +17,8 @@ def one_recording(context: Context, _: Scored, h: Hypothesis) -> str | None:
     if len(context.recordings) > 1 or h.effect.search != "window":
         return None
     return (
-        f"with a single recording to fit, {h.effect.word} at {h.where} cannot be distinguished from a law that "
-        "differs a little from the model's; record the machine once more, or fit a held-out recording, too"
+        f"with a single recording to fit, {h.effect.word} at {h.where} cannot be distinguished from a law "
+        "that differs a little from the model's; record the machine once more, or fit a held-out recording, too"
     )
 
 
