@@ -18,7 +18,7 @@ def one_recording(context: Context, _: Scored, h: Hypothesis) -> str | None:
         return None
     return (
         f"with a single recording to fit, {h.effect.word} at {h.where} cannot be distinguished from a law "
-        "that differs a little from the model's; record the machine once more, or fit a held-out recording, too"
+        "that differs a little from the model's; record the machine once more, or fit a held-out recording"
     )
 
 
