@@ -39,7 +39,7 @@ RESOLUTION = {  # finer gives the same answer in more time
 }
 SHOWN = {  # what is shown with an answer, not the answer
     "evidence/late.py": "SAID SMALL",
-    "diagnosis/description.py": "MOST_TERMS LAGS",
+    "diagnosis/description.py": "MOST_TERMS LIMITS LAGS",
     "diagnosis/document.py": "CONSIDERED WRONG_READINGS",
     "diagnosis/location.py": "*",
     "diagnosis/proof.py": "CLOSABLE",

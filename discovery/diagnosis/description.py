@@ -1,8 +1,9 @@
 """A formula that describes missing heat if no effect of the catalogue fits. It is a description, not a cause.
 
 SINDy in the filtered form. The library has powers, products, thresholds, saturations and lags of the inputs
-and of the temperature of the body, each filtered through the model. Evidence chooses one term after the
-other.
+and of the temperature of the body, and what opens or shuts there to the temperatures around it, each filtered
+through the model. A temperature that is read counts as it was read: the model misses it. Evidence chooses one
+term after the other.
 """
 
 from __future__ import annotations
@@ -15,14 +16,16 @@ from numpy.typing import NDArray
 
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.scored import Scored
-from discovery.dynamics import Column, sensitivities
+from discovery.dynamics import Column, Trajectory, sensitivities
+from discovery.dynamics.grid import interleaved
 from discovery.evidence.bayes import project
 from discovery.evidence.latent_force import Force
-from discovery.terms import Expression, evaluate, parse
+from discovery.terms import Expression, Name, evaluate, parse
 
 Array = NDArray[np.float64]
 
 MOST_TERMS = 3
+LIMITS = tuple(0.1 * k for k in range(1, 10))  # quantiles of a temperature at which something may begin
 LAGS = (1 / 150, 1 / 40)  # of the longest recording: time constants of a description
 
 
@@ -47,11 +50,12 @@ class Curve:
 
 def describe(context: Context, current: Scored, force: Force) -> Description | None:
     """The best short formula for the heat of a force; None when no term adds evidence."""
-    library = _library(context, current, force.state)
+    bodies = [_read(t, force.state) for t in current.fit.trajectories]
+    library = _library(context, current, force.state, np.concatenate(bodies))
     setting = current.settings[current.best]
     columns = []
-    for trajectory in current.fit.trajectories:
-        env = trajectory.at_ends()
+    for trajectory, body in zip(current.fit.trajectories, bodies, strict=True):
+        env = {**trajectory.at_ends(), force.state: interleaved(body[:-1], body[1:])}
         pieces = [
             Column(
                 k,
@@ -103,7 +107,18 @@ def _evidence(gram: Array, dot: Array, chosen: Sequence[int], count: int) -> flo
     return float(found - 0.5 * len(chosen) * np.log(count))
 
 
-def _library(context: Context, current: Scored, state: str) -> list[tuple[str, Expression]]:
+def _read(run: Trajectory, state: str) -> Array:
+    """A state at the nodes (T,): as its own sensor reads it, else as the model has it."""
+    grid, series = run.system.grid, np.asarray(run.at_nodes()[state], dtype=float)
+    shown = [y for y, n in enumerate(grid.outputs) if run.system.model.outputs.get(n, Name(n)) == Name(state)]
+    seen = grid.measured[:, shown[0]] if shown else np.zeros(0, dtype=bool)
+    if not seen.any():
+        return series
+    missed = grid.readings[seen, shown[0]] - series[grid.read[seen]]
+    return np.asarray(series + np.interp(grid.time, grid.time[grid.read[seen]], missed))
+
+
+def _library(context: Context, current: Scored, state: str, body: Array) -> list[tuple[str, Expression]]:
     channels = [n for n in current.fit.trajectories[0].system.grid.samples if n in context.campaign.channels]
     nodes = current.fit.trajectories[0].at_nodes()
     moving = [n for n in channels if np.ptp(np.asarray(nodes[n])) > 1e-9]
@@ -138,10 +153,12 @@ def _library(context: Context, current: Scored, state: str) -> list[tuple[str, E
                 for other in moving
                 if "temperature" in context.campaign.channels[other].role
             ]
-    body = np.concatenate([np.asarray(t.at_nodes()[state], dtype=float) for t in current.fit.trajectories])
+    around = [n for n in moving if "temperature" in context.campaign.channels[n].role]
+    for limit in np.quantile(body, LIMITS):
+        texts += [f"max({state} - {limit:.4g}, 0)"]
+        texts += [f"({state} > {limit:.4g})*({name} - {state})" for name in around]
     middle = float(np.median(body))
     texts += [
-        f"max({state} - {middle:.4g}, 0)",
         f"abs({state} - {middle:.4g})*({state} - {middle:.4g})",
         *(f"(lag({state}, {lag}) - {state})" for lag in slow),
     ]

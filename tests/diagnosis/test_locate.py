@@ -9,11 +9,15 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from discovery.diagnosis.description import _library
+from discovery.diagnosis.description import _library, describe
 from discovery.diagnosis.regime import of_effects, of_free_heat
 from discovery.diagnosis.scored import Scored
 from discovery.evidence.latent_force import BLOCKS, Force
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
 from tests.design.test_ask import plate, ten_minutes
 from tests.diagnosis.parts import claim_of, context_of, scored_of
 from tests.machine import Array, campaign, model, simulated
@@ -59,11 +63,45 @@ def test_a_rule_holds_the_tightest_bounds_of_each_variable(
 def test_a_description_has_lags_that_recordings_can_show() -> None:
     """Ten minutes: time constants of seconds, not those of a machine tool."""
     where = context_of(ten_minutes(), plate(0.04), outputs=["T"])
-    said = " ".join(text for text, _ in _library(where, scored_of(where), "T"))
+    said = " ".join(text for text, _ in _library(where, scored_of(where), "T", np.array([20.0, 40.0])))
     times = [float(t) for t in re.findall(r"lag\([\w.]+, ([\d.]+)\)", said)]
     assert min(times) == pytest.approx(600.0 / 150)
     assert max(times) == pytest.approx(600.0 / 40)
     assert "heater" in said
+
+
+def valve() -> Recording:
+    """A body of 2500 J/K that loses 3 W/K to the room, and 9 W/K more from 45 degC on."""
+    rng, time = np.random.default_rng(5), np.arange(0.0, 18000.0, 60.0)
+    heater = np.repeat(rng.uniform(0.0, 300.0, 15), 20)
+    room = 21.0 + 1.5 * np.sin(time / 4800.0)
+
+    def rate(t: float, x: Array) -> Array:
+        k = min(int(t / 60.0), time.size - 1)
+        opened = 9.0 / (1.0 + np.exp((45.0 - x) / 0.5))
+        return np.asarray((heater[k] - (3.0 + opened) * (x - room[k])) / 2500.0)
+
+    body = solve_ivp(rate, (0.0, time[-1]), [21.0], t_eval=time, max_step=20.0).y[0]
+    read = body + rng.normal(0.0, 0.05, time.size)
+    return Recording("r1", time, {"heater": heater, "room": room, "T": read})
+
+
+def test_a_law_that_begins_at_a_temperature_is_described_with_it() -> None:
+    """The model misses the body by several kelvin where the valve opens: its readings say where that is."""
+    channels = {
+        "heater": Channel("heater", "heat load", "W", None, "held"),
+        "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+        "T": Channel("T", "temperature", "degC", 0.05, "linear"),
+    }
+    terms = (Term("heater", "T", parse("heater")), Term("air", "T", parse("hA*(room - T)")))
+    state = State("T", "degC", 2500.0, parse("room"), 0.3, 1 / 2500.0)
+    body = Model("body", {"hA": Parameter(3.0, "W/K", 0.0)}, {"T": state}, terms, {})
+    where = context_of(Campaign("valve", channels, {"r1": valve()}), body, outputs=["T"])
+    nothing = Force("T", 1.0, {}, {}, {}, np.zeros(0))
+    found = describe(where, scored_of(where), nothing)
+    assert found is not None
+    limits = re.findall(r"max\(T - ([\d.]+), 0\)|\(T > ([\d.]+)\)", found.formula)
+    assert any(40.0 < float(a or b) < 50.0 for a, b in limits), found.formula
 
 
 @pytest.mark.parametrize(
