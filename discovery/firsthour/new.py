@@ -242,6 +242,13 @@ def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Gue
             "no column says what heats the machine: a model can only follow its surroundings; "
             "record a power, current, speed or switch as well"
         )
+    loads = [column for column in found.seen if column.name in drives(guesses)]
+    if loads and all(never_moves(column) for column in loads):
+        still = ", ".join(column.name for column in loads)
+        lines.append(
+            f"{still} never {'moves' if len(loads) == 1 else 'move'} in the recordings to fit, so they say "
+            "little of what heats the machine: record steps and pauses as well"
+        )
     lines += [
         f"'{name}' is below zero in {one.below_zero:.0%} of its readings, so its gain may have either sign; "
         "a heat load below zero cools: where it is heat (a discharge, a brake), write its magnitude"
