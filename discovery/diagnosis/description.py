@@ -25,7 +25,7 @@ from discovery.terms import Expression, Name, evaluate, parse
 Array = NDArray[np.float64]
 
 MOST_TERMS = 3
-LIMITS = tuple(0.1 * k for k in range(1, 10))  # quantiles of a temperature at which something may begin
+LIMITS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # quantiles at which something may begin
 LAGS = (1 / 150, 1 / 40)  # of the longest recording: time constants of a description
 
 

@@ -356,18 +356,20 @@ def _apart(
     sentences = []
     for n in rest:
         added = _added(found, answer, n.hypothesis)
-        evidence = (
-            f"{printed(added)} of the {printed(least)} that a name needs" if added < least else f"{added:.0f}"
-        )
         sentence = (
             f"{n.hypothesis.effect.word} at {n.hypothesis.where} is possible but not sure enough to be named "
-            f"(probability {n.probability:.2f}, log evidence {evidence})"
+            f"(probability {n.probability:.2f}, log evidence {_of(added, least)})"
         )
         if n.rivals and n.rivals[0].below < added:
             other, below = n.rivals[0].hypothesis, n.rivals[0].below
             sentence += f"; {other.effect.word} at {other.where} instead has {below:.1f} less"
         sentences.append(sentence if matters else f"{sentence}; it does too little for free runs")
     return tuple(sentences)
+
+
+def _of(added: float, least: float) -> str:
+    """Log evidence, and what a name needs where it is less."""
+    return f"{printed(added)} of the {printed(least)} that a name needs" if added < least else f"{added:.0f}"
 
 
 def _added(found: Search, answer: Scored, h: Hypothesis) -> float:
