@@ -149,7 +149,7 @@ class Grid:
 
     def sd(self, white: Sequence[float]) -> Array:
         """Standard deviations (R, Y) of the readings, where single ones have `white` (Y,)."""
-        return np.broadcast_to(np.array(white), self.readings.shape) / self.per_reading
+        return np.array(white) / self.per_reading
 
     @cached_property
     def per_reading(self) -> Array:

@@ -302,19 +302,32 @@ def between(which, e, read):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def driven(which, e, w0, w1, read, gain):  # type: ignore[no-untyped-def]
-    """Response (R - 1, n, n) of the states, from each reading instant to the next, to a force at each state
-    whose size in interval k is gain[k] (K, n) times a number that is held in between.
+def driven(which, e, w0, w1, read, f, heated, floor, share, flow):  # type: ignore[no-untyped-def]
+    """The way (R - 1, n, n + q) of the states from each reading instant to the next: f (R - 1, n, n) from
+    `between`, then their response to a force at each of some states.
+
+    Args:
+        heated: (q,) indices of these states.
+        floor, share: (q,) of the force, whose size in interval k is the root of floor^2 + (share flow)^2
+            times a number that is held in between.
+        flow: (K, n) through each state.
     """
-    n = e.shape[1]
+    n, q = e.shape[1], heated.shape[0]
     count = read.shape[0] - 1
-    b = np.zeros((count, n, n))
-    work = np.empty((n, n))
+    ways = np.zeros((count, n, n + q))
+    work = np.empty(n)
     for r in range(count):
+        copy(f[r], ways[r])
         for k in range(read[r], read[r + 1]):
             u = which[k]
-            _matmul(e[u], b[r], work)
-            for i in range(n):
-                for j in range(n):
-                    b[r, i, j] = work[i, j] + (w0[u, i, j] + w1[u, i, j]) * gain[k, j]
-    return b
+            for c in range(q):
+                s = heated[c]
+                size = np.sqrt(floor[c] ** 2 + (share[c] * flow[k, s]) ** 2)
+                for i in range(n):
+                    total = (w0[u, i, s] + w1[u, i, s]) * size
+                    for j in range(n):
+                        total += e[u, i, j] * ways[r, j, n + c]
+                    work[i] = total
+                for i in range(n):
+                    ways[r, i, n + c] = work[i]
+    return ways

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics.trajectory import Trajectory
 from discovery.errors import RunsAwayError, UserError
-from discovery.terms import Dual, evaluate
+from discovery.terms import Dual
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -19,18 +19,12 @@ def outputs(trajectory: Trajectory, wrt: frozenset[str] = frozenset()) -> list[D
     Each counts from the zero that its readings have in this recording.
     """
     system = trajectory.system
-    env = trajectory.at_nodes()
-    found = []
     for name in system.grid.outputs:
-        expression = system.model.outputs.get(name)
-        if expression is not None:
-            found.append(evaluate(expression, env, wrt, system.nodes))
-        elif name in system.states:
-            found.append(Dual(env[name], {name: 1.0} if name in wrt else {}))
-        else:
+        if name not in system.model.outputs and name not in system.states:
             raise UserError(
                 f"model '{system.model.name}' has no output '{name}'; give it one under [outputs]"
             )
+    found = system.outputs(trajectory.at_nodes(), wrt, system.nodes)
     zeros = [system.grid.offset.get(name, 0.0) for name in system.grid.outputs]
     return [Dual(one.value + zero, one.partials) for one, zero in zip(found, zeros, strict=True)]
 
@@ -42,18 +36,20 @@ def predict(trajectory: Trajectory) -> Array:
         RunsAwayError: one that is not finite where it was read.
     """
     grid = trajectory.system.grid
-    count = len(grid.time)
-    shown = [np.broadcast_to(dual.value, (count,))[grid.looked_at] for dual in outputs(trajectory)]
-    columns = grid.at_readings(np.column_stack(shown)).T
-    for name, column, seen in zip(grid.outputs, columns, grid.measured.T, strict=True):
-        lost = seen & ~np.isfinite(column)
-        if lost.any():
-            raise RunsAwayError(
-                f"model '{trajectory.system.model.name}': the output '{name}' is not a finite number "
-                f"{grid.time[grid.read][lost][0]:.0f} s after the start of recording '{grid.recording}'; "
-                "check what it divides by and what log(), sqrt() and ** are taken of"
-            )
-    return np.ascontiguousarray(columns.T)
+    shown = np.empty((len(grid.looked_at), len(grid.outputs)))
+    for y, dual in enumerate(outputs(trajectory)):
+        value = np.asarray(dual.value)
+        shown[:, y] = value[grid.looked_at] if value.ndim else value
+    found = grid.at_readings(shown)
+    lost = grid.measured & ~np.isfinite(found)
+    if lost.any():
+        y = int(np.argmax(lost.any(axis=0)))
+        raise RunsAwayError(
+            f"model '{trajectory.system.model.name}': the output '{grid.outputs[y]}' is not a finite number "
+            f"{grid.time[grid.read][lost[:, y]][0]:.0f} s after the start of recording '{grid.recording}'; "
+            "check what it divides by and what log(), sqrt() and ** are taken of"
+        )
+    return found
 
 
 def output_matrix(trajectory: Trajectory, nodes: Ints | None = None) -> Array:

@@ -87,7 +87,10 @@ def sensitivities(
         size,
         nodes.astype(np.int64),
     )
-    dy: Array = output_matrix(trajectory, nodes) @ s
+    lever = output_matrix(trajectory, nodes)
+    dy = np.zeros((*lever.shape[:2], s.shape[2]))
+    for y, i in np.argwhere(lever.any(axis=0)).tolist():  # few states show in an output
+        dy[:, y] += lever[:, y, i, None] * s[:, i]
     for y, partials in enumerate(_shown_by_outputs(trajectory, parameters)):
         zero = system.grid.outputs[y]
         shown = partials | ({zero: 1.0} if zero in parameters else {})
@@ -152,14 +155,13 @@ def _start_slopes(
     """Slopes of the start values, (n, M)."""
     system, wanted = trajectory.system, frozenset(parameters)
     start = np.zeros((len(system.states), total))
-    for i, state in enumerate(system.model.states.values()):
-        # one that also moves freely does so around what its formula says
-        if state.start is not None and not wanted.isdisjoint(names(state.start)):
-            known = {**system.grid.first, **trajectory.values}
-            for name, slope in evaluate(state.start, known, wanted).partials.items():
-                turn = -1.0 if name in system.grid.outputs else 1.0  # a first reading less its zero
-                start[i, parameters.index(name)] = turn * float(np.mean(slope))
+    # one that also moves freely does so around what its formula says
+    for state, dual in system.starts({**system.grid.first, **trajectory.values}, wanted).items():
+        for name, slope in dual.partials.items():
+            turn = -1.0 if name in system.grid.outputs else 1.0  # a first reading less its zero
+            start[system.states.index(state), parameters.index(name)] = turn * float(np.mean(slope))
     free = balanced(system)
+    late = memories(system, free)
     inner = _in_terms(trajectory, parameters)
     wrt = [*dict.fromkeys((*system.states, *inner))]
     slopes = rates_at_start(system, trajectory.values, trajectory.x[0], wrt, free)[1] if free else start[:0]
@@ -172,14 +174,14 @@ def _start_slopes(
             moved[:, parameters.index(name)] += mine[:, wrt.index(name)]
         start[some] = settled(mine[:, list(some)], moved)
 
-    if free:
+    if free and not (starts and late == free):  # memories are settled once all others have moved
         settle(free)
     if starts:
         by, follow = np.zeros_like(start), starts_follow(system)
         for k, name in enumerate(starts, len(parameters)):
             by[:, k] = follow[:, system.states.index(name)]
         start += by
-        if late := memories(system, free):
+        if late:
             settle(late)
             start[late] += by[late]
     return start

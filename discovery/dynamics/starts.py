@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics.system import System
 from discovery.errors import RunsAwayError, UserError
-from discovery.terms import evaluate
+from discovery.terms import names
 from discovery.terms.dual import Value
 
 Array = NDArray[np.float64]
@@ -28,19 +28,19 @@ def start_values(
         moved: shifts of start values by name. States whose starts follow move along. Memories are settled
             anew, and shifted from there.
     """
-    known: dict[str, float] = {**system.grid.first, **values}
     out = np.zeros(len(system.states))
-    for i, name in enumerate(system.states):
-        start = system.model.states[name].start
-        if start is None:
-            continue
-        try:
-            out[i] = float(np.mean(evaluate(start, known, memory=None).value))
-        except KeyError as missing:
-            raise UserError(
-                f"model '{system.model.name}': the start of state '{name}' needs {missing}, "
-                f"which recording '{system.grid.recording}' does not give"
-            ) from None
+    try:
+        begun = system.starts({**system.grid.first, **values})
+    except KeyError as missing:
+        of = next(
+            name for name, s in system.model.states.items() if s.start and missing.args[0] in names(s.start)
+        )
+        raise UserError(
+            f"model '{system.model.name}': the start of state '{of}' needs {missing}, "
+            f"which recording '{system.grid.recording}' does not give"
+        ) from None
+    for name, dual in begun.items():
+        out[system.states.index(name)] = float(np.mean(dual.value))
     free = balanced(system)
     late = memories(system, free)
     if not moved or late != free:  # memories are settled once all others have moved
@@ -114,10 +114,10 @@ def _first(value: Value) -> float:
 
 def _balanced(system: System, values: Mapping[str, float], start: Array, free: Sequence[int]) -> Array:
     """The start values (n,) with some states in the balance of their terms, given the others."""
-    names = [system.states[i] for i in free]
+    wrt = [system.states[i] for i in free]
     before = 1.0
-    for _ in range((1 if system.affine_in(tuple(names)) else _ROUNDS) if free else 0):
-        rates, slopes = rates_at_start(system, values, start, names, free)
+    for _ in range((1 if system.affine_in(tuple(wrt)) else _ROUNDS) if free else 0):
+        rates, slopes = rates_at_start(system, values, start, wrt, free)
         if not (np.isfinite(rates).all() and np.isfinite(slopes).all()):
             raise RunsAwayError(
                 f"model '{system.model.name}' has no finite rate at the start of recording "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from discovery.dynamics.memory import Memory
 from discovery.models import Model, expanded
 from discovery.models.model import read_at_start
 from discovery.recordings import Campaign
-from discovery.terms import Dual, Program, compiled, degree
+from discovery.terms import Dual, Expression, Name, Program, compiled, degree
 from discovery.terms.dual import Value
 
 Array = NDArray[np.float64]
@@ -33,10 +33,7 @@ class System:
     scale: Array  # (states,)
     ends: Memory
     nodes: Memory
-    programs: dict[tuple[frozenset[str], tuple[int, ...] | None], Program] = field(
-        default_factory=dict, repr=False, compare=False
-    )
-
+    programs: dict[tuple[object, ...], Program] = field(default_factory=dict, repr=False, compare=False)
     lines: dict[tuple[str, ...], bool] = field(default_factory=dict, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
@@ -51,11 +48,30 @@ class System:
         some: tuple[int, ...] | None = None,
     ) -> list[Dual]:
         """Rate of each term, or of some by index, with derivatives by some names."""
-        if (wrt, some) not in self.programs:
-            terms = self.model.terms
-            taken = terms if some is None else [terms[k] for k in some]
-            self.programs[wrt, some] = compiled(tuple(t.expression for t in taken), wrt)
-        return self.programs[wrt, some].run(values, memory)
+        terms = self.model.terms
+        taken = terms if some is None else [terms[k] for k in some]
+        return self._program("rates", wrt, some, (t.expression for t in taken)).run(values, memory)
+
+    def starts(self, values: Mapping[str, Value], wrt: frozenset[str] = frozenset()) -> dict[str, Dual]:
+        """Where each state begins that has a formula for it, with derivatives by some names."""
+        told = {name: s.start for name, s in self.model.states.items() if s.start is not None}
+        found = self._program("starts", wrt, None, told.values()).run(values)
+        return dict(zip(told, found, strict=True))
+
+    def outputs(self, values: Mapping[str, Value], wrt: frozenset[str], memory: Memory) -> list[Dual]:
+        """What the model shows of each output of the grid, with derivatives by some names."""
+        names = self.grid.outputs
+        told = (self.model.outputs.get(name, Name(name)) for name in names)
+        return self._program("outputs", wrt, names, told).run(values, memory)
+
+    def _program(
+        self, kind: str, wrt: frozenset[str], some: tuple[object, ...] | None, told: Iterable[Expression]
+    ) -> Program:
+        """The program of some expressions of the model, compiled once."""
+        key = kind, wrt, some
+        if key not in self.programs:
+            self.programs[key] = compiled(tuple(told), wrt)
+        return self.programs[key]
 
     def affine_in(self, states: tuple[str, ...]) -> bool:
         """Whether no term has a curve in some states together, whatever the others are."""

@@ -202,19 +202,17 @@ class Filter:
     def _made(self, noise: Noise) -> _Parts:
         t, heat = self.trajectory, noise.heat or {}
         system = t.system
-        there = np.array([heat.get(name, 0.0) > 0 for name in system.states])
-        own = [(noise.force or {}).get(name, (heat.get(name, 0.0), noise.share)) for name in system.states]
-        floor, share = np.array(own).reshape(-1, 2).T
-        ways = self.f
-        if there.any():
-            gain = np.sqrt(floor**2 + (share * self.flow) ** 2) * system.scale * there
-            response = driven(t.which, t.e, t.w0, t.w1, system.grid.read.astype(np.int64), gain)
-            ways = np.concatenate([self.f, response[:, :, there]], axis=2)
+        heated = [i for i, name in enumerate(system.states) if heat.get(name, 0.0) > 0]
+        names = [system.states[i] for i in heated]
+        own = [(noise.force or {}).get(name, (heat[name], noise.share)) for name in names]
+        floor, share = np.array(own).reshape(-1, 2).T * system.scale[heated]
+        read, into = system.grid.read.astype(np.int64), np.array(heated, dtype=np.int64)
+        ways = driven(t.which, t.e, t.w0, t.w1, read, self.f, into, floor, share, self.flow)
         slow = np.array(noise.slow) if any(noise.slow) else np.zeros(0)
-        counts = len(system.states), int(there.sum()), len(slow)
+        counts = len(system.states), len(heated), len(slow)
         decays = np.exp(-self.step[:, None] / [np.inf, noise.heat_time, noise.slow_time])
         fresh = np.concatenate([np.zeros(counts[0]), np.ones(counts[1]), slow**2])
-        return _Parts(ways, np.repeat(decays, counts, axis=1), fresh, counts[2])
+        return _Parts(ways, decays[:, np.repeat(np.arange(3), counts)], fresh, counts[2])
 
     def whitened(self, noise: Noise, data: Array) -> tuple[Array, Array]:
         """Columns (measured readings, M) of data (R, Y, M), whitened, and the logarithm (measured readings,)
