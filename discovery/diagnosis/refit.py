@@ -84,7 +84,6 @@ def score(
     start: Fit | None = None,
     sizes: Mapping[str, float] | None = None,
     goal: float = inf,
-    asked: list[Noise] | None = None,
 ) -> Scored | None:
     """Refit with a set of effects and score it; None if the model does not stay finite.
 
@@ -94,20 +93,13 @@ def score(
     Args:
         noise: of the first refit.
         goal: of the first refit, as in `fit_model`.
-        asked: noises under which these effects were refitted to the end; those of this course are added. A
-            course that comes to one of them ends: it would go on as the other one did.
     """
     one: Scored | None = None
-    asked = [] if asked is None else asked
     for _ in range(1 + ROUNDS):
-        if noise in asked:
-            break
         try:
             other = scored(context, chosen, refit(context, chosen, noise, start, sizes, goal))
         except RunsAwayError:
             break
-        if not other.fit.ended_early:
-            asked.append(noise)
         if one is not None and other.evidence <= one.evidence:
             break
         one = other

@@ -106,8 +106,8 @@ def attempt(
         low, _ = h.effect.amplitude.ends
         sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
     chosen = (*others, h)
-    noises, asked = _noises(context, current), list[Noise]()
-    tries = [score(context, chosen, noise, current.fit, sizes, goal(noise), asked) for noise in noises]
+    noises = _noises(context, current)
+    tries = [score(context, chosen, noise, current.fit, sizes, goal(noise)) for noise in noises]
     found = [one for one in tries if one is not None]
     return max(found, key=lambda one: one.evidence, default=None)
 

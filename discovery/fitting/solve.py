@@ -8,7 +8,7 @@ a rejected trial step costs one free run, without sensitivities.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
@@ -30,23 +30,6 @@ _HOPELESS = 1e10  # damping at which no shorter step helps any more
 _STILL = 1e-11  # relative change of the unknowns below which the search has ended
 _PACE = 4  # steps whose mean gain says whether a search comes near its goal
 _FAR = 0.5  # what a step has to take off the cost for the whitening filters to be made anew behind it
-_WORTH = 0.01  # of the gain that ends a search: a step that promises less is not tried
-
-Filters = tuple[Filter | None, ...]
-# the unknowns (C,) that act in each recording, and how its whitened residual (N, C) moves with them
-Jacobian = list[tuple[list[int], Array]]
-
-
-@dataclass(frozen=True)
-class Place:
-    """The model at one place under a noise: free runs, their whitened residual (N,) and how it moves."""
-
-    trajectories: tuple[Trajectory, ...]
-    noise: Noise
-    filters: Filters
-    residual: Array
-    slopes: tuple[Array, ...] = ()  # by recording (R, Y, C): sensitivities of the outputs, not whitened
-    jacobian: Jacobian = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -54,16 +37,25 @@ class Solution:
     """Where a search ended."""
 
     theta: Array  # (U,)
-    place: Place
+    trajectories: tuple[Trajectory, ...]
     gram: Array  # (U, U) normal equations of whitened residuals and priors
     cost: float  # half the sum of their squares
     converged: bool = True  # no step helps any more; else the rounds were used up
     ended_early: bool = False  # it would not have come near its goal
+    slopes: tuple[Array, ...] = ()  # by recording (R, Y, C): sensitivities of the outputs, not whitened
 
-    @property
-    def trajectories(self) -> tuple[Trajectory, ...]:
-        """Free runs there."""
-        return self.place.trajectories
+
+@dataclass(frozen=True)
+class _Run:
+    """The model at one place: trajectories and whitened residual with priors (N,)."""
+
+    trajectories: tuple[Trajectory, ...]
+    residual: Array
+
+
+Filters = tuple[Filter | None, ...]
+# the unknowns (C,) that act in each recording, and how its whitened residual (N, C) moves with them
+Jacobian = list[tuple[list[int], Array]]
 
 
 def solve(
@@ -98,76 +90,65 @@ def solve(
     """
     low, high = problem.bounds
     x = np.clip(theta, low, high)
-    here = _beginning(problem, theta, x, noise, last, runs)
-    residual, jacobian = _with_priors(problem, x, together, here)
-    cost, damping = _cost(residual, loss), _DAMPING
+    known = last if last is not None and np.array_equal(last.theta, x) else None
+    if known:
+        runs = known.trajectories
+    elif not runs or not np.array_equal(x, theta):
+        runs = free_runs(problem, x)
+    filters = _filters(runs, noise)
+    now = _whitened(problem, x, noise, together, runs, filters)
+    cost, damping = _cost(now.residual, loss), _DAMPING
+    slopes = known.slopes if known else _slopes(problem, runs)
+    jacobian = _jacobian(problem, x, noise, together, now, filters, slopes)
     course, done, late = [cost], len(x) == 0, False
     for left in range(max_rounds if len(x) else 0, 0, -1):
-        gram, gradient = _normal(jacobian, residual, len(x), loss)
+        gram, gradient = _normal(jacobian, now.residual, len(x), loss)
         found = None
         while damping < _HOPELESS:
             moved = np.clip(x + _step(x, gram, gradient, damping, low, high), low, high)
             change = moved - x
             expected = -float(gradient @ change) - 0.5 * float(change @ gram @ change)
-            if np.all(np.abs(change) <= _STILL * (1.0 + np.abs(x))) or expected < _WORTH * tolerance * cost:
+            if np.all(np.abs(change) <= _STILL * (1.0 + np.abs(x))):
                 break
             try:
-                trial = _at(problem, free_runs(problem, moved, here.trajectories), noise, here.filters)
+                runs = free_runs(problem, moved, now.trajectories)
+                trial = _whitened(problem, moved, noise, together, runs, filters)
             except RunsAwayError:
                 trial = None
-            if trial is not None:
-                lower = _cost(_with_priors(problem, moved, together, trial)[0], loss)
-                if lower < cost:
-                    found = trial
-                    break
+            if trial is not None and _cost(trial.residual, loss) < cost:
+                found = trial
+                break
             if expected < tolerance * cost:
                 break
             damping *= _TIGHTEN
         if found is None:
             done = True
             break
-        gained = cost - lower
-        x = moved
+        gained = cost - _cost(found.residual, loss)
+        x, now = moved, found
         if gained > 0.5 * expected:
             damping = max(damping * _EASE, 1e-12)
         done = gained < tolerance * cost
         if gained > _FAR and not noise.is_white:
-            found = _at(problem, found.trajectories, noise, _filters(found.trajectories, noise))
-        here = _moving(problem, found)
-        residual, jacobian = _with_priors(problem, x, together, here)
-        cost = _cost(residual, loss)
+            filters = _filters(now.trajectories, noise)
+            now = _whitened(problem, x, noise, together, now.trajectories, filters)
+        cost = _cost(now.residual, loss)
+        slopes = _slopes(problem, now.trajectories)
+        jacobian = _jacobian(problem, x, noise, together, now, filters, slopes)
         course.append(cost)
         late = len(course) > _PACE and cost - left * (course[-1 - _PACE] - cost) / _PACE > goal
         if done or late:
             break
-    gram = _normal(jacobian, residual, len(x), "linear")[0]
-    return Solution(x, here, gram, 0.5 * float(residual @ residual), done, late)
-
-
-def _beginning(
-    problem: Problem,
-    theta: Array,
-    x: Array,
-    noise: Noise,
-    last: Solution | None,
-    runs: tuple[Trajectory, ...],
-) -> Place:
-    """Where a search begins: at x (U,), which is `theta` (U,) within the bounds."""
-    if last is not None and np.array_equal(last.theta, x):
-        if last.place.noise == noise:
-            return last.place
-        runs, slopes = last.trajectories, last.place.slopes
-    else:
-        runs = runs if runs and np.array_equal(x, theta) else free_runs(problem, x)
-        slopes = ()
-    return _moving(problem, replace(_at(problem, runs, noise, _filters(runs, noise)), slopes=slopes))
+    square = float(now.residual @ now.residual)
+    gram = _normal(jacobian, now.residual, len(x), "linear")[0]
+    return Solution(x, now.trajectories, gram, 0.5 * square, done, late, slopes)
 
 
 def cost_under(problem: Problem, theta: Array, trajectories: Sequence[Trajectory], noise: Noise) -> float:
     """What a search under a noise would have to beat to be better than unknowns (U,) and their free runs."""
     runs = tuple(trajectories)
-    here = _at(problem, runs, noise, _filters(runs, noise))
-    return _cost(_with_priors(problem, theta, 1.0, here)[0], "linear")
+    now = _whitened(problem, theta, noise, 1.0, runs, _filters(runs, noise))
+    return _cost(now.residual, "linear")
 
 
 def free_runs(problem: Problem, x: Array, near: tuple[Trajectory, ...] = ()) -> tuple[Trajectory, ...]:
@@ -180,30 +161,40 @@ def _filters(trajectories: tuple[Trajectory, ...], noise: Noise) -> Filters:
     return tuple(None if noise.is_white else make_filter(t) for t in trajectories)
 
 
-def _at(problem: Problem, trajectories: tuple[Trajectory, ...], noise: Noise, filters: Filters) -> Place:
-    """The model at the place of some free runs."""
+def _whitened(
+    problem: Problem,
+    x: Array,
+    noise: Noise,
+    together: float,
+    trajectories: tuple[Trajectory, ...],
+    filters: Filters,
+) -> _Run:
     parts = [
         whiten(t, noise, problem.residual(t)[:, :, None], part)[:, 0]
         for t, part in zip(trajectories, filters, strict=True)
     ]
-    return Place(trajectories, noise, filters, np.concatenate(parts))
+    return _Run(trajectories, np.concatenate([*parts, problem.prior_rows(x, together)[0]]))
 
 
-def _moving(problem: Problem, place: Place) -> Place:
-    """The place with how the residual moves there."""
-    slopes = place.slopes or tuple(problem.slopes(t) for t in place.trajectories)
-    jacobian = [
-        (problem.concerns(t.system), whiten(t, place.noise, -slope, part))
-        for t, slope, part in zip(place.trajectories, slopes, place.filters, strict=True)
+def _slopes(problem: Problem, trajectories: tuple[Trajectory, ...]) -> tuple[Array, ...]:
+    return tuple(problem.slopes(t) for t in trajectories)
+
+
+def _jacobian(
+    problem: Problem,
+    x: Array,
+    noise: Noise,
+    together: float,
+    run: _Run,
+    filters: Filters,
+    slopes: tuple[Array, ...],
+) -> Jacobian:
+    """How the residual moves: of each recording, then of the priors."""
+    parts = [
+        (problem.concerns(t.system), whiten(t, noise, -slope, part))
+        for t, slope, part in zip(run.trajectories, slopes, filters, strict=True)
     ]
-    return replace(place, slopes=slopes, jacobian=jacobian)
-
-
-def _with_priors(problem: Problem, x: Array, together: float, place: Place) -> tuple[Array, Jacobian]:
-    """Residual (N + K,) of the readings, then of the priors, and how it moves."""
-    residual, slope = problem.prior_rows(x, together)
-    every = list(range(len(x)))
-    return np.concatenate([place.residual, residual]), [*place.jacobian, (every, slope)]
+    return [*parts, (list(range(len(x))), problem.prior_rows(x, together)[1])]
 
 
 def _normal(jacobian: Jacobian, residual: Array, unknowns: int, loss: Loss) -> tuple[Array, Array]:

@@ -14,7 +14,6 @@ from discovery.diagnosis.refit import MOVED, refit, score
 from discovery.diagnosis.scan import scan_model
 from discovery.diagnosis.scored import is_usual, scored, with_change, with_force, with_unknown
 from discovery.evidence.process_noise import unknown_heat
-from discovery.fitting import Noise
 from tests.diagnosis.parts import bare, claim_of, context_of, dry, scored_of, wetted
 from tests.machine import NOISE, campaign, changed, model, simulated
 
@@ -171,14 +170,3 @@ def test_a_fit_settles_under_the_noise_that_it_makes_likely() -> None:
     assert last.evidence > first.evidence + 1.0
     size = {name: p.value for name, p in last.fit.model.parameters.items()}
     assert size["hF_table"] == pytest.approx(30.0, rel=0.05)
-
-
-def test_no_noise_is_asked_for_a_second_time() -> None:
-    """Two courses of refits begin under two noises. A course that comes to a noise of the other one ends."""
-    chosen, asked = (claim_of(dry(), "fluid_convection", "table"),), list[Noise]()
-    first = score(dry(), chosen, dry().usual, asked=asked)
-    assert first is not None
-    assert asked[0] == dry().usual
-    count = len(asked)
-    assert score(dry(), chosen, asked[-1], asked=asked) is None
-    assert len(asked) == count

@@ -147,17 +147,6 @@ def test_outliers_pull_less_with_a_robust_loss() -> None:
     assert abs(found[1] - clean) < 0.3 * abs(found[0] - clean)
 
 
-def test_a_search_from_where_the_last_one_ended_asks_for_no_free_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing is to be gained there, and under the same noise everything is known."""
-    problem = make_problem(model(), campaign(recording(3)), ["r3"])
-    noise = fit_model(model(), campaign(recording(3)), ["r3"]).noise
-    first = solve(problem, problem.start, noise, "linear", 60, 1e-6)
-    for name in ("free_runs", "whiten"):
-        monkeypatch.delattr(f"discovery.fitting.solve.{name}")
-    again = solve(problem, first.theta, noise, "linear", 60, 1e-6, last=first)
-    assert (again.converged, again.cost) == (True, first.cost)
-
-
 def test_a_fit_that_will_not_come_near_its_goal_ends_early(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the heat a model cannot reach what the whole one leaves. With a goal in reach, the end is the
     same as without one. One step is enough here to judge the pace: so simple a fit takes few."""
