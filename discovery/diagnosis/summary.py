@@ -9,7 +9,7 @@ from discovery.diagnosis.thresholds import RIVAL
 from discovery.printed import printed
 from discovery.runfolder import read_diagnosis
 
-_NOISE = "reading noise and heat that nobody records:"
+_NOISE = "reading noise and heat that nobody records explain up to"
 
 
 def summary(folder: Path) -> list[str]:

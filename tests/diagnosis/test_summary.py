@@ -75,7 +75,7 @@ def test_the_proof_has_a_unit_or_is_in_noises_and_a_jump_that_may_be_none_is_not
         assert summary(tmp_path)[1:-1] == [
             "  rezero at dZ in fri, probability 0.98: zero_dZ = 2.1 um (2 to 2.2), t_zero = 60 s (50 to 70)",
             f"  held-out recording sun: rms 0.861 -> 0.412{said} "
-            f"(reading noise and heat that nobody records: 0.421{said})",
+            f"(reading noise and heat that nobody records explain up to 0.421{said})",
         ]
 
 
@@ -102,4 +102,6 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
     (line,) = summary(tmp_path)[1:-1]
     assert line.startswith("  recordings to fit: rms 4.8 times the reading noise (")
-    assert line.endswith("reading noise and heat that nobody records: 4.6 times the reading noise)")
+    assert line.endswith(
+        "reading noise and heat that nobody records explain up to 4.6 times the reading noise)"
+    )

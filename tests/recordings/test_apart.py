@@ -22,7 +22,7 @@ def recorded(name: str, begin: int, end: int, tau: float, clock: float = 1.0) ->
     """Rows of a step test: a heater at 50 % warms a body by 40 K. `clock`: how much too fast it runs."""
     time = 10.0 * np.arange(begin, end)
     values = {
-        "heater": np.full(time.size, 50.0),
+        "heater": np.where(time > 0.0, 50.0, 0.0),  # it is switched on at the first stamp
         "room": np.full(time.size, 22.0),
         "T": np.round(62.0 - 40.0 * np.exp(-time / tau), 1),
     }
