@@ -16,6 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1] / "discovery"
 FOLDERS = ("evidence", "diagnosis")
+VERDICTS = ("diagnosis/verdict.py", "diagnosis/withdrawal.py")
 AIM_RULES, AIM_CONSTANTS = 15, 20
 TODAY_RULES, TODAY_CONSTANTS = 19, 27  # what a test holds: the aim is not reached yet
 
@@ -110,7 +111,7 @@ def rules() -> list[str]:
                 and id(node) not in said
                 and (_used(node, thresholds) or not limits.isdisjoint(_names(node)))
             )
-            if by_constant or (file == "diagnosis/verdict.py" and _withdraws(node)):
+            if by_constant or (file in VERDICTS and _withdraws(node)):
                 found.append(f"{file}: {ast.unparse(node)}")
             elif isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "VETOES":
                 found += [f"{file}: veto {ast.unparse(veto)}" for veto in getattr(node.value, "elts", [])]

@@ -20,7 +20,8 @@ from discovery.dynamics import Column, Trajectory, sensitivities
 from discovery.dynamics.grid import interleaved
 from discovery.evidence.bayes import project
 from discovery.evidence.latent_force import Force
-from discovery.terms import Expression, Name, evaluate, parse
+from discovery.models.model import shown_states
+from discovery.terms import Expression, evaluate, parse
 
 Array = NDArray[np.float64]
 
@@ -110,11 +111,14 @@ def _evidence(gram: Array, dot: Array, chosen: Sequence[int], count: int) -> flo
 def _read(run: Trajectory, state: str) -> Array:
     """A state at the nodes (T,): as its own sensor reads it, else as the model has it."""
     grid, series = run.system.grid, np.asarray(run.at_nodes()[state], dtype=float)
-    shown = [y for y, n in enumerate(grid.outputs) if run.system.model.outputs.get(n, Name(n)) == Name(state)]
-    seen = grid.measured[:, shown[0]] if shown else np.zeros(0, dtype=bool)
+    output = shown_states(run.system.model, grid.outputs).get(state)
+    if output is None:
+        return series
+    y = grid.outputs.index(output)
+    seen = grid.measured[:, y]
     if not seen.any():
         return series
-    missed = grid.readings[seen, shown[0]] - series[grid.read[seen]]
+    missed = grid.readings[seen, y] - series[grid.read[seen]]
     return np.asarray(series + np.interp(grid.time, grid.time[grid.read[seen]], missed))
 
 

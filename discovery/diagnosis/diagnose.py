@@ -22,17 +22,8 @@ from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
 from discovery.diagnosis.scored import Scored, with_unknown
 from discovery.diagnosis.selection import Search
-from discovery.diagnosis.verdict import (
-    NO_MISMATCH,
-    UNEXPLAINED,
-    Verdict,
-    decide,
-    idle,
-    refuted,
-    runs_away,
-    unfinished,
-    unforeseen,
-)
+from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide
+from discovery.diagnosis.withdrawal import idle, refuted, runs_away, unfinished, unforeseen
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis
@@ -312,9 +303,7 @@ def _reasons(
         )
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
-    if (
-        verdict.word == UNEXPLAINED
-    ):  # what a fit finds of its inputs may stand for the cause that nobody knows
+    if verdict.word == UNEXPLAINED:  # what a fit finds of its inputs may stand for the unknown cause
         return said
     answer = verdict.answer
     return [*said, *late.sentences(answer.fit), *noisy.sentences(answer.fit, answer.noise)]

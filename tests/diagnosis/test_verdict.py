@@ -17,7 +17,8 @@ from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import SHORT
-from discovery.diagnosis.verdict import Verdict, decide, idle, refuted, runs_away, unfinished, unforeseen
+from discovery.diagnosis.verdict import Verdict, decide
+from discovery.diagnosis.withdrawal import idle, refuted, runs_away, unfinished, unforeseen
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis, Key
 

@@ -66,7 +66,6 @@ _DOUBT = {
     "level": 0.05,
 }
 _LATE = np.arange(0.002, 0.25, 0.001)  # of a recording: how late a channel may be
-_STILL = 1.0  # K
 _STEP = 0.05  # of a recording, on both sides of an offset: half of it has come there
 _MOST = 6  # repairs of a campaign that are looked for
 
@@ -76,7 +75,7 @@ def disagreements(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -
     """Repairs that make recordings agree with the others, the largest gain first."""
     recordings = [one for one in recordings if len(one.time) >= FEWEST and one.time[-1] > 0]
     inputs, outputs = inputs_of(channels, recordings), outputs_of(channels)
-    if len(recordings) < 2 or not outputs or not any(_moves(recordings, channels[name]) for name in inputs):
+    if len(recordings) < 2 or not inputs or not outputs:
         return []
     # one clock that runs in other units must not set the time constants of all
     longest = float(np.median(sorted(one.time[-1] for one in recordings)[len(recordings) // 2 :]))
@@ -88,12 +87,6 @@ def disagreements(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -
     if (odd := odd_pace(known)) is not None:
         found.append(odd)
     return found
-
-
-def _moves(recordings: Sequence[Seen], channel: Channel) -> bool:
-    """Whether an input moves enough to drive anything: a room that is still within a kelvin does not."""
-    known = [values for one in recordings if (values := one.known(channel.name)[1]).size]
-    return any(float(np.ptp(values)) > (_STILL if channel.unit == "degC" else 0.0) for values in known)
 
 
 def _best_repair(known: CrossPrediction) -> Disagreement | None:

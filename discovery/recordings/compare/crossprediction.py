@@ -82,10 +82,9 @@ class CrossPrediction:
         self.recordings = {one.name: one for one in recordings}
         self.channels = channels
         self.inputs, self.outputs, self.taus = list(inputs), list(outputs), list(taus)
-        rooms = [channels[name] for name in inputs if channels[name].role == "ambient temperature"]
-        set_by_hand = {name for one in recordings for name in one.constant}
-        # one with a spread is a guess, and a number is no record
-        self.has_room = any(not room.spread and room.name not in set_by_hand for room in rooms)
+        by_hand = {name for one in recordings for name in one.constant}  # a number is no record
+        rooms = {name for name in inputs if channels[name].role == "ambient temperature"}
+        self.has_room = not rooms <= by_hand
         self.responses = {
             one.name: (known or {}).get(one.name) or self.responses_of(one) for one in recordings
         }

@@ -1,0 +1,104 @@
+"""Names that free runs withdraw, once the repaired model is there: they never add one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from math import inf, isfinite, log
+
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.proof import Improvement
+from discovery.diagnosis.selection import Search
+from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, coarse
+from discovery.printed import printed
+
+
+def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:
+    """No name where what was named does too little for free runs, on average over all recordings, fitted and
+    unseen. Logarithms of the rms are averaged: one recording of another machine does not drown the rest.
+    """
+    if not verdict.named or _lower(runs) >= 0.5 * thresholds.MATTERS**2:
+        return verdict
+    reason = (
+        "the surest effects change free runs too little to matter (rms lower by "
+        f"{100 * _lower(runs):.1f} % on average over the recordings)"
+    )
+    reasons = (reason, *coarse(found), *verdict.reasons)
+    word = UNEXPLAINED if coarse(found) else NO_MISMATCH
+    return replace(verdict, word=word, named=(), candidates=(), reasons=reasons)
+
+
+def _lower(runs: Iterable[Improvement]) -> float:
+    """Mean over the recordings of the logarithm by which the rms of free runs falls."""
+    judged = [i.judged for i in runs]
+    logs = [log(max(old, 1e-12) / max(new, 1e-12)) if isfinite(new) else -inf for old, new in judged]
+    return sum(logs) / max(len(logs), 1)
+
+
+def runs_away(verdict: Verdict) -> Verdict:
+    """The verdict with its names withdrawn, because the repaired model does not stay finite in free runs."""
+    names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in verdict.named)
+    reasons = (f"with {names}, free runs of the model do not stay finite", *verdict.reasons)
+    return replace(verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=reasons)
+
+
+def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
+    """The verdict with its names withdrawn where unseen recordings are predicted worse with them, on average
+    over the recordings (of the logarithm of the rms).
+    """
+    lasting = [n for n in verdict.named if not n.hypothesis.effect.is_event]
+    worse = [run for run, i in proof.items() if i.contradicts]
+    if not lasting or not worse:
+        return verdict
+    names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in lasting)
+    if _lower(proof.values()) >= 0:
+        reason = (
+            f"{names} improves the other held-out recordings but not {', '.join(worse)}: check whether the "
+            "machine was the same there"
+        )
+        return replace(verdict, reasons=(*verdict.reasons, reason))
+    reason = f"with {names}, free runs on {', '.join(worse)} are worse than without"
+    return replace(
+        verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
+    )
+
+
+def unfinished(verdict: Verdict, fitting: Improvement, unit: str) -> Verdict:
+    """The verdict with its names withdrawn where the repaired model misses the recordings that it was fitted
+    to by more than noise makes likely, and leaves more than it explains: the cause is another one.
+    """
+    if not verdict.named or fitting.mostly or not _misses(fitting, fitting.judged[1]):
+        return verdict
+    reason = (
+        "the effects that are sure enough leave more than they explain: free runs on the fitted recordings "
+        f"still miss by {_size(fitting, fitting.judged[1])} {unit}"
+    )
+    return replace(
+        verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
+    )
+
+
+def _misses(run: Improvement, rms: float) -> bool:
+    """Whether free runs miss their readings by more than noise and the fit make likely."""
+    return rms > thresholds.MISSED * run.expected
+
+
+def _size(run: Improvement, rms: float) -> str:
+    return f"{printed(rms)} ({printed(run.expected)} expected)"
+
+
+def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) -> Verdict:
+    """The verdict where unseen recordings show what the recordings to fit do not: free runs miss their
+    readings by more than noise and the uncertainty of the parameters make likely.
+    """
+    rms = {run: i.judged[1 if verdict.named else 0] for run, i in proof.items()}
+    missed = [run for run, i in proof.items() if _misses(i, rms[run])]
+    if not missed:
+        return verdict
+    sizes = ", ".join(f"{_size(proof[r], rms[r])} on {r}" for r in missed)
+    reason = (
+        "from any start, free runs on held-out recordings miss more than noise and the fit explain: "
+        f"rms {sizes} {unit}; something acts there that the recordings to fit do not show"
+    )
+    word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
+    return replace(verdict, word=word, reasons=(*verdict.reasons, reason))
