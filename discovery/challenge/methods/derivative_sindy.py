@@ -19,7 +19,6 @@ from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis
 from discovery.errors import RunsAwayError
 from discovery.fitting import Fit
-from discovery.sparse.derivative import discrepancy_terms, smoothed_derivative
 from discovery.terms import evaluate
 
 Array = NDArray[np.float64]
@@ -29,6 +28,8 @@ MOST = 3  # effects that may be named
 
 def derivative_sindy(problem: Problem) -> Answer:
     """The effects whose terms the regression keeps, largest first, with their shares as probabilities."""
+    from discovery.sparse.derivative import discrepancy_terms  # PySINDy takes seconds to load
+
     context, fit = problem.context, problem.context.baseline
     library = [
         one
@@ -86,6 +87,8 @@ def output_rates(trajectory: Trajectory, library: list[Hypothesis]) -> Array:
 
 def _blocks(trajectory: Trajectory, residual: Array, rates: Array) -> list[tuple[Array, Array]]:
     """Quarters of a recording: library (N, A) and derivative of the residual (N,)."""
+    from discovery.sparse.derivative import smoothed_derivative
+
     time = trajectory.system.grid.time[trajectory.system.grid.read]
     columns, target, when = [], [], []
     for y in range(residual.shape[1]):
