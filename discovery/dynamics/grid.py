@@ -159,15 +159,20 @@ class Grid:
         return np.sqrt(np.maximum(self.means.counts, 1.0))
 
     @cached_property
+    def _spread_out(self) -> bool:
+        """Whether a reading shows something of nodes beside its own: not where a block has one at most."""
+        return self.means is not None and bool(self.means.neighbours.any())
+
+    @cached_property
     def looked_at(self) -> Ints:
         """Nodes (N,) that the readings show something of, ascending."""
-        if self.means is None:
+        if not self._spread_out:
             return self.read
         return self._once("looked at", _looked_at, self.time, self.read)[0]
 
     def at_readings(self, shown: Array) -> Array:
         """Outputs at the readings, (R, Y, ...), of what they are at the nodes `looked_at`, (N, Y, ...)."""
-        if self.means is None:
+        if self.means is None or not self._spread_out:
             return shown
         before, here, behind = (
             shown[place] for place in self._once("looked at", _looked_at, self.time, self.read)[1]
