@@ -234,8 +234,21 @@ def product(a, x, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def columns(which, ways, start, owner, into, into_scale, source, source_scale, size, read):  # type: ignore[no-untyped-def]
-    """Sensitivities of the states at the reading instants.
+def _show(lever, z, out):  # type: ignore[no-untyped-def]
+    """Fills out (Y, m) = lever z with the first rows of z; few states show in an output."""
+    for y in range(lever.shape[0]):
+        for c in range(out.shape[1]):
+            out[y, c] = 0.0
+        for i in range(lever.shape[1]):
+            factor = lever[y, i]
+            if factor != 0.0:
+                for c in range(out.shape[1]):
+                    out[y, c] += factor * z[i, c]
+
+
+@njit(cache=True, nogil=True)
+def columns(which, ways, start, owner, into, into_scale, source, source_scale, size, read, lever):  # type: ignore[no-untyped-def]
+    """Sensitivities of the outputs at the reading instants, as far as states show in them.
 
     Args:
         which: from `transitions`.
@@ -246,19 +259,20 @@ def columns(which, ways, start, owner, into, into_scale, source, source_scale, s
         source, source_scale: (P,) state that it leaves (-1: none) and its scale.
         size: (P, 2K) of the piece at the ends of each interval.
         read: (R,) ascending node indices.
+        lever: (R, Y, n) of the states on the outputs there.
 
     Returns:
-        (R, n, M)
+        (R, Y, M)
     """
     pieces, count = size.shape[0], size.shape[1] // 2
     n, m = start.shape
-    out = np.empty((read.shape[0], n, m))
+    out = np.empty((read.shape[0], lever.shape[1], m))
     z = np.zeros((3 * n, m))  # states, then forcing at the left end of the interval, then at the right end
     new = np.empty((n, m))
     copy(start, z)
     r = 0
     while r < read.shape[0] and read[r] == 0:
-        copy(start, out[r])
+        _show(lever[r], z, out[r])
         r += 1
     for k in range(count):
         if r >= read.shape[0]:
@@ -279,7 +293,7 @@ def columns(which, ways, start, owner, into, into_scale, source, source_scale, s
         product(ways[which[k]], z, new)
         copy(new, z)
         while r < read.shape[0] and read[r] == k + 1:
-            copy(new, out[r])
+            _show(lever[r], z, out[r])
             r += 1
     return out
 

@@ -75,7 +75,7 @@ def sensitivities(
     begin = _start_slopes(trajectory, parameters, starts, first + owners)
     if grown is not None:
         begin[:, : len(parameters)] *= grown[0]
-    s = kernel.columns(
+    dy = kernel.columns(
         trajectory.which,
         np.concatenate([trajectory.e, trajectory.w0, trajectory.w1], axis=2),
         begin,
@@ -86,11 +86,8 @@ def sensitivities(
         system.scale[source],
         size,
         nodes.astype(np.int64),
+        output_matrix(trajectory, nodes),
     )
-    lever = output_matrix(trajectory, nodes)
-    dy = np.zeros((*lever.shape[:2], s.shape[2]))
-    for y, i in np.argwhere(lever.any(axis=0)).tolist():  # few states show in an output
-        dy[:, y] += lever[:, y, i, None] * s[:, i]
     for y, partials in enumerate(_shown_by_outputs(trajectory, parameters)):
         zero = system.grid.outputs[y]
         shown = partials | ({zero: 1.0} if zero in parameters else {})
