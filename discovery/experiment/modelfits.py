@@ -10,6 +10,7 @@ from typing import Any
 from discovery.errors import UserError
 from discovery.evaluation.crossvalidation import ROUNDS, Refit
 from discovery.experiment.experiment import Experiment, only
+from discovery.experiment.fileunits import refuse_file_units
 from discovery.experiment.fitted import Fitted, judged
 from discovery.experiment.form import (
     FileEntry,
@@ -100,7 +101,10 @@ def fit_of(
     if isinstance(entry, SparseOptions):
         return model, report, _fitting(report)(model, campaign, recordings, given, max_rounds=max_rounds)
     loss: Loss = getattr(entry, "loss", "linear")
-    return model, report, fit_model(model, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
+    fit = fit_model(model, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
+    if isinstance(entry, FileEntry):
+        refuse_file_units(experiment.path, name, fit, campaign)
+    return model, report, fit
 
 
 def compared(

@@ -29,7 +29,7 @@ class Channel:
     """`unit` is the canonical one, `noise` (standard deviation of a reading) and `spread` are in it.
 
     `spread`: standard deviation of the unknown constant by which an input, or the zero of an error, is off in
-    a recording; 0: known.
+    a recording; 0: known. `factor`: of a value in the file, to make it one in `unit`.
     """
 
     name: str
@@ -38,6 +38,7 @@ class Channel:
     noise: float | None
     between: Between
     spread: float = 0.0
+    factor: float = 1.0
 
     @property
     def measured(self) -> bool:
@@ -141,7 +142,8 @@ def make_channel(name: str, form: ChannelForm, to: Conversion) -> Channel:
     """A channel in its canonical unit; noise and spread are differences, so they take the factor alone."""
     noise = None if form.noise is None else form.noise * abs(to.factor)
     spread = (form.spread or 0.0) * abs(to.factor)
-    return Channel(name, form.role, to.unit, noise, form.between or ROLES[form.role].between, spread)
+    between = form.between or ROLES[form.role].between
+    return Channel(name, form.role, to.unit, noise, between, spread, to.factor)
 
 
 def wanted_columns(form: RecordingForm, channels: Mapping[str, ChannelForm]) -> dict[str, str]:
