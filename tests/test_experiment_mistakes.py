@@ -15,7 +15,7 @@ from discovery.experiment import load_experiment, run
 from discovery.models import read_model
 from discovery.recordings import load_campaign
 from discovery.recordings.check import check_campaign
-from tests.small import CAMPAIGN, EXPERIMENT, MODEL, results_of, write_small
+from tests.small import EXPERIMENT, MODEL, results_of, write_small
 
 
 @pytest.fixture
@@ -98,36 +98,6 @@ def test_a_model_without_the_outputs_is_refused(folder: Path) -> None:
     (folder / "model.toml").write_text(MODEL.split("[outputs]")[0])
     with pytest.raises(UserError, match=r"'one_body' gives none of the outputs E_Y0C, E_R0T"):
         run(folder / "experiment.toml", folder / "out")
-
-
-def in_millimetres(folder: Path) -> None:
-    """The errors of E_Y0C in mm, as another logger would write them."""
-    for name in "abc":
-        path = folder / f"{name}.csv"
-        head, *rows = [line.split(",") for line in path.read_text().splitlines()]
-        for row in rows:
-            row[3] = f"{float(row[3]) / 1000:.6f}" if row[3] else ""
-        path.write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
-    text = CAMPAIGN.replace('"um", noise = 0.3', '"mm", noise = 0.0003', 1)
-    (folder / "campaign.toml").write_text(text)
-
-
-def test_a_formula_in_the_unit_of_the_file_is_refused(folder: Path) -> None:
-    in_millimetres(folder)
-    (folder / "model.toml").write_text(MODEL.replace('"-5*', '"-0.005*'))
-    words = r"'one_body': the formula of output 'E_Y0C' .* converted to um\. Write 1000\*\(\.\.\.\)"
-    with pytest.raises(UserError, match=words):
-        run(folder / "experiment.toml", folder / "out")
-    assert not (folder / "out").exists()
-
-
-@pytest.mark.parametrize("formula", ["-5*", "0.02*"])  # right; and wrong, but no better in mm
-def test_a_formula_in_um_is_taken_for_a_file_in_mm(folder: Path, formula: str) -> None:
-    in_millimetres(folder)
-    (folder / "model.toml").write_text(MODEL.replace('"-5*', f'"{formula}'))
-    run(folder / "experiment.toml", folder / "out")
-    rms = results_of(folder / "out")["models"]["one_body"]["recordings"]["c"]["E_Y0C"]["rms"]
-    assert (rms < 0.5) == (formula == "-5*")
 
 
 def test_an_output_that_a_model_lacks_is_told_with_the_nearest_name(folder: Path) -> None:

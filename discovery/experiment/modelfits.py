@@ -10,7 +10,7 @@ from typing import Any
 from discovery.errors import UserError
 from discovery.evaluation.crossvalidation import ROUNDS, Refit
 from discovery.experiment.experiment import Experiment, only
-from discovery.experiment.fileunits import refuse_file_units
+from discovery.experiment.fileunits import converted_notes, refitted_in_file_units
 from discovery.experiment.fitted import Fitted, judged
 from discovery.experiment.form import (
     FileEntry,
@@ -51,8 +51,10 @@ def fit_entry(experiment: Experiment, name: str, entry: ModelEntry, progress: Pr
         refit = _refit(fit, report) if isinstance(entry, SparseOptions) else None
         fitted = judged(experiment, name, entry.kind, model, fit, report, seconds, progress, refit)
     also = [recording for recording in experiment.fit if recording not in common]
-    also_fitted = [f"also fitted to {', '.join(also)}"] if also else []
-    return replace(fitted, notes=(*also_fitted, *fitted.notes), seconds=clock.perf_counter() - began)
+    first = [f"also fitted to {', '.join(also)}"] if also else []
+    if isinstance(entry, FileEntry):
+        first += converted_notes(experiment.model_file(name), fitted.start, experiment.campaign.channels)
+    return replace(fitted, notes=(*first, *fitted.notes), seconds=clock.perf_counter() - began)
 
 
 def _fitting(report: Mapping[str, Any]) -> Callable[..., Fit]:
@@ -103,7 +105,7 @@ def fit_of(
     loss: Loss = getattr(entry, "loss", "linear")
     fit = fit_model(model, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
     if isinstance(entry, FileEntry):
-        refuse_file_units(experiment.path, name, fit, campaign)
+        model, fit = refitted_in_file_units(model, fit, campaign)
     return model, report, fit
 
 
