@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
+import time as clock
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,8 @@ from discovery.runtime.guards import Reading, number
 
 FILE = "history.sqlite"
 EVERY_S = 60.0  # between two ticks that are kept; a change of state is always kept
-FLUSH_S = 10.0  # between two writes
+FLUSH_S = 10.0  # between two writes, on the clock of the ticks ...
+LEAST_S = 1.0  # ... and of the computer: recorded days pass in seconds
 KEEP_S = 400 * 24 * 3600.0  # history older than this is forgotten
 MOST_WAITING = 100_000  # rows kept in memory while the disk does not take them
 
@@ -40,7 +42,8 @@ class History:
         self.facts = dict(facts)
         self.waiting: list[tuple[str, tuple[Any, ...]]] = []
         self.kept: tuple[float, str] = (-math.inf, "")  # last tick that was kept
-        self.flushed = -math.inf
+        self.flushed = self.written = -math.inf  # on the clock of the ticks, and of the computer
+        self.failed: Exception | None = None  # why the last write was none
         self.ticks = 0
         self.base: Any = None
 
@@ -70,10 +73,14 @@ class History:
         self.waiting.append(("INSERT INTO event VALUES (?,?,?,?)", row))
 
     def flush(self, now: float, *, force: bool = False) -> Exception | None:
+        """Write what waits, if it is time; the error where the disk did not take it the last time."""
+        recent = 0.0 <= now - self.flushed < FLUSH_S or clock.monotonic() - self.written < LEAST_S
+        if force or not recent:
+            self.flushed, self.failed = now, self._write(now)
+        return self.failed
+
+    def _write(self, now: float) -> Exception | None:
         """Write what waits; the error where the disk does not take it."""
-        if not force and 0.0 <= now - self.flushed < FLUSH_S:
-            return None
-        self.flushed = now
         del self.waiting[:-MOST_WAITING]
         try:
             if self.base is None:
@@ -92,6 +99,7 @@ class History:
                 self.base.execute("DELETE FROM tick WHERE time < ?", (now - KEEP_S,))
                 self.base.execute("DELETE FROM event WHERE time < ?", (now - KEEP_S,))
             self.waiting.clear()
+            self.written = clock.monotonic()
         except (sqlite3.Error, OSError) as error:
             if isinstance(error, sqlite3.DatabaseError) and "malformed" in str(error):
                 self._set_aside()

@@ -316,6 +316,8 @@ class Session:
         output = self.output
         if output is not None and output.flush() is not None:
             return  # a state may not claim lines that no disk has
+        if self.history is not None:
+            self.history.flush(now, force=True)
         more = {
             "output": output.size if output is not None and output.file is not None else None,
             "clock": self.clock.saved() if self.clock is not None else {},

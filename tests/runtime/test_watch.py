@@ -65,6 +65,26 @@ def test_a_folder_without_history_is_told(tmp_path: Path) -> None:
         server(tmp_path, 0, 24.0)
 
 
+def test_recorded_days_are_written_in_few_pieces_and_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A day of events in a moment: once at the start, with a saved state, and at the end."""
+    from discovery.runtime.events import Event
+
+    computer = iter([0.5] * 2000)
+    monkeypatch.setattr("discovery.runtime.history.clock.monotonic", lambda: next(computer))
+    history = History(tmp_path, {})
+    there = []
+    for k in range(1440):
+        history.event(Event(60.0 * k, "a", "b"))
+        assert history.flush(60.0 * k, force=k == 700) is None
+        if k in (0, 699, 700, 1439):
+            there.append(len(read_history(tmp_path, 1e6)["events"]))
+    history.close(86_400.0)
+    assert there == [1, 1, 701, 701]
+    assert len(read_history(tmp_path, 1e6)["events"]) == 1440
+
+
 def test_a_disk_that_fails_costs_no_tick_and_no_event(tmp_path: Path) -> None:
     (tmp_path / "no").write_text("a file where a folder should be")
     history = History(tmp_path / "no" / "memory", {})
@@ -72,6 +92,7 @@ def test_a_disk_that_fails_costs_no_tick_and_no_event(tmp_path: Path) -> None:
 
     history.event(Event(1.0, "a", "b"))
     assert history.flush(1.0) is not None
+    assert history.flush(2.0) is not None  # not tried again so soon, and not written either
     history.path = tmp_path / "history.sqlite"
     assert history.flush(20.0) is None
     history.close(30.0)
