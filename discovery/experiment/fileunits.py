@@ -2,49 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import isclose
 
 import numpy as np
 
 from discovery.errors import RunsAwayError
-from discovery.fitting import Fit, fit_model
+from discovery.fitting import fit_model
 from discovery.models import Model
 from discovery.recordings import Campaign, Channel
 from discovery.terms import Apply, Number
 
-MISSED = 0.5  # share of the spread of readings: a model that leaves more may have another unit
-BETTER = 0.5  # share of both that the formula in the unit of the file leaves at most
+MISSED = 0.5  # share of the spread of readings that a model with the right unit leaves at most
+ASTRAY = 30.0  # times its start: a parameter that a fit moves farther means another unit
 
 
-def refitted_in_file_units(model: Model, fit: Fit, campaign: Campaign) -> tuple[Model, Fit]:
-    """The model and its fit, formulas of outputs converted where they are in the unit of the file.
+def in_file_units(
+    model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str]
+) -> Model:
+    """The model, formulas of outputs converted where they are in the unit of the file.
 
-    A displacement in mm is converted to um. A formula that still gives mm is 1000 times too small, and a
-    diagnosis would look for the physics that is missing. Only outputs that the model misses are asked, and
-    only a fit with the formula converted decides.
-
-    Args:
-        model: as the fit began from.
+    A displacement in mm is converted to um. A formula that still gives mm is 1000 times too small: the model
+    misses the readings, or its parameters leave all reason, and a diagnosis would look for the physics that
+    is missing. A formula is converted if a fit fails so as it stands, and none does with it converted.
     """
-    outputs = fit.problem.outputs
     for y, output in enumerate(outputs):
         factor = campaign.channels[output].factor
         if output not in model.outputs or isclose(factor, 1.0):
             continue
-        missed, spread = _rms(fit, y), _spread(fit, y)
-        if missed < MISSED * spread:
-            continue
         formula = Apply("*", (Number(factor), model.outputs[output]))
         other = replace(model, outputs={**model.outputs, output: formula})
-        try:
-            better = fit_model(other, campaign, list(fit.residuals()), outputs)
-        except RunsAwayError:
-            continue
-        if _rms(better, y) < BETTER * min(missed, spread):
-            model, fit = other, better
-    return model, fit
+        if not _fits(model, campaign, recordings, outputs, y):
+            model = other if _fits(other, campaign, recordings, outputs, y) else model
+    return model
 
 
 def converted_notes(written: Model, model: Model, channels: Mapping[str, Channel]) -> Iterator[str]:
@@ -58,16 +49,22 @@ def converted_notes(written: Model, model: Model, channels: Mapping[str, Channel
             unit, factor = channels[output].unit, channels[output].factor
             yield (
                 f"the formula of output '{output}' is taken in the unit of the file, times {factor:g} to "
-                f"give {unit}: as it stands, it misses the readings. Write {factor:g}*(...) in the model "
-                "to confirm"
+                f"give {unit}: it fits the readings so, and not as it stands. Write {factor:g}*(...) in the "
+                "model to confirm"
             )
 
 
-def _rms(fit: Fit, y: int) -> float:
+def _fits(
+    model: Model, campaign: Campaign, recordings: Sequence[str], outputs: Sequence[str], y: int
+) -> bool:
+    """Whether a fit explains output number `y`, with parameters that stay near their starts."""
+    try:
+        fit = fit_model(model, campaign, recordings, outputs)
+    except RunsAwayError:
+        return False
     left = np.concatenate([one[:, y] for one in fit.residuals().values()])
-    return float(np.sqrt(np.nanmean(left**2)))
-
-
-def _spread(fit: Fit, y: int) -> float:
-    """Standard deviation of the readings of an output."""
-    return float(np.nanstd(np.concatenate([t.system.grid.readings[:, y] for t in fit.trajectories])))
+    readings = np.concatenate([t.system.grid.readings[:, y] for t in fit.trajectories])
+    starts, found = model.values(), fit.model.values()
+    moved = [found[n] / starts[n] for n in model.free if starts[n]]
+    near = all(1 / ASTRAY < change < ASTRAY for change in moved if change > 0)
+    return near and bool(np.nanstd(left) < MISSED * np.nanstd(readings))

@@ -10,7 +10,7 @@ from typing import Any
 from discovery.errors import UserError
 from discovery.evaluation.crossvalidation import ROUNDS, Refit
 from discovery.experiment.experiment import Experiment, only
-from discovery.experiment.fileunits import converted_notes, refitted_in_file_units
+from discovery.experiment.fileunits import converted_notes, in_file_units
 from discovery.experiment.fitted import Fitted, judged
 from discovery.experiment.form import (
     FileEntry,
@@ -103,10 +103,9 @@ def fit_of(
     if isinstance(entry, SparseOptions):
         return model, report, _fitting(report)(model, campaign, recordings, given, max_rounds=max_rounds)
     loss: Loss = getattr(entry, "loss", "linear")
-    fit = fit_model(model, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
     if isinstance(entry, FileEntry):
-        model, fit = refitted_in_file_units(model, fit, campaign)
-    return model, report, fit
+        model = in_file_units(model, campaign, recordings, given)
+    return model, report, fit_model(model, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
 
 
 def compared(
