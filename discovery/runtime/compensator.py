@@ -183,8 +183,8 @@ class Compensator:
             reading = readings.get(guard.spec.name)
             if reading is not None and self.shift:
                 reading = Reading(reading.value, number(reading.time) + self.shift, reading.good)
-            others = any(way and way == ways[k] for j, way in enumerate(ways) if j != k)
-            found.append(guard.check(reading, now, others))
+            together = ways[k] != 0 and ways.count(ways[k]) > 1
+            found.append(guard.check(reading, now, together))
         return found
 
     def _advance(self, u: Array, lost: NDArray[np.bool_], now: float) -> tuple[bool, bool]:
