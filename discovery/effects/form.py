@@ -28,7 +28,7 @@ Place = Literal[
     "coolant terms",  # terms in which the coolant temperature stands
     "cooling terms",  # terms in which the cooling power stands
     "current terms",  # terms in which an electric current stands
-    "loss terms",  # terms in which a heat load stands, or a law of the speed
+    "loss terms",  # terms in which a heat load stands, or a law of the speed or another input
     "air terms",  # terms in which the ambient temperature stands
     "error state",  # a state that is an error: its terms are rates
     "seat",  # a body as all errors see it; the formula is added to its temperature there

@@ -178,7 +178,7 @@ def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, st
     terms = tuple(
         t
         for t in parts.own
-        if _holds(t, wanted, role) or (wanted == "heat load" and _is_friction(t, model, role))
+        if _holds(t, wanted, role) or (wanted == "heat load" and _is_loss(t, model, role))
     )
     yield from _of(effect, terms)
 
@@ -211,7 +211,12 @@ def _holds(term: Term, wanted: str, role: Mapping[str, str]) -> bool:
 
 def _is_friction(term: Term, model: Model, role: Mapping[str, str]) -> bool:
     """Whether a term is a loss that follows the speed; with a temperature in it, it is an exchange."""
+    return _is_loss(term, model, role) and _holds(term, "rotation speed", role)
+
+
+def _is_loss(term: Term, model: Model, role: Mapping[str, str]) -> bool:
+    """Whether a term is heat that a speed or another input makes (strokes of a press), whatever is warm."""
     used: Collection[str] = names(term.expression)
     roles = {role[n] for n in used if n in role}
     warm = not set(used).isdisjoint(model.states) or any("temperature" in r for r in roles)
-    return "rotation speed" in roles and not warm
+    return not warm and not roles.isdisjoint(("rotation speed", "other input"))

@@ -153,7 +153,18 @@ def test_losses_age_all_together_or_at_one_body() -> None:
     found = expand(catalogue()["wear"])
     assert {h.states for h in found} == {("motor", "table"), ("motor",), ("table",)}
     assert {(h.recording, h.acting) for h in found} == {("two", ("two",))}
-    assert {h.states for h in expand(catalogue()["wear"], without={"heat load"})} == {("table",)}
+    alone = expand(catalogue()["wear"], without={"heat load", "other input"})
+    assert {h.states for h in alone} == {("table",)}
+
+
+def test_heat_of_any_input_can_age() -> None:
+    """Guides of a press rub with its strokes, which are neither a power nor a speed."""
+    model, channels = sample({"heat load", "rotation speed", "other input"})
+    channels = {**channels, "strokes": Channel("strokes", "other input", "1/min", None, "held")}
+    for law, ages in (("P_g*strokes", True), ("P_g*strokes*(room - bed)", False), ("P_g*pump", False)):
+        on = replace(model, terms=(*model.terms, Term("guides", "bed", parse(law))))
+        found = {h.states for h in claims(on, catalogue()["wear"], channels)}
+        assert (("bed",) in found) == ages
 
 
 def test_what_begins_acts_in_the_recordings_that_were_made_later() -> None:

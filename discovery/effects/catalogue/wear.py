@@ -2,10 +2,10 @@
 
     q = wear q_loss    [W] at each body, from a recording on
 
-q_loss is what the losses of the model are there, of a recorded power or by a law of the speed; wear: change
-of them, of either sign, -0.7 to 0.5. Source: friction torque -70 % after 4 to 7 years (Zwingenberger, TU
-Dresden, 2023), a run-in step of 30 %. Limits: a step between recordings, in the order of their dates, never
-inside one; what all recordings share is the model's own parameter.
+q_loss is what the losses of the model are there, of a recorded power or by a law of the speed (or strokes);
+wear: change of them, of either sign, -0.7 to 0.5. Source: friction torque -70 % after 4 to 7 years
+(Zwingenberger, TU Dresden, 2023), a run-in step of 30 %. Limits: a step between recordings, in the order of
+their dates, never inside one; what all recordings share is the model's own parameter.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example
