@@ -36,7 +36,8 @@ def lines_of(d: dict[str, Any]) -> list[str]:
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
         after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
         rms = f"rms {printed(i['rms_before'])} -> {after}{unit} ({_NOISE} {printed(i['noise_floor'])}{unit})"
-        lines.append(f"  held-out recording {run}: {rms}{', worse than without' if run in worse else ''}")
+        rms += ", worse than without" if run in worse else _otherwise(i, unit)
+        lines.append(f"  held-out recording {run}: {rms}")
     if not d["physics"]:
         lines += _left(d["improvement"])
     if worse:
@@ -45,6 +46,16 @@ def lines_of(d: dict[str, Any]) -> list[str]:
         )
     lines.append(f"  next: {d['next_experiment']}")
     return lines
+
+
+def _otherwise(one: dict[str, Any], unit: str) -> str:
+    """The rms with start values from all readings, if it says the opposite of the rms from the first ones."""
+    before, after = one.get("from_known_starts") or (None, None)
+    if before is None or after is None or one["rms_after"] is None:
+        return ""
+    if (after - before) * (one["rms_after"] - one["rms_before"]) >= 0:
+        return ""
+    return f"; with start values from all readings, rms {printed(before)} -> {printed(after)}{unit}"
 
 
 def _left(improvement: dict[str, Any]) -> list[str]:

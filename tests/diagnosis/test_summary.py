@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from discovery.diagnosis.summary import summary
 
 
@@ -105,3 +107,26 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
     assert line.endswith(
         "reading noise and heat that nobody records explain up to 4.6 times the reading noise)"
     )
+
+
+@pytest.mark.parametrize(
+    ("starts", "said"),
+    [([1.11, 0.466], "; with start values from all readings, rms 1.11 -> 0.466 K"), ([1.11, 1.3], "")],
+)
+def test_starts_that_turn_the_proof_around_are_said(tmp_path: Path, starts: list[float], said: str) -> None:
+    """A hidden body starts unknown: from first readings alone the right repair may look worse."""
+    last = {"rms_before": 2.02, "rms_after": 5.94, "noise_floor": 3.18, "from_known_starts": starts}
+    held_out = {"last": last}
+    document: dict[str, Any] = {
+        "verdict": "missing physics",
+        "model": "m",
+        "physics": [{"effect": "input_heat", "states": ["core"], "probability": 0.98, "parameters": {}}],
+        "alternatives": [],
+        "reasons": [],
+        "description": None,
+        "improvement": {"unit": "K", "held_out": held_out, "contradicted_by": []},
+        "next_experiment": "none",
+    }
+    (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
+    noise = "reading noise and heat that nobody records explain up to 3.18 K"
+    assert summary(tmp_path)[2] == f"  held-out recording last: rms 2.02 -> 5.94 K ({noise}){said}"
