@@ -54,6 +54,7 @@ _AGREE = 0.3  # of that distance: what the neighbours differ by
 _IMPOSSIBLE = {"degC": 30.0, "um": 100.0, "um/m": 100.0}
 _AFTER = 7  # readings that a first one is compared with
 _ROW = 3  # such readings in a row
+_LEFT = 0.02  # of a step at the start, in the readings behind it: a response leaves more
 _TRACE = 3.0  # times the usual steps, or those next to it: a response leaves more behind
 _SOME = 3  # readings that are none: no slip any more
 _MANY, _MANY_SHARE = 5, 0.01  # so many lone readings, or such a share of all, pull at a fit
@@ -108,10 +109,10 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         first = last = int(lone[0])
         while last + 1 in lone:
             last += 1
-        what = (
-            f"'{channel.name}' is {read[first]:g} {channel.unit} in {_count(last - first + 1)} between "
-            f"{read[first - 1]:g} and {read[last + 1]:g}"
-        )
+        where = f"between {read[first - 1]:g} and {read[last + 1]:g}"
+        where = where if first else f"at the start, before {read[last + 1]:g}"
+        count = _count(last - first + 1)
+        what = f"'{channel.name}' is {read[first]:g} {channel.unit} in {count} {where}"
         do = "it is left out" if dropped else "leave the cell empty if the sensor failed there"
         line = int(lines[known[first]])
         yield Finding("warning", file, line, what + more(lone.size), do, "outlier", channel.name, 2.0)
@@ -155,7 +156,23 @@ def impossible_readings(channel: Channel, read: Array) -> Lines:
             away = np.abs(read[k + 1 : last + 1] - read[k])
             if away.min() > far and abs(read[last + 1] - read[k]) <= _TRACE * moves:
                 rows |= set(range(k + 1, last + 1))
+    rows |= set(range(_wild_start(read, far)))
     return np.array(sorted(rows), dtype=np.intp)
+
+
+def _wild_start(read: Array, far: float) -> int:
+    """How many readings (R,) at the start, up to three, are far from all that follow.
+
+    A machine that warms leaves a trace: after a large step comes a smaller one. After a wrong reading, the
+    readings move no more than they do otherwise.
+    """
+    sizes = np.abs(np.diff(read))
+    for count in range(1, _ROW + 1):
+        after = read[count : count + _AFTER]
+        away = np.abs(read[:count, None] - after).min()
+        if away > far and np.ptp(after) <= max(_TRACE * float(np.percentile(sizes, 90)), away * _LEFT):
+            return count
+    return 0
 
 
 def lone_readings(read: Array) -> Lines:

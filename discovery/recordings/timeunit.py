@@ -8,13 +8,13 @@ import numpy as np
 
 from discovery.recordings.columns import Array
 
-SECONDS = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 _HOUR = 3600.0
 _TRIED = 200  # stamps that are looked at
 _ROUGH = 0.2  # of a part: a stamp that is rounded more roughly says nothing
 _MOST = 6.0  # log odds that digits are worth
 # log odds before anything is seen: who writes no unit mostly means seconds
-_PRIOR = {"s": 0.0, "min": -2.0, "h": -2.5, "ms": -3.5, "d": -5.0}
+_PRIOR = {"s": 0.0, "min": -2.0, "h": -2.5, "ms": -3.5, "us": -4.5, "d": -5.0}
 _LENGTH = (np.log(5 * _HOUR), np.log(4.0))  # of a recording [s]: median and spread, both of the logarithm
 _STEP = (np.log(15.0), np.log(10.0))  # of a logger [s]
 _SMALL = 0.7  # correlation of the two: what answers quickly is recorded for a short time

@@ -80,3 +80,22 @@ def test_wrong_readings_in_a_row_are_left_out_and_said(write: Write) -> None:
     assert told.endswith("left out")
     air = next(iter(load_campaign(path).recordings.values())).values["T_env"]
     assert np.flatnonzero(np.isnan(air)).tolist() == [30, 31]
+
+
+@pytest.mark.parametrize("wrong", [1, 2, 3])
+def test_wrong_readings_at_the_start_are_left_out_and_said(write: Write, wrong: int) -> None:
+    """A sensor that has not answered yet writes -45: a model that starts there misses the whole recording."""
+    steady = 59.8 + 0.2 * np.sin(np.arange(60) / 8.0)
+    cells = [-45.0] * wrong + [round(value, 1) for value in steady]
+    path = write(with_column(1, [f"{cell}" for cell in cells]))
+    [told] = found(path)
+    count = "one reading" if wrong == 1 else f"{wrong} readings in a row"
+    assert f"line 2: 'T_env' is -45 degC in {count} at the start, before 59.8" in told
+    assert told.endswith("left out")
+
+
+@pytest.mark.parametrize("shift", [0.6, 2.0, 5.0])
+def test_a_fast_warm_up_at_the_start_is_no_fault(shift: float) -> None:
+    """A nozzle is heated from the first reading on: its steps become smaller, they do not stop at once."""
+    read = 220.0 - 195.0 * np.exp(-np.arange(200) / shift) + np.random.default_rng(3).normal(0.0, 0.05, 200)
+    assert impossible_readings(Channel("n", "temperature", "degC", None, "linear"), read).size == 0

@@ -28,3 +28,11 @@ def test_a_machine_whose_clock_ends_at_600_is_in_minutes() -> None:
     clock = np.arange(0.0, 600.0, 1.0)
     shares = probabilities(time_odds(clock, [40.0 - 18.0 * np.exp(-clock / 80.0)]))
     assert next(iter(shares)) == "min"
+
+
+def test_a_counter_of_microseconds_is_a_possible_answer() -> None:
+    """A board counts in us and reads each second; the file does not say so. It is not surely in ms."""
+    clock = 1e6 * np.arange(250.0)
+    shares = probabilities(time_odds(clock, [24.6 + 5.5 * np.exp(-np.arange(250.0) / 60.0)]))
+    assert shares["us"] > 0.1
+    assert shares["ms"] < 0.9

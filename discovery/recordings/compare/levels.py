@@ -8,7 +8,7 @@ import numpy as np
 
 from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Array
-from discovery.recordings.compare.seen import Seen, noise_of, smallest_step, warning
+from discovery.recordings.compare.seen import Seen, noise_of, rounding_of, smallest_step, warning
 from discovery.recordings.finding import Finding
 
 _FEWEST = 30  # readings
@@ -35,10 +35,16 @@ def level_findings(recordings: Sequence[Seen], channels: Mapping[str, Channel]) 
 def _noise(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
     if not channel.measured and channel.between != "linear":
         return
-    found = {one.name: noise_of(one.known(channel.name)[1]) for one in recordings}
-    sizes = {one.name: one.known(channel.name)[1].size for one in recordings}
+    reads = {one.name: one.known(channel.name)[1] for one in recordings}
+    found = {name: noise_of(read) for name, read in reads.items()}
+    hidden = {name: rounding_of(read) for name, read in reads.items()}
+    sizes = {name: read.size for name, read in reads.items()}
     for one in recordings:
-        others = [v for name, v in found.items() if name != one.name and v > 0 and sizes[name] >= _FEWEST]
+        others = [
+            max(v, hidden[name])
+            for name, v in found.items()
+            if name != one.name and v > 0 and sizes[name] >= _FEWEST
+        ]
         usual = float(np.median(others)) if others else channel.noise or 0.0
         if sizes[one.name] >= _FEWEST and usual > 0 and found[one.name] > _NOISIER * usual:
             times = found[one.name] / usual
@@ -63,9 +69,10 @@ def _scale(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
         if read.size < 2 * _FEWEST:
             continue
         best, where = 1.0, 0
+        rounding = rounding_of(read)  # readings that stand still hide less noise than this
         least = _ROUNDING * float(np.std(read))  # less is no noise: a straight line, or digits
         for row in np.linspace(_FEWEST, read.size - _FEWEST, _PLACES).astype(int):
-            before, after = noise_of(read[:row]), noise_of(read[row:])
+            before, after = (max(noise_of(part), rounding) for part in (read[:row], read[row:]))
             if min(before, after) > least and abs(np.log(after / before)) > abs(np.log(best)):
                 best, where = after / before, int(row)
         if max(best, 1 / best) > _RESCALED:

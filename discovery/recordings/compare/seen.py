@@ -77,6 +77,13 @@ def smallest_step(readings: Array) -> float:
     return float(np.min(different)) if different.size > 2 else 0.0
 
 
+def rounding_of(readings: Array) -> float:
+    """Standard deviation of what rounding to the smallest step hides: readings that stand still have no noise
+    of their own.
+    """
+    return smallest_step(readings) / float(np.sqrt(12.0))
+
+
 def warning(one: Seen, channel: Channel, row: int, what: str, do: str, kind: str, weight: float) -> Finding:
     """A finding at a reading (`row`) of a channel."""
     return Finding(
