@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -245,6 +245,9 @@ def read_numbers(cells: Sequence[str], comma: bool | None) -> Numbers:
             strange.setdefault(cell)
             value = math.nan
         values[index] = value
+    if wrong is None and (other := _no_switch(known)) is not None:
+        wrong = cells.index(other)
+        values[[cell == other for cell in cells]] = math.nan
     unit = max(units, key=lambda u: units[u]) if units and sum(units.values()) > len(known) / 2 else ""
     words = [cell for cell in known if cell in strange or cell.casefold() in SWITCHES]
     if wrong is not None and len(words) == 2 and all(map(is_empty, known.keys() - set(words))):
@@ -253,6 +256,13 @@ def read_numbers(cells: Sequence[str], comma: bool | None) -> Numbers:
         values = np.array([math.nan if is_empty(c) else float(c == second) for c in cells])
         return Numbers(values, "", None, (first, second))
     return Numbers(values, unit, wrong)
+
+
+def _no_switch(known: Mapping[str, float | None]) -> str | None:
+    """The first cell that a switch cannot have: a column that says both on and off knows no other number."""
+    said = {SWITCHES[cell.casefold()] for cell in known if cell.casefold() in SWITCHES}
+    other = (cell for cell, value in known.items() if value is not None and value not in (0.0, 1.0))
+    return next((cell for cell in other if not is_empty(cell)), None) if len(said) == 2 else None
 
 
 def _value(cell: str, comma: bool | None, units: dict[str, int]) -> float | None:

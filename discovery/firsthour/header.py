@@ -37,7 +37,7 @@ def find_header(
             f"put a line of {width} names above them, such as time,heater,T1"
         )
     end = len(head) if first is None else first
-    rows = [(k, _fitted(head[k][1], width)) for k in range(end)]
+    rows = [(k, fitted(head[k][1], width)) for k in range(end)]
     full = [(k, cells) for k, cells in rows if cells is not None]
     if not full:
         _compare(path, head[:end], width)
@@ -101,10 +101,14 @@ def _without_labels(cells: list[str]) -> list[str]:
     return [cell if k % 2 else "" for k, cell in enumerate(cells)] if paired else cells
 
 
-def _fitted(cells: list[str], width: int) -> list[str] | None:
-    """A line of names or units with as many cells as there are columns, or None."""
+def fitted(cells: list[str], width: int) -> list[str] | None:
+    """A line of names or units with as many cells as there are columns, or None. Marks before or behind the
+    names make empty cells: these name nothing.
+    """
     if len(cells) == width:
         return cells
+    if len(cells) > width and len(names := [cell for cell in cells if cell]) == width:
+        return names
     return cells[:width] if len(cells) == width + 1 and not cells[-1] else None
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from discovery.errors import UserError
 from discovery.firsthour.cells import holds_word, is_empty, is_number, is_stamp, is_switch
 from discovery.firsthour.encodings import decode
-from discovery.firsthour.header import Row, begin, explained, find_header, is_data
+from discovery.firsthour.header import Row, begin, explained, find_header, fitted, is_data
 from discovery.firsthour.instants import is_time_of_day
 from discovery.firsthour.workbooks import is_workbook, read_workbook
 from discovery.limits import check_shape, read_table
@@ -183,7 +183,7 @@ def _sheet(
             f"{path}: only {rows} rows of data below the header; a recording needs at least {FEWEST}"
         )
     check_shape(path, rows, width)
-    header = (*head[at][1], *[""] * width)[:width]
+    header = (*(fitted(head[at][1], width) or head[at][1]), *[""] * width)[:width]
     header = tuple(word or group for word, group in zip(header, groups, strict=True))  # a merged cell
     above = (*remarks, *("  ".join(filter(None, cells)) for _, cells in head[:at]))
     said = (

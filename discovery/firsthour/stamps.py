@@ -104,8 +104,8 @@ def find_clock(
             notes = [*notes, *said]
         steps = np.diff(seconds)
         if np.isfinite(seconds).all() and (steps >= 0).all() and np.sum(steps > 0) >= _FEWEST:
-            if (steps == 0).any() and not sure:
-                continue
+            if not sure and ((steps == 0).any() or (backwards and one.counted)):
+                continue  # a temperature that only rises is no clock, least of all where one is called time
             return replace(one, seconds=seconds, about=about, order=order, notes=tuple(notes))
         if not backwards and sure and (steps < 0).any():
             backwards = _backwards(sheet, seconds, names[one.columns[0]])
@@ -304,7 +304,10 @@ def _backwards(sheet: Sheet, seconds: Array, name: str) -> str:
     kept = np.flatnonzero(~repeated_rows(sheet, seconds))
     row = int(np.flatnonzero(np.diff(seconds[kept]) < 0)[0]) + 1
     same = np.flatnonzero(seconds[kept[:row]] == seconds[kept[row]])
+    falls = int(np.sum(np.diff(seconds[kept]) < 0))
     do = "sort the rows"
+    if falls > 1:
+        do = f"it falls {falls} times: sort the rows, or let it run on if the counter starts again there"
     if same.size:
         first = sheet.lines[kept[same[0]]]
         do = f"its stamp stands in line {first} already, with other values: delete the wrong rows"

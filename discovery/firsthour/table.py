@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.errors import UserError
-from discovery.firsthour.cells import comma_is_decimal, is_empty, is_number, is_stamp, read_numbers
+from discovery.firsthour.cells import (
+    comma_is_decimal,
+    is_empty,
+    is_number,
+    is_stamp,
+    is_switch,
+    read_numbers,
+)
 from discovery.firsthour.clocks import is_clock
 from discovery.firsthour.instants import is_instant
 from discovery.firsthour.longform import find_long, widen
@@ -27,6 +34,7 @@ from discovery.recordings.units import multiple
 
 Array = NDArray[np.float64]
 
+_GARBLED = 0.02  # words for each on or off: so few are garbled cells, not states
 _SAMPLE = 2000  # cells of a column that show how decimals are written
 _NOTED = re.compile(r"(.+?)\s*\(([^()]*:[^()]*)\)")  # Temp, °C (LGR S/N: 123, LBL: bed)
 _UMLAUTS = str.maketrans(
@@ -238,7 +246,7 @@ def _columns(
             continue
         cells = sheet.cells(index)
         read = read_numbers(cells, comma)
-        if read.wrong is not None and not any(is_number(cell) or is_stamp(cell) for cell in set(cells)):
+        if read.wrong is not None and _holds_words(cells):
             few = list(dict.fromkeys(filter(None, cells)))
             do = f" ({', '.join(few)}); write numbers for them if they matter" if 1 < len(few) <= 6 else ""
             notes.append(f"column '{header}' holds words: left out{do}")
@@ -267,6 +275,14 @@ def _columns(
         said = ", ".join(f"{code:g}" for code in sorted(codes))
         notes.append(f"{codes.total()} cells hold a logger's code for a missing value ({said}): emptied")
     return columns, notes
+
+
+def _holds_words(cells: Sequence[str]) -> bool:
+    """Whether a column that cannot be read holds words: no number, no stamp, and not almost only switches."""
+    if any(is_number(cell) or is_stamp(cell) for cell in set(cells)):
+        return False
+    said = Counter(is_switch(cell) for cell in cells if not is_empty(cell))
+    return said[False] > _GARBLED * said[True]
 
 
 def _without_codes(values: Array) -> tuple[Array, Array]:

@@ -247,3 +247,38 @@ def test_rooms_in_spanish_and_swedish(header: str) -> None:
     slow = np.linspace(20.0, 23.0, 300)
     head = Column("T1", "T1", "degC", slow + 5.0)
     assert guess_all([Column(header, "room", "degC", slow), head])["room"].role == "ambient temperature"
+
+
+@pytest.mark.parametrize("cell", ["OFF44:09", "7.0%", "Target:"])
+def test_a_garbled_cell_of_a_switch_is_an_error_with_its_line(tmp_path: Path, cell: str) -> None:
+    """One cell of a serial line that lost letters: neither the switch is left out, nor the cell a number."""
+    rows = [
+        f"{10 * k};{20 + 0.1 * k:.1f};{cell if k == 100 else ('ON', 'OFF')[k // 30 % 2]}" for k in range(200)
+    ]
+    with pytest.raises(UserError, match=f"line 102, column 'Heater': '{cell}' is not a number; empty it"):
+        read_own(write(tmp_path / "mat.csv", "t/s;T1 [°C];Heater", *rows))
+
+
+def test_a_column_of_states_with_on_and_off_is_left_out(tmp_path: Path) -> None:
+    rows = [f"{k};{('ON', 'OFF', 'STANDBY')[k // 5 % 3]};{k % 7}" for k in range(60)]
+    table = read_own(write(tmp_path / "plc.csv", "t/s;Mode;T1 [°C]", *rows))
+    assert "column 'Mode' holds words: left out (ON, OFF, STANDBY)" in table.notes[0]
+
+
+def test_a_power_that_is_off_at_times_is_read(tmp_path: Path) -> None:
+    rows = [f"{k};{'OFF' if k % 3 else 45.5};{k % 7}" for k in range(60)]
+    table = read_own(write(tmp_path / "power.csv", "t/s;P [W];T1 [°C]", *rows))
+    assert table.columns[0].values[:3].tolist() == [45.5, 0.0, 0.0]
+
+
+def test_names_behind_empty_cells(tmp_path: Path) -> None:
+    """A program wrote marks for columns that it had hidden, in front of the names alone."""
+    rows = [f"{k}\t{20 + 0.1 * k:.1f}\t{k % 7}" for k in range(60)]
+    table = read_own(write(tmp_path / "hidden.csv", "\t\t\ttime [s]\tT1 [°C]\tpower [W]", *rows))
+    assert [(c.name, c.unit) for c in table.columns] == [("T1", "°C"), ("power", "W")]
+
+
+def test_a_counter_that_starts_again_is_not_to_be_sorted(tmp_path: Path) -> None:
+    rows = [f"{(4000 + 1000 * k) % 10000};{20 + 0.1 * k:.1f};{k % 7}" for k in range(60)]
+    with pytest.raises(UserError, match=r"line 8: .*'time'; it falls 6 times: sort .*starts again there"):
+        read_own(write(tmp_path / "counter.csv", "time;T1 [°C];power [W]", *rows))
