@@ -127,11 +127,14 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
 
 
 def odd_readings(channel: Channel, read: Array) -> Lines:
-    """Rows of readings (R,) that are words for nothing, zeros for missing readings, or stand alone."""
+    """Rows of readings (R,) that are words for nothing, zeros for missing readings, stand alone, or that
+    only a fault explains.
+    """
     words = logger_words(read)
     if not channel.is_sensor or read.size < FEW:
         return words
-    return np.unique(np.concatenate((words, _zeros(channel, read), lone_readings(read))))
+    away = impossible_readings(channel, read)
+    return np.unique(np.concatenate((words, _zeros(channel, read), lone_readings(read), away)))
 
 
 def impossible_readings(channel: Channel, read: Array) -> Lines:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from discovery.recordings import load_campaign
 from discovery.recordings.campaign import Channel
-from discovery.recordings.oddvalues import impossible_readings
+from discovery.recordings.oddvalues import impossible_readings, odd_readings
 from tests.recordings.conftest import Write, found, with_column
 
 PROBE = Channel("z", "error", "um", None, "linear")
@@ -99,3 +99,10 @@ def test_a_fast_warm_up_at_the_start_is_no_fault(shift: float) -> None:
     """A nozzle is heated from the first reading on: its steps become smaller, they do not stop at once."""
     read = 220.0 - 195.0 * np.exp(-np.arange(200) / shift) + np.random.default_rng(3).normal(0.0, 0.05, 200)
     assert impossible_readings(Channel("n", "temperature", "degC", None, "linear"), read).size == 0
+
+
+@pytest.mark.parametrize("rows", [[0], [0, 1], [70, 71]])
+def test_what_is_left_out_does_not_disturb_the_comparison_of_recordings(rows: list[int]) -> None:
+    read = slow()
+    read[rows] += 4300.0
+    assert odd_readings(PROBE, read).tolist() == rows
