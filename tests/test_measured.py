@@ -47,7 +47,8 @@ def exists(command: str) -> None:
     options = {word.partition("=")[0] for word in words if word.startswith("--")}
     if program == "discovery":
         verb = get_command(app).commands[words[0]]  # type: ignore[attr-defined]
-        assert options <= {one for parameter in verb.params for one in parameter.opts}, command
+        known = {one for p in verb.params for one in (*p.opts, *p.secondary_opts)}
+        assert options <= known, command
         assert all((ROOT / word).exists() for word in words if word.endswith(".toml")), command
     elif program == "python":
         while words[0] == "-W":
