@@ -103,10 +103,10 @@ def markdown(tallies: Mapping[str, Tally], seal: Mapping[str, Any]) -> str:
     """The comparison, power and reliability as Markdown."""
     ours = tallies[WORKBENCH]
     quiet = ours.false_alarms
+    lead = " In brackets: the lead of the workbench over each other method (− behind)."
     parts = [
         f"{len(ours.scored)} concealed cases, sealed {seal['sealed']} (answers {seal['answers'][:16]}…, "
-        f"version {seal['version']}, commit {str(seal['commit'])[:10]}). "
-        "In brackets: the lead of the workbench over each other method (− behind).",
+        f"version {seal['version']}, commit {str(seal['commit'])[:10]}).{lead * (len(tallies) > 1)}",
         _table(rows(tallies)),
         f"False alarms: {quiet.hits:g} of {quiet.count}; with 95 % certainty the rate is below "
         f"{100 * quiet.upper():.1f} %.",

@@ -170,6 +170,7 @@ def test_end_to_end_and_going_on(cases: Path, tmp_path: Path) -> None:
     assert judged["case_2"]["verdict"] != "no mismatch"
     assert "<svg" in (out / "report.html").read_text()
     assert "false alarms" in (out / "challenge.md").read_text()
+    assert "In brackets" not in (out / "challenge.md").read_text()  # no other method to lead
     assert first.lines
 
     answer = out / "solved" / "case_1" / "diagnosis.json"
