@@ -27,6 +27,8 @@ from discovery.terms import (
     substitute,
 )
 
+MEDIA = ("fluid", "coolant")  # whose exchange an input changes; without one, it is that with the air
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -84,7 +86,9 @@ def _claims(effect: Effect, model: Model, scene: Scene) -> Iterator[Hypothesis]:
     any_input = () if effect.place in ("input temperature", "inputs of a recording") else (INPUT, LEVEL, RATE)
     wanted = [variable for variable in (*ROLE_OF, *any_input) if variable in used]
     choices = [_choices(variable, effect, model, scene) for variable in wanted]
-    in_name = [v in (INPUT, LEVEL) or len(choice) > 1 for v, choice in zip(wanted, choices, strict=True)]
+    own = (INPUT, LEVEL, *(MEDIA if effect.group == "inputs" else ()))
+    in_name = [v in own or len(choice) > 1 for v, choice in zip(wanted, choices, strict=True)]
+    order = sorted(range(len(wanted)), key=lambda k: wanted[k] not in (INPUT, LEVEL))  # what it follows first
     runs: tuple[str | None, ...] = (None,) if effect.acts == "always" else scene.recordings
     if effect.acts == "from a recording on" and effect.place != "input temperature":
         runs = scene.recordings[1:]  # what is common to all recordings is the model's own parameter
@@ -96,7 +100,7 @@ def _claims(effect: Effect, model: Model, scene: Scene) -> Iterator[Hypothesis]:
             if {INPUT, LEVEL} & set(wanted) and _stands(chosen[-1], spot, model, effect):
                 continue
             for run in runs:
-                named = tuple(c for c, one in zip(chosen, in_name, strict=True) if one)
+                named = tuple(chosen[k] for k in order if in_name[k])
                 yield _claim(effect, model, spot, run, named, binding, scene)
 
 
@@ -147,8 +151,8 @@ def _is_second(name: str, scene: Scene) -> bool:
 
 def _stands(channel: str, spot: Spot, model: Model, effect: Effect) -> bool:
     """Whether the model already has that input at that body, in proportion; then a refit would absorb it."""
-    if spot.outputs or len(spot.bodies) != 1 or "other" in effect.formula or "ambient" in effect.formula:
-        return False
+    if spot.outputs or len(spot.bodies) != 1 or "body" in names(parse(effect.formula)):
+        return False  # an exchange
     return any(
         t.into == spot.bodies[0] and names(t.expression) - set(model.parameters) == {channel}
         for t in model.terms

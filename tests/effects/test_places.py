@@ -167,6 +167,21 @@ def test_heat_of_any_input_can_age() -> None:
         assert (("bed",) in found) == ages
 
 
+def test_an_input_changes_the_exchange_with_air_coolant_or_fluid() -> None:
+    """A second pump of the coolant cools a body; they are three claims, each with its medium in its name."""
+    entries = ("input_exchange", "input_exchange_coolant", "input_exchange_fluid")
+    model, channels = sample()
+    effects = [catalogue()[file] for file in entries]
+    found = [
+        h for e in effects for h in claims(model, e, channels) if h.states == ("bed",) and "cut" in h.follows
+    ]
+    assert [h.follows for h in found] == [("cut",), ("cut", "water"), ("cut", "emulsion")]
+    assert len({h.key for h in found}) == len({h.amplitudes for h in found}) == 3
+    warm = {"cut": 0.5, "room": 20.0, "water": 15.0, "emulsion": 30.0, "bed": 25.0}
+    flows = [evaluate(h.terms[0].expression, warm | {h.amplitudes[0]: 10.0}).value for h in found]
+    assert [float(flow) > 0 for flow in flows] == [False, False, True]
+
+
 def test_what_begins_acts_in_the_recordings_that_were_made_later() -> None:
     model, channels = sample()
     three = replace(scene(model, channels), recordings=("a", "b"), after={"a": ("a", "c", "b"), "b": ("b",)})
