@@ -30,7 +30,6 @@ from discovery.fitting.held import held_fit
 from discovery.models import Model, Parameter, State
 from discovery.models.model import TIME_UNITS
 from discovery.recordings import Campaign
-from discovery.sparse.weakdomains import weak_domains
 from discovery.terms import Term, parse
 
 Array = NDArray[np.float64]
@@ -238,16 +237,30 @@ def _coefficients(frame: _Frame, tables: Sequence[Table], setting: Setting, seed
 def _weak_rows(table: Table, degree: int, seed: int) -> tuple[Array, Array]:
     """Rows (K, F) and targets (K, Y) of the weak library of one recording, the random domains seeded.
 
-    They are what `transform` and `convert_u_dot_integral` of the library give. Its arrays with named axes
-    take some hundred times as long.
+    The rows are what `transform` of the library gives. Its arrays with named axes take ten times as long to
+    be cut into the domains as plain ones.
     """
     import pysindy
 
+    weak = _weak_form(table.time.tobytes(), seed)
     both = pysindy.AxesArray(np.column_stack([table.x, table.u]), {"ax_time": 0, "ax_coord": 1})
     functions = np.asarray(pysindy.PolynomialLibrary(degree=degree, include_bias=True).fit_transform(both))
-    domains = weak_domains(table.time, TEST_FUNCTIONS, seed)
-    rows = [one.of_values @ functions[one.rows] for one in domains]
-    return np.array(rows), np.array([-one.of_rates @ table.x[one.rows] for one in domains])
+    pairs = zip(weak.fullweights0, weak.inds_k, strict=True)
+    rows = [np.tensordot(weights, functions[np.ix_(*at)], ((0,), (0,))) for weights, at in pairs]
+    return np.array(rows), np.asarray(weak.convert_u_dot_integral(table.x))
+
+
+@lru_cache(maxsize=32)
+def _weak_form(time: bytes, seed: int) -> Any:
+    """The weak library on a grid of times (T,); its domains depend on nothing but the grid and the seed."""
+    import pysindy
+
+    state = np.random.get_state()  # noqa: NPY002 - the library draws from the global generator
+    np.random.seed(seed)  # noqa: NPY002
+    try:
+        return pysindy.WeakPDELibrary(spatiotemporal_grid=np.frombuffer(time), K=TEST_FUNCTIONS)
+    finally:
+        np.random.set_state(state)  # noqa: NPY002
 
 
 def _left_out(

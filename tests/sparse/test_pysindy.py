@@ -155,11 +155,11 @@ def test_constraints_are_lines_of_the_experiment() -> None:
 
 
 @pytest.mark.filterwarnings("ignore::pysindy.utils._axes.AxesWarning")
-@pytest.mark.parametrize(("degree", "count"), [(1, 300), (2, 300), (2, 24)])
-def test_weak_rows_are_those_of_the_library(degree: int, count: int) -> None:
-    """Bit for bit; in a short recording, domains with a single reading are drawn again."""
-    rng, time = np.random.default_rng(degree), np.linspace(0.0, 3.0, count)
-    table = Table(time, rng.normal(size=(count, 2)), rng.normal(size=(count, 1)))
+@pytest.mark.parametrize("degree", [1, 2])
+def test_weak_rows_are_those_of_the_library(degree: int) -> None:
+    """Bit for bit; its domains on a grid of times are drawn once for all degrees and signals."""
+    rng, time = np.random.default_rng(degree), np.linspace(0.0, 3.0, 300)
+    table = Table(time, rng.normal(size=(300, 2)), rng.normal(size=(300, 1)))
     both = pysindy.AxesArray(np.column_stack([table.x, table.u]), {"ax_time": 0, "ax_coord": 1})
     np.random.seed(7)  # noqa: NPY002
     functions = pysindy.PolynomialLibrary(degree=degree, include_bias=True)
