@@ -151,8 +151,9 @@ def _is_second(name: str, scene: Scene) -> bool:
 
 def _stands(channel: str, spot: Spot, model: Model, effect: Effect) -> bool:
     """Whether the model already has that input at that body, in proportion; then a refit would absorb it."""
-    if spot.outputs or len(spot.bodies) != 1 or "body" in names(parse(effect.formula)):
-        return False  # an exchange
+    exchanges = names(parse(effect.formula)) & {"other", "ambient", *MEDIA}
+    if spot.outputs or len(spot.bodies) != 1 or exchanges:
+        return False
     return any(
         t.into == spot.bodies[0] and names(t.expression) - set(model.parameters) == {channel}
         for t in model.terms

@@ -14,7 +14,7 @@ _FED = {  # roles of which a place needs one: of bodies or terms that the model 
     "fluid terms": ("fluid temperature",),
     "driven body": ("heat load", "rotation speed"),
     "driven and another": ("heat load", "rotation speed"),
-    "loss terms": ("heat load", "rotation speed"),
+    "loss terms": ("heat load", "rotation speed", "other input"),
     "air body": ("ambient temperature",),
     "air terms": ("ambient temperature",),
     "coolant terms": ("coolant temperature",),

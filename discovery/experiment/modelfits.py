@@ -103,9 +103,14 @@ def fit_of(
     if isinstance(entry, SparseOptions):
         return model, report, _fitting(report)(model, campaign, recordings, given, max_rounds=max_rounds)
     loss: Loss = getattr(entry, "loss", "linear")
+
+    def fitted(some: Model) -> Fit:
+        return fit_model(some, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
+
+    fit = fitted(model)
     if isinstance(entry, FileEntry):
-        model = in_file_units(model, campaign, recordings, given)
-    return model, report, fit_model(model, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
+        model, fit = in_file_units(model, fit, campaign.channels, fitted)
+    return model, report, fit
 
 
 def compared(
