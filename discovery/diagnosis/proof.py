@@ -85,8 +85,10 @@ class Improvement:
 
     @property
     def contradicts(self) -> bool:
-        """Whether the recording is predicted worse than without the repair, beyond chance."""
-        return (self.started[3] if self.started else self.high) < 0
+        """Whether the recording is predicted worse than without the repair, beyond chance, from either of the
+        starts: a controller knows the first readings alone.
+        """
+        return min(self.high, self.started[3] if self.started else inf) < 0
 
     @property
     def mostly(self) -> bool:

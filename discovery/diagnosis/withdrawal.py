@@ -53,8 +53,8 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in lasting)
     if _lower(proof.values()) >= 0:
         reason = (
-            f"{names} improves the other held-out recordings but not {', '.join(worse)}: check whether the "
-            "machine was the same there"
+            f"with {names}, free runs are better over all held-out recordings, but worse on "
+            f"{', '.join(worse)}: check whether the machine was the same there, and how it began"
         )
         return replace(verdict, reasons=(*verdict.reasons, reason))
     reason = f"with {names}, free runs on {', '.join(worse)} are worse than without"
@@ -64,15 +64,17 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
 
 
 def unfinished(verdict: Verdict, fitting: Improvement, unit: str) -> Verdict:
-    """The verdict with its names withdrawn where the repaired model misses the recordings that it was fitted
-    to by more than noise makes likely, and leaves more than it explains: the cause is another one.
+    """The verdict where the repaired model misses the recordings that it was fitted to by more than noise
+    makes likely: something else acts as well. Where that is more than the names explain, they are withdrawn:
+    they may stand for it.
     """
-    if not verdict.named or fitting.mostly or not _misses(fitting, fitting.judged[1]):
+    if not verdict.named or not _misses(fitting, fitting.judged[1]):
         return verdict
-    reason = (
-        "the effects that are sure enough leave more than they explain: free runs on the fitted recordings "
-        f"still miss by {_size(fitting, fitting.judged[1])} {unit}"
-    )
+    still = f"free runs on the fitted recordings still miss by {_size(fitting, fitting.judged[1])} {unit}"
+    if fitting.mostly:
+        reason = f"something else acts as well, or the named laws are not exact: {still}"
+        return replace(verdict, reasons=(reason, *verdict.reasons))
+    reason = f"the effects that are sure enough leave more than they explain: {still}"
     return replace(
         verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
     )

@@ -289,9 +289,9 @@ def _proof(diagnosis: Mapping[str, Any]) -> tuple[list[str], list[tuple[str, str
     points += _from_known_starts(held, unit)
     if improvement.get("contradicted_by"):
         points.append(
-            "On these recordings the repaired model is worse than the original one. The named effect may fit "
-            "only the recordings of the diagnosis. Do not use the repaired model. Fit more recordings in "
-            "which each input moves on its own."
+            "On some of these recordings the repaired model is worse than the original one. Before you use "
+            "it, check whether the machine was the same there, and how it began. The named effect may fit "
+            "only the recordings of the diagnosis: fit more recordings in which each input moves on its own."
         )
     return points, figures
 

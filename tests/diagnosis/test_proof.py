@@ -145,6 +145,13 @@ def test_what_is_worse_everywhere_contradicts_a_repair() -> None:
     assert lost.after == inf
 
 
+def test_worse_from_the_first_readings_contradicts_a_repair() -> None:
+    """A slow path whose own start all readings show, and the first ones do not."""
+    from_all = (1.8, 2.0, -0.6, 0.2)
+    assert Improvement(1.8, 3.4, 1.1, -2.2, -0.9, {}, started=from_all).contradicts
+    assert not Improvement(1.8, 1.9, 1.1, -0.5, 0.3, {}, started=from_all).contradicts
+
+
 def test_slow_noise_adds_to_the_floor() -> None:
     assert noise_in_free_runs(body(), Noise(("E",), (3.0,), (4.0,))) == pytest.approx(5.0 / 3.0)
 

@@ -45,7 +45,7 @@ def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path
     path.write_text(json.dumps(diagnosis))
     page = write_report(folder).read_text("utf-8")
     assert "clock shift in fit (98 % sure); but the held-out “left” contradicts the repair." in page
-    assert "Do not use the repaired model" in page
+    assert "Before you use it, check whether the machine was the same there" in page
     held |= {"rms_after": 1.59, "gain_low": -0.1, "gain_high": 0.2}
     diagnosis["improvement"] = {"fit": {}, "held_out": {"left": held}, "explained": -0.002}
     path.write_text(json.dumps(diagnosis))
