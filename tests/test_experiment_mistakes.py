@@ -107,9 +107,8 @@ def test_an_output_that_a_model_lacks_is_told_with_the_nearest_name(folder: Path
     assert "is its output 'E_R0TT' meant to be 'E_R0T'?" in done.output
     assert results_of(folder / "out")["models"]["reduced"]["notes"] == []
     (folder / "model.toml").write_text("\n".join(line for line in MODEL.splitlines() if "E_R0T" not in line))
-    done = CliRunner().invoke(
-        app, ["diagnose", str(folder / "experiment.toml"), "--out", str(folder / "two")]
-    )
+    done = CliRunner().invoke(app, ["diagnose", str(folder), "--out", str(folder / "two")])
+    assert done.exit_code == 0, done.output
     assert "gives no" not in done.output  # the first model is diagnosed, and gives them all
 
 

@@ -121,7 +121,10 @@ def _run_folder(
 
 
 def diagnose(
-    experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="An experiment file.")],
+    experiment: Annotated[
+        Path,
+        typer.Argument(metavar="EXPERIMENT", help="An experiment file, or a folder with an experiment.toml."),
+    ],
     out: Annotated[Path | None, typer.Option(help="Folder of the results [runs/NAME].")] = None,
     jobs: Jobs = None,
     force: Force = False,
@@ -141,6 +144,8 @@ def diagnose(
     from discovery.experiment.summary import remarks
     from discovery.progress import shown
 
+    if (inside := experiment / "experiment.toml").is_file():
+        experiment = inside
     with shown() as progress:
         folder = find(experiment, out, progress, force=force, tell=_on_stderr)
     for line in summary(folder):
