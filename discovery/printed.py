@@ -28,3 +28,13 @@ def sized(value: float, unit: str, digits: int = 3) -> str:
     ('28 W/K', '28 %')
     """
     return f"{printed(100 * value, digits)} %" if unit == "1" else f"{printed(value, digits)} {unit}"
+
+
+def undetermined(low: float | None, high: float | None) -> str:
+    """What is said behind the interval of the size of an effect that is sure to act: with zero in it,
+    readings leave the size open, as where only its ratio to another parameter shows.
+
+    >>> undetermined(0.0, 5.9), undetermined(1.2, 5.9)
+    (', not determined', '')
+    """
+    return ", not determined" if low is not None and high is not None and low <= 0.0 <= high else ""

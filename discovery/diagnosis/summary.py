@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from discovery.diagnosis.thresholds import RIVAL
-from discovery.printed import printed
+from discovery.printed import printed, undetermined
 from discovery.runfolder import read_diagnosis
 
 _NOISE = "reading noise and heat that nobody records explain up to"
@@ -93,5 +93,6 @@ def _size(name: str, q: dict[str, Any]) -> str:
     """A parameter with its unit, the speed at which it is stated, and its 95 % interval."""
     unit = "" if q["unit"] == "1" else f" {q['unit']}"
     unit += f" at {q['at']}" if q.get("at") else ""
-    interval = f" ({printed(q['low'], 4)} to {printed(q['high'], 4)})" if q["low"] != q["high"] else ""
+    ends = f"{printed(q['low'], 4)} to {printed(q['high'], 4)}"
+    interval = f" ({ends}{undetermined(q['low'], q['high'])})" if q["low"] != q["high"] else ""
     return f"{name} = {printed(q['value'], 4)}{unit}{interval}"

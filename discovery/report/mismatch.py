@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from discovery.printed import undetermined
 from discovery.report.heat import heat_charts, heat_unit, subject, unit_of
 from discovery.report.printed import Line, Printed
 from discovery.report.ranking import rms_unit
@@ -86,7 +87,8 @@ def sizes(one: Mapping[str, Any]) -> list[str]:
     moved = one.get("moved") or one.get("states") or []
     return [
         f"{name} = {number(p.get('value'))} {pretty_unit(str(p.get('unit', '')))} {_speed(p)}"
-        f"(95 %: {number(p.get('low'))} to {number(p.get('high'))})"
+        f"(95 %: {number(p.get('low'))} to {number(p.get('high'))}"
+        f"{undetermined(p.get('low'), p.get('high'))})"
         for name, p in (one.get("parameters") or {}).items()
         if p.get("low") != p.get("high") and p.get("output") in (None, *moved)
     ]

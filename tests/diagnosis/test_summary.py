@@ -56,7 +56,7 @@ def test_the_proof_has_a_unit_or_is_in_noises_and_a_jump_that_may_be_none_is_not
     jumps = {
         "zero_T": {**number(-0.01, -0.03, 0.01, "K"), "output": "T"},
         "zero_dZ": {**number(2.1, 2.0, 2.2, "um"), "output": "dZ"},
-        "t_zero": number(60.0, 50.0, 70.0, "s"),
+        "t_zero": number(60.0, -50.0, 70.0, "s"),
     }
     device = {"effect": "rezero", "states": ["T", "dZ"], "moved": ["dZ"], "recording": "fri"}
     held_out = {"sun": {"rms_before": 0.861, "rms_after": 0.412, "noise_floor": 0.421}}
@@ -75,7 +75,8 @@ def test_the_proof_has_a_unit_or_is_in_noises_and_a_jump_that_may_be_none_is_not
             json.dumps({**document, "improvement": improvement}), "utf-8"
         )
         assert summary(tmp_path)[1:-1] == [
-            "  rezero at dZ in fri, probability 0.98: zero_dZ = 2.1 um (2 to 2.2), t_zero = 60 s (50 to 70)",
+            "  rezero at dZ in fri, probability 0.98: zero_dZ = 2.1 um (2 to 2.2), "
+            "t_zero = 60 s (-50 to 70, not determined)",
             f"  held-out recording sun: rms 0.861 -> 0.412{said} "
             f"(reading noise and heat that nobody records explain up to 0.421{said})",
         ]
