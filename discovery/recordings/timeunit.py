@@ -17,8 +17,11 @@ _MOST = 6.0  # log odds that digits are worth
 _PRIOR = {"s": 0.0, "min": -2.0, "h": -2.5, "ms": -3.5, "us": -4.5, "d": -5.0}
 _LENGTH = (np.log(5 * _HOUR), np.log(4.0))  # of a recording [s]: median and spread, both of the logarithm
 _STEP = (np.log(15.0), np.log(10.0))  # of a logger [s]
-_SMALL = 0.7  # correlation of the two: what answers quickly is recorded for a short time
+_TOGETHER = 0.7  # correlation of the two: what answers quickly is recorded for a short time
 _ANSWER = (np.log(0.5 * _HOUR), np.log(4.0))  # s that a temperature needs for a third of its range
+# the same of small things: the winding of a motor, a hot end, electronics; and how often they are recorded
+_SMALL_THINGS = ((np.log(600.0), np.log(3.0)), (np.log(2.0), np.log(4.0)), (np.log(60.0), np.log(4.0)))
+_OFTEN_SMALL = 0.05
 # the same of what is not thermal: a spring, a tank, a motor, a cell
 _OTHERS = ((np.log(300.0), np.log(30.0)), (np.log(0.1), np.log(100.0)), (np.log(10.0), np.log(100.0)))
 _USUAL_STEPS = (
@@ -79,11 +82,12 @@ def time_odds(
                 else _both(length * scale, of_length, answer * scale, of_answer)
             )
             for chance, (of_length, of_step, of_answer) in (
-                (thermal, (_LENGTH, _STEP, _ANSWER)),
+                (thermal * (1.0 - _OFTEN_SMALL), (_LENGTH, _STEP, _ANSWER)),
+                (thermal * _OFTEN_SMALL, _SMALL_THINGS),
                 (1.0 - thermal, _OTHERS),
             )
         ]
-        score = prior + float(np.logaddexp(*kinds))
+        score = prior + float(np.logaddexp.reduce(kinds))
         score += 1.5 * any(abs(step * scale / usual - 1) < 1e-3 for usual in _USUAL_STEPS)
         if interval:
             score += 6.0 * (abs(step * scale / interval - 1) < 0.02)
@@ -131,8 +135,8 @@ def _answer(series: Array, clock: Array) -> float | None:
 def _both(a: float, about_a: tuple[float, float], b: float, about_b: tuple[float, float]) -> float:
     """Logarithm of the density of two log-normal values that are small or large together."""
     p, q = ((np.log(max(v, 1e-12)) - m) / s for v, (m, s) in ((a, about_a), (b, about_b)))
-    far = (p**2 + q**2 - 2 * _SMALL * p * q) / (1 - _SMALL**2)
-    return float(-0.5 * far - 0.5 * np.log(1 - _SMALL**2) - np.log(about_a[1] * about_b[1]))
+    far = (p**2 + q**2 - 2 * _TOGETHER * p * q) / (1 - _TOGETHER**2)
+    return float(-0.5 * far - 0.5 * np.log(1 - _TOGETHER**2) - np.log(about_a[1] * about_b[1]))
 
 
 def _density(value: float, about: tuple[float, float]) -> float:

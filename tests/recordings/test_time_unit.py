@@ -18,6 +18,15 @@ def test_a_small_heater_in_seconds_is_not_surely_in_minutes(step: float) -> None
     assert shares["min"] < 0.9  # it is marked as doubtful
 
 
+def test_a_motor_winding_read_each_second_for_three_minutes_is_not_surely_in_minutes() -> None:
+    """A robot's motor, 3 min under 14 A: it was said to be three hours, without a question mark."""
+    clock = np.arange(0.0, 181.0)
+    warm = np.where(clock < 40.0, 1 - np.exp(-clock / 30.0), 0.74 * np.exp(-(clock - 40.0) / 60.0))
+    shares = probabilities(time_odds(clock, [22.8 + 14.0 * warm]))
+    assert shares["s"] > 0.2
+    assert shares["min"] < 0.9  # it is marked as doubtful
+
+
 def test_a_machine_of_hours_is_surely_in_seconds() -> None:
     clock = np.arange(0.0, 30000.0, 10.0)
     shares = probabilities(time_odds(clock, [40.0 - 18.0 * np.exp(-clock / 5000.0)]))
