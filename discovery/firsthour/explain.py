@@ -31,6 +31,14 @@ FIRST_MODELS = {
     "pysindy": MODELS["pysindy"],
 }
 
+# what a role means where its name can be misread
+_MEANT = {
+    "fluid temperature": "cutting fluid, or what else wets parts from outside and may dry on them",
+    "coolant temperature": "a liquid in pipes or channels: it never dries",
+    "fluid flow": "of the cutting fluid or the coolant",
+    "temperature": "a sensor that the errors follow is an 'other input'",
+}
+
 
 def list_words(what: str) -> Iterator[str]:
     """Lines on all effects, models or roles.
@@ -69,8 +77,8 @@ def _roles() -> Iterator[str]:
             if facts.measured
             else f"input, {facts.between} between its stamps"
         )
-        if role == "temperature":
-            kind += "; a sensor that the errors follow is an 'other input'"
+        if role in _MEANT:
+            kind += f"; {_MEANT[role]}"
         if role == CORRECTION:
             kind = 'added to the readings of its error: corrects = "E_Y0C"'
         yield f"{role:20} {facts.said:12} {kind}"

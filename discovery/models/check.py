@@ -24,8 +24,12 @@ _COUNTED = (("K",), ("W",), ("J",), ("s", "min", "h", "d"), ("um", "mm", "m"), (
 def check_models(campaign: Path, models: Sequence[Path]) -> Iterator[str]:
     """A sentence for each place where the units of a model do not fit.
 
+    A path that does not exist is looked for next to the campaign file.
+
     Raises UserError: a mistake in a file, or a model that cannot be used with the campaign.
     """
+    folder = campaign_path(campaign).parent
+    models = [folder / path if not path.exists() and (folder / path).exists() else path for path in models]
     form = read_toml(campaign_path(campaign), CampaignForm)
     channels = {}
     for name, one in form.channels.items():

@@ -91,6 +91,14 @@ def test_a_heat_load_may_be_in_percent() -> None:
     assert next(line for line in lines if line.startswith("heat load")).split()[2:5] == ["W", "or", "percent"]
 
 
+def test_the_roles_say_which_liquid_may_dry_on_a_part() -> None:
+    """The fluid of a solar collector was given the role of a cutting fluid, and "evaporation" was named."""
+    said = CliRunner().invoke(app, ["list", "roles"]).output
+    lines = {line[:20].strip(): line for line in said.splitlines()}
+    assert "wets parts from outside" in lines["fluid temperature"]
+    assert "in pipes or channels" in lines["coolant temperature"]
+
+
 @pytest.mark.parametrize(("kind", "path"), FILES, ids=lambda value: getattr(value, "stem", value))
 def test_schemas_accept_our_files(kind: str, path: Path) -> None:
     document = json.loads(schema(kind))

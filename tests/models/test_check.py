@@ -38,6 +38,16 @@ def test_a_unit_that_does_not_fit_is_a_warning(two: Path, tmp_path: Path) -> Non
     assert "nothing is wrong" not in done.output
 
 
+def test_a_model_is_found_next_to_the_campaign(two: Path) -> None:
+    """As the page on models says: `discovery check my_machine --model mine.toml`."""
+    text = (DATA / "dry_thermobalance.toml").read_text()
+    (two / "mine.toml").write_text(text.replace('start = 3.0,  unit = "W/K"', 'start = 3.0,  unit = "W"'))
+    done = CliRunner().invoke(app, ["check", str(two), "--model", "mine.toml"])
+    assert "warning: model 'dry thermobalance, five bodies', term 'air around table'" in done.output
+    missing = CliRunner().invoke(app, ["check", str(two), "--model", "other.toml"])
+    assert "other.toml: there is no such file" in missing.output
+
+
 def test_a_name_that_the_campaign_does_not_have(two: Path, tmp_path: Path) -> None:
     text = (DATA / "dry_thermobalance.toml").read_text()
     bad = tmp_path / "bad.toml"
