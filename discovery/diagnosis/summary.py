@@ -9,7 +9,7 @@ from discovery.diagnosis.thresholds import RIVAL
 from discovery.printed import printed, undetermined
 from discovery.runfolder import read_diagnosis
 
-_NOISE = "reading noise and heat that nobody records explain up to"
+_NOISE = "reading noise and heat that nobody records explain"
 
 
 def summary(folder: Path) -> list[str]:
@@ -35,7 +35,7 @@ def lines_of(d: dict[str, Any]) -> list[str]:
     worse, unit = d["improvement"]["contradicted_by"], _unit(d["improvement"])
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
         after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
-        rms = f"rms {printed(i['rms_before'])} -> {after}{unit} ({_NOISE} {printed(i['noise_floor'])}{unit})"
+        rms = f"rms {printed(i['rms_before'])} -> {after}{unit} ({_by_noise(i, unit)})"
         rms += ", worse than without" if run in worse else _otherwise(i, unit)
         lines.append(f"  held-out recording {run}: {rms}")
     if not d["physics"]:
@@ -61,10 +61,18 @@ def _left(improvement: dict[str, Any]) -> list[str]:
     }
     unit = _unit(improvement)
     return [
-        f"  {which}: rms {printed(i['rms_before'])}{unit} ({_NOISE} {printed(i['noise_floor'])}{unit})"
+        f"  {which}: rms {printed(i['rms_before'])}{unit} ({_by_noise(i, unit)})"
         for which, i in runs.items()
         if i["rms_before"] is not None
     ]
+
+
+def _by_noise(one: dict[str, Any], unit: str) -> str:
+    """What noise explains of an rms; where it explains all of it, its size says nothing more."""
+    floor, rms = one["noise_floor"], (one["rms_before"], one["rms_after"])
+    if all(r is not None and r < floor for r in rms):
+        return f"{_NOISE} all of it"
+    return f"{_NOISE} up to {printed(floor)}{unit}"
 
 
 def _unit(improvement: dict[str, Any]) -> str:

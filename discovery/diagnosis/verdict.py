@@ -265,15 +265,24 @@ def _apart(
     sentences = []
     for n in rest:
         added = _added(found, answer, n.hypothesis)
-        sentence = (
-            f"{n.hypothesis.effect.word} at {n.hypothesis.where} is possible but not sure enough to be named "
-            f"(probability {n.probability:.2f}, log evidence {_of(added, least)})"
-        )
+        sentence = _unsure(n, added, least)
         if n.rivals and n.rivals[0].below < added:
             other, below = n.rivals[0].hypothesis, n.rivals[0].below
             sentence += f"; {other.effect.word} at {other.where} instead has {below:.1f} less"
         sentences.append(sentence if matters else f"{sentence}; it does too little for free runs")
     return tuple(sentences)
+
+
+def _unsure(n: Named, added: float, least: float) -> str:
+    """Why an effect of the answer has no name."""
+    name = f"{n.hypothesis.effect.word} at {n.hypothesis.where}"
+    chance = f"probability {n.probability:.2f}"
+    if added >= least and n.together >= thresholds.NAMED:
+        return (
+            f"{name} is not named: its log evidence of {added:.0f} ({chance}) counts only next to effects "
+            "that are not named either"
+        )
+    return f"{name} is possible but not sure enough to be named ({chance}, log evidence {_of(added, least)})"
 
 
 def _of(added: float, least: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from math import inf, isfinite, log
+from math import expm1, inf, isfinite, log
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.proof import Improvement
@@ -19,13 +19,18 @@ def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdic
     """
     if not verdict.named or _lower(runs) >= 0.5 * thresholds.MATTERS**2:
         return verdict
-    reason = (
-        "the surest effects change free runs too little to matter (rms lower by "
-        f"{100 * _lower(runs):.1f} % on average over the recordings)"
-    )
+    reason = f"the surest effects {_does(_lower(runs))}"
     reasons = (reason, *coarse(found), *verdict.reasons)
     word = UNEXPLAINED if coarse(found) else NO_MISMATCH
     return replace(verdict, word=word, named=(), candidates=(), reasons=reasons)
+
+
+def _does(lower: float) -> str:
+    """What effects do to free runs. `lower`: the logarithm by which the rms falls."""
+    if not isfinite(lower):
+        return "make free runs run away"
+    change = f"{100 * expm1(-lower):+.3g} %"
+    return f"do too little for free runs (the rms changes by {change} on average over the recordings)"
 
 
 def _lower(runs: Iterable[Improvement]) -> float:

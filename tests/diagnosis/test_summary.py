@@ -80,6 +80,14 @@ def test_the_proof_has_a_unit_or_is_in_noises_and_a_jump_that_may_be_none_is_not
             f"  held-out recording sun: rms 0.861 -> 0.412{said} "
             f"(reading noise and heat that nobody records explain up to 0.421{said})",
         ]
+        improvement["held_out"] = {"sun": {"rms_before": 15.4, "rms_after": 14.1, "noise_floor": 1.94e6}}
+        (tmp_path / "diagnosis.json").write_text(
+            json.dumps({**document, "improvement": improvement}), "utf-8"
+        )
+        assert summary(tmp_path)[2] == (
+            f"  held-out recording sun: rms 15.4 -> 14.1{said} "
+            "(reading noise and heat that nobody records explain all of it)"
+        )
 
 
 def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> None:

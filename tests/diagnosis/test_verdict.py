@@ -182,6 +182,19 @@ def test_a_name_needs_evidence_of_its_own() -> None:
     assert [n.hypothesis for n in found.named] == [FLUID, FRICTION]
 
 
+def test_evidence_that_needs_an_effect_without_a_name_is_said() -> None:
+    """A collector: "possible but not sure enough to be named (probability 0.98, log evidence 49229)"."""
+    both = pair(FLUID, FRICTION, 100.0, 5.0, 10.0)
+    found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.3})
+    assert found.named == ()
+    assert (
+        f"fluid_convection at {FLUID.where} is not named: its log evidence of 90 (probability 0.95) counts "
+        "only next to effects that are not named either"
+    ) in found.reasons
+    said_of = f"friction_speed at {FRICTION.where} is possible but not sure enough to be named"
+    assert any(said_of in text for text in found.reasons)
+
+
 def test_single_wrong_readings_are_all_that_is_wrong() -> None:
     dry = Tried([Model((FLUID,), 1.0), Model((), 0.0)])
     found = said(dry, {"fluid_convection": 0.1}, World(outliers=("one", "two")))
@@ -444,6 +457,12 @@ def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
     assert idle(cast(Any, WET), named, [large]) is named
     withdrawn = idle(cast(Any, WET), named, [small, small])
     assert (withdrawn.word, withdrawn.named) == ("no mismatch", ())
+    assert "do too little for free runs (the rms changes by -0.25 % on average" in withdrawn.reasons[0]
+    tripled = idle(cast(Any, WET), named, [improved(1.0, 3.0, -2.5, -1.5)])
+    assert tripled.reasons[0] == (
+        "the surest effects do too little for free runs (the rms changes by +200 % on average over the "
+        "recordings)"
+    )
     assert idle(cast(Any, WET), named, [large, large, another_machine]) is named
     far = Tried([Model((FLUID,), 50.0), Model((), 0.0, off=0.24)])
     assert idle(cast(Any, far), named, [small, small]).word == "unexplained"
