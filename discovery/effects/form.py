@@ -33,6 +33,7 @@ Place = Literal[
     "error state",  # a state that is an error: its terms are rates
     "seat",  # a body as all errors see it; the formula is added to its temperature there
     "lever",  # a body; each error sees the formula with a lever of its own
+    "thermometer",  # a body as one measured temperature sees it
     "output",  # one output, all recordings
     "output of a state",  # the same, of a state of the model: where none is, the body itself lags
     "output that is no temperature",  # the same; what a thermometer shows beyond the model is heat

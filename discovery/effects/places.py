@@ -102,10 +102,14 @@ def spots(
         case place if place.startswith("output"):
             single = _single_outputs(effect, model, parts, outputs, channels)
             yield from (Spot(outputs=(name,)) for name in single)
-        case "seat" | "lever":
+        case "seat" | "lever" | "thermometer":
+            warm = {y for y in outputs if same_dimension(channels[y].unit, "degC")}
             for b in parts.bodies:
                 moved = tuple(y for y in outputs if b in names(model.outputs.get(y, Name(y))))
-                shown = outputs if effect.place == "lever" else moved
+                if effect.place == "thermometer":
+                    yield from (Spot((b,), outputs=(y,)) for y in moved if y in warm)
+                    continue
+                shown = tuple(y for y in (moved if effect.place == "seat" else outputs) if y not in warm)
                 if moved and shown:
                     yield Spot((b,), outputs=shown)
         case "inputs of a recording":

@@ -13,6 +13,7 @@ _GIVES = {
     "error state": "a rate of the error, added to the rates that the model has without the effect",
     "seat": "K, added to the temperature of the body where all errors see it",
     "lever": "what an error shows in addition to what the model predicts without the effect",
+    "thermometer": "what a temperature shows in addition to what the model predicts without the effect",
 }
 _SHOWN = "what the output shows in addition to what the model predicts without the effect"
 _BECOMES = "what the channel becomes in the terms of the model where it stands"

@@ -35,6 +35,7 @@ CHANNELS = {
     "servo": Channel("servo", "other input", "A", None, "held"),
     "E_Y": Channel("E_Y", "error", "um", 0.5, "linear"),
     "E_Z": Channel("E_Z", "error", "um", 0.5, "linear"),
+    "T_motor": Channel("T_motor", "temperature", "degC", 0.1, "linear"),
 }
 STATES = {"motor": 30e3, "table": 25e3, "bed": 120e3}
 TERMS = (
@@ -58,6 +59,7 @@ UNITS = {
     "h_w": "W/K",
 }
 RUNS = ("one", "two")
+READ = ("E_Y", "E_Z", "T_motor")
 HIGH = {
     "pump": 4.0,
     "rpm": 1000.0,
@@ -81,7 +83,11 @@ def sample(without: Collection[str] = ()) -> tuple[Model, dict[str, Channel]]:
     states = {name: State(name, "degC", c, parse("22"), 0.5, 1 / c) for name, c in STATES.items()}
     parameters = {name: Parameter(0.3 if unit == "1" else 8.0, unit, 0.0) for name, unit in UNITS.items()}
     return Model(
-        "sample", parameters, states, terms, {"E_Y": parse("2.0*table + 1.5*bed"), "E_Z": parse("3.0*motor")}
+        "sample",
+        parameters,
+        states,
+        terms,
+        {"E_Y": parse("2.0*table + 1.5*bed"), "E_Z": parse("3.0*motor"), "T_motor": parse("1.0*motor")},
     ), channels
 
 
@@ -98,7 +104,7 @@ def campaign() -> Campaign:
             name: size * np.repeat(rng.choice([0.0, 0.5, 1.0], 19), 10)[: len(time)]
             for name, size in HIGH.items()
         }
-        read = {name: np.where(time % EVERY == 0, 0.0, np.nan) for name in ("E_Y", "E_Z")}
+        read = {name: np.where(time % EVERY == 0, 0.0, np.nan) for name in READ}
         recordings[run] = Recording(run, time, {**walk, **switched, **read})
     return Campaign("sample", CHANNELS, recordings)
 
@@ -126,10 +132,11 @@ def errors() -> Model:
 
 def scene(model: Model, channels: Mapping[str, Channel], odds: float = ODDS) -> Scene:
     """What candidates are made for: every input moves."""
-    largest = {name: HIGH.get(name, 25.0) for name in channels if not name.startswith("E_")}
+    largest = {name: HIGH.get(name, 25.0) for name in channels if name not in READ}
     after = {run: RUNS[k:] for k, run in enumerate(RUNS)}
     unused = frozenset(set(largest) - set(model.inputs))
-    return Scene(channels, ("E_Y", "E_Z"), RUNS, after, largest, unused, odds, EVENT_ODDS)
+    shown = tuple(name for name in READ if name in {*model.outputs, *model.states})
+    return Scene(channels, shown, RUNS, after, largest, unused, odds, EVENT_ODDS)
 
 
 def claims(model: Model, effect: Effect, channels: Mapping[str, Channel] = CHANNELS) -> list[Hypothesis]:
@@ -151,14 +158,15 @@ def expand(effect: Effect, without: Collection[str] = ()) -> list[Hypothesis]:
 
 def trajectory(model: Model, recording: str = "two", still: bool = False) -> Trajectory:
     """Free run of a model of the sample machine; `still`: no input moves."""
-    inputs = [n for n in CHANNELS if not n.startswith("E_")]
+    inputs = [n for n in CHANNELS if n not in READ]
     recorded = campaign()
     if still:
         one = recorded.recordings[recording]
         values = {name: np.full(len(one.time), one.values[name][0]) for name in inputs}
         held = replace(one, values={**one.values, **values})
         recorded = replace(recorded, recordings={recording: held})
-    grid = make_grid(recorded, recording, inputs, ("E_Y", "E_Z"))
+    shown = tuple(name for name in READ if name in {*model.outputs, *model.states})
+    grid = make_grid(recorded, recording, inputs, shown)
     return simulate(make_system(model, grid), model.values(recording))
 
 

@@ -13,7 +13,7 @@ EFFECT = Effect(
     word="joint_hysteresis",
     title="Hysteresis of a joint",
     group="air and structure",
-    place="output",
+    place="output that is no temperature",
     formula="slip*(play(y, width) - y)",
     amplitude=Amplitude("slip", "1", 0.5, most=1.0),
     shapes=(Shape("width", "um", 1.2, factor=2.0),),
