@@ -21,7 +21,7 @@ from discovery.recordings.finding import Finding, more
 _SEPARATORS = {",": "a comma", ";": "a semicolon", "\t": "a tab", "|": "a bar"}
 _DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 _NAME = re.compile(r"[^\W_][\w .%°/()\[\]-]{0,40}")
-_EXPORT = "export it with a comma between the columns and a point in numbers"
+_EXPORT = "export it with a comma between the columns and a point in numbers, or let `discovery new` read it"
 
 
 @dataclass

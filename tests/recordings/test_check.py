@@ -85,7 +85,8 @@ def test_nothing_is_wrong(write: Write) -> None:
         ),
         (
             "\n".join(rows()).replace(",", ";"),
-            "error: fit.csv, line 1: the columns are separated by a semicolon",
+            "error: fit.csv, line 1: the columns are separated by a semicolon; export it with a comma "
+            "between the columns and a point in numbers, or let `discovery new` read it",
         ),
         ("\n".join(rows()).replace(",", "\t"), "error: fit.csv, line 1: the columns are separated by a tab"),
         (
