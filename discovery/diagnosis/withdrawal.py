@@ -73,7 +73,7 @@ def unfinished(verdict: Verdict, fitting: Improvement, unit: str) -> Verdict:
     makes likely: something else acts as well. Where that is more than the names explain, they are withdrawn:
     they may stand for it.
     """
-    if not verdict.named or not _misses(fitting, fitting.judged[1]):
+    if not verdict.named or not _misses(fitting, fitting.judged[1], power=2):
         return verdict
     still = f"free runs on the fitted recordings still miss by {_size(fitting, fitting.judged[1])} {unit}"
     if fitting.mostly:
@@ -85,9 +85,14 @@ def unfinished(verdict: Verdict, fitting: Improvement, unit: str) -> Verdict:
     )
 
 
-def _misses(run: Improvement, rms: float) -> bool:
-    """Whether free runs miss their readings by more than noise and the fit make likely."""
-    return rms > thresholds.MISSED * run.expected
+def _misses(run: Improvement, rms: float, power: int = 1) -> bool:
+    """Whether free runs miss their readings by more than noise and the fit make likely.
+
+    Args:
+        power: of the rms that counts. A fit brings the mean square below what is expected, if nothing is
+            lacking; another day is off by more than a linear look at the parameters says.
+    """
+    return rms**power > thresholds.MISSED * run.expected**power
 
 
 def _size(run: Improvement, rms: float) -> str:
