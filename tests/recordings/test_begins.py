@@ -1,4 +1,4 @@
-"""A temperature that begins as it does in another recording is in the unit that the campaign states."""
+"""What lies where it lies in other recordings is in the unit, and has the sign, that the campaign states."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ import numpy as np
 import pytest
 
 from discovery.recordings.campaign import Channel
-from discovery.recordings.compare.agreement import _begins_elsewhere
-from discovery.recordings.compare.repairs import units
+from discovery.recordings.compare.agreement import _begins_elsewhere, _goes_elsewhere
+from discovery.recordings.compare.repairs import halves, signs, units
 from discovery.recordings.compare.seen import Seen
 from discovery.recordings.units import conversion
 
 NOZZLE = Channel("nozzle", "temperature", "degC", None, "linear")
+OIL = Channel("oil", "fluid flow", "l/min", None, "held")
 
 
-def seen(name: str, values: list[float]) -> Seen:
+def seen(name: str, values: list[float], channel: str = "nozzle") -> Seen:
     time = np.linspace(0.0, 600.0, len(values))
-    return Seen(name, Path(f"{name}.csv"), time, {"nozzle": np.array(values)}, np.arange(len(values)))
+    return Seen(name, Path(f"{name}.csv"), time, {channel: np.array(values)}, np.arange(len(values)))
 
 
 @pytest.mark.parametrize(
@@ -44,3 +45,27 @@ def test_the_unit_is_right_where_a_temperature_begins_as_elsewhere(
     )
     (repair,) = (r for r in units(one, known.channels, [], ["nozzle"]) if "degF" in r.what)
     assert _begins_elsewhere(known, one, repair) is right
+
+
+@pytest.mark.parametrize(
+    ("flow", "said", "right"),
+    [
+        ([0.0, 25.0, 40.0, 110.0, 70.0, 40.0], "is 10 times too large from", True),
+        ([0.0, 25.0, 40.0, 1100.0, 700.0, 400.0], "is 10 times too large from", False),
+        ([0.0, 25.0, 40.0, 110.0, 70.0, 40.0], "has the other sign than", True),
+        ([0.0, -25.0, -40.0, -110.0, -70.0, -40.0], "has the other sign than", False),
+        ([0.0, 25.0, 40.0, 110.0, 70.0, 40.0], "10 times too small", True),
+        ([0.0, 2.5, 4.0, 11.0, 7.0, 4.0], "10 times too small", False),
+        ([0.0, 25.0, 40.0, 50.0, 50.0, 40.0], "half as large", False),  # both would be usual
+    ],
+)
+def test_a_flow_is_right_where_it_lies_as_elsewhere(flow: list[float], said: str, right: bool) -> None:
+    one = seen("monday", flow, "oil")
+    others = [seen(day, [0.0, 25.0, 70.0, 110.0], "oil") for day in ("tuesday", "sunday")]
+    known = cast(
+        "Any", SimpleNamespace(recordings={s.name: s for s in (one, *others)}, channels={"oil": OIL})
+    )
+    every = (r for family in (units, signs, halves) for r in family(one, known.channels, ["oil"], []))
+    found = [r for r in every if said in r.what and np.any(one.values["oil"] != r.made.values["oil"])]
+    assert found
+    assert all(_goes_elsewhere(known, one, r) is right for r in found)

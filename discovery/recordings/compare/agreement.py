@@ -50,6 +50,7 @@ _POOR = (
 )
 _TWO_AGREES = 0.4  # of the movement itself
 _APART = 2.0  # times the usual movement: others do not know how what begins so far away goes on
+_SCALED = ("unit", "factor", "sign", "halfway")  # repairs that change every value, or all from an instant on
 _BEGINS = 5.0  # K: by so much more a temperature begins elsewhere than in any other recording
 _FREE_AGREES = 0.3  # of the movement: a drift or an offset of any size fits a little of a poor prediction
 # how much larger the gain of a less usual damage must be to go before a usual one
@@ -111,7 +112,7 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
         touched = [y for y in misfit if y in repair.channels] or list(misfit)
         if not two and not set(touched) & wrong:
             continue
-        if _begins_elsewhere(known, one, repair):
+        if _begins_elsewhere(known, one, repair) or _goes_elsewhere(known, one, repair):
             continue
         after = _after(known, predicted, repair, touched)
         if len(after) < len(touched):
@@ -145,6 +146,28 @@ def _begins_elsewhere(known: CrossPrediction, one: Seen, repair: Repair) -> bool
         if known.channels[name].unit == "degC" and np.isfinite(others).any():
             now, then = (np.nanmin(np.abs(_first(s, name) - np.array(others))) for s in (one, repair.made))
             if then > now + _BEGINS:
+                return True
+    return False
+
+
+def _goes_elsewhere(known: CrossPrediction, one: Seen, repair: Repair) -> bool:
+    """Return whether most of the values of an input that a repair changes lie where other recordings have
+    theirs, and would not after it.
+
+    Their unit and sign are right then: programs use the same speeds and flows.
+    """
+    for name in repair.channels if repair.kind in _SCALED else ():
+        if not known.channels[name].is_input:
+            continue
+        now, then = one.values[name], repair.made.values[name]
+        others = [s.values[name] for s in known.recordings.values() if s.name != one.name]
+        there = np.concatenate([now[now == then], *others])  # what stays, too
+        there, changed = there[np.isfinite(there) & (there != 0)], np.isfinite(now) & (now != then)
+        if there.size and changed.any():
+            was, would = (
+                np.median((v >= there.min()) & (v <= there.max())) for v in (now[changed], then[changed])
+            )
+            if was > would:
                 return True
     return False
 
