@@ -236,7 +236,7 @@ def make_grid(
     """Grid of a recording: every stamp of an input or a reading is a node, long intervals are divided.
 
     With more than `most` nodes it is coarsened: a body of minutes or hours answers to the mean of what
-    came within seconds. Stamps are taken together in blocks, which end where a held input switches. All
+    came within seconds. Stamps are taken together in blocks, which end where an input switches or jumps. All
     readings count: they are their means over a block, at the mean of their stamps. Nodes are these instants,
     the switches, and the bounds of blocks without a reading. Inputs are their means in between.
 
@@ -340,15 +340,22 @@ def _switches(
     rows: Ints, base: NDArray[np.bool_], samples: Iterable[Samples], stamps: Array, coarse: int
 ) -> NDArray[np.bool_]:
     """Which rows of the stamps (N,) bound a block because a held input is far from what it was at the last
-    bound; all of `base` are bounds.
+    bound, or another input jumps between two rows; all of `base` are bounds.
 
     What switches more often than the nodes allow (a heater on a pulsed supply) is averaged.
     """
-    held = [s.at(stamps[rows]) for s in samples if not s.linear and np.ptp(s.value) > 0]
+    moving = [s for s in samples if np.ptp(s.value) > 0]
+    jumps = np.zeros(len(rows), dtype=bool)
+    for one in moving:
+        far_apart = np.abs(np.diff(one.at(stamps[rows]))) > MOVED * np.ptp(one.value)
+        if one.linear and far_apart.sum() < coarse:  # a valve that changes over to warm water
+            jumps[:-1] |= far_apart
+            jumps[1:] |= far_apart
+    held = [s.at(stamps[rows]) for s in moving if not s.linear]
     if not held:
-        return np.zeros(len(rows), dtype=bool)
+        return jumps
     share = np.column_stack([values / np.ptp(values) for values in held])
     far = MOVED
     while ((found := series.moved(share, base, far)) & ~base).sum() > coarse:
         far *= 2
-    return np.asarray(found)
+    return np.asarray(found | jumps)

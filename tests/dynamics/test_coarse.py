@@ -83,6 +83,23 @@ def test_a_recording_of_months_is_not_averaged_over_what_its_body_does() -> None
     assert np.max(np.abs(found - grid.readings)) < 1e-3  # of 75 K
 
 
+def test_a_temperature_that_jumps_keeps_its_instant() -> None:
+    """Oil that changes over from 104 to 85 degC within a minute, 27 times: a roll of 30 min is met to 0.1 K. With
+    the jump spread over its block, the roll answered 90 s before, and its reading there was 0.3 K off.
+    """
+    time = np.arange(3000.0) * 60
+    oil = np.where((time // 6660) % 2 > 0, 85.0, 104.0) + 0.2 * np.sin(time / 500)
+    read = np.where(np.arange(3000) % 4 == 0, 90.0, np.nan)
+    channels = {**CHANNELS, "u": Channel("u", "coolant temperature", "degC", None, "linear")}
+    data = Campaign("c", channels, {"r": Recording("r", time, {"u": oil, "y": read})})
+    values = {"tau": 1800.0, "gain": 1.0}
+    runs = []
+    for most in (2000, 4000):
+        grid = make_grid(data, "r", ["u"], ["y"], coarse=1000, most=most)
+        runs.append(predict(simulate(make_system(model(), grid), values)))
+    assert np.max(np.abs(runs[0] - runs[1])) < 0.1
+
+
 def test_a_pulsed_heater_is_averaged() -> None:
     """On for 2 s of 6 s, more switches than nodes: its mean warms the body as it does, within the swing of a
     single pulse.
