@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from math import log
 
-from discovery.effects.form import INPUT, LEVEL, RATE, ROLE_OF, TERM, Effect
+from discovery.effects.form import INPUT, LEVEL, RATE, REPLACED, ROLE_OF, TERM, Effect
 from discovery.effects.hypothesis import BEFORE, Hypothesis
 from discovery.effects.places import TEMPERATURES, Spot, spots
 from discovery.models import Model
@@ -309,9 +309,7 @@ def _changed(
         used = names(term.expression) & inputs
         swaps = {c: substitute(formula, {**known, "input": Name(c)}) for c in used}
     else:
-        replaced = spot.channel or next(
-            n.id for v in ("fluid", "cooling", "flow") if isinstance(n := naming.known.get(v), Name)
-        )
+        replaced = spot.channel or next(n.id for v in REPLACED if isinstance(n := naming.known.get(v), Name))
         swaps = {replaced: substitute(formula, {**known, "input": Name(replaced)})}
     changed = delays_at(inputs, substitute(term.expression, swaps))  # the term may delay the channel itself
     difference = Apply("-", (changed, term.expression))

@@ -53,6 +53,9 @@ TERM_PLACES = (
     "input temperature",
 )
 
+# what a formula without `term` replaces in the terms of its place: the first of these that it names
+REPLACED = ("fluid", "coolant", "ambient", "cooling", "load", "flow")
+
 # Variables that a formula may use, and the role of the channel that each is
 ROLE_OF = {
     "ambient": "ambient temperature",
@@ -79,6 +82,7 @@ DRIVING = (  # roles of the inputs that an error may follow by a law of its own
     "other input",
 )
 
+_PER_SPEED = r"(\bspeed\s*/\s*)(\d+(?:\.\d+)?)"  # at which speed the size of an effect counts
 _RATIO = 3.0  # between neighbouring values of a shape in a search: signatures of both are much alike
 _REACH = 2.0  # standard deviations of a prior that a search covers
 _FARTHEST = 4.0  # ... and beyond which a law is another one
@@ -193,8 +197,8 @@ class Effect:
 
     `formula` is a heat flow [W] into `body` (and out of `other` where it names one), or what an output shows
     more; where `term` stands in it, it is what a term of the model changes by, and at other "terms" what
-    their fluid, cooling, flow or input channel becomes (the first of these that it names). For outputs `y` is
-    the error without the effect. Where states have no capacity (phenomenological models) it is a rate.
+    their channel becomes (the first of `REPLACED` that it names). For outputs `y` is the error without the
+    effect. Where states have no capacity (phenomenological models) it is a rate.
 
     `search`: how its instants are found, if it has any; `acts`: in all recordings, in one, or from one on.
     `shared`: also offered at all its places at once, with one size. `spreads`: also offered at two linked
@@ -235,7 +239,7 @@ class Effect:
         """The speed that the amplitude is a size at, "1000 rpm", where the formula divides by one; of what a
         speed adds to, it is the size at standstill.
         """
-        found = re.search(r"\bspeed\s*/\s*(\d+(?:\.\d+)?)", self.formula)
+        found = re.search(_PER_SPEED, self.formula)
         if re.search(r"\+[^()]*\bspeed\b", self.formula):
             return ""
-        return f"{float(found[1]):g} rpm" if found else ""
+        return f"{float(found[2]):g} rpm" if found else ""

@@ -12,6 +12,7 @@ from discovery.effects.form import (
     INPUT,
     LEVEL,
     RATE,
+    REPLACED,
     ROLE_OF,
     TERM,
     TERM_PLACES,
@@ -30,6 +31,10 @@ from discovery.schema import Strict
 from discovery.terms import Expression, degree, evaluate, names, parse
 from discovery.terms.expression import rewrite
 
+_OF_INPUTS: tuple[Place, ...] = (
+    "input temperature",
+    "inputs of a recording",
+)  # which are replaced themselves
 # places of effects by how many instants are searched for: a jump, or heat for some hours
 _SEARCHED: dict[int, tuple[Place, ...]] = {
     1: ("output of a recording", "recording"),
@@ -172,12 +177,17 @@ class EffectForm(Strict):
             )
         if self.amplitude not in used:
             raise UserError(f"{where}: the amplitude '{self.amplitude}' is not in the formula")
-        at_terms = self.place in (*TERM_PLACES, "inputs of a recording")
+        at_terms = self.place in (*TERM_PLACES, *_OF_INPUTS)
         replaces = at_terms and TERM not in used  # then it is what a channel becomes, no change
         if not replaces and not _is_a_factor(self.amplitude, formula):
             raise UserError(
                 f"{where}: its formula has to be zero where {self.amplitude} is zero, and linear in it; "
                 f"write it as {self.amplitude}*(...)"
+            )
+        if replaces and self.place not in _OF_INPUTS and used.isdisjoint(REPLACED):
+            raise UserError(
+                f"{where}: at the place '{self.place}' its formula needs `{TERM}`, the term that changes, or "
+                f"the channel that it replaces there: {', '.join(REPLACED)}"
             )
         if used & {INPUT, LEVEL} and not at_terms and not self.roles:
             raise UserError(f"{where}: say under `roles` which inputs '{INPUT}' and '{LEVEL}' may be")

@@ -13,6 +13,7 @@ import pytest
 
 from discovery.diagnosis import Diagnosis
 from discovery.diagnosis.summary import summary
+from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.not_offered import not_offered
@@ -48,6 +49,17 @@ def test_the_amplitude_has_to_be_a_factor(formula: str) -> None:
     text = RUB.replace("k_rub*speed*exp(-time/t_free)", formula)
     with pytest.raises(UserError, match=r"effect 'rub': its formula has to be zero where k_rub is zero"):
         own(text)
+
+
+def test_a_formula_may_replace_the_channel_of_its_place() -> None:
+    """Air that follows the room sensor late. A formula without the channel and without `term` is refused."""
+    enclosure = RUB.replace("driven body", "air terms").replace('"W/rpm"', '"1"')
+    late = "ambient + k_rub*(lag(ambient, t_free) - ambient)"
+    effect = own(enclosure.replace("k_rub*speed*exp(-time/t_free)", late))
+    (h,) = candidates(machine.model(), [effect], machine.scene(machine.model()))
+    assert {t.into for t in h.terms} == {"motor", "bed"}
+    with pytest.raises(UserError, match=r"at the place 'air terms' its formula needs `term`"):
+        own(enclosure.replace("exp(-time/t_free)", "exp(-time/t_free) + 0*speed"))
 
 
 def answered(path: Path) -> Diagnosis:
