@@ -53,6 +53,17 @@ def test_a_fluid_that_is_late_already_is_later() -> None:
     assert np.allclose(found, expected, rtol=0, atol=1e-9)
 
 
+def test_a_coolant_may_be_late_or_mixed() -> None:
+    """As a fluid: its sensor may stand far from the bodies."""
+    baseline, _ = sample()
+    later = claims(baseline, catalogue()["fluid_delay_coolant"])[0]
+    mixed = claims(baseline, catalogue()["fluid_sump_coolant"])[0]
+    assert later.states == mixed.states == ("bed",)
+    later = later.at(dict.fromkeys(later.shapes, 600.0))
+    found = predict(trajectory(later.added_to(baseline)))
+    assert np.allclose(found, predict(trajectory(late({"water": 600.0}))), rtol=0, atol=1e-9)
+
+
 def test_what_lags_in_a_model_without_states_is_the_body() -> None:
     """No sensor: a model that answers at once has no body whose time constant a lag could add to."""
     outputs = {"E_Y": parse("0.02*drive"), "E_Z": parse("0.01*drive")}
