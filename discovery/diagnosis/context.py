@@ -15,7 +15,7 @@ from discovery.diagnosis import thresholds
 from discovery.diagnosis.sizes import Sizes
 from discovery.dynamics import Grid, make_grid
 from discovery.effects.candidates import Scene, candidates
-from discovery.effects.form import Effect
+from discovery.effects.form import ROLE_OF, Effect
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import model_form
@@ -166,7 +166,7 @@ def make_context(
         tuple(recordings),
         tuple(outputs),
         grids,
-        tuple(shown_by(grids, effects)),
+        tuple(shown_by(grids, effects, scene)),
         scene,
         fit,
         noises,
@@ -248,8 +248,19 @@ def make_scene(
     )
 
 
-def shown_by(grids: Mapping[str, Grid], effects: Sequence[Effect]) -> list[Effect]:
-    """The effects, their generic time constants limited to those that the recordings can show."""
+def shown_by(grids: Mapping[str, Grid], effects: Sequence[Effect], scene: Scene) -> list[Effect]:
+    """The effects, their generic time constants limited to those that the recordings can show, their sizes at
+    a speed that the machine has. What users state counts at the speed that they state.
+    """
     duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
     spacing = min(float(np.median(np.diff(g.time[g.read]))) for g in grids.values() if len(g.read) > 1)
-    return [replace(e, shapes=tuple(s.within(0.5 * spacing, duration) for s in e.shapes)) for e in effects]
+    top = max(
+        (v for n, v in scene.largest.items() if scene.channels[n].role == ROLE_OF["speed"]), default=0.0
+    )
+    return [
+        replace(
+            e if e.group == "user" else e.up_to(top),
+            shapes=tuple(s.within(0.5 * spacing, duration) for s in e.shapes),
+        )
+        for e in effects
+    ]

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from math import ceil, erf, exp, inf, log, pi, sqrt
+from math import ceil, erf, exp, inf, log, log10, pi, sqrt
 from typing import Literal
 
 Group = Literal[
@@ -243,3 +243,15 @@ class Effect:
         if re.search(r"\+[^()]*\bspeed\b", self.formula):
             return ""
         return f"{float(found[2]):g} rpm" if found else ""
+
+    def up_to(self, speed: float) -> Effect:
+        """The effect on a machine that turns at most at a speed [rpm]. On a slow one, its size counts at the
+        nearest power of ten: a roll at 20 rpm rubs as much as a spindle at 1000 rpm.
+        """
+        if not self.at or speed <= 0:
+            return self
+
+        def slower(found: re.Match[str]) -> str:
+            return f"{found[1]}{min(float(found[2]), 10.0 ** round(log10(speed))):.10g}"
+
+        return replace(self, formula=re.sub(_PER_SPEED, slower, self.formula))

@@ -109,7 +109,7 @@ class Task:
         problem = make_problem(model, campaign, recordings, outputs, grids=grids)
         runs = [problem.run(system, problem.start) for system in problem.systems]
         scene = make_scene(campaign, model, recordings, outputs, {})
-        effects = shown_by(grids, [e for e in catalogue().values() if _may_begin(e)])
+        effects = shown_by(grids, [e for e in catalogue().values() if _may_begin(e)], scene)
         return cls(
             model,
             known,

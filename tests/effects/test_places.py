@@ -64,6 +64,22 @@ def test_a_coolant_may_be_late_or_mixed() -> None:
     assert np.allclose(found, predict(trajectory(late({"water": 600.0}))), rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("top", "said"), [(24000.0, "1000 rpm"), (620.0, "1000 rpm"), (20.0, "10 rpm"), (0.0, "1000 rpm")]
+)
+def test_the_size_of_friction_counts_at_a_speed_that_the_machine_has(top: float, said: str) -> None:
+    friction = catalogue()["friction_speed"].up_to(top)
+    assert friction.at == said
+    per = float(said.removesuffix(" rpm"))
+    values = {"P_f": 150.0, "speed": per, "m_loss": 1.7}
+    assert evaluate(parse(friction.formula), values).value == pytest.approx(150.0)
+
+
+def test_what_has_no_size_at_a_speed_stays() -> None:
+    for word in ("rim_detachment", "evaporation_spinning", "radiation"):
+        assert catalogue()[word].up_to(20.0) == catalogue()[word]
+
+
 def test_what_lags_in_a_model_without_states_is_the_body() -> None:
     """No sensor: a model that answers at once has no body whose time constant a lag could add to."""
     outputs = {"E_Y": parse("0.02*drive"), "E_Z": parse("0.01*drive")}
