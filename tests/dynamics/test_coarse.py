@@ -84,8 +84,8 @@ def test_a_recording_of_months_is_not_averaged_over_what_its_body_does() -> None
 
 
 def test_a_temperature_that_jumps_keeps_its_instant() -> None:
-    """Oil that changes over from 104 to 85 degC within a minute, 27 times: a roll of 30 min is met to 0.1 K. With
-    the jump spread over its block, the roll answered 90 s before, and its reading there was 0.3 K off.
+    """Oil that changes over from 104 to 85 degC within a minute, 27 times: a roll of 30 min is met to 0.1 K.
+    With the jump spread over its block, the roll answered 90 s before, and was 0.3 K off there.
     """
     time = np.arange(3000.0) * 60
     oil = np.where((time // 6660) % 2 > 0, 85.0, 104.0) + 0.2 * np.sin(time / 500)
