@@ -64,7 +64,8 @@ def read_careful_csv(
         if header.count(name) > 1:
             troubles.error(line, f"{header.count(name)} columns are named '{name}'", "rename or delete one")
     if TIME not in header:
-        troubles.error(line, f"no column '{TIME}'", f"name the column of stamps '{TIME}'{_named(header)}")
+        do = f"name the column of stamps '{TIME}'; it counts in s (`discovery new` converts minutes)"
+        troubles.error(line, f"no column '{TIME}'", do + _named(header))
         return None, troubles.all()
     whole = (row for row in rows if _is_whole(row, header, troubles))
     columns = _columns(header, whole, [name for name in wanted if name in header], troubles)

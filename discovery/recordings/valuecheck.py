@@ -109,7 +109,7 @@ def small_findings(file: Path, lines: Lines, channel: Channel, column: Array) ->
     most = float(np.max(np.abs(known)))
     if 0.0 < most < least[0] and known.min() < known.max():
         what = f"'{channel.name}' is never more than {most:.2g} {channel.unit}"
-        do = f"a {channel.role} of a machine is seldom so small: is it in {least[1]}?"
+        do = f"on a machine, the role {channel.role} seldom has values so small: is it in {least[1]}?"
         yield Finding("warning", file, int(lines[0]), what, do, "small", channel.name, 5.0)
 
 

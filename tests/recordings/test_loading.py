@@ -141,6 +141,10 @@ def changed(line: int, text: str) -> list[str]:
     [
         (changed(1, "time,T_env,speeed,E_Y0C"), "fit.csv, line 1: no column 'speed'; did you mean 'speeed'?"),
         (changed(1, "stamp,T_env,speed,E_Y0C"), "fit.csv, line 1: no column 'time'"),
+        (
+            changed(1, "time [min],T_env,speed,E_Y0C"),
+            "'time'; it counts in s (`discovery new` converts minutes)",
+        ),
         (changed(7, "300,20,abc,"), "fit.csv, line 7: 'speed' is 'abc', not a number"),
         (changed(7, "300,20,inf,"), "fit.csv, line 7: 'speed' is 'inf', not a number"),
         (changed(7, "100,20,0,"), "fit.csv, line 7: time runs backwards by 140 s"),
