@@ -18,6 +18,7 @@ from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.refit import score
 from discovery.diagnosis.scored import Scored, with_unknown
 from discovery.diagnosis.selection import Search
+from discovery.diagnosis.unknown_law import with_law
 from discovery.diagnosis.vetoes import vetoed
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.printed import printed
@@ -85,7 +86,9 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     # what changes no free run outside the fit is not lacking either; what may do so by chance can be
     nothing = {key for key in idle if not _changes(proofs[key])}
     reasons = [*refused.values(), *(text for key, text in idle.items() if key not in nothing)]
-    rest = [m for m in (*posterior.models, *found.tried.values()) if not m.keys & nothing]
+    # without a name, none stands for a law
+    laws = [law for m in (found.baseline, answer) for law in with_law(context, m)] if named else []
+    rest = [m for m in (*posterior.models, *found.tried.values(), *laws) if not m.keys & nothing]
     best = max(rest, key=lambda m: m.evidence)
     alone = _alone(context, found, answer, named) if matters else answer.evidence
     # names hold next to effects that are not sure, and next to something that no effect explains if they
@@ -95,9 +98,12 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     if best.evidence - without > thresholds.SHORT and (
         named or best.forced or not _idle_all(context, found, answer, candidates)
     ):
-        laws = [n for n in named if (proof := proofs[n.hypothesis.key]) and proof.mostly]
+        mostly = [n for n in named if (proof := proofs[n.hypothesis.key]) and proof.mostly]
+        by_law = any(best is one for one in laws)
         named = tuple(
-            _needed(laws, least, lambda some, goal: _unknown_beside(context, found, answer, some, goal))
+            _needed(
+                mostly, least, lambda some, goal: _unknown_beside(context, found, answer, some, goal, by_law)
+            )
         )
         if named:
             reasons.append(
@@ -186,13 +192,16 @@ def _needed(
 
 
 def _unknown_beside(
-    context: Context, found: Search, answer: Scored, chosen: Sequence[Named], goal: float
+    context: Context, found: Search, answer: Scored, chosen: Sequence[Named], goal: float, by_law: bool
 ) -> float:
-    """Log evidence of a model with only these effects and something of unknown cause; it need not be exact
-    below a goal.
+    """Log evidence of a model with only these effects and something of unknown cause, which may also be a
+    law; it need not be exact below a goal.
     """
     model = _only(context, found, answer, chosen)
-    return -inf if model is None else max(m.evidence for m in with_unknown(context, [model], goal))
+    if model is None:
+        return -inf
+    unknown = [*with_unknown(context, [model], goal), *(with_law(context, model) if by_law else [])]
+    return max(m.evidence for m in unknown)
 
 
 def by_chance(gain: float, least: float = thresholds.SHORT) -> float:

@@ -17,7 +17,7 @@ from discovery.dynamics import predict
 from discovery.fitting import predict_recording
 from discovery.models import Model, Parameter, read_model, write_model
 from discovery.models.reduced import reduced
-from discovery.recordings import Recording
+from discovery.recordings import Channel, Recording
 from discovery.terms import Term, parse
 from tests.diagnosis.parts import document
 from tests.machine import CHANNELS, NOISE, SEEN, SIZES, Array, Inputs, campaign, changed, model, simulated
@@ -318,6 +318,26 @@ def test_a_law_that_no_entry_has_is_not_given_a_name() -> None:
     assert found["location"]["windows"]
     assert found["missing_heat"]["over_time"]["r1"]["heat"]
     assert {"speed", "pump", "bed"} <= set(found["missing_heat"]["against"])
+
+
+def test_heat_of_two_inputs_together_is_no_heat_of_one_of_them() -> None:
+    """A brake resistor at the bed heats while two axes work. Heat of one of them explains most of it."""
+    work = np.random.default_rng(7).integers(0, 3, (2, 40)) / 2  # of the largest power, for 50 min each
+
+    def axes(t: float | Array) -> Array:
+        return np.asarray(np.array([[800.0], [600.0]]) * work[:, np.minimum(t // 3000.0, 39).astype(int)])
+
+    def brake(t: float, _: Array, __: Inputs) -> tuple[float, float, float]:
+        (x,), (y,) = axes(np.array([t]))
+        return (0.0, 0.0, 250.0 * x * y / 480e3)
+
+    runs = [simulated(seed, concealed=brake) for seed in (1, 2)]
+    runs = [changed(r, **dict(zip(("P_x", "P_y"), axes(r.time), strict=True))) for r in runs]
+    powers = {name: Channel(name, "heat load", "W", None, "held") for name in ("P_x", "P_y")}
+    seen = replace(campaign(*runs), channels={**CHANNELS, **powers})
+    found = document(diagnose(model(), seen, ["r1", "r2"]))
+    assert (found["verdict"], found["physics"]) == ("unexplained", [])
+    assert found["reasons"][0] == "heat at bed that follows P_x times P_y explains more than effects do"
 
 
 def test_a_model_of_the_errors_themselves() -> None:

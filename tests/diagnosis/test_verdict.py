@@ -125,6 +125,11 @@ def _unknown_heat_explains_everything(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verdict, "with_unknown", alike)
 
 
+@pytest.fixture(autouse=True)
+def _no_law_is_lacking(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verdict, "with_law", lambda *_: [])
+
+
 def said(
     found: Tried,
     words: dict[str, float],
@@ -142,6 +147,19 @@ def pair(first: Hypothesis, other: Hypothesis, both: float, one: float, second: 
 
 
 WET = Tried([Model((FLUID,), 100.0), Model((), 0.0)])
+
+
+@pytest.mark.parametrize(("evidence", "word"), [(115.0, "missing physics"), (117.0, "unexplained")])
+def test_a_name_has_to_be_better_than_a_law_without_one(
+    evidence: float, word: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A model with the name has 100; the law may exceed it by 16."""
+    what = "heat at table that follows P_x times P_y"
+    law = replace(WET.baseline, evidence=evidence, forced=what)
+    monkeypatch.setattr(verdict, "with_law", lambda _, m: [law] if m is WET.baseline else [])
+    answer = said(WET, {"fluid_convection": 0.9})
+    assert answer.word == word
+    assert (f"{what} explains more than effects do" in answer.reasons) == (word == "unexplained")
 
 
 @pytest.mark.parametrize(
