@@ -26,7 +26,6 @@ Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 
 _DAMPING = 1e-4  # of the first step, relative to the diagonal of the normal equations
 _EASE, _TIGHTEN = 0.1, 5.0  # factors of the damping after a step that is taken, or refused
-_SHORTER = (0.1, 0.5)  # of a refused step: where a parabola along it is lowest, within this range
 _HOPELESS = 1e10  # damping at which no shorter step helps any more
 _STILL = 1e-11  # relative change of the unknowns below which the search has ended
 _PACE = 4  # steps whose mean gain says whether a search comes near its goal
@@ -111,24 +110,21 @@ def solve(
             expected = -float(gradient @ change) - 0.5 * float(change @ gram @ change)
             if np.all(np.abs(change) <= _STILL * (1.0 + np.abs(x))):
                 break
-            gained = -inf
             try:
                 runs = free_runs(problem, moved, now.trajectories)
                 trial = _whitened(problem, moved, noise, together, runs, filters)
-                gained = cost - _cost(trial.residual, loss)
             except RunsAwayError:
-                pass
-            if gained > 0:
+                trial = None
+            if trial is not None and _cost(trial.residual, loss) < cost:
                 found = trial
                 break
             if expected < tolerance * cost:
                 break
-            slope = -float(gradient @ change)
-            share = np.clip(0.5 * slope / max(slope - gained, 1e-300), *_SHORTER)
-            damping = _tightened(x, gram, gradient, damping, (low, high), share * change)
+            damping *= _TIGHTEN
         if found is None:
             done = True
             break
+        gained = cost - _cost(found.residual, loss)
         x, now = moved, found
         if gained > 0.5 * expected:
             damping = max(damping * _EASE, 1e-12)
@@ -232,22 +228,6 @@ def _step(x: Array, gram: Array, gradient: Array, damping: float, low: Array, hi
         step[over] = np.clip(x + step, low, high)[over] - x[over]
         free &= ~over
     return step
-
-
-def _tightened(
-    x: Array, gram: Array, gradient: Array, damping: float, bounds: tuple[Array, Array], last: Array
-) -> float:
-    """Damping at which a step is no longer than `last` (U,), in units of the rows that move with it. Damping
-    far below the curvature of a direction does not change the step along it, and each trial costs free runs.
-    """
-    weight = np.diag(gram)
-    longest = float(last @ (weight * last))
-    while damping < _HOPELESS:
-        damping *= _TIGHTEN
-        change = np.clip(x + _step(x, gram, gradient, damping, *bounds), *bounds) - x
-        if not float(change @ (weight * change)) > longest:
-            break
-    return damping
 
 
 def _solved(matrix: Array, vector: Array) -> Array:
