@@ -1,7 +1,8 @@
-"""A law that no entry of the catalogue has: heat at a body that follows the product of two recorded inputs.
+"""A law that no entry of the catalogue has: heat at a body that follows the product of two recorded inputs,
+or the square of one.
 
-What acts unknown may be a law of what is recorded, and not only heat at random. An effect that stands for
-such a law has to be better than it: a brake resistor that heats while two motors work is no heat of one.
+The unknown cause may be a law of what is recorded, and not only random heat. An effect that is named instead
+of such a law has to be better than it: a brake resistor that heats while two motors work is no heat of one.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations_with_replacement
-from math import log
+from math import inf, log
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
@@ -35,15 +36,21 @@ _LAW = Effect(
 )
 
 
-def with_law(context: Context, one: Scored) -> list[Scored]:
-    """A model with the law of two inputs that it lacks most, fitted; nothing if it lacks none."""
+def with_law(context: Context, one: Scored, goal: float = inf) -> list[Scored]:
+    """A model with the law of two inputs that it lacks most, fitted; nothing if it lacks none.
+
+    Args:
+        goal: the cost from which it matters, as in `fit_model`.
+    """
     offered = list(_laws(context))
     if not offered:
         return []
     best, *_ = scan(one.seen, [one.settings[one.best]], offered, context.slab(offered)).claims
     h = best.hypothesis
     sizes = dict(zip(h.amplitudes, best.size, strict=True))
-    found = score(context, (*one.hypotheses, h), one.noise, one.fit, sizes) if best.odds > 0 else None
+    if best.odds <= 0:
+        return []
+    found = score(context, (*one.hypotheses, h), one.noise, one.fit, sizes, goal)
     if found is None:
         return []
     (body,), inputs = h.states, " times ".join(h.channels)

@@ -86,8 +86,9 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     # what changes no free run outside the fit is not lacking either; what may do so by chance can be
     nothing = {key for key in idle if not _changes(proofs[key])}
     reasons = [*refused.values(), *(text for key, text in idle.items() if key not in nothing)]
-    # without a name, none stands for a law
-    laws = [law for m in (found.baseline, answer) for law in with_law(context, m)] if named else []
+    # a law has no name: it matters only where a name may stand for it
+    lacking = (found.baseline, answer) if named else ()
+    laws = [law for m in lacking for law in with_law(context, m, found.goal(m.noise))]
     rest = [m for m in (*posterior.models, *found.tried.values(), *laws) if not m.keys & nothing]
     best = max(rest, key=lambda m: m.evidence)
     alone = _alone(context, found, answer, named) if matters else answer.evidence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import sqrt
+from math import inf, sqrt
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -86,6 +86,9 @@ class Tried:
     def gain(self) -> float:
         return self.best.evidence - self.baseline.evidence
 
+    def goal(self, _: Any) -> float:
+        return inf
+
 
 @dataclass(frozen=True)
 class Believed:
@@ -156,7 +159,7 @@ def test_a_name_has_to_be_better_than_a_law_without_one(
     """A model with the name has 100; the law may exceed it by 16."""
     what = "heat at table that follows P_x times P_y"
     law = replace(WET.baseline, evidence=evidence, forced=what)
-    monkeypatch.setattr(verdict, "with_law", lambda _, m: [law] if m is WET.baseline else [])
+    monkeypatch.setattr(verdict, "with_law", lambda _, m, *__: [law] if m is WET.baseline else [])
     answer = said(WET, {"fluid_convection": 0.9})
     assert answer.word == word
     assert (f"{what} explains more than effects do" in answer.reasons) == (word == "unexplained")

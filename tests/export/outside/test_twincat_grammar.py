@@ -16,7 +16,12 @@ def _is_read(text: str) -> bool:
 def test_a_grammar_of_another_make_reads_the_text() -> None:
     text = st_text(sealed(make_model(), make_campaign()), "double")
     assert _is_read(text)
-    assert not _is_read(text.replace("END_IF", "", 1))
+
+
+def test_the_grammar_refuses_what_it_does_not_know() -> None:
+    program = "PROGRAM p\nVAR\n    a : LREAL;\nEND_VAR\nIF a > 0.0 THEN\n    a := 0.0;\nEND_IF\nEND_PROGRAM\n"
+    assert _is_read(program)
+    assert not _is_read(program.replace("END_IF", ""))
 
 
 def test_single_precision_is_the_same_text() -> None:
