@@ -26,7 +26,7 @@ RESOLUTION = {  # finer gives the same answer in more time
     "evidence/form_error.py": "LAWS PLACES INNER DEPTH",
     "evidence/latent_force.py": "BLOCKS SIZES MEMORY_BLOCKS",
     "evidence/noisy.py": "_TOGETHER",
-    "evidence/process_noise.py": "_TRIED _BLOCKS JITTER",
+    "evidence/process_noise.py": "_TRIED JITTER",
     "evidence/whitening.py": "_AT_BOUND _UNSEEN _ROUNDING _REMEMBERED _TOGETHER",
     "diagnosis/context.py": "MOST_READINGS NODES",
     "diagnosis/diagnose.py": "ANOTHER_NOISE",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -229,7 +229,12 @@ def _over_noise(
 
     begin = bare.noise if bare.settings else bare.fit.noise
     start = min(usual, key=lambda k: _distance(context.settings[k].noise, begin)), 0
-    kept, known, asked = {start: tried(start)}, {start}, set[tuple[int, int]]()
+    kept, asked = {start: tried(start)}, set[tuple[int, int]]()
+    if forces:
+        _climb_along(start, other_forces, tried, kept)
+    known = set(kept)
+    if forces and _is_idle(context, bare, kept, forces, goal):
+        asked = known  # a force of no use under the noise of the model is of none under its neighbours
     while open_ends := [node for node in kept if node not in asked]:
         here = max(open_ends, key=lambda node: float(kept[node].levels[0]))
         top = max(kept, key=lambda node: float(kept[node].levels[0]))
@@ -246,6 +251,38 @@ def _over_noise(
         settings=tuple(one.settings[0] for one in kept.values()),
         grams=tuple(one.grams[0] for one in kept.values()),
     )
+
+
+def _climb_along(
+    start: tuple[int, int],
+    other_forces: Sequence[Sequence[int]],
+    tried: Callable[[tuple[int, int]], Scored],
+    kept: dict[tuple[int, int], Scored],
+) -> None:
+    """Add forces under one noise setting, from one to the next, until none is more likely."""
+    k, j = start
+    while True:
+        kept |= {(k, i): tried((k, i)) for i in other_forces[j] if (k, i) not in kept}
+        top = max(kept, key=lambda node: float(kept[node].levels[0]))[1]
+        if top == j:
+            return
+        j = top
+
+
+def _is_idle(
+    context: Context,
+    bare: Scored,
+    kept: dict[tuple[int, int], Scored],
+    forces: Sequence[UnknownHeat | UnknownChange],
+    goal: float,
+) -> bool:
+    """Whether no force explains anything under the noise of the model without it, and none reaches a goal."""
+    (k, j), top = max(kept.items(), key=lambda one: float(one[1].levels[0]))
+    places = [s.place for s in bare.settings]
+    if context.settings[k].place not in places:
+        return False
+    plain = bare.levels[places.index(context.settings[k].place)]
+    return bool(top.evidence < goal and top.levels[0] - forces[j].log_weight <= plain)
 
 
 def _distance(one: Noise, other: Noise) -> float:

@@ -24,7 +24,6 @@ from discovery.dynamics.samples import Samples, read_samples
 from discovery.evidence.late import OFTEN
 from discovery.evidence.outliers import FAR
 from discovery.fitting import Fit, Noise
-from discovery.fitting.impulses import impulse_variance
 from discovery.fitting.kalman import make_filter
 from discovery.recordings import Campaign
 
@@ -150,5 +149,5 @@ def _gain(run: Trajectory, white: Noise) -> float:
     noise = replace(white, rough=1.0)
     sd = run.system.grid.sd(noise.white)
     _, roots = make_filter(run).gains(noise)
-    gain = 0.5 * impulse_variance(run, noise) / sd**2 - np.log(roots / sd)
+    gain = 0.5 * make_filter(run).spread(noise) / sd**2 - np.log(roots / sd)
     return float(np.sum(gain[run.system.grid.measured]))

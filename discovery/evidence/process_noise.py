@@ -15,18 +15,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Column, Trajectory, sensitivities
+from discovery.dynamics import Trajectory
 from discovery.dynamics.trajectory import answers, flows
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Fit, Noise
-from discovery.fitting.impulses import impulse_variance
+from discovery.fitting.kalman import make_filter
 from discovery.fitting.noise import resolution
 
 Array = NDArray[np.float64]
 
 JITTER = 12**-0.5  # of a logging interval: a switch that comes anywhere in it
 _TRIED = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # levels with which a reading noise is sought where none is stated
-_BLOCKS = 72  # of a recording, in each of which process noise is one number
 _CLIPPED = 4.0  # standard deviations beyond which an innovation counts no more: single wrong readings
 
 
@@ -264,21 +263,5 @@ def _white_with(
 
 def noise_in_free_runs(trajectory: Trajectory, noise: Noise) -> float:
     """rms of a free run from reading noise, slow noise, process noise and inputs, in reading noises."""
-    white = np.array(noise.white)
-    slow = np.array(noise.slow or np.zeros(len(white)))
-    variance = np.tile(1.0 + (slow / white) ** 2, (len(trajectory.system.grid.read), 1))
-    variance = variance + impulse_variance(trajectory, noise) / white**2
-    system, size = trajectory.system, flows(trajectory)
-    middle = 0.5 * (system.grid.time[1:] + system.grid.time[:-1])
-    edges = np.linspace(system.grid.time[0], system.grid.time[-1], _BLOCKS + 1)
-    block = np.clip(np.searchsorted(edges, middle, side="right") - 1, 0, _BLOCKS - 1)
-    lag = np.abs(np.subtract.outer(edges[:-1], edges[:-1]))
-    kernel = np.exp(-lag / noise.heat_time)
-    for state, floor in (noise.heat or {}).items():
-        if state not in system.states:
-            continue
-        sd = np.hypot(floor, noise.share * size[:, system.states.index(state)])
-        pieces = [Column(k, state, np.repeat(sd * (block == k), 2)) for k in range(_BLOCKS)]
-        blocks = sensitivities(trajectory, (), (), pieces, count=_BLOCKS) / white[None, :, None]
-        variance = variance + np.einsum("ryk,kl,ryl->ry", blocks, kernel, blocks, optimize=True)
-    return float(np.sqrt(np.mean(variance)))
+    around = make_filter(trajectory).spread(noise) / np.array(noise.white) ** 2
+    return float(np.sqrt(np.mean(1.0 + around)))

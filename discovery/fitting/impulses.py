@@ -16,10 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory
-from discovery.dynamics.kernel import between
-from discovery.dynamics.prediction import output_matrix
 from discovery.dynamics.sensitivity import moved_in_time, moved_terms
-from discovery.fitting.noise import Noise
 
 Array = NDArray[np.float64]
 
@@ -30,21 +27,6 @@ def added(parts: Sequence[tuple[float, Callable[[], Array]]]) -> Array:
     """
     found = [size**2 * covariance for size, made in parts if size and len(covariance := made())]
     return np.sum(found, axis=0) if found else np.zeros((0, 0, 0))
-
-
-def impulse_variance(trajectory: Trajectory, noise: Noise) -> Array:
-    """Variance (R, Y) of the outputs of a free run from inputs that are recorded a little wrong."""
-    late, noisy = (lambda: late_switches(trajectory)), (lambda: noisy_inputs(trajectory))
-    jumps = added([(noise.jitter, late), (noise.rough, noisy)])
-    shown = np.zeros(trajectory.system.grid.readings.shape)
-    if len(jumps):
-        read = trajectory.system.grid.read.astype(np.int64)
-        ways, lever = between(trajectory.which, trajectory.e, read), output_matrix(trajectory)
-        now = np.zeros(jumps.shape[1:])
-        for r, (way, jump) in enumerate(zip(ways, jumps, strict=True), 1):
-            now = way @ now @ way.T + jump
-            shown[r] = np.einsum("yi,ij,yj->y", lever[r], now, lever[r])
-    return shown
 
 
 def late_switches(trajectory: Trajectory) -> Array:

@@ -145,6 +145,31 @@ def _whitened(ways, decays, h, measured, gains, roots, nv, data):  # type: ignor
     return out
 
 
+@njit(cache=True, nogil=True)
+def _spread(ways, decays, h, fresh, nv, jumps):  # type: ignore[no-untyped-def]
+    """Variances (R, Y) of what the readings show where none of them corrects the states; arguments as in
+    `_gains`.
+    """
+    readings, outs, n = h.shape
+    size = fresh.shape[0]
+    p = np.zeros((size, size))
+    for i in range(size):
+        p[i, i] = fresh[i]
+    shown = np.zeros((readings, outs))
+    top = np.zeros((n, size))
+    none = np.zeros((n, n))
+    for r in range(readings):
+        if r > 0:
+            _moved_on(ways[r - 1], decays[r - 1], fresh, jumps[r - 1] if len(jumps) else none, p, top)
+        for y in range(outs):
+            total = fresh[size - nv + y] if nv else 0.0
+            for i in range(n):
+                for j in range(n):
+                    total += h[r, y, i] * p[i, j] * h[r, y, j]
+            shown[r, y] = total
+    return shown
+
+
 @dataclass(frozen=True)
 class _Parts:
     """What a noise makes of a filter: the way (R - 1, n, n + heats) of states from one reading to the next,
@@ -187,11 +212,20 @@ class Filter:
         if "gains" not in self.last or self.last["gains"][0] != noise:
             one = self._parts(noise)
             white = self.trajectory.system.grid.sd(noise.white)
-            jumps = added([(noise.jitter, lambda: self.late), (noise.rough, lambda: self.noisy)])
+            jumps = self._jumps(noise)
             found = _gains(one.ways, one.decays, self.h, self.measured, white, one.fresh, one.slow, jumps)
             self.last["gains"] = (noise, found)
         known: tuple[Array, Array] = self.last["gains"][1]
         return known
+
+    def spread(self, noise: Noise) -> Array:
+        """Variance (R, Y) of the readings around a free run, without their white noise."""
+        one = self._parts(noise)
+        found: Array = _spread(one.ways, one.decays, self.h, one.fresh, one.slow, self._jumps(noise))
+        return found
+
+    def _jumps(self, noise: Noise) -> Array:
+        return added([(noise.jitter, lambda: self.late), (noise.rough, lambda: self.noisy)])
 
     def _parts(self, noise: Noise) -> _Parts:
         if "parts" not in self.last or self.last["parts"][0] != noise:

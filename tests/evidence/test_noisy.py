@@ -16,8 +16,7 @@ from discovery.dynamics.samples import Samples
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.noisy import smooth, spectral, with_noise
 from discovery.fitting import Noise
-from discovery.fitting.impulses import impulse_variance
-from discovery.fitting.kalman import innovations
+from discovery.fitting.kalman import innovations, make_filter
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -85,7 +84,7 @@ def test_the_variance_of_free_runs_is_that_of_many_simulated_ones() -> None:
     """Of a body under a steady load: sd^2 D / (2 tau) (1 - exp(-2 t / tau)) / hA^2 for t far above D."""
     seen = campaign(recorded(1, SHARE))
     run = runs(seen)[0]
-    free = impulse_variance(run, noise(1.0))[:, 0]
+    free = make_filter(run).spread(noise(1.0))[:, 0]
     rng = np.random.default_rng(4)
     level = np.abs(recorded(1, 0.0).values["P"])
     moved, decay, many = np.zeros(2000), np.exp(-EVERY * LOSS / CAPACITY), []
