@@ -49,6 +49,7 @@ def process_prior() -> Prior:
         thresholds.SHARES,
         thresholds.SLOW,
         thresholds.FORMS,
+        thresholds.TIMES,
     )
 
 

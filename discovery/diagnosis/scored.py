@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from math import inf
+from functools import cached_property, partial
+from math import inf, log
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,9 @@ from discovery.models import Model
 from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
+Node = tuple[int, int]  # a noise setting, and something of unknown cause
 
+_ERRORS = slice(3, 5)  # of the place of a setting: unrecorded heat, and errors that grow with the flows
 KEPT = 4  # noise settings of a model, the most likely ones
 # what something of unknown cause changes of a score
 _OF_FORCE = ("settings", "grams", "forced", "forced_state", "log_odds_force")
@@ -217,24 +219,46 @@ def _over_noise(
     usual = {k for k, s in enumerate(context.settings) if not forces or is_usual(s)}
     other_forces = neighbours([f.place for f in forces])
 
-    def near(node: tuple[int, int]) -> list[tuple[int, int]]:
+    def near(less: bool, node: Node) -> list[Node]:
         k, j = node
         there = [(k, other) for other in other_forces[j]] if forces else []
-        return [*((other, j) for other in context.next_to[k] if other in usual), *there]
+        return [*((o, j) for o in context.next_to[k] if o in usual and (not less or _is_less(o, k))), *there]
 
-    def tried(node: tuple[int, int]) -> Scored:
+    def _is_less(one: int, other: int) -> bool:
+        places = context.settings[one].place, context.settings[other].place
+        return places[0][_ERRORS] < places[1][_ERRORS]
+
+    def tried(node: Node) -> Scored:
         setting = context.settings[node[0]]
         setting = forces[node[1]].on_top_of(setting) if forces else setting
         return replace(bare, settings=(setting,), grams=(bare.seen.grams(setting.noise),))
 
     begin = bare.noise if bare.settings else bare.fit.noise
     start = min(usual, key=lambda k: _distance(context.settings[k].noise, begin)), 0
-    kept, asked = {start: tried(start)}, set[tuple[int, int]]()
-    if forces:
-        _climb_along(start, other_forces, tried, kept)
-    known = set(kept)
-    if forces and _is_idle(context, bare, kept, forces, goal):
-        asked = known  # a force of no use under the noise of the model is of none under its neighbours
+    kept = {start: tried(start)}
+    # something of unknown cause leaves less to what is always there: if that does not reach the goal, the
+    # other neighbours are not asked
+    for less in (True, False) if forces else (False,):
+        kept = _walked(kept, partial(near, less), tried, goal)
+        if max(float(one.evidence) for one in kept.values()) < goal:
+            break
+    return replace(
+        bare,
+        settings=tuple(one.settings[0] for one in kept.values()),
+        grams=tuple(one.grams[0] for one in kept.values()),
+    )
+
+
+def _walked(
+    kept: dict[Node, Scored],
+    near: Callable[[Node], list[Node]],
+    tried: Callable[[Node], Scored],
+    goal: float,
+) -> dict[Node, Scored]:
+    """The most likely nodes: each is asked for its neighbours until those that are kept have all been asked,
+    or the best has been, and is below a goal.
+    """
+    known, asked = set(kept), set[Node]()
     while open_ends := [node for node in kept if node not in asked]:
         here = max(open_ends, key=lambda node: float(kept[node].levels[0]))
         top = max(kept, key=lambda node: float(kept[node].levels[0]))
@@ -243,46 +267,10 @@ def _over_noise(
         asked.add(here)
         fresh = [node for node in near(here) if node not in known]
         known.update(fresh)
-        kept |= {node: tried(node) for node in fresh}
+        kept = kept | {node: tried(node) for node in fresh}
         order = sorted(kept, key=lambda node: -float(kept[node].levels[0]))
         kept = {node: kept[node] for node in order[:KEPT]}  # normal equations are large
-    return replace(
-        bare,
-        settings=tuple(one.settings[0] for one in kept.values()),
-        grams=tuple(one.grams[0] for one in kept.values()),
-    )
-
-
-def _climb_along(
-    start: tuple[int, int],
-    other_forces: Sequence[Sequence[int]],
-    tried: Callable[[tuple[int, int]], Scored],
-    kept: dict[tuple[int, int], Scored],
-) -> None:
-    """Add forces under one noise setting, from one to the next, until none is more likely."""
-    k, j = start
-    while True:
-        kept |= {(k, i): tried((k, i)) for i in other_forces[j] if (k, i) not in kept}
-        top = max(kept, key=lambda node: float(kept[node].levels[0]))[1]
-        if top == j:
-            return
-        j = top
-
-
-def _is_idle(
-    context: Context,
-    bare: Scored,
-    kept: dict[tuple[int, int], Scored],
-    forces: Sequence[UnknownHeat | UnknownChange],
-    goal: float,
-) -> bool:
-    """Whether no force explains anything under the noise of the model without it, and none reaches a goal."""
-    (k, j), top = max(kept.items(), key=lambda one: float(one[1].levels[0]))
-    places = [s.place for s in bare.settings]
-    if context.settings[k].place not in places:
-        return False
-    plain = bare.levels[places.index(context.settings[k].place)]
-    return bool(top.evidence < goal and top.levels[0] - forces[j].log_weight <= plain)
+    return kept
 
 
 def _distance(one: Noise, other: Noise) -> float:
@@ -291,7 +279,8 @@ def _distance(one: Noise, other: Noise) -> float:
     form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
     here, there = (sum((noise.heat or {}).values()) for noise in (one, other))
     heat = abs(here - there) / max(here + there, 1e-300)
-    return slow + form + heat + abs(one.jitter - other.jitter) + abs(one.rough - other.rough)
+    time = abs(log(one.heat_time / other.heat_time))
+    return slow + form + heat + time + abs(one.jitter - other.jitter) + abs(one.rough - other.rough)
 
 
 def is_usual(setting: Setting) -> bool:

@@ -45,7 +45,7 @@ class Grid:
     spread: Mapping[str, float] = field(default_factory=dict)  # of channels known only within one
     # what `ends` and `nodes` have on the samples, and readings of an output on what a model shows
     offset: Mapping[str, float] = field(default_factory=dict)
-    unsure: Mapping[str, float] = field(default_factory=dict)  # s, of held channels perhaps logged late
+    unsure: Mapping[str, float] = field(default_factory=dict)  # s, of channels perhaps logged late
     late: Mapping[str, float] = field(default_factory=dict)  # s, which `ends` has them earlier than stamped
     noisy: Mapping[str, Samples] = field(default_factory=dict)  # noise of channels: its sd, per root of Hz
     instants: int = 0  # nodes that there were before it was coarsened; 0: it was not
@@ -54,8 +54,8 @@ class Grid:
     known: dict[str, tuple[Any, ...]] = field(default_factory=dict, repr=False, compare=False)
 
     def shifted(self, offset: Mapping[str, float], late: Mapping[str, float] | None = None) -> Grid:
-        """The grid with channels moved by constants from what was recorded, in value and, held ones, in time
-        (whatever moved them before).
+        """The grid with channels moved by constants from what was recorded, in value and in time (whatever
+        moved them before).
         """
         return replace(self, offset=dict(offset), late=dict(late or {}))
 
@@ -107,12 +107,17 @@ class Grid:
     @cached_property
     def ends(self) -> dict[str, Array]:
         """Channels and `time` at the interval ends, each (2(T - 1),)."""
-        late = {name: self.held(name, by) for name, by in self.late.items() if name in self.samples}
+        late = {name: self.logged_late(name, by) for name, by in self.late.items() if name in self.samples}
         return self._moved(self._once("ends", _at_ends, self.time, self.samples) | late)
 
-    def held(self, name: str, late: float) -> Array:
-        """A channel at the interval ends (2(T - 1),), logged seconds late: its mean over each interval."""
-        return np.repeat(self.samples[name].means(self.time + late), 2)
+    def logged_late(self, name: str, by: float) -> Array:
+        """A channel at the interval ends (2(T - 1),), logged seconds late; its mean over each interval where
+        it is held.
+        """
+        samples, time = self.samples[name], self.time + by
+        if samples.linear:
+            return interleaved(samples.at(time[:-1]), samples.at(time[1:]))
+        return np.repeat(samples.means(time), 2)
 
     @cached_property
     def nodes(self) -> dict[str, Array]:

@@ -120,7 +120,7 @@ def moved_in_time(trajectory: Trajectory, late: Sequence[str]) -> list[Column]:
         sides = []
         for by in (width, -width):
             when = {**grid.late, channel: grid.late[channel] + by}
-            there = grid.held(channel, when[channel]) + grid.offset.get(channel, 0.0)
+            there = grid.logged_late(channel, when[channel]) + grid.offset.get(channel, 0.0)
             sides.append((shifted(system, grid.offset, when).ends, {**ends, channel: there}))
         for term in system.model.terms:
             if channel in names(term.expression):

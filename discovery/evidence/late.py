@@ -1,8 +1,8 @@
 """Inputs that may be logged late: a switch some seconds before its stamp looks like missing heat.
 
-A logger that holds, averages or smooths its samples is late by up to about one of its intervals. This shift
-is an unknown of each recording, like the offset of an input with a spread. It is left out if readings are too
-rare to follow it, or if a shift by a whole interval could not pass for an effect.
+A logger that holds, averages or smooths its samples is late or early by up to about one of its intervals.
+This shift is an unknown of each recording, like the offset of an input with a spread. It is left out if
+readings are rarer than the samples, or if a shift by a whole interval could not pass for an effect.
 
 A shift that differs from switch to switch is noise (`process_noise.py`).
 """
@@ -21,7 +21,6 @@ from discovery.fitting import Fit, make_problem
 from discovery.fitting.noise import resolution, roughness
 from discovery.recordings import Campaign
 
-OFTEN = 2.0  # intervals of an input between readings that still show it
 SAID = 3.0  # standard errors beyond which what was found is said
 SMALL = 0.25  # of an interval, below which it is not
 
@@ -73,15 +72,14 @@ def beside_switches(grid: Grid) -> NDArray[np.bool_]:
 
 
 def _possible(grid: Grid) -> dict[str, float]:
-    """Logging interval in s of each held input that switches, where an output was read as often, or nearly.
-    What counts is what was recorded: means over blocks of a coarsened grid follow a late stamp, too.
+    """Logging interval in s of each input that moves, where an output was read as often. What counts is what
+    was recorded: means over blocks of a coarsened grid follow a late stamp, too.
     """
     spacing = min((grid.logged[y] for y in grid.outputs if y in grid.logged), default=np.inf)
     return {
         name: grid.logged[name]
         for name, samples in grid.samples.items()
-        if not samples.linear and np.ptp(samples.value) > 0
-        if name in grid.logged and spacing <= OFTEN * grid.logged[name]
+        if np.ptp(samples.value) > 0 and spacing <= grid.logged.get(name, 0.0)
     }
 
 

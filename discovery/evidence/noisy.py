@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
 from discovery.dynamics.samples import Samples, read_samples
-from discovery.evidence.late import OFTEN
 from discovery.evidence.outliers import FAR
 from discovery.fitting import Fit, Noise
 from discovery.fitting.kalman import make_filter
@@ -125,7 +124,7 @@ def with_noise(campaign: Campaign, run: Trajectory) -> Trajectory:
 
 def _noisy(campaign: Campaign, grid: Grid) -> dict[str, Samples]:
     spacing = min((grid.logged[y] for y in grid.outputs if y in grid.logged), default=0.0)
-    often = [n for n in grid.samples if grid.logged.get(n, np.inf) <= OFTEN * spacing]
+    often = [n for n in grid.samples if grid.logged.get(n, np.inf) <= spacing]
     samples = read_samples(campaign, grid.recording, often)
     noise = {n: spectral(s, campaign.channels[n].noise) for n, s in samples.items()}
     return {n: one for n, one in noise.items() if one.value.any()}

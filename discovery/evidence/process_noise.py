@@ -36,7 +36,7 @@ class Setting:
     noise: Noise
     log_weight: float
     level: float  # of the heat that nobody records
-    place: tuple[int, ...]  # on the grid of jitters, noisy inputs, slow noises, levels, shares, form errors
+    place: tuple[int, ...]  # on the grid of jitters, noisy inputs, slow noises, levels, shares, forms, times
 
     @property
     def is_plain(self) -> bool:
@@ -96,6 +96,7 @@ class Prior:
     shares: Mapping[float, float]  # of what flows through a body, off from hour to hour
     slow: Mapping[float, float]  # slow noise, shares of the reading noise
     forms: Mapping[tuple[float, float], float]  # laws are off; flows act beyond a body
+    times: Mapping[float, float]  # time constant of process noise, shares of the longest that is likely
 
 
 def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float = 0.0) -> dict[str, float]:
@@ -149,16 +150,18 @@ def settings(
         list(prior.levels.items()),
         list(prior.shares.items()),
         [(float(k), weight) for k, weight in enumerate(prior.forms.values())],
+        list(prior.times.items()),
     )
     forms = list(prior.forms)
     total = float(np.prod([sum(weight for _, weight in axis) for axis in axes]))
     found = []
     for place in np.ndindex(*(len(axis) for axis in axes)):
-        jitter, rough, slow, level, share, _ = (axis[k][0] for axis, k in zip(axes, place, strict=True))
-        form, edge = forms[place[-1]]
+        jitter, rough, slow, level, share, _, part = (axis[k][0] for axis, k in zip(axes, place, strict=True))
+        form, edge = forms[place[-2]]
         weight = np.prod([axis[k][1] for axis, k in zip(axes, place, strict=True)])
         noise = _noise(white, floor, level, share, slow)
-        noise = replace(noise, jitter=jitter, rough=rough, form=form, edge=edge)
+        time = part * white.heat_time
+        noise = replace(noise, jitter=jitter, rough=rough, form=form, edge=edge, heat_time=time)
         found.append(Setting(noise, float(np.log(weight / total)), level, place))
     return tuple(found)
 

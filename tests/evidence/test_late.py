@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from importlib import import_module
 from types import SimpleNamespace
@@ -15,7 +16,7 @@ from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import SHORT
 from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
-from discovery.evidence.late import beside_switches, perhaps_late
+from discovery.evidence.late import beside_switches, perhaps_late, sentences
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -93,7 +94,7 @@ def test_a_power_that_is_logged_late_is_no_missing_physics(monkeypatch: pytest.M
 
 def test_switches_off_the_grid_of_the_logger_are_no_missing_physics(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each is logged at the next stamp: 0 to 60 s late."""
-    seen = campaign(light(1, 30.0, 30.0), light(2, 30.0, 30.0))
+    seen = campaign(*(light(k, 30.0, 30.0) for k in (1, 2, 3, 4)))
     assert found(seen) == ()
     monkeypatch.setattr("discovery.evidence.process_noise.JITTER", 0.0)
     assert found(seen) != ()
@@ -146,6 +147,46 @@ def test_precise_readings_of_a_slow_body_show_a_late_stamp(monkeypatch: pytest.M
     assert taken_up() == []
     monkeypatch.setattr("discovery.diagnosis.context.perhaps_late", lambda _fit, _seen, grids, _enough: grids)
     assert taken_up() != []
+
+
+def jacket(seed: int) -> Recording:
+    """A day of a body in a water jacket, read every 5 min to 0.03 K. The temperature of the water is the mean
+    of the 5 min after its stamp.
+    """
+    rng = np.random.default_rng(seed)
+    water: Array = np.full(8640, 20.0)
+    for k in range(1, len(water)):
+        water[k] = 20.0 + 0.995 * (water[k - 1] - 20.0) + 0.1 * rng.standard_normal()
+    warm: Array = np.full(len(water), 20.0)
+    for k, one in enumerate(water[:-1]):
+        warm[k + 1] = one + (warm[k] - one) * np.exp(-10.0 * 46.0 / 50000.0)
+    read = warm[::30] + 0.03 * rng.standard_normal(288)
+    values = {"water": water.reshape(-1, 30).mean(axis=1), "body": read}
+    return Recording(f"r{seed}", 300.0 * np.arange(288.0), values)
+
+
+def test_a_mean_that_is_stamped_at_its_beginning_is_early(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By 150 s, and some for what a mean smooths. Without this, a sensor lags, or the water comes late."""
+    channels = {
+        "water": Channel("water", "fluid temperature", "degC", None, "linear"),
+        "body": Channel("body", "temperature", "degC", 0.03, "linear"),
+    }
+    seen = Campaign("jacket", channels, {r.name: r for r in (jacket(7), jacket(8))})
+    states = {"body": State("body", "degC", 50000.0, parse("water"), 0.3, 1 / 50000.0)}
+    terms = (Term("water", "body", parse("hF*(water - body)")),)
+    one = Model("jacket", {"hF": Parameter(40.0, "W/K", 0.0)}, states, terms, {})
+    effects = [e for e in catalogue().values() if e.word in ("fluid_delay", "sensor_lag")]
+
+    def taken_up() -> tuple[list[str], list[str]]:
+        context = make_context(seen, one, ["r7", "r8"], ("body",), effects, after(seen))
+        best = Search(context).run().best
+        return [h.effect.word for h in best.hypotheses], sentences(best.fit)
+
+    words, said = taken_up()
+    assert words == []
+    assert re.fullmatch(r"water is logged 1[4-8]\d s early in r7, 1[4-8]\d s early in r8; .*", said[0])
+    monkeypatch.setattr("discovery.diagnosis.context.perhaps_late", lambda _fit, _seen, grids, _enough: grids)
+    assert taken_up()[0] != []
 
 
 def test_stamps_that_are_exact_stay_so() -> None:

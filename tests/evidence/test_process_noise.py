@@ -1,0 +1,81 @@
+"""The time constant of process noise is unknown: a machine whose laws are off for minutes has no event."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.context import make_context
+from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.selection import Search
+from discovery.effects.catalogue import catalogue
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
+
+Array = NDArray[np.float64]
+STEP, CAPACITY, LINK, AIR = 60.0, (8000.0, 40000.0), 30.0, 9.0  # s, J/K, W/K
+OFF, MINUTES = 0.04, 20.0  # share by which each flow is off, and for how long
+WORDS = ("unmeasured_heat", "friction_speed", "second_thermal_mass", "conduction_path")
+
+
+def wandering(rng: np.random.Generator, count: int) -> Array:
+    """First-order noise of unit variance."""
+    kept = np.exp(-STEP / (60.0 * MINUTES))
+    out = rng.standard_normal(count)
+    for k in range(1, count):
+        out[k] = kept * out[k - 1] + np.sqrt(1 - kept**2) * out[k]
+    return out
+
+
+def recorded(seed: int) -> Recording:
+    """A day of a coil on a frame, read each minute to 0.01 K."""
+    rng = np.random.default_rng(seed)
+    count = 1440
+    power: Array = np.repeat(rng.choice([0.0, 100.0, 250.0, 400.0], 24), 60)
+    heat, link, air = (1.0 + OFF * wandering(rng, count) for _ in range(3))
+    x: Array = np.full((count, 2), 22.0)
+    for k in range(count - 1):
+        coil, frame = x[k]
+        between, lost = LINK * (coil - frame) * link[k], AIR * (frame - 22.0) * air[k]
+        x[k + 1, 0] = coil + STEP * (power[k] * heat[k] - between) / CAPACITY[0]
+        x[k + 1, 1] = frame + STEP * (between - lost) / CAPACITY[1]
+    read = x + 0.01 * rng.standard_normal(x.shape)
+    values = {"P": power, "room": np.full(count, 22.0), "coil": read[:, 0], "frame": read[:, 1]}
+    return Recording(f"r{seed}", STEP * np.arange(count, dtype=float), values)
+
+
+def best(*seeds: int) -> Scored:
+    """The most likely model."""
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+        "coil": Channel("coil", "temperature", "degC", 0.01, "linear"),
+        "frame": Channel("frame", "temperature", "degC", 0.01, "linear"),
+    }
+    seen = Campaign("coil", channels, {r.name: r for r in map(recorded, seeds)})
+    terms = (
+        Term("power", "coil", parse("share*P")),
+        Term("link", "coil", parse("G*(frame - coil)"), "frame"),
+        Term("air", "frame", parse("hA*(room - frame)")),
+    )
+    sizes = {"share": (0.9, "1"), "G": (25.0, "W/K"), "hA": (8.0, "W/K")}
+    parameters = {name: Parameter(value, unit, 0.0) for name, (value, unit) in sizes.items()}
+    capacity = dict(zip(("coil", "frame"), CAPACITY, strict=True))
+    states = {name: State(name, "degC", c, parse("room"), 0.3, 1 / c) for name, c in capacity.items()}
+    model = Model("coil", parameters, states, terms, {})
+    names = list(seen.recordings)
+    after = {run: tuple(names[k:]) for k, run in enumerate(names)}
+    effects = [e for e in catalogue().values() if e.word in WORDS]
+    return Search(make_context(seen, model, names, ("coil", "frame"), effects, after)).run().best
+
+
+def test_laws_that_are_off_for_minutes_are_no_event(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With one time constant of 3 h they are."""
+    found = best(1, 2)
+    assert found.hypotheses == ()
+    assert 0.5 * 60 * MINUTES < found.noise.heat_time < 3 * 60 * MINUTES
+    monkeypatch.setattr(thresholds, "TIMES", {1.0: 1.0})
+    assert best(1, 2).hypotheses != ()
