@@ -30,6 +30,8 @@ _SHRINKS = 0.5  # factor by which later ones have to become shorter, else half o
 _AWAY = 3  # steps of Newton that lead away from a trajectory that old linearisations have come close to ...
 _NEAR = 1e-5  # ... by steps as short as this: the solution, as well as the kink of a law lets it be known
 
+_CHECK = "check signs, bounds and start values of its parameters"
+
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -129,7 +131,7 @@ def _in_windows(system: System, values: Mapping[str, float], first: Array) -> Tr
         if found is None and shortest:
             raise RunsAwayError(
                 f"model '{system.model.name}' diverges on recording '{system.grid.recording}'; "
-                "check signs, bounds and start values of its parameters"
+                + (_no_number(system.between(done, end), values, x[done]) or _CHECK)
             )
         if found is None:
             wide = max((end - done) // 2, 1)
@@ -138,6 +140,21 @@ def _in_windows(system: System, values: Mapping[str, float], first: Array) -> Tr
         wide *= 2 if quick else 1
     a = _linearise(system, values, x)[0]
     return Trajectory(system, dict(values), x, a, *kernel.transitions(a, system.grid.step))
+
+
+def _no_number(system: System, values: Mapping[str, float], first: Array) -> str:
+    """Which term has no number at the start of a window, and when; empty where all have one."""
+    with np.errstate(all="ignore"):
+        found = _term_rates(system, values, np.tile(first, (len(system.grid.time), 1)))
+    for term, dual in zip(system.model.terms, found, strict=True):
+        wrong = np.flatnonzero(np.isnan(np.broadcast_to(dual.value, 2 * len(system.grid.step))))
+        if wrong.size:
+            at = system.grid.time[(wrong[0] + 1) // 2]
+            return (
+                f"its term '{term.name}' is not a number at {at:g} s: a power, root or logarithm of a value "
+                "below zero? If an input is noisy around zero, write max(0, ...)"
+            )
+    return ""
 
 
 def _window(

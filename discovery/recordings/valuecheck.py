@@ -13,7 +13,7 @@ from discovery.recordings.roles import ROLES
 
 FEW = 20  # readings: fewer carry no model
 _STANDS = 5.0  # a sensor that stands still so many times longer than chance explains
-_NEAR_ZERO = 0.05  # of the largest magnitude of a load: so far below zero is noise
+_NEAR_ZERO = 0.05  # of the largest magnitude of a load or flow: so far below zero is noise
 # what a channel exceeds somewhere in any recording, and the unit that it has where it does not
 _SMALLEST = {
     ("error", "um"): (0.3, "mm"),
@@ -33,13 +33,14 @@ def range_findings(file: Path, lines: Lines, channel: Channel, column: Array) ->
     unit = f" {channel.unit}" if channel.unit != "1" else ""
     kind = "temperature" if channel.role == "other input" else channel.role
     do = f"check its unit and the sensor; usual is {limits.usual[0]:g} to {limits.usual[1]:g}{unit}"
-    impossible = _outside(column, limits.possible)
+    impossible = _outside(column, _with_noise(limits.possible, column))
     if impossible.size:
         what = f"'{channel.name}' is {column[impossible[0]]:g}{unit}, no {kind} can be that"
         yield Finding("error", file, int(lines[impossible[0]]), what + more(impossible.size), do)
     known = np.flatnonzero(np.isfinite(column))
     left_out = known[impossible_readings(channel, column[known])]
-    unusual = np.setdiff1d(_outside(column, limits.usual), [*impossible, *left_out]).astype(np.intp)
+    outside = _outside(column, _with_noise(limits.usual, column))
+    unusual = np.setdiff1d(outside, [*impossible, *left_out]).astype(np.intp)
     if unusual.size:
         what = f"'{channel.name}' is {column[unusual[0]]:g}{unit}, unusual for a channel of role {kind}"
         yield Finding("warning", file, int(lines[unusual[0]]), what + more(unusual.size), do)
@@ -63,6 +64,12 @@ def load_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> 
     what = f"'{channel.name}' is {column[rows[0]]:g}{unit}, a heat load below zero"
     do = "it cools there; if it is heat (a discharge, a brake), write its magnitude"
     yield Finding("warning", file, int(lines[rows[0]]), what + more(rows.size), do)
+
+
+def _with_noise(limits: tuple[float, float], column: Array) -> tuple[float, float]:
+    """Limits with room for the noise of a sensor around zero: a meter of a flow that stands still."""
+    largest = float(np.nanmax(column, initial=0.0))
+    return (-_NEAR_ZERO * largest, limits[1]) if limits[0] == 0.0 else limits
 
 
 def _outside(column: Array, limits: tuple[float, float]) -> Lines:

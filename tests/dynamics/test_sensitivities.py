@@ -185,5 +185,14 @@ def test_a_runaway_model_is_a_sentence(campaign: Campaign) -> None:
 
     model = two_bodies("k*(a - T)**3", "a", k=1e6)
     system = make_system(model, make_grid(campaign, "r", model.inputs, ["y"]))
-    with pytest.raises(UserError, match=r"diverges on recording 'r'"):
+    with pytest.raises(UserError, match=r"diverges on recording 'r'; check signs"):
+        simulate(system, model.values())
+
+
+def test_a_power_of_a_value_below_zero_is_a_sentence(campaign: Campaign) -> None:
+    from discovery.errors import UserError
+
+    model = two_bodies("k*(-P - 1.0)**1.5", "a", k=1.0)
+    system = make_system(model, make_grid(campaign, "r", model.inputs, ["y"]))
+    with pytest.raises(UserError, match=r"its term '.*' is not a number at 0 s: a power, root"):
         simulate(system, model.values())

@@ -24,6 +24,15 @@ def test_nothing_is_wrong(write: Write) -> None:
     assert summary([]) == "nothing is wrong with these recordings"
 
 
+def test_a_meter_of_a_flow_is_noisy_around_zero(write: Write) -> None:
+    flow = CAMPAIGN.replace("[recordings]", 'flow = { role = "fluid flow", unit = "l/min" }\n\n[recordings]')
+    noisy = [f"{12.0 * (k // 20 % 2) - 0.2 * (k % 3 == 0):.1f}" for k in range(60)]
+    data = ["time,T_env,speed,E_Y0C,flow", *(f"{a},{b}" for a, b in zip(rows()[1:], noisy, strict=True))]
+    assert found(write(data, flow)) == []
+    wrong = [*data[:9], data[9].rsplit(",", 1)[0] + ",-5.0", *data[10:]]
+    assert any("'flow' is -5 l/min, no fluid flow can be that" in one for one in found(write(wrong, flow)))
+
+
 @pytest.mark.parametrize(
     ("data", "said"),
     [

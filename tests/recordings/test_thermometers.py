@@ -63,3 +63,11 @@ def test_a_body_that_warms_as_fast_as_it_cools_elsewhere_is_sound() -> None:
     ]
     body = Channel("body", "other input", "degC", None, "linear")
     assert [one.kind for one in temperature_findings(recordings, {"body": body})] == []
+
+
+def test_a_body_that_warms_while_its_readings_are_missing_is_sound(write: Write) -> None:
+    quick = WARM + 15.0 * (np.arange(WARM.size) > 150)
+    lines = recorded(quick)
+    for k in range(146, 157):  # rows without a reading around the step
+        lines[k] = lines[k].rsplit(",", 1)[0] + ","
+    assert not [one for one in found(write(lines, BODY % ', between = "linear"')) if "jumps from" in one]
