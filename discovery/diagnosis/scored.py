@@ -34,7 +34,7 @@ from discovery.threads import side_by_side
 Array = NDArray[np.float64]
 Node = tuple[int, int]  # a noise setting, and something of unknown cause
 
-_ERRORS = slice(3, 5)  # of the place of a setting: unrecorded heat, and errors that grow with the flows
+_ERRORS = slice(2, 6)  # of the place of a setting: slow noise, unrecorded heat, errors of flows and of laws
 KEPT = 4  # noise settings of a model, the most likely ones
 # what something of unknown cause changes of a score
 _OF_FORCE = ("settings", "grams", "forced", "forced_state", "log_odds_force")

@@ -12,7 +12,7 @@ The numbers are priors, resolutions of integrals, and limits of probability. The
 from __future__ import annotations
 
 # --- process noise: what a lumped model misses everywhere -------------------------------------------------
-FLOOR = 0.02  # of the largest rms flow of the model, at level one: heat at a body that nobody records
+FLOOR = 0.02  # of the mean of the flows of a body and of the busiest, rms, at level one: unrecorded heat
 AIR = 0.1  # K: the air at a body differs from what is measured, at level one; zeros of thermometers are off
 LEVELS = {0.1: 0.15, 0.3: 0.35, 1.0: 0.3, 2.0: 0.12, 5.0: 0.06, 10.0: 0.02}  # of this heat, with weights
 SHARE = 0.08  # off by more than this share of its flows a lumped model is coarse

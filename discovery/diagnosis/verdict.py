@@ -90,12 +90,14 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     lacking = (found.baseline, answer) if named else ()
     laws = [law for m in lacking for law in with_law(context, m, found.goal(m.noise))]
     rest = [m for m in (*posterior.models, *found.tried.values(), *laws) if not m.keys & nothing]
-    best = max(rest, key=lambda m: m.evidence)
+    # what effects add beside an unknown cause is no evidence of it: it has to exceed them
+    best = max(rest, key=lambda m: m.evidence - (thresholds.SHORT if m.forced else 0.0))
+    known = max(m.evidence for m in rest if not m.forced)
     alone = _alone(context, found, answer, named) if matters else answer.evidence
     # names hold next to effects that are not sure, and next to something that no effect explains if they
     # explain more than they leave, and add as much beside it; without names, something is missing only if its
     # cause is unknown, or an effect improves runs outside the fit
-    without = max(m.evidence for m in rest if not m.forced) if named else alone
+    without = known if named or best.forced else alone
     if best.evidence - without > thresholds.SHORT and (
         named or best.forced or not _idle_all(context, found, answer, candidates)
     ):

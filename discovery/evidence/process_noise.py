@@ -100,9 +100,11 @@ class Prior:
 
 
 def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float = 0.0) -> dict[str, float]:
-    """Process noise that no state is free of, W at a body, else a rate: a share of the largest rms flow of
-    the model, and what flows where the air at a body is not quite as warm as the air that is measured. Heat
-    and rates are never compared: a bed may follow the room at 1e-5 K/s while other bodies take 300 W.
+    """Process noise that no state is free of, W at a body, else a rate: a share of what flows through it and
+    through the busiest body (their geometric mean: a glass scale that takes 3 W has less of it than a motor
+    that takes 150 W, and more than its share), and what flows where the air at a body is not quite as warm as
+    the air that is measured. Heat and rates are never compared: a bed may follow the room at 1e-5 K/s while
+    other bodies take 300 W.
 
     Args:
         ambient: channels that measure the air.
@@ -119,7 +121,8 @@ def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float =
         size = apart * np.sqrt(np.mean(answers(run, ambient) ** 2, axis=0))
         for name, one in zip(run.system.states, size.tolist(), strict=True):
             air[name] = max(air.get(name, 0.0), one)
-    return {n: float(np.hypot(share * top[bool(s.capacity)], air[n])) for n, s in states.items()}
+    usual = {n: np.sqrt(top[bool(s.capacity)] * largest[n]) for n, s in states.items()}
+    return {n: float(np.hypot(share * usual[n], air[n])) for n in states}
 
 
 def flow_sizes(trajectories: Sequence[Trajectory]) -> dict[str, float]:

@@ -180,7 +180,7 @@ def test_a_window_of_heat_is_found_with_its_body_and_hours() -> None:
     assert first.state == "bed"
     centre = 0.5 * (first.edges["r2"][1:] + first.edges["r2"][:-1])
     inside = (centre > 32000) & (centre < 50000)
-    assert 60.0 < np.mean(first.heat["r2"][inside]) < 130.0  # its prior pulls it to zero
+    assert 45.0 < np.mean(first.heat["r2"][inside]) < 130.0  # its prior pulls it to zero
     assert np.abs(first.heat["r2"][(centre < 27000) | (centre > 55000)]).mean() < 30.0
     assert np.abs(first.heat["r1"]).mean() < 15.0
 

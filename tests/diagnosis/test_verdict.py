@@ -251,6 +251,21 @@ def test_heat_that_no_effect_explains_refutes_names(gain: float, unknown: float,
 
 
 @pytest.mark.parametrize(
+    ("friction", "beside", "word"),
+    [(15.2, 16.2, "no mismatch"), (15.2, 15.3 + SHORT, "unexplained"), (17.0, 18.0, "unexplained")],
+)
+def test_an_unknown_cause_has_no_credit_for_the_effects_beside_it(
+    friction: float, beside: float, word: str
+) -> None:
+    """A gear shaper that lacks nothing: friction added 15.2, and a slow change beside it 1 more."""
+    found = Tried([Model((FRICTION,), friction), Model((), 0.0)])
+    slow = Model((FRICTION,), beside, forced="a slow change of T of unknown cause")
+    answer = said(found, {"friction_speed": 0.6}, unknown=slow)
+    assert answer.word == word
+    assert any("slow change" in text for text in answer.reasons) == (beside > friction + SHORT)
+
+
+@pytest.mark.parametrize(
     ("adds", "after", "word"),
     [
         (1.5 * sqrt(400.0) + 0.1, 0.70, "missing physics"),
