@@ -199,7 +199,8 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
         fit.theta[index],
         any(place[name] not in moving for name in shapes),
     )
-    return _over_noise(context, bare)
+    # a fit that ended early is no part of the answer: its most likely noise says enough
+    return _over_noise(context, bare, goal=inf if fit.ended_early else -inf)
 
 
 def _over_noise(

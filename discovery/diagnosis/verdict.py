@@ -90,16 +90,12 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     lacking = (found.baseline, answer) if named else ()
     laws = [law for m in lacking for law in with_law(context, m, found.goal(m.noise))]
     rest = [m for m in (*posterior.models, *found.tried.values(), *laws) if not m.keys & nothing]
-    # what effects add beside an unknown cause is no evidence of it: it has to exceed them
-    best = max(rest, key=lambda m: m.evidence - (thresholds.SHORT if m.forced else 0.0))
-    known = max(m.evidence for m in rest if not m.forced)
     alone = _alone(context, found, answer, named) if matters else answer.evidence
+    best, without = _unknown_cause(rest, alone, bool(named))
     # names hold next to effects that are not sure, and next to something that no effect explains if they
-    # explain more than they leave, and add as much beside it; without names, something is missing only if its
-    # cause is unknown, or an effect improves runs outside the fit
-    without = known if named or best.forced else alone
+    # explain more than they leave, and add as much beside it
     if best.evidence - without > thresholds.SHORT and (
-        named or best.forced or not _idle_all(context, found, answer, candidates)
+        best.forced or named or not _idle_all(context, found, answer, candidates)
     ):
         mostly = [n for n in named if (proof := proofs[n.hypothesis.key]) and proof.mostly]
         by_law = any(best is one for one in laws)
@@ -114,10 +110,12 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
                 f"with it, the model has {best.evidence - without:.0f} more log evidence"
             )
         else:
-            reasons += [f"{best.forced} explains more than effects do"] if best.forced else []
+            most = max(m.evidence for m in rest if not m.forced)
+            does = "explains more than effects do" if best.evidence > most else "or unsure effects act"
+            reasons += [f"{best.forced} {does}"] if best.forced else []
             reasons.append(
                 "the effects that are sure enough explain too little: the best model of all has "
-                f"{best.evidence - alone:.0f} more log evidence"
+                f"{max(m.evidence for m in rest) - alone:.0f} more log evidence"
             )
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
     further = (*(idle[key] for key in nothing), *_apart(found, answer, unsure, least, matters))
@@ -153,6 +151,23 @@ def _idle_all(context: Context, found: Search, answer: Scored, candidates: Seque
     """Whether no effect of the answer, sure or not, improves free runs outside the fit."""
     kept, *_ = _proved(context, found, answer, candidates)
     return not kept
+
+
+def _unknown_cause(rest: Sequence[Scored], alone: float, named: bool) -> tuple[Scored, float]:
+    """The model that may show that something else acts, and the log evidence that it has to exceed.
+
+    Next to names, an unknown cause has to exceed all effects: what they add beside it is no evidence of it.
+    Without a name, it stands for all effects that are not sure, and stands alone, for process noise looks
+    like a few events; if it is not among the likely models, the best effects have to do.
+
+    Args:
+        alone: log evidence of a model with the named effects only.
+    """
+    effects = [m for m in rest if not m.forced]
+    if not named:
+        return max([m for m in rest if m.forced and not m.keys] or effects, key=lambda m: m.evidence), alone
+    best = max(rest, key=lambda m: m.evidence - (thresholds.SHORT if m.forced else 0.0))
+    return best, max(m.evidence for m in effects)
 
 
 def _changes(outside: Improvement | None) -> bool:
