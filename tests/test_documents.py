@@ -114,7 +114,7 @@ def test_the_numbers_of_the_diagnosis_are_those_that_decide() -> None:
     text = " ".join((ROOT / "docs" / "mismatch.md").read_text("utf-8").split())
     for said in (
         f"`level` of {numbers(t.LEVELS)} with weights {', '.join(map(str, t.LEVELS.values()))}",
-        f"{t.FLOOR:.0%} of the largest flow".replace("%", " %"),
+        f"{t.FLOOR:.0%} of the geometric mean of the flow".replace("%", " %"),
         f"{numbers(t.SLOW)} times the reading noise, weights {', '.join(map(str, t.SLOW.values()))}",
         f"odds of {t.ODDS} for each word",
         f"within a factor of {t.FACTOR} (jumps of a sensor: {t.JUMP:g} reading noises",

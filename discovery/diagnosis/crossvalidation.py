@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
 from discovery.evaluation.crossvalidation import Fold, folds
 from discovery.fitting import fit_model, from_known_starts, predict_recording
+from discovery.fitting.kalman import innovations
 from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
@@ -27,6 +28,9 @@ def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> 
     turn: of the outputs that it shows in, or of all where it acts in the machine.
 
     Models are fitted anew to the others, and start, as those of an experiment are; rms in reading noises.
+    Whether it is by chance is judged by what each reading says beyond those before it, under the process
+    noise of the answer (log predictive density): hours of heat that nobody records decide the rms of a free
+    run.
     None where nothing can be left out, or where recordings left out can say nothing of an effect because it
     does not act in all of them.
     """
@@ -37,7 +41,7 @@ def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> 
         for effects in ([answer.hypotheses, *sets] if lasting else [])
         for fold in folds(context.campaign, context.recordings, blocks=0)
     ]
-    left: dict[frozenset[Key], dict[str, Array]] = {}
+    left: dict[frozenset[Key], dict[str, tuple[Array, Array]]] = {}
     parts = side_by_side(lambda task: _residuals(context, answer, *task), tasks)
     for (effects, _), part in zip(tasks, parts, strict=True):
         left.setdefault(frozenset(o.key for o in effects), {}).update(part)
@@ -45,21 +49,38 @@ def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> 
     for h in lasting:
         only = set(h.shown) if h.shown and not h.terms else set(context.outputs)
         mine = [y for y, name in enumerate(context.outputs) if name in only]
-        without, with_it = left[answer.keys - {h.key}], left[answer.keys]
-        one = np.ones(len(mine))
-        runs = [
-            FreeRuns(without[r][:, mine], with_it[r][:, mine] if r in with_it else None, 1.0, one)
+        if not left[answer.keys - {h.key}]:
+            continue
+        free, beyond = (
+            improvement(runs, [context.outputs[y] for y in mine])
+            for runs in _compared(context, left[answer.keys - {h.key}], left[answer.keys], mine)
+        )
+        found[h.key] = replace(free, started=(*free.judged, beyond.low, beyond.high))
+    return found
+
+
+def _compared(
+    context: Context,
+    without: Mapping[str, tuple[Array, Array]],
+    with_it: Mapping[str, tuple[Array, Array]],
+    mine: Sequence[int],
+) -> Iterator[list[FreeRuns]]:
+    """Residuals of some outputs without and with an effect: of free runs, and of the filter."""
+    one = np.ones(len(mine))
+    for kind in (0, 1):
+        yield [
+            FreeRuns(without[r][kind][:, mine], with_it[r][kind][:, mine] if r in with_it else None, 1.0, one)
             for r in context.recordings
             if r in without
         ]
-        found[h.key] = improvement(runs, [context.outputs[y] for y in mine]) if runs else None
-    return found
 
 
 def _residuals(
     context: Context, answer: Scored, chosen: Sequence[Hypothesis], fold: Fold
-) -> dict[str, Array]:
-    """Residuals (R, Y) over the reading noise on left-out recordings, if the free run stays finite."""
+) -> dict[str, tuple[Array, Array]]:
+    """Residuals (R, Y) over the reading noise on left-out recordings, if the free run stays finite, and what
+    each reading says beyond those before it, in its standard deviations.
+    """
     model, found = with_effects(context.model, chosen), answer.fit.model.parameters
     model = model.with_values({n: found[n].value for n in model.free if n in found})
     white = np.array(context.white.white)
@@ -88,7 +109,8 @@ def _residuals(
                 context.grids[name],
             )
             left = run.system.grid.readings - predict(run)
-            out[name] = from_known_starts(run, left, white, together=fit.together) / white
+            left = from_known_starts(run, left, white, together=fit.together)
+            out[name] = left / white, innovations(run, answer.noise, left)
     except RunsAwayError:
         pass
     return out

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.stats import norm
 
-from discovery.diagnosis import thresholds
+from discovery.diagnosis import crossvalidation, thresholds
+from discovery.diagnosis.context import Context
 from discovery.diagnosis.crossvalidation import left_out
 from discovery.diagnosis.refit import MOVED, refit, score
 from discovery.diagnosis.scan import scan_model
-from discovery.diagnosis.scored import is_usual, scored, with_change, with_force, with_unknown
+from discovery.diagnosis.scored import Scored, is_usual, scored, with_change, with_force, with_unknown
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evaluation.crossvalidation import Fold
 from discovery.evidence.process_noise import unknown_heat
 from tests.diagnosis.parts import bare, claim_of, context_of, dry, scored_of, wetted
 from tests.machine import NOISE, campaign, changed, model, simulated
+
+Residuals = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 
 def test_the_effect_that_is_there_makes_the_readings_more_likely() -> None:
@@ -156,6 +163,27 @@ def test_what_is_there_predicts_recordings_that_are_left_out() -> None:
     assert proofs[event.key] is None  # other recordings say nothing of it
     alone = replace(dry(), recordings=("r1",))
     assert left_out(alone, wetted(), [h]) == {h.key: None}
+
+
+@pytest.mark.parametrize(("size", "sure"), [(1.2, True), (1.0, False)])
+def test_whether_it_is_by_chance_is_judged_under_the_process_noise(
+    size: float, sure: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Free runs of a network with a second mass missed by 15.7 and 11.6 reading noises, both for hours."""
+
+    def residuals(_: Context, answer: Scored, chosen: Sequence[Hypothesis], fold: Fold) -> Residuals:
+        rng, acts = np.random.default_rng(5), len(chosen) == len(answer.hypotheses)
+        hours = np.repeat(rng.uniform(0.0, 20.0, (2, 8, 3)), 50, axis=1)  # without and with it
+        z = (1.0 if acts else size) * rng.standard_normal((400, 3))
+        return {name: ((0.9 if acts else 1.0) * hours[int(acts)], z) for name in fold.recordings}
+
+    monkeypatch.setattr(crossvalidation, "_residuals", residuals)
+    (h,) = wetted().hypotheses
+    found = left_out(dry(), wetted(), [h])[h.key]
+    assert found is not None
+    assert found.explained > 1.0
+    assert found.low < 0  # of the free runs alone
+    assert found.sure == sure
 
 
 def test_a_fit_settles_under_the_noise_that_it_makes_likely() -> None:
