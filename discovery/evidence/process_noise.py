@@ -99,7 +99,9 @@ class Prior:
     times: Mapping[float, float]  # time constant of process noise, shares of the longest that is likely
 
 
-def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float = 0.0) -> dict[str, float]:
+def floors(
+    fit: Fit, share: float, ambient: Collection[str] = (), apart: float = 0.0, own: bool = True
+) -> dict[str, float]:
     """Process noise that no state is free of, W at a body, else a rate: a share of what flows through it and
     through the busiest body (their geometric mean: a glass scale that takes 3 W has less of it than a motor
     that takes 150 W, and more than its share), and what flows where the air at a body is not quite as warm as
@@ -109,6 +111,7 @@ def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float =
     Args:
         ambient: channels that measure the air.
         apart: rms difference [K] of the air at a body from these.
+        own: what flows through a body counts; not for what comes to a machine later, which may be anywhere.
     """
     largest = flow_sizes(fit.trajectories)
     states = {n: s for n, s in fit.problem.model.states.items() if not s.memory}
@@ -121,7 +124,8 @@ def floors(fit: Fit, share: float, ambient: Collection[str] = (), apart: float =
         size = apart * np.sqrt(np.mean(answers(run, ambient) ** 2, axis=0))
         for name, one in zip(run.system.states, size.tolist(), strict=True):
             air[name] = max(air.get(name, 0.0), one)
-    usual = {n: np.sqrt(top[bool(s.capacity)] * largest[n]) for n, s in states.items()}
+    busiest = {n: top[bool(s.capacity)] for n, s in states.items()}
+    usual = {n: np.sqrt(most * largest[n]) if own else most for n, most in busiest.items()}
     return {n: float(np.hypot(share * usual[n], air[n])) for n in states}
 
 

@@ -132,7 +132,7 @@ def knowledge(model: Model, campaign: Campaign, recordings: Sequence[str]) -> Kn
     white = white_noise(outputs, stated, residuals, least)
     fit = Fit(problem, theta, np.zeros((len(theta),) * 2), white, runs, 0.0, (), 0.0)
     ambient = [n for n, channel in campaign.channels.items() if channel.role == "ambient temperature"]
-    floor = floors(fit, thresholds.FLOOR, ambient, thresholds.AIR)
+    floor = floors(fit, thresholds.FLOOR, ambient, thresholds.AIR, own=False)
     scales = scales_of(runs)
     laws = [law_columns(run, scales) for run in runs]
     edges = [edge_columns(run) for run in runs]
