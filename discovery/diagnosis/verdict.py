@@ -156,9 +156,9 @@ def _idle_all(context: Context, found: Search, answer: Scored, candidates: Seque
 def _unknown_cause(rest: Sequence[Scored], alone: float, named: bool) -> tuple[Scored, float]:
     """The model that may show that something else acts, and the log evidence that it has to exceed.
 
-    Next to names, an unknown cause has to exceed all effects: what they add beside it is no evidence of it.
-    Without a name, it stands for all effects that are not sure, and stands alone, for process noise looks
-    like a few events; if it is not among the likely models, the best effects have to do.
+    With names, an unknown cause has to exceed all effects: their evidence is no evidence of it. Without a
+    name, only a model with the unknown cause and no effect counts, for process noise looks like a few events.
+    If that model is not likely, the best model of effects takes its place.
 
     Args:
         alone: log evidence of a model with the named effects only.
