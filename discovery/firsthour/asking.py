@@ -126,7 +126,10 @@ def with_statements(
         unit = unit or (one.unit if _fits(role, one.unit) else _usual(role))
         if not _fits(role, unit):
             raise UsageError(f"'{name}': the unit {unit} cannot be that of a {role}")
-        found[known[name]] = replace(one, role=role, unit=unit, said=True, why="you said so")
+        below = one.below_zero if role == "heat load" else 0.0
+        found[known[name]] = replace(
+            one, role=role, unit=unit, said=True, why="you said so", below_zero=below
+        )
     return found
 
 

@@ -138,6 +138,8 @@ def unit_in(header: str) -> tuple[str, str] | None:
     (('Bed temp', '°F'), ('T1', 'degC'), ('主軸温度', '℃'), None)
     >>> unit_in("F_N"), unit_in("Heater_A"), unit_in("v_x_m_min"), unit_in("T1_min")
     (('F', 'N'), None, ('v_x', 'm/min'), None)
+    >>> unit_in("time_h"), unit_in("T_h"), unit_in("q_W_m2")
+    (('time', 'h'), None, ('q', 'W/m2'))
     >>> unit_in("oil_C"), unit_in("coolant_flow_C"), unit_in("hall_A")
     (('oil', 'C'), None, None)
     >>> unit_in("oil_in"), unit_in("T_in"), unit_in("Disp X in"), unit_in("x [in]")
@@ -148,12 +150,22 @@ def unit_in(header: str) -> tuple[str, str] | None:
         if not found or not found[1].strip():
             continue
         name, unit = found[1].strip(), re.sub(r"(?<=[^\W_])_(?=[^\W_])", "/", found[2].strip())
-        meant = form is _WITH_UNIT[0] or _is_symbol(name, unit)
-        if _is_unit(unit, meant) and (meant or _belongs(name, unit)):
+        meant = form in _WITH_UNIT[:2] or _is_symbol(name, unit)
+        if (_is_unit(unit, meant) and (meant or _belongs(name, unit))) or _of_a_clock(name, unit):
             return name, unit
         if meant and _is_range(name, unit):
             return name, unit
     return None
+
+
+def _of_a_clock(name: str, unit: str) -> bool:
+    """Whether a letter behind a word for time is its unit: time_h, but not T_h, which may be hot.
+
+    >>> _of_a_clock("time", "h"), _of_a_clock("T", "h"), _of_a_clock("Fecha", "h")
+    (True, False, False)
+    """
+    words = re.sub(r"\bt\b", "", fold(name))
+    return time_unit(unit) is not None and not is_dated(name) and bool(CLOCKS.search(words))
 
 
 def _is_range(name: str, unit: str) -> bool:
@@ -186,6 +198,7 @@ def _belongs(name: str, unit: str) -> bool:
 
 _WITH_UNIT = (
     re.compile(r"(.*?)\s*[\[(（［【<]([^\])）］】>]*)[\])）］】>]\s*\.?"),
+    re.compile(r"(.*?)_([mk]?W_m2)"),
     re.compile(r"(.*?)\s+in\s+(\S+)"),
     re.compile(r"(.*?)\s*[,/:]\s*(\S+)"),
     re.compile(r"(.*?)_([^\W\d_]{1,2}_(?:min|s|h|m))"),

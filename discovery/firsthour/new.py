@@ -73,7 +73,7 @@ def new(
         return _planned_again(folder, progress, quick=quick)
     said, clock = read_statements(statements)
     tables = _tables(sources, joins, progress)
-    found = recorded(tables, clock)
+    found = recorded(tables, clock, [*said, *([room] if room else [])])
     guesses = with_statements(found.seen, found.guesses, said, room)
     if ask is not None:
         guesses = answered(guesses, questions(found.seen, guesses), ask)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,13 +44,16 @@ class Recorded:
     notes: tuple[str, ...]
 
 
-def recorded(tables: Sequence[OwnTable], time_unit: str | None = None) -> Recorded:
+def recorded(
+    tables: Sequence[OwnTable], time_unit: str | None = None, wanted: Collection[str] = ()
+) -> Recorded:
     """Recordings with the columns that all have and that say something in what is seen.
 
     Whatever is chosen or guessed is so from `seen` alone: what the unseen recording holds stays a question.
 
     Args:
         time_unit: what a person says of a clock whose unit nothing names.
+        wanted: headers or names of columns of which a person says something: they stay.
 
     Raises:
         UserError: files that have nothing in common, or of which nothing is left.
@@ -68,7 +71,7 @@ def recorded(tables: Sequence[OwnTable], time_unit: str | None = None) -> Record
     for column in seen:
         of_runs = [(run.time, values) for run in runs[:-1] for values in _values(run, column.name)]
         why = _says_nothing(column, guesses[column.name], of_runs, has_load=moves)
-        if why:
+        if why and not {column.header, column.name} & set(wanted):
             notes.append(f"column '{column.header}' {why}")
         else:
             kept.append(column)
@@ -256,7 +259,9 @@ def _says_nothing(
     inputs = one.role == "other input" or (
         one.role not in TEMPERATURES and one.role != "error" and not one.sure
     )
-    return "never moves: left out" if inputs and never_moves(column) else ""
+    if not (inputs and never_moves(column)):
+        return ""
+    return f'never moves in the recordings to fit: left out (to keep it: --is "{column.header}={one.role}")'
 
 
 def _named(column: Column) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # Names, products, quotients and powers of one digit (and a fraction): pint would compute 9**9**9**9 for as
 # long as it takes.
 _POWER = r"(\*\*|\^)\s?-?\d(\.\d{1,6})?(?!\s*(\*\*|\^|[\d.]))"
-_SPELLING = re.compile(rf"1?([^\W\d]|[/*() %°·²³⁻¹]|{_POWER}|(?<=[/(])1(?![\d.]))*")
+_SPELLING = re.compile(rf"1?([^\W\d]|[/*() %°·²³⁻¹]|{_POWER}|(?<=[/(*])1(?![\d.]))*")
 # a factor: 2.5, 1e-3, 1/10, with or without a sign of multiplication on either side; then a unit
 _MULTIPLE = re.compile(
     r"[x×*·]?\s*(\d{1,12}(?:[.,]\d{1,12})?(?:[eE][-+]?\d{1,3})?|1/1\d{1,12}|10\^[-+]?\d{1,2})\s*[x×*·]?\s*((?!\d)[\w°%].{0,99})"

@@ -166,7 +166,7 @@ def test_columns_that_say_nothing_stay_out(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), *files])
     assert result.exit_code == 0, result.output
     assert "column 'extra' is not in every file: left out" in result.output
-    assert "column 'fault' never moves: left out" in result.output
+    assert "column 'fault' never moves in the recordings to fit: left out" in result.output
     channels = tomllib.loads((tmp_path / "rig" / "campaign.toml").read_text())["channels"]
     assert set(channels) == {"P", "T1", "T2", "T_env"}
     experiment = tomllib.loads((tmp_path / "rig" / "experiment.toml").read_text())

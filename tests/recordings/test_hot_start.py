@@ -47,3 +47,16 @@ def test_a_cold_start_among_warm_ones() -> None:
     cooling = 22.0 + 78.0 * np.exp(-TIME / 900.0)
     recordings = [seen("monday", cooling), seen("tuesday", cooling), seen("friday", warmed())]
     assert list(starts(recordings, CHANNELS)) == []
+
+
+def test_only_one_other_temperature_agrees_with_nothing() -> None:
+    """A sensor that is off by 25 K, next to the room alone."""
+    room = np.full(len(TIME), 21.0)
+
+    def two(name: str, bed: Array) -> Seen:
+        return Seen(name, Path(f"{name}.csv"), TIME, {"bed": bed, "frame": room}, np.arange(len(TIME)))
+
+    cold = 22.0 + 20.0 * TIME / 3600.0
+    found = list(starts([two("a", cold), two("b", cold), two("c", cold + 125.0)], CHANNELS[:2]))
+    assert [f.channel for f in found] == ["bed"]
+    assert "126 K above 'frame'" in found[0].what

@@ -108,3 +108,8 @@ def test_common_units_have_the_dimension_and_size_of_pint(name: str) -> None:
 )
 def test_what_is_not_common_is_left_to_pint(unit: str) -> None:
     assert parts(unit) is None
+
+
+def test_the_unit_of_a_coefficient_of_a_square_is_known() -> None:
+    """A search writes it so for the square of a rate."""
+    assert parse_unit("1/s/s/(1/s*1/s)") == parse_unit("1/s/s/(s**-2)")
