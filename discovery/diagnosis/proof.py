@@ -91,6 +91,11 @@ class Improvement:
         return min(self.high, self.started[3] if self.started else inf) < 0
 
     @property
+    def only_from_its_first_reading(self) -> bool:
+        """Whether it is so from the start that the first reading shows, not from those that all show."""
+        return self.contradicts and self.started is not None and self.started[3] >= 0
+
+    @property
     def mostly(self) -> bool:
         """Whether the repair explains more of what was left before than it leaves."""
         before, after = self.judged

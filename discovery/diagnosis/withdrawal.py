@@ -57,9 +57,12 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
         return verdict
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in lasting)
     if _lower(proof.values()) >= 0:
+        shown, check = "", "whether the machine was the same there, and how it began"
+        if all(proof[run].only_from_its_first_reading for run in worse):
+            shown, check = " from its first reading alone", "how it began, and the inputs that are not sure"
         reason = (
             f"with {names}, free runs are better over all held-out recordings, but worse on "
-            f"{', '.join(worse)}: check whether the machine was the same there, and how it began"
+            f"{', '.join(worse)}{shown}: check {check}"
         )
         return replace(verdict, reasons=(*verdict.reasons, reason))
     reason = f"with {names}, free runs on {', '.join(worse)} are worse than without"

@@ -25,6 +25,8 @@ from discovery.recordings.units import UnitError, conversion
 _LAST_THIRD = 2 / 3
 _ELSEWHERE = 30.0  # times what a column moves in a run
 _ELECTRIC = ("current", "voltage")
+_OWN = "time"  # the name that the documents give to a column of seconds
+_KEPT_TO = 2.0  # log odds that who uses this name keeps to its unit, too
 
 
 @dataclass(frozen=True)
@@ -192,6 +194,8 @@ def _counted(
         ).items():
             # recordings of one logger say the same again: their mean counts, not their sum
             odds[unit] = odds.get(unit, 0.0) + value / len(seen)
+    if all(run.clock == _OWN for run in seen):
+        odds["s"] += _KEPT_TO
     shares = {said: 1.0} if said else probabilities(odds)
     unit, chance = next(iter(shares.items()))
     doubt = "" if chance >= 0.9 else f" (? {chance:.0%} likely; nothing names its unit)"

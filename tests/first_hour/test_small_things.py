@@ -1,0 +1,60 @@
+"""Recordings of small things, as their owners log them: what `discovery new` keeps, says, and how it counts."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from discovery.cli import app
+
+
+def _door(folder: Path, *more: str) -> tuple[str, dict[str, Any]]:
+    """What `discovery new` prints where a door opens in the unseen file alone, and the channels."""
+    command = ["new", str(folder / "oven"), "--quick", *more]
+    for number in range(3):
+        rows = [f"{k},{40 * (k // 9 % 2)},{25 + k % 20 / 9},{int(number == 2 and k > 40)}" for k in range(60)]
+        (folder / f"run{number}.csv").write_text("\n".join(["time_s,P_W,T1_C,door", *rows]), "utf-8")
+        command += ["--from", str(folder / f"run{number}.csv")]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    campaign = tomllib.loads((folder / "oven" / "campaign.toml").read_text("utf-8"))
+    return result.output, campaign["channels"]
+
+
+def test_a_column_that_moves_in_the_unseen_file_alone_is_said_not_to_move_elsewhere(tmp_path: Path) -> None:
+    out, channels = _door(tmp_path)
+    assert "column 'door' never moves in the recordings to fit: left out" in out
+    assert '--is "door=other input"' in out
+    assert "door" not in channels
+
+
+def test_a_column_of_which_a_person_says_something_stays(tmp_path: Path) -> None:
+    """It was left out before anyone was asked: there was no such column, said the command."""
+    _, channels = _door(tmp_path, "--is", "door=other input")
+    assert channels["door"]["role"] == "other input"
+
+
+@pytest.mark.parametrize(("role", "said"), [("heat load,W", True), ("other output,W/m^2", False)])
+def test_only_of_a_heat_load_it_is_said_that_it_is_below_zero(tmp_path: Path, role: str, said: bool) -> None:
+    rows = [f"{k},{20 + k % 9},{25 + k % 20 / 9},{(k % 30 - 10) / 9}" for k in range(60)]
+    (tmp_path / "run.csv").write_text("\n".join(["time_h,T_out_C,T_in_C,q_kW", *rows]), "utf-8")
+    command = ["new", str(tmp_path / "wall"), "--quick", "--is", f"q_kW={role}"]
+    result = CliRunner().invoke(app, [*command, "--from", str(tmp_path / "run.csv")])
+    assert result.exit_code == 0, result.output
+    assert ("is below zero in" in result.output) is said
+
+
+@pytest.mark.parametrize(("name", "unit"), [("time", "s"), ("t", "min")])
+def test_a_column_called_time_is_rather_in_seconds(tmp_path: Path, name: str, unit: str) -> None:
+    """A lamp warms a plate for a quarter of an hour. The documents call a column of seconds so."""
+    rows = [f"{4 * k},{9 * (k > 9)},{20 + 170 * (1 - math.exp(-max(k - 9, 0) / 15))}" for k in range(240)]
+    (tmp_path / "run.csv").write_text("\n".join([f"{name},drive,T_plate", *rows]), "utf-8")
+    command = ["new", str(tmp_path / "lamp"), "--quick", "--from", str(tmp_path / "run.csv")]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    assert f"time counted in {unit} (?" in result.output
