@@ -1,4 +1,4 @@
-"""Recordings of small things, as their owners log them: what `discovery new` keeps, says, and how it counts."""
+"""Recordings of small things, as their owners log them: what `discovery new` keeps and how it counts."""
 
 from __future__ import annotations
 
