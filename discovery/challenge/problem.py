@@ -16,6 +16,7 @@ from discovery.diagnosis.refit import score
 from discovery.diagnosis.scored import Scored, scored
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.settings import only
 from discovery.experiment import Experiment, load_experiment
 from discovery.experiment.modelfits import starting_model
 from discovery.fitting import Fit
@@ -52,8 +53,7 @@ class Problem:
     @cached_property
     def baseline(self) -> Scored:
         """The baseline under the process noise that makes what it leaves most likely."""
-        noise = self.context.settings[len(self.context.settings) // 2].noise
-        found = score(self.context, (), noise)
+        found = score(self.context, (), self.context.usual)
         assert found is not None  # the context has fitted it
         return found
 
@@ -61,13 +61,12 @@ class Problem:
     def white(self) -> Context:
         """The context with one noise: white, as large as the residual of the baseline."""
         context = self.context
-        fit, (first, *_) = context.baseline, context.settings
+        fit = context.baseline
         stated = {name: context.campaign.channels[name].noise for name in context.outputs}
         residuals = [fit.problem.residual(t) for t in fit.trajectories]
         noise = white_noise(context.outputs, stated, residuals)
         exact = tuple(columns[:, :, :0] for columns in context.form)  # laws of the right form
-        one = (replace(first, noise=noise, log_weight=0.0),)
-        return replace(context, settings=one, form=exact, kinds=(0, 0, 0))
+        return replace(context, settings=only(noise), form=exact, kinds=(0, 0, 0))
 
     def improvement(self, repaired: Fit | None, chosen: Sequence[Hypothesis]) -> Answer:
         """`improvement` of diagnosis.json for a repaired model with `chosen` in it; nothing without one.

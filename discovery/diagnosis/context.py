@@ -22,14 +22,8 @@ from discovery.evidence.form_error import model_form
 from discovery.evidence.late import perhaps_late
 from discovery.evidence.noisy import log_likelihood, perhaps_noisy, smoothed
 from discovery.evidence.outliers import Outlier, find_outliers, without
-from discovery.evidence.process_noise import (
-    Prior,
-    Setting,
-    floors,
-    neighbours,
-    reading_noise,
-    settings,
-)
+from discovery.evidence.process_noise import floors, reading_noise
+from discovery.evidence.settings import Prior, Settings, settings
 from discovery.fitting import Fit, Noise, fit_model
 from discovery.models import Model
 from discovery.recordings import Campaign
@@ -65,7 +59,7 @@ class Context:
     effects: tuple[Effect, ...]
     scene: Scene
     baseline: Fit
-    settings: tuple[Setting, ...]
+    settings: Settings
     floor: Mapping[str, float]  # of the process noise of each state at level one
     belief: float | None
     outliers: tuple[Outlier, ...]  # set aside
@@ -77,7 +71,7 @@ class Context:
     @property
     def white(self) -> Noise:
         """The reading noise."""
-        return self.settings[0].noise
+        return self.settings.white
 
     @property
     def blocks(self) -> int:
@@ -87,12 +81,7 @@ class Context:
     @property
     def usual(self) -> Noise:
         """The noise that is most likely before the recordings are read."""
-        return max(self.settings, key=lambda s: s.log_weight).noise
-
-    @cached_property
-    def next_to(self) -> tuple[tuple[int, ...], ...]:
-        """The noise settings next to each one, by index."""
-        return neighbours([s.place for s in self.settings])
+        return self.settings.usual.noise
 
     @property
     def unused_readings(self) -> list[str]:
@@ -177,7 +166,7 @@ def make_context(
         tuple(form),
         kinds,
         thermometers,
-        Sizes(model, fit.trajectories, noises[0].noise),
+        Sizes(model, fit.trajectories, noises.white),
     )
 
 
@@ -193,7 +182,7 @@ def with_noise_of(context: Context, fit: Fit) -> Context:
     return replace(context, settings=_settings(white, context.floor, context.grids))
 
 
-def _settings(white: Noise, floor: Mapping[str, float], grids: Mapping[str, Grid]) -> tuple[Setting, ...]:
+def _settings(white: Noise, floor: Mapping[str, float], grids: Mapping[str, Grid]) -> Settings:
     unsure, noisy = any(g.unsure for g in grids.values()), any(g.noisy for g in grids.values())
     return settings(white, floor, process_prior(), unsure, noisy)
 

@@ -15,7 +15,7 @@ from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score, Without, scan
 from discovery.evidence.events import place_events
-from discovery.evidence.process_noise import Setting
+from discovery.evidence.settings import Setting
 from discovery.evidence.signatures import signatures
 from discovery.fitting import Noise
 
@@ -84,7 +84,7 @@ def _in_play(context: Context, current: Scored) -> list[Setting]:
     noise may have absorbed the missing physics.
     """
     best = current.settings[current.best]
-    other = next(s for s in context.settings if s.place == (*best.place[:-3], 0, 0, 0))
+    other = context.settings.at((*best.place[:-3], 0, 0, 0))
     return [best] if other.place == best.place else [best, other]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from math import inf, log
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -18,13 +18,13 @@ from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import effect_form
 from discovery.evidence.process_noise import (
-    Setting,
     UnknownChange,
     UnknownHeat,
     neighbours,
     unknown_change,
     unknown_heat,
 )
+from discovery.evidence.settings import Place, Setting
 from discovery.evidence.whitening import Grams, Whitened, log_sum_exp
 from discovery.fitting import Fit, Noise
 from discovery.fitting.covariance import Z95
@@ -32,7 +32,7 @@ from discovery.models import Model
 from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
-Node = tuple[int, int]  # a noise setting, and something of unknown cause
+Node = tuple[Place, int]  # a noise setting, and something of unknown cause
 
 _ERRORS = slice(2, 6)  # of the place of a setting: slow noise, unrecorded heat, errors of flows and of laws
 KEPT = 4  # noise settings of a model, the most likely ones
@@ -216,26 +216,25 @@ def _over_noise(
         forces: what something of unknown cause may be like; all of it is integrated over, too.
         goal: log evidence from which the score matters: below it, the most likely setting says enough.
     """
-    # a force on top of form error that is larger than usual would be the same noise once more
-    usual = {k for k, s in enumerate(context.settings) if not forces or is_usual(s)}
-    other_forces = neighbours([f.place for f in forces])
+    grid, other_forces = context.settings, neighbours([f.place for f in forces])
+
+    def allowed(setting: Setting) -> bool:
+        # a force on top of form error that is larger than usual would be the same noise once more
+        return not forces or is_usual(setting)
 
     def near(less: bool, node: Node) -> list[Node]:
-        k, j = node
-        there = [(k, other) for other in other_forces[j]] if forces else []
-        return [*((o, j) for o in context.next_to[k] if o in usual and (not less or _is_less(o, k))), *there]
-
-    def _is_less(one: int, other: int) -> bool:
-        places = context.settings[one].place, context.settings[other].place
-        return places[0][_ERRORS] < places[1][_ERRORS]
+        place, j = node
+        there = [(place, other) for other in other_forces[j]] if forces else []
+        here = [o for o in grid.near(place) if not less or o[_ERRORS] < place[_ERRORS]]
+        return [*((o, j) for o in here if allowed(grid.at(o))), *there]
 
     def tried(node: Node) -> Scored:
-        setting = context.settings[node[0]]
+        setting = grid.at(node[0])
         setting = forces[node[1]].on_top_of(setting) if forces else setting
         return replace(bare, settings=(setting,), grams=(bare.seen.grams(setting.noise),))
 
     begin = bare.noise if bare.settings else bare.fit.noise
-    start = min(usual, key=lambda k: _distance(context.settings[k].noise, begin)), 0
+    start = grid.closest(begin, allowed), 0
     kept = {start: tried(start)}
     # something of unknown cause leaves less to what is always there: if that does not reach the goal, the
     # other neighbours are not asked
@@ -272,16 +271,6 @@ def _walked(
         order = sorted(kept, key=lambda node: -float(kept[node].levels[0]))
         kept = {node: kept[node] for node in order[:KEPT]}  # normal equations are large
     return kept
-
-
-def _distance(one: Noise, other: Noise) -> float:
-    """Distance of two noise settings in slow noise, form error, unrecorded heat and inputs."""
-    slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
-    form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
-    here, there = (sum((noise.heat or {}).values()) for noise in (one, other))
-    heat = abs(here - there) / max(here + there, 1e-300)
-    time = abs(log(one.heat_time / other.heat_time))
-    return slow + form + heat + time + abs(one.jitter - other.jitter) + abs(one.rough - other.rough)
 
 
 def is_usual(setting: Setting) -> bool:

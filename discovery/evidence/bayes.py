@@ -20,7 +20,7 @@ from numpy.polynomial.hermite_e import hermegauss
 from numpy.typing import NDArray
 
 from discovery.effects.hypothesis import Hypothesis
-from discovery.evidence.process_noise import Setting
+from discovery.evidence.settings import Setting
 from discovery.evidence.signatures import Claims
 from discovery.evidence.whitening import Absorbed, Whitened, absorbed, log_sum_exp
 from discovery.fitting import Noise

@@ -17,7 +17,7 @@ from discovery.dynamics import Column, Trajectory, sensitivities
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Projected, Slab, project_one
 from discovery.evidence.outliers import MOST
-from discovery.evidence.process_noise import Setting
+from discovery.evidence.settings import Setting
 from discovery.evidence.whitening import Whitened, log_sum_exp
 from discovery.threads import side_by_side
 

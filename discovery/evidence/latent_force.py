@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from discovery.evidence.bayes import project
 from discovery.evidence.events import heat_steps
-from discovery.evidence.process_noise import Setting
+from discovery.evidence.settings import Setting
 from discovery.evidence.whitening import Whitened, log_sum_exp
 
 Array = NDArray[np.float64]

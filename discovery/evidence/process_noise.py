@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
 from discovery.dynamics.trajectory import answers, flows
+from discovery.evidence.settings import Prior, Setting, with_levels
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Fit, Noise
 from discovery.fitting.kalman import make_filter
@@ -24,24 +25,8 @@ from discovery.fitting.noise import resolution
 
 Array = NDArray[np.float64]
 
-JITTER = 12**-0.5  # of a logging interval: a switch that comes anywhere in it
 _TRIED = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # levels with which a reading noise is sought where none is stated
 _CLIPPED = 4.0  # standard deviations beyond which an innovation counts no more: single wrong readings
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A possible noise, and the logarithm of its prior weight."""
-
-    noise: Noise
-    log_weight: float
-    level: float  # of the heat that nobody records
-    place: tuple[int, ...]  # on the grid of jitters, noisy inputs, slow noises, levels, shares, forms, times
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether it has no slow noise, and the least of errors that grow with the flows."""
-        return not any(self.place[2:3] + self.place[4:])
 
 
 @dataclass(frozen=True)
@@ -86,19 +71,6 @@ class UnknownChange:
         )
 
 
-@dataclass(frozen=True)
-class Prior:
-    """Priors of process noise and slow noise (`thresholds.py`)."""
-
-    floor: float  # of the largest rms flow of the model, at level one
-    share: float  # of the flow through each state that a usual lumped model is off by
-    levels: Mapping[float, float]  # of the heat that nobody records, each with its weight
-    shares: Mapping[float, float]  # of what flows through a body, off from hour to hour
-    slow: Mapping[float, float]  # slow noise, shares of the reading noise
-    forms: Mapping[tuple[float, float], float]  # laws are off; flows act beyond a body
-    times: Mapping[float, float]  # time constant of process noise, shares of the longest that is likely
-
-
 def floors(
     fit: Fit, share: float, ambient: Collection[str] = (), apart: float = 0.0, own: bool = True
 ) -> dict[str, float]:
@@ -139,40 +111,6 @@ def flow_sizes(trajectories: Sequence[Trajectory]) -> dict[str, float]:
     return found
 
 
-def settings(
-    white: Noise, floor: Mapping[str, float], prior: Prior, unsure: bool, noisy: bool
-) -> tuple[Setting, ...]:
-    """The noise settings that evidence is integrated over.
-
-    Args:
-        white: reading noise and the two time constants.
-        floor: of each state, from `floors`.
-        unsure: inputs may be logged late, each switch by another time, or all by the same.
-        noisy: inputs may be recorded with noise.
-    """
-    axes = (
-        [(jitter, 1.0) for jitter in ((0.0, JITTER) if unsure else (0.0,))],
-        [(rough, 1.0) for rough in ((0.0, 1.0) if noisy else (0.0,))],
-        list(prior.slow.items()),
-        list(prior.levels.items()),
-        list(prior.shares.items()),
-        [(float(k), weight) for k, weight in enumerate(prior.forms.values())],
-        list(prior.times.items()),
-    )
-    forms = list(prior.forms)
-    total = float(np.prod([sum(weight for _, weight in axis) for axis in axes]))
-    found = []
-    for place in np.ndindex(*(len(axis) for axis in axes)):
-        jitter, rough, slow, level, share, _, part = (axis[k][0] for axis, k in zip(axes, place, strict=True))
-        form, edge = forms[place[-2]]
-        weight = np.prod([axis[k][1] for axis, k in zip(axes, place, strict=True)])
-        noise = _noise(white, floor, level, share, slow)
-        time = part * white.heat_time
-        noise = replace(noise, jitter=jitter, rough=rough, form=form, edge=edge, heat_time=time)
-        found.append(Setting(noise, float(np.log(weight / total)), level, place))
-    return tuple(found)
-
-
 def neighbours(places: Sequence[tuple[int, ...]]) -> tuple[tuple[int, ...], ...]:
     """For each place on a grid, the indices of those one step away."""
     index = {place: k for k, place in enumerate(places)}
@@ -206,15 +144,6 @@ def unknown_change(output: str, times: Sequence[float]) -> tuple[UnknownChange, 
     """A slow change of an output, of unknown cause; every size (in reading noises) is equally likely."""
     weight = -float(np.log(len(times)))
     return tuple(UnknownChange(output, size, weight, (i, 0)) for i, size in enumerate(times))
-
-
-def _noise(white: Noise, floor: Mapping[str, float], level: float, share: float, slow: float) -> Noise:
-    return replace(
-        white,
-        slow=tuple(slow * w for w in white.white) if slow else (),
-        heat={name: level * value for name, value in floor.items()} if level else None,
-        share=share,
-    )
 
 
 def reading_noise(
@@ -255,7 +184,7 @@ def _white_with(
     """White level (Y,) of unit innovations with given slow and process noise, and its -log likelihood."""
     white, cost = np.array(start.white), np.inf
     for _ in range(4):
-        noise = _noise(replace(start, white=tuple(white)), floor, level, level * prior.share, slow)
+        noise = with_levels(replace(start, white=tuple(white)), floor, level, level * prior.share, slow)
         squares, counts, cost = np.zeros(len(white)), np.zeros(len(white)), 0.0
         for part, residual in zip(seen.filters, seen.residuals, strict=True):
             z, log = part.whitened(noise, residual[:, :, None])

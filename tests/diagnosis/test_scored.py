@@ -134,7 +134,7 @@ def test_heat_of_unknown_cause_may_have_any_size(monkeypatch: pytest.MonkeyPatch
 
 def test_less_noise_than_usual_is_no_unknown_cause() -> None:
     """Heat of unknown cause adds to the variance that is always there, whatever its size and share."""
-    usual = dry().settings[-1]
+    *_, usual = dry().settings
     before = ((usual.noise.heat or {})["table"], usual.noise.share)
     for heat in unknown_heat("table", 1.0, (0.0, 30.0), (0.0, 0.8)):
         after = (heat.on_top_of(usual).noise.force or {})["table"]

@@ -15,7 +15,7 @@ from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Projected, Slab, products, projected, ranked, scan
-from discovery.evidence.process_noise import Setting
+from discovery.evidence.settings import Setting
 from discovery.evidence.signatures import signatures
 from discovery.evidence.whitening import Whitened, absorbed
 from discovery.fitting import Noise, fit_model

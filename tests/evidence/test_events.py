@@ -13,7 +13,7 @@ from discovery.effects.candidates import Scene, candidates
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.bayes import Slab, project, project_one, scan
 from discovery.evidence.events import _span, heat_steps, place_events
-from discovery.evidence.process_noise import Setting
+from discovery.evidence.settings import Setting
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Noise, fit_model
 from discovery.models import Model, Parameter, State

@@ -96,7 +96,7 @@ def test_switches_off_the_grid_of_the_logger_are_no_missing_physics(monkeypatch:
     """Each is logged at the next stamp: 0 to 60 s late."""
     seen = campaign(*(light(k, 30.0, 30.0) for k in (1, 2, 3, 4)))
     assert found(seen) == ()
-    monkeypatch.setattr("discovery.evidence.process_noise.JITTER", 0.0)
+    monkeypatch.setattr("discovery.evidence.settings.JITTER", 0.0)
     assert found(seen) != ()
 
 

@@ -1,0 +1,149 @@
+"""The noise settings that evidence is integrated over: a grid of which each setting is made when it is asked
+for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import log
+
+import numpy as np
+
+from discovery.fitting import Noise
+
+JITTER = 12**-0.5  # of a logging interval: a switch that comes anywhere in it
+
+Place = tuple[int, ...]  # on the axes of a grid
+Weighted = tuple[tuple[tuple[float, ...], float], ...]  # values of one kind, or of two, each with its weight
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Priors of process noise and slow noise (`thresholds.py`)."""
+
+    floor: float  # of the largest rms flow of the model, at level one
+    share: float  # of the flow through each state that a usual lumped model is off by
+    levels: Mapping[float, float]  # of the heat that nobody records, each with its weight
+    shares: Mapping[float, float]  # of what flows through a body, off from hour to hour
+    slow: Mapping[float, float]  # slow noise, shares of the reading noise
+    forms: Mapping[tuple[float, float], float]  # laws are off; flows act beyond a body
+    times: Mapping[float, float]  # time constant of process noise, shares of the longest that is likely
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A possible noise, and the logarithm of its prior weight."""
+
+    noise: Noise
+    log_weight: float
+    level: float  # of the heat that nobody records
+    place: Place  # on the grid of jitters, noisy inputs, slow noises, levels, shares, forms, times
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it has no slow noise, and the least of errors that grow with the flows."""
+        return not any(self.place[2:3] + self.place[4:])
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The grid.
+
+    Args:
+        white: reading noise, and the longest time constants.
+        floor: heat that nobody records of each state at level one, from `floors`.
+        axes: jitters, noisy inputs, slow noises, levels, shares, forms and times.
+    """
+
+    white: Noise
+    floor: Mapping[str, float]
+    axes: tuple[Weighted, ...]
+
+    @property
+    def usual(self) -> Setting:
+        """The most likely one before the recordings are read."""
+        return self.at(tuple(max(range(len(a)), key=lambda k: a[k][1]) for a in self.axes))
+
+    def __iter__(self) -> Iterator[Setting]:
+        return map(self.at, np.ndindex(*(len(axis) for axis in self.axes)))
+
+    def at(self, place: Place) -> Setting:
+        """The setting at a place."""
+        (jitter,), (rough,), (slow,), (level,), (share,), (form, edge), (part,) = (
+            axis[k][0] for axis, k in zip(self.axes, place, strict=True)
+        )
+        noise = replace(
+            with_levels(self.white, self.floor, level, share, slow),
+            jitter=jitter,
+            rough=rough,
+            form=form,
+            edge=edge,
+            heat_time=part * self.white.heat_time,
+        )
+        weights = (log(a[k][1] / sum(w for _, w in a)) for a, k in zip(self.axes, place, strict=True))
+        return Setting(noise, sum(weights), level, place)
+
+    def near(self, place: Place) -> list[Place]:
+        """The places one step away."""
+        steps = [(axis, at + step) for axis, at in enumerate(place) for step in (-1, 1)]
+        return [
+            (*place[:axis], at, *place[axis + 1 :]) for axis, at in steps if 0 <= at < len(self.axes[axis])
+        ]
+
+    def closest(self, noise: Noise, allowed: Callable[[Setting], bool]) -> Place:
+        """The place most alike to a noise among some, axis by axis: what is allowed, and what is alike, is so
+        on each axis for itself.
+        """
+        place: Place = (0,) * len(self.axes)
+        for axis, values in enumerate(self.axes):
+            options = [self.at((*place[:axis], k, *place[axis + 1 :])) for k in range(len(values))]
+            inside = [one for one in options if allowed(one)]
+            place = min(inside, key=lambda one: _distance(one.noise, noise)).place
+        return place
+
+
+def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: bool, noisy: bool) -> Settings:
+    """The grid of noise settings.
+
+    Args:
+        white: reading noise and the two time constants.
+        floor: of each state, from `floors`.
+        unsure: inputs may be logged late, each switch by another time, or all by the same.
+        noisy: inputs may be recorded with noise.
+    """
+    maybe = ((JITTER, unsure), (1.0, noisy))
+    chances = [dict.fromkeys([0.0, size] if there else [0.0], 1.0) for size, there in maybe]
+    single = [*chances, prior.slow, prior.levels, prior.shares]
+    axes = [
+        *(tuple(((value,), weight) for value, weight in table.items()) for table in single),
+        tuple(prior.forms.items()),
+        tuple(((part,), weight) for part, weight in prior.times.items()),
+    ]
+    return Settings(white, floor, tuple(axes))
+
+
+def only(noise: Noise) -> Settings:
+    """The grid of a noise without slow noise and process noise."""
+    none = (((0.0,), 1.0),)
+    return Settings(noise, {}, (*[none] * 5, (((0.0, 0.0), 1.0),), (((1.0,), 1.0),)))
+
+
+def with_levels(white: Noise, floor: Mapping[str, float], level: float, share: float, slow: float) -> Noise:
+    """Reading noise with slow noise and process noise of a size."""
+    return replace(
+        white,
+        slow=tuple(slow * w for w in white.white) if slow else (),
+        heat={name: level * value for name, value in floor.items()} if level else None,
+        share=share,
+    )
+
+
+def _distance(one: Noise, other: Noise) -> float:
+    """Distance of two noise settings in slow noise, form error, unrecorded heat and inputs."""
+    slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
+    form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
+    here, there = (sum((noise.heat or {}).values()) for noise in (one, other))
+    heat = abs(here - there) / max(here + there, 1e-300)
+    time = abs(log(one.heat_time / other.heat_time))
+    return slow + form + heat + time + abs(one.jitter - other.jitter) + abs(one.rough - other.rough)
