@@ -27,10 +27,10 @@ def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> 
     """What each of some effects of a model changes of free runs on recordings that are left out of the fit in
     turn: of the outputs that it shows in, or of all where it acts in the machine.
 
-    Models are fitted anew to the others, and start, as those of an experiment are; rms in reading noises.
-    Whether it is by chance is judged by what each reading says beyond those before it, under the process
-    noise of the answer (log predictive density): hours of heat that nobody records decide the rms of a free
-    run.
+    Models are fitted anew to the others, under the process noise of the answer: a single recording does not
+    determine a model whose fit takes hours of unrecorded heat for its own. They start as those of an
+    experiment do; rms in reading noises. Whether it is by chance is judged by what each reading says beyond
+    those before it, under the same noise (log predictive density): these hours decide the rms of a free run.
     None where nothing can be left out, or where recordings left out can say nothing of an effect because it
     does not act in all of them.
     """
@@ -94,6 +94,7 @@ def _residuals(
             seen,
             kept,
             context.outputs,
+            noise=answer.noise,
             grids=grids,
             belief=context.belief,
             begin=answer.fit,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from discovery.diagnosis.scored import Scored, is_usual, scored, with_change, wi
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evaluation.crossvalidation import Fold
 from discovery.evidence.process_noise import unknown_heat
+from discovery.fitting import Fit, Noise, fit_model
 from tests.diagnosis.parts import bare, claim_of, context_of, dry, scored_of, wetted
 from tests.machine import NOISE, campaign, changed, model, simulated
 
@@ -163,6 +165,25 @@ def test_what_is_there_predicts_recordings_that_are_left_out() -> None:
     assert proofs[event.key] is None  # other recordings say nothing of it
     alone = replace(dry(), recordings=("r1",))
     assert left_out(alone, wetted(), [h]) == {h.key: None}
+
+
+def test_models_are_fitted_to_the_rest_under_the_process_noise_of_the_answer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else hours of unrecorded heat in a single recording determine its parameters: the slip of a
+    joint, which is there, turned free runs of 2.0 reading noises into 6.0, and into 1.4 since then.
+    """
+    seen = []
+
+    def spied(*args: Any, noise: Noise, **more: Any) -> Fit:
+        seen.append(noise)
+        return fit_model(*args, noise=noise, **more)
+
+    monkeypatch.setattr(crossvalidation, "fit_model", spied)
+    (h,) = wetted().hypotheses
+    left_out(dry(), wetted(), [h])
+    assert seen == [wetted().noise] * 4
+    assert wetted().noise.heat
 
 
 @pytest.mark.parametrize(("size", "sure"), [(1.2, True), (1.0, False)])
