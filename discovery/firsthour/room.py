@@ -17,6 +17,7 @@ _USUAL = (22.0, 5.0)  # degC and its spread, where nothing is known: 12 to 32 in
 _ROOMS = (5.0, 35.0)  # degC: what people work in
 _COLD = 1.5  # K: temperatures that agree so well at the start of a recording are those of the air
 _COLD_SPREAD = 2.0  # K: an air that moves while the machine runs
+_DAYS = 2.0  # K: what the same room differs from one recording to another
 _FIRST = 5  # readings
 
 
@@ -50,9 +51,12 @@ def unknown_room(
             "errors. Record it, or name a substitute with --room COLUMN"
         )
     cold = [degrees for run in runs for degrees in [_cold_start(run, guesses)] if degrees is not None]
-    if cold and len(cold) == len(runs):
-        degrees, spread = float(np.mean(cold)), float(np.hypot(_COLD_SPREAD, np.std(cold)))
-        why = f"the temperatures agree at the start of each recording, near {degrees:.3g} degC"
+    if cold:
+        every = len(cold) == len(runs)
+        degrees, other = float(np.mean(cold)), np.std(cold) if every else np.hypot(np.std(cold), _DAYS)
+        spread = float(np.hypot(_COLD_SPREAD, other))
+        where = "each recording" if every else f"{len(cold)} of {len(runs)} recordings"
+        why = f"the temperatures agree at the start of {where}, near {degrees:.3g} degC"
     else:
         (degrees, spread), why = _USUAL, "nothing shows it"
     room = Room(round(degrees, 1), round(spread, 1), why)

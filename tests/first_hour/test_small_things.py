@@ -58,3 +58,18 @@ def test_a_column_called_time_is_rather_in_seconds(tmp_path: Path, name: str, un
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 0, result.output
     assert f"time counted in {unit} (?" in result.output
+
+
+def test_one_cold_start_says_what_the_room_is_near(tmp_path: Path) -> None:
+    """Two heaters on a board, one day cold and one day warm from the run before; nobody measured the room."""
+    command = ["new", str(tmp_path / "board"), "--quick"]
+    for number, (t1, t2) in enumerate([(28.9, 28.6), (60.0, 39.3), (27.7, 28.7)]):
+        rows = [f"{5 * k},{t1 + k % 50 / 5},{t2 + k % 50 / 9},{50 * (k // 25 % 2)}" for k in range(120)]
+        (tmp_path / f"run{number}.csv").write_text("\n".join(["time_s,T1,T2,Q1", *rows]), "utf-8")
+        command += ["--from", str(tmp_path / f"run{number}.csv")]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    assert "the temperatures agree at the start of 1 of 2 recordings, near 29.1 degC" in result.output
+    campaign = tomllib.loads((tmp_path / "board" / "campaign.toml").read_text("utf-8"))
+    assert 2.0 < campaign["channels"]["T_env"]["spread"] < 5.0
+    assert campaign["recordings"]["run1"]["set"]["T_env"] == 29.1
