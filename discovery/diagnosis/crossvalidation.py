@@ -34,28 +34,46 @@ def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> 
     None where nothing can be left out, or where recordings left out can say nothing of an effect because it
     does not act in all of them.
     """
-    lasting = [h for h in chosen if h.recording is None] if len(context.recordings) > 1 else []
-    sets = [tuple(o for o in answer.hypotheses if o.key != h.key) for h in lasting]
+    found = _changed(context, answer, [(h,) for h in chosen if h.recording is None])
+    return {h.key: found.get((h.key,)) for h in chosen}
+
+
+def together_left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> Improvement | None:
+    """What several effects of a model change together, as in `left_out`. One alone may make free runs worse:
+    the lag of a sensor on a body that is really two.
+    """
+    lasting = tuple(h for h in chosen if h.recording is None)
+    return next(iter(_changed(context, answer, [lasting] if lasting else []).values()), None)
+
+
+def _changed(
+    context: Context, answer: Scored, groups: Sequence[tuple[Hypothesis, ...]]
+) -> dict[tuple[Key, ...], Improvement]:
+    """What each group of effects of a model changes, by its keys."""
+    groups = groups if len(context.recordings) > 1 else ()
+    keys = [tuple(h.key for h in group) for group in groups]
+    sets = [tuple(o for o in answer.hypotheses if o.key not in own) for own in keys]
     tasks = [
         (effects, fold)
-        for effects in ([answer.hypotheses, *sets] if lasting else [])
+        for effects in ([answer.hypotheses, *sets] if groups else [])
         for fold in folds(context.campaign, context.recordings, blocks=0)
     ]
     left: dict[frozenset[Key], dict[str, tuple[Array, Array]]] = {}
     parts = side_by_side(lambda task: _residuals(context, answer, *task), tasks)
     for (effects, _), part in zip(tasks, parts, strict=True):
         left.setdefault(frozenset(o.key for o in effects), {}).update(part)
-    found: dict[Key, Improvement | None] = dict.fromkeys(h.key for h in chosen)
-    for h in lasting:
-        only = set(h.shown) if h.shown and not h.terms else set(context.outputs)
+    found = {}
+    for own, group in zip(keys, groups, strict=True):
+        everywhere = any(h.terms or not h.shown for h in group)
+        only = set(context.outputs) if everywhere else {name for h in group for name in h.shown}
         mine = [y for y, name in enumerate(context.outputs) if name in only]
-        if not left[answer.keys - {h.key}]:
+        if not left[answer.keys - {*own}]:
             continue
         free, beyond = (
             improvement(runs, [context.outputs[y] for y in mine])
-            for runs in _compared(context, left[answer.keys - {h.key}], left[answer.keys], mine)
+            for runs in _compared(context, left[answer.keys - {*own}], left[answer.keys], mine)
         )
-        found[h.key] = replace(free, started=(*free.judged, beyond.low, beyond.high))
+        found[own] = replace(free, started=(*free.judged, beyond.low, beyond.high))
     return found
 
 

@@ -126,7 +126,7 @@ class Search:
         while True:
             pool = [*hopeful(left(scan.claims), REFITS), *hopeful(left(scan.quiet), RIVALS)]
             before, best = len(self.lost), self._refitted(current, current.hypotheses, pool)
-            if best is not current or len(self.lost) == before:
+            if len(self.lost) == before:
                 return best
 
     def _widened(self, current: Scored) -> Scored:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import inf, isfinite, sqrt
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.crossvalidation import left_out
+from discovery.diagnosis.crossvalidation import left_out, together_left_out
 from discovery.diagnosis.posterior import Posterior
 from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.refit import score
@@ -83,8 +84,15 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
         lambda some, goal: _alone(context, found, answer, some, found.best.evidence - goal),
     )
     named, idle, proofs = _proved(context, found, answer, sure)
+    others = [n.hypothesis for n in candidates if n not in named]
+
+    @cache
+    def acts() -> bool:
+        """Whether the effects without a name improve free runs outside the fit, all together."""
+        return _supports(together_left_out(context, answer, others))
+
     # what changes no free run outside the fit is not lacking either; what may do so by chance can be
-    nothing = {key for key in idle if not _changes(proofs[key])}
+    nothing = {key for key in idle if not _changes(proofs[key])} if idle and not acts() else set[Key]()
     reasons = [*refused.values(), *(text for key, text in idle.items() if key not in nothing)]
     # a law has no name: it matters only where a name may stand for it
     lacking = (found.baseline, answer) if named else ()
@@ -94,9 +102,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     best, without = _unknown_cause(rest, alone, bool(named))
     # names hold next to effects that are not sure, and next to something that no effect explains if they
     # explain more than they leave, and add as much beside it
-    if best.evidence - without > thresholds.SHORT and (
-        best.forced or named or not _idle_all(context, found, answer, candidates)
-    ):
+    if best.evidence - without > thresholds.SHORT and (best.forced or named or acts()):
         mostly = [n for n in named if (proof := proofs[n.hypothesis.key]) and proof.mostly]
         by_law = any(best is one for one in laws)
         named = tuple(
@@ -147,12 +153,6 @@ def _proved(
     return kept, idle, proofs
 
 
-def _idle_all(context: Context, found: Search, answer: Scored, candidates: Sequence[Named]) -> bool:
-    """Whether no effect of the answer, sure or not, improves free runs outside the fit."""
-    kept, *_ = _proved(context, found, answer, candidates)
-    return not kept
-
-
 def _unknown_cause(rest: Sequence[Scored], alone: float, named: bool) -> tuple[Scored, float]:
     """The model that may show that something else acts, and the log evidence that it has to exceed.
 
@@ -177,10 +177,15 @@ def _changes(outside: Improvement | None) -> bool:
     return outside is None or outside.explained >= thresholds.MATTERS
 
 
+def _supports(outside: Improvement | None) -> bool:
+    """Whether left-out recordings support what was added; true where nothing can be left out."""
+    return outside is None or (outside.sure and _changes(outside))
+
+
 def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None:
     """Why left-out recordings do not support an effect; None if they do."""
     outside = proofs[h.key]
-    if outside is None or (outside.sure and _changes(outside)):
+    if outside is None or _supports(outside):
         return None
     old, new = outside.judged
     rms = f"{printed(old)} without it, {printed(new)} with it"

@@ -119,6 +119,15 @@ def _nothing_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(autouse=True)
+def _effects_do_together_what_the_best_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    def best(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> Improvement | None:
+        proofs = [p for p in verdict.left_out(context, answer, chosen).values() if p is not None]
+        return max(proofs, key=lambda p: p.explained) if len(proofs) == len(chosen) > 0 else None
+
+    monkeypatch.setattr(verdict, "together_left_out", best)
+
+
+@pytest.fixture(autouse=True)
 def _unknown_heat_explains_everything(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever effects act beside it."""
 
@@ -454,6 +463,19 @@ def test_a_name_has_to_matter_on_recordings_left_out(
     assert found.word == word
     if word != "missing physics":
         assert "on recordings that are left out of the fit" in found.reasons[0]
+
+
+def test_effects_that_improve_free_runs_only_together_are_no_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lamp that heats a plate: the lag of its thermometer alone makes free runs worse, and a second mass is
+    a little too unsure to be named; together they halve what is left.
+    """
+    alone, both = Improvement(65.0, 87.0, 0.5, -1.0, 1.0, {}), Improvement(65.0, 43.0, 0.5, 8.0, 36.0, {})
+    monkeypatch.setattr(verdict, "left_out", lambda _, __, chosen: dict.fromkeys((h.key for h in chosen), alone))
+    probabilities = {"fluid_convection": 0.98, "friction_speed": 0.3}
+    models = pair(FLUID, FRICTION, 150.0, 100.0, 50.0)
+    assert said(models, probabilities).word == "no mismatch"
+    monkeypatch.setattr(verdict, "together_left_out", lambda *_: both)
+    assert said(models, probabilities).word == "unexplained"
 
 
 @pytest.mark.parametrize(
