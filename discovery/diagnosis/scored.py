@@ -134,7 +134,8 @@ class Scored:
 
     def drawn(self, k: int, weights: Array | None = None, widths: Sequence[float] = (1.0,)) -> Array:
         """(W, D) `level` under a noise setting for many draws at once; arguments as in `Grams.marginal`."""
-        if self.outside or (self.sizes < 0).any():  # what presses against zero does not act
+        finite = np.isfinite(self.grams[k].rows.logdet).all()  # under this noise, too
+        if self.outside or not finite or (self.sizes < 0).any():  # what presses against zero does not act
             return np.full((len(widths), 1 if weights is None else len(weights)), -inf)
         forms = self.grams[k].marginals(self.sizes, self._own_forms, weights, widths)
         level, step, covariance = (np.array(one) for one in zip(*forms, strict=True))
@@ -154,9 +155,13 @@ class Scored:
         if not len(place):
             return None
         _, step, covariance = self._forms(self.best)[0].solved()
-        k = int(place[0])
-        middle, half = float(self.fit.theta[index] + step[k]), Z95 * float(np.sqrt(covariance[k, k]))
-        return max(middle - half, unknowns[index].low), min(middle + half, unknowns[index].high)
+        k, unknown = int(place[0]), unknowns[index]
+        at, half = float(self.fit.theta[index]), Z95 * float(np.sqrt(covariance[k, k]))
+        if unknown.is_log:  # a time constant is known within a factor
+            ends = [at * np.exp((step[k] + side * half) / at) for side in (-1.0, 1.0)]
+        else:
+            ends = [at + step[k] + side * half for side in (-1.0, 1.0)]
+        return max(float(ends[0]), unknown.low), min(float(ends[1]), unknown.high)
 
     def known(self) -> Known:
         """How well the recordings determine the parameters, under the most likely noise."""

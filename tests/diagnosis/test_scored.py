@@ -105,6 +105,28 @@ def test_a_shape_at_the_end_of_its_range_is_another_law() -> None:
     assert replace(wetted(), outside=True).evidence == -np.inf
 
 
+def test_a_model_that_is_not_finite_under_a_noise_does_not_count_there() -> None:
+    """A winding whose resistance grows with its temperature, on a public recording of an oven."""
+    first, *others = wetted().grams
+    lost = replace(first, rows=replace(first.rows, logdet=np.full_like(first.rows.logdet, np.nan)))
+    levels = replace(wetted(), grams=(lost, *others)).levels
+    assert levels[0] == -np.inf
+    assert list(levels[1:]) == list(wetted().levels[1:])
+
+
+def test_a_time_constant_is_known_within_a_factor() -> None:
+    """Ends of an interval that is wider than its value are both positive, and far from the limits."""
+    one = wetted()
+    name = wetted().hypotheses[0].amplitudes[0]
+    unknowns = [replace(u, is_log=u.name == name) for u in one.fit.problem.unknowns]
+    fit = replace(one.fit, problem=replace(one.fit.problem, unknowns=tuple(unknowns)))
+    low, high = one.interval(name) or (0.0, 0.0)
+    first, last = replace(one, fit=fit).interval(name) or (0.0, 0.0)
+    at = float(one.fit.theta[[u.name for u in unknowns].index(name)])
+    assert np.log(last / first) == pytest.approx((high - low) / at)
+    assert np.log(first * last / at**2) == pytest.approx((high + low - 2 * at) / at)
+
+
 def test_an_output_may_change_for_a_cause_that_no_body_shows() -> None:
     """A joint that snaps twice a day is no heat: a slow change of this output explains it better than heat at
     any body, and than a slow change of another output.
