@@ -46,6 +46,7 @@ SHOWN = {  # what is shown with an answer, not the answer
     "diagnosis/location.py": "*",
     "diagnosis/proof.py": "CLOSABLE",
     "diagnosis/regime.py": "ACTS MOST HOLDS",
+    "diagnosis/summary.py": "_OPEN",
     "diagnosis/thresholds.py": "RIVAL RIVALS_SHOWN",
 }
 

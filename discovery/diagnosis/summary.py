@@ -10,6 +10,7 @@ from discovery.printed import printed, undetermined
 from discovery.runfolder import read_diagnosis
 
 _NOISE = "reading noise and heat that nobody records explain"
+_OPEN = 1.5  # times the noise: from there on, the uncertainty of the parameters is said
 
 
 def summary(folder: Path) -> list[str]:
@@ -68,11 +69,15 @@ def _left(improvement: dict[str, Any]) -> list[str]:
 
 
 def _by_noise(one: dict[str, Any], unit: str) -> str:
-    """What noise explains of an rms; where it explains all of it, its size says nothing more."""
+    """What noise explains of an rms, and the uncertainty of the parameters where it explains much more; where
+    noise explains all of it, its size says nothing more.
+    """
     floor, rms = one["noise_floor"], (one["rms_before"], one["rms_after"])
     if all(r is not None and r < floor for r in rms):
         return f"{_NOISE} all of it"
-    return f"{_NOISE} up to {printed(floor)}{unit}"
+    expected = one.get("expected") or floor
+    unsure = f", with what the fit leaves open {printed(expected)}{unit}" if expected > _OPEN * floor else ""
+    return f"{_NOISE} up to {printed(floor)}{unit}{unsure}"
 
 
 def _unit(improvement: dict[str, Any]) -> str:

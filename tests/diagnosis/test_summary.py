@@ -94,7 +94,7 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
     """Far from the reading noise, an engineer has to see it, whatever explains it."""
     left = {"rms_before": 4.8, "rms_after": 4.8, "noise_floor": 4.6}
     away = {"rms_before": None, "rms_after": None, "noise_floor": 1.0}
-    improvement = {
+    improvement: dict[str, Any] = {
         "unit": "times the reading noise",
         "fit": left,
         "held_out": {"sun": away},
@@ -116,6 +116,10 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
     assert line.endswith(
         "reading noise and heat that nobody records explain up to 4.6 times the reading noise)"
     )
+    improvement["fit"] = {**left, "expected": 9.87}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
+    (line,) = summary(tmp_path)[1:-1]
+    assert line.endswith("with what the fit leaves open 9.87 times the reading noise)")
 
 
 @pytest.mark.parametrize(
