@@ -12,26 +12,27 @@ from discovery.effects.hypothesis import Hypothesis
 Veto = Callable[[Context, Scored, Hypothesis], str | None]
 
 
-def one_recording(context: Context, _: Scored, h: Hypothesis) -> str | None:
-    """Unrecorded heat for some hours is an event only if another recording is without it."""
-    if len(context.recordings) > 1 or h.effect.search != "window":
+def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | None:
+    """What every recording shows is no event: unrecorded heat for some hours, or a clock that is wrong."""
+    is_clock = h.effect.place == "inputs of a recording"
+    if not is_clock and h.effect.search != "window":
         return None
+    alike = [o for o in answer.hypotheses if o.effect.place == h.effect.place and o.states == h.states]
+    if h.recording is not None and not {o.recording for o in alike} >= set(context.recordings):
+        return None
+    if is_clock:
+        return (
+            "the clock of every recording would be shifted; a dead time between the inputs and the readings "
+            "explains this as well"
+        )
+    if len(context.recordings) > 1:
+        return (
+            f"{h.effect.word} at {h.where} would come in every recording; a law that the model leaves out "
+            "explains this as well"
+        )
     return (
         f"with a single recording to fit, {h.effect.word} at {h.where} cannot be distinguished from a law "
         "that differs a little from the model's; record the machine once more, or fit a held-out recording"
-    )
-
-
-def every_clock(context: Context, answer: Scored, h: Hypothesis) -> str | None:
-    """If the clocks of all recordings are wrong, a dead time of the machine explains it as well."""
-    if h.effect.place != "inputs of a recording":
-        return None
-    shifted = {o.recording for o in answer.hypotheses if o.effect.place == h.effect.place}
-    if h.recording is not None and not shifted >= set(context.recordings):
-        return None
-    return (
-        "the clock of every recording would be shifted; a dead time between the inputs and the readings "
-        "explains this as well"
     )
 
 
@@ -47,7 +48,7 @@ def far_from_the_machine(_: Context, answer: Scored, h: Hypothesis) -> str | Non
     )
 
 
-VETOES: tuple[Veto, ...] = (one_recording, every_clock, far_from_the_machine)
+VETOES: tuple[Veto, ...] = (every_recording, far_from_the_machine)
 
 
 def vetoed(context: Context, answer: Scored, h: Hypothesis) -> str | None:

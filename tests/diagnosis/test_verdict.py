@@ -485,6 +485,12 @@ def test_effects_that_improve_free_runs_only_together_are_no_nothing(monkeypatch
     ("models", "world", "words", "reason"),
     [
         ([Model((SUN,), 50.0)], World(("r2",)), {"unmeasured_heat": 0.98}, "record the machine once more"),
+        (
+            [Model(tuple(claim("unmeasured_heat", recording=r) for r in ("r1", "r2")), 50.0)],
+            World(),
+            {"unmeasured_heat": 0.98},
+            "would come in every recording",
+        ),
         ([Model((OFFSET,), 50.0, off=0.24)], World(), {"sensor_offset": 0.98}, "wrong by about 24 %"),
         (
             [Model(tuple(claim("clock_shift", recording=r) for r in ("r1", "r2")), 50.0)],
