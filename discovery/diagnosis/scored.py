@@ -158,10 +158,11 @@ class Scored:
         k, unknown = int(place[0]), unknowns[index]
         at, half = float(self.fit.theta[index]), Z95 * float(np.sqrt(covariance[k, k]))
         if unknown.is_log:  # a time constant is known within a factor
-            ends = [at * np.exp((step[k] + side * half) / at) for side in (-1.0, 1.0)]
+            logs = np.clip([(step[k] + side * half) / at for side in (-1.0, 1.0)], -500, 500)
+            ends = [float(end) for end in at * np.exp(logs)]
         else:
             ends = [at + step[k] + side * half for side in (-1.0, 1.0)]
-        return max(float(ends[0]), unknown.low), min(float(ends[1]), unknown.high)
+        return max(ends[0], unknown.low), min(ends[1], unknown.high)
 
     def known(self) -> Known:
         """How well the recordings determine the parameters, under the most likely noise."""

@@ -101,7 +101,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
     alone = _alone(context, found, answer, named) if matters else answer.evidence
     best, without = _unknown_cause(rest, alone, bool(named))
     # names hold next to effects that are not sure, and next to something that no effect explains if they
-    # explain more than they leave, and add as much beside it
+    # explain more than they leave, and still add as much as a name needs
     if best.evidence - without > thresholds.SHORT and (best.forced or named or acts()):
         mostly = [n for n in named if (proof := proofs[n.hypothesis.key]) and proof.mostly]
         by_law = any(best is one for one in laws)

@@ -125,6 +125,12 @@ def test_a_time_constant_is_known_within_a_factor() -> None:
     at = float(one.fit.theta[[u.name for u in unknowns].index(name)])
     assert np.log(last / first) == pytest.approx((high - low) / at)
     assert np.log(first * last / at**2) == pytest.approx((high + low - 2 * at) / at)
+    lost = replace(fit, theta=np.where(fit.theta == at, 1e-6 * at, fit.theta))  # any size is as likely
+    with np.errstate(over="raise"):
+        first, last = replace(one, fit=lost).interval(name) or (0.0, 0.0)
+    unknown = next(u for u in unknowns if u.name == name)
+    assert first == pytest.approx(unknown.low, abs=1e-9)
+    assert last == unknown.high
 
 
 def test_an_output_may_change_for_a_cause_that_no_body_shows() -> None:

@@ -265,12 +265,12 @@ def test_heat_that_no_effect_explains_refutes_names(gain: float, unknown: float,
     [(15.2, 1.6, "no mismatch"), (23.0, 2.0, "no mismatch"), (23.0, 0.1 + SHORT, "unexplained")],
 )
 def test_an_unknown_cause_without_a_name_stands_alone(friction: float, slow: float, word: str) -> None:
-    """A gear shaper that lacks nothing: a slow change explained 1.6, and friction beside it 15.2."""
+    """A gear shaper that lacks nothing: a slow change explained 1.6, and friction with it 15.2."""
     what = "a slow change of T of unknown cause"
     alone = Model((), slow, forced=what)
-    beside = Model((FRICTION,), slow + friction, forced=what)
+    both = Model((FRICTION,), slow + friction, forced=what)
     found = Tried([Model((FRICTION,), friction), Model((), 0.0)])
-    chances = Believed({"friction_speed": 0.6}, [*found.models, alone, beside])
+    chances = Believed({"friction_speed": 0.6}, [*found.models, alone, both])
     answer = decide(World(), found, chances, 10.0)  # type: ignore[arg-type]
     assert answer.word == word
     assert (f"{what} or unsure effects act" in answer.reasons) == (word == "unexplained")

@@ -110,8 +110,8 @@ def starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Itera
             if odd and not (here > 0 and _was_hot(one, c.name, here, recordings)):
                 read = one.known(c.name)[1]
                 side = "above" if here > 0 else "below"
-                beside = [n for r, n in away if r == one.name and n != c.name]
-                alike = "the other temperatures, which agree" if siblings > 1 else f"'{beside[0]}'"
+                rest = [n for r, n in away if r == one.name and n != c.name]
+                alike = "the other temperatures, which agree" if siblings > 1 else f"'{rest[0]}'"
                 what = (
                     f"'{c.name}' starts at {np.median(read[:5]):.3g} degC, {abs(here):.3g} K {side} {alike}"
                 )
