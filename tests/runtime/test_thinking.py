@@ -141,11 +141,10 @@ def test_another_process_gives_the_same_answer(
     hours(session, minutes, 0, 14)
     with other_process() as other:
         asked = other.submit(answer, thinking.asked[0])
-        began, longest = time.perf_counter(), 0.0
+        began, ticks = time.perf_counter(), 0
         while not asked.done():  # ticks of this process meanwhile
-            before = time.perf_counter()
             session.compensator.tick({}, 15 * HOUR)
-            longest = max(longest, time.perf_counter() - before)
-            assert before - began < 120.0
+            ticks += 1
+            assert time.perf_counter() - began < 120.0
     assert asked.result()[0].odds == pytest.approx(answer(thinking.asked[0])[0].odds)
-    assert longest < 0.5  # s; the comparison itself takes longer than a tick of a second may
+    assert ticks > 10  # a tick that waits for the comparison is the only one until its end
