@@ -1,7 +1,7 @@
 """Sizes that key and diagnosis measure alike: amplitude of the diagnosis in the unit of the key.
 
 The plant is finer than the model and its exponents differ, so a true value exists only where the formula is
-linear in the same product; powers of the speed are compared at 600 rpm.
+linear in the same product; powers of the speed are compared at the top speed of the machine.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-REFERENCE = 600.0 / 1000.0  # the plant counts speed in 600 rpm, the catalogue in 1000 rpm
+CATALOGUE = 1000.0  # rpm in which laws of the catalogue count speed
 
 # effect -> how the name of the compared parameter begins, whether a power m of the speed is in the formula
 COMPARED: Mapping[str, tuple[str, bool]] = {
@@ -53,5 +53,7 @@ def covered(key: Mapping[str, Any], named: Mapping[str, Any]) -> bool | None:
         exponent = next(
             (p["value"] for name, p in parameters.items() if name == "m" or name.startswith("m_")), None
         )
-        factor = REFERENCE ** float(exponent) if exponent is not None else 1.0
+        if exponent is None or "top_speed" not in key:
+            return None
+        factor = (key["top_speed"] / CATALOGUE) ** float(exponent)
     return bool(entry["low"] * factor <= key["size"] <= entry["high"] * factor)

@@ -178,6 +178,7 @@ def _identity(world: World, effect: Effect, at: Place, size: float, shapes: Shap
     key: Key = {"effect": effect.word, "states": [] if of_output else list(at)}
     key |= {"output": at[0]} if of_output else {}
     key |= {"size": size, "unit": effect.unit}
+    key |= {"top_speed": world.machine.words.top_speed} if world.machine.words.speed else {}  # rpm
     key |= {"also": list(effect.also)} if effect.also else {}
     accepts = list(effect.accepts)
     if effect.word == "second_thermal_mass" and shapes.values["cells"] >= 2.5:

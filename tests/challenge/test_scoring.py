@@ -172,8 +172,8 @@ def test_overlap_of_windows() -> None:
 
 
 def test_sizes_are_compared_in_one_unit() -> None:
-    """100 W at 600 rpm with an exponent of 2 are 277.8 W at 1000 rpm."""
-    key = {"effect": "friction_speed", "size": 100.0, "unit": "W"}
+    """100 W at a top speed of 600 rpm with an exponent of 2 are 277.8 W at 1000 rpm."""
+    key = {"effect": "friction_speed", "size": 100.0, "unit": "W", "top_speed": 600.0}
 
     def found(low: float, high: float) -> dict[str, Any]:
         size = {"value": (low + high) / 2, "low": low, "high": high, "unit": "W"}
@@ -181,6 +181,8 @@ def test_sizes_are_compared_in_one_unit() -> None:
 
     assert covered(key, found(270.0, 285.0)) is True
     assert covered(key, found(90.0, 110.0)) is False
+    assert covered({**key, "top_speed": 6000.0}, found(2.5, 3.0)) is True
+    assert covered({"effect": "friction_speed", "size": 100.0}, found(270.0, 285.0)) is None
     assert covered({"effect": "radiation", "size": 1.0}, {"effect": "radiation"}) is None
     assert covered(key, {"effect": "friction_speed"}) is None
 
