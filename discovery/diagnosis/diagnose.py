@@ -81,13 +81,15 @@ class Diagnosis:
     def interval(self, h: Hypothesis, name: str) -> tuple[float | None, float | None]:
         """95 % interval of a parameter of a named effect.
 
-        It covers the interval of the diagnosis and that of the fitted repaired model, which may differ. Each
-        is wider than in its fit, because the form of the law may be slightly wrong.
+        It covers the interval under the noise of the diagnosis, that next to effects which are not sure, and
+        that of the fitted repaired model: they may differ. Each is wider than in its fit, because the form of
+        the law may be slightly wrong.
         """
         assert self.after is not None
         p = self.after.model.parameters[name]
         wider = thresholds.FORM * abs(p.value) if h.effect.is_physics and name in h.amplitudes else 0.0
-        known = [s for s in (self.alone.interval(name), (p.low, p.high)) if s and None not in s]
+        every = (self.alone.interval(name), self.verdict.answer.interval(name), (p.low, p.high))
+        known = [s for s in every if s and None not in s]
         lows = [p.value - np.hypot(p.value - s[0], wider) for s in known if s[0] is not None]
         highs = [p.value + np.hypot(s[1] - p.value, wider) for s in known if s[1] is not None]
         low, high = min(lows, default=None), max(highs, default=None)

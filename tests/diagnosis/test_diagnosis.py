@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -121,6 +122,12 @@ def test_a_size_lies_within_the_intervals_of_both_fits() -> None:
     assert low <= min(own[0], p.low)
     assert high >= max(own[1], p.high)
     assert low < p.value < high
+    unsure = SimpleNamespace(interval=lambda _: (0.5 * low, 2.0 * high))  # of a model with more effects
+    wider = replace(found, verdict=replace(found.verdict, answer=unsure)).interval(h, size)  # type: ignore[arg-type]
+    assert wider[0] is not None
+    assert wider[1] is not None
+    assert wider[0] <= 0.5 * low
+    assert wider[1] >= 2.0 * high
 
 
 def test_a_device_set_to_zero_is_named_where_it_jumps() -> None:
