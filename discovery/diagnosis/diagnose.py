@@ -172,12 +172,10 @@ def diagnose(
     tell("fitting the baseline and its noise")
     context = make_context(seen, model, fit, outputs, entries, _after(campaign, fit))
     tell("scoring the catalogue")
-    found = Search(context, lambda what: tell(f"found so far: {what}")).run()
-    other = with_noise_of(context, found.best.fit)
-    change = np.log(np.array(other.white.white) / np.array(context.white.white))
-    if found.best.hypotheses and np.max(np.abs(change)) > ANOTHER_NOISE:
-        tell("repeating with the reading noise of the answer")
-        context, found = other, found.again(other)
+    found = Search(context, lambda what: tell(f"found so far: {what}")).grow()
+    for _ in range(2):  # each answer is questioned under the reading noise that it leaves
+        context, found = _under_own_noise(context, found, tell)
+        found.run()
     tell("weighing the answers")
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
     tell("proving in free runs")
@@ -230,6 +228,16 @@ def diagnose(
         seconds=clock.perf_counter() - began,
         own=mine,
     )
+
+
+def _under_own_noise(context: Context, found: Search, tell: Callable[[str], None]) -> tuple[Context, Search]:
+    """Context and search under the reading noise that the best model leaves, where it is another one."""
+    other = with_noise_of(context, found.best.fit)
+    change = np.log(np.array(other.white.white) / np.array(context.white.white))
+    if not found.best.hypotheses or np.max(np.abs(change)) <= ANOTHER_NOISE:
+        return context, found
+    tell("repeating with the reading noise of the answer")
+    return other, found.under(other)
 
 
 def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]:

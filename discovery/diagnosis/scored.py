@@ -72,6 +72,13 @@ class Scored:
         return self.fit.model
 
     @property
+    def acts(self) -> bool:
+        """Whether its effects act: one that presses against zero does not, and at the end of the range of its
+        shape another law does.
+        """
+        return not self.outside and not (self.sizes < 0).any()
+
+    @property
     def prior(self) -> float:
         """Log prior odds of its effects, of the instants of its events, and of a latent force."""
         unknown = self.log_odds_force if self.forced else 0.0
@@ -135,7 +142,7 @@ class Scored:
     def drawn(self, k: int, weights: Array | None = None, widths: Sequence[float] = (1.0,)) -> Array:
         """(W, D) `level` under a noise setting for many draws at once; arguments as in `Grams.marginal`."""
         finite = np.isfinite(self.grams[k].rows.logdet).all()  # under this noise, too
-        if self.outside or not finite or (self.sizes < 0).any():  # what presses against zero does not act
+        if not self.acts or not finite:
             return np.full((len(widths), 1 if weights is None else len(weights)), -inf)
         forms = self.grams[k].marginals(self.sizes, self._own_forms, weights, widths)
         level, step, covariance = (np.array(one) for one in zip(*forms, strict=True))
@@ -244,7 +251,8 @@ def _over_noise(
     kept = {start: tried(start)}
     # something of unknown cause leaves less to what is always there: if that does not reach the goal, the
     # other neighbours are not asked
-    for less in (True, False) if forces else (False,):
+    rounds = (True, False) if forces else (False,)
+    for less in rounds if bare.acts else ():  # what does not act is so under every noise
         kept = _walked(kept, partial(near, less), tried, goal)
         if max(float(one.evidence) for one in kept.values()) < goal:
             break

@@ -68,19 +68,24 @@ class Search:
 
     def run(self) -> Search:
         """Search from the most likely model that was tried, or from the baseline."""
-        if not self.tried:
-            first = score(self.context, (), self.context.usual)
-            assert first is not None  # the context has fitted it
-            self.keep(first)
-        current = self.best
+        current = self.grow().best
         while True:
             start = current.keys
             current = self._questioned(self._grown(current))
             if current.keys == start or len(current.hypotheses) >= MOST:
                 return self
 
-    def again(self, context: Context) -> Search:
-        """Repeat the search under another noise: score the tried models again, and continue."""
+    def grow(self) -> Search:
+        """Add effects to the most likely model that was tried, or to the baseline, and question none."""
+        if not self.tried:
+            first = score(self.context, (), self.context.usual)
+            assert first is not None  # the context has fitted it
+            self.keep(first)
+        self._grown(self.best)
+        return self
+
+    def under(self, context: Context) -> Search:
+        """The search under another noise: the tried models that are not far below the best, scored again."""
         best = self.best.evidence
         other = Search(context, self.tell, first=self.claims)
         near = [one for one in self.tried.values() if not one.hypotheses or one.evidence > best - FAR]
@@ -90,7 +95,7 @@ class Search:
 
         for one in side_by_side(under_it, near):
             other.keep(one)
-        return other.run()
+        return other
 
     def keep(self, one: Scored) -> Scored:
         """Store a refit if no refit of the same effects is better."""

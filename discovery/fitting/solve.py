@@ -28,7 +28,8 @@ _DAMPING = 1e-4  # of the first step, relative to the diagonal of the normal equ
 _EASE, _TIGHTEN = 0.1, 5.0  # factors of the damping after a step that is taken, or refused
 _HOPELESS = 1e10  # damping at which no shorter step helps any more
 _STILL = 1e-11  # relative change of the unknowns below which the search has ended
-_PACE = 4  # steps whose mean gain says whether a search comes near its goal
+_SETTLED = 2  # steps after which the linear look says whether a search comes near its goal ...
+_TIMES = 10.0  # ... if it would not by so many times what that look expects
 _FAR = 0.5  # what a step has to take off the cost for the whitening filters to be made anew behind it
 
 
@@ -80,8 +81,8 @@ def solve(
         max_rounds: of linearisation.
         tolerance: relative change of the cost that ends the search.
         together: readings that count as one against the priors (`Problem.prior_rows`).
-        goal: the cost that is good enough to matter: a search that would not reach it at the pace of its last
-            steps ends.
+        goal: the cost that is good enough to matter: a search ends that is far from it by all that the linear
+            look expects.
         last: where the same problem ended under another noise or other priors; what stands there is used.
         runs: free runs at `theta`, where they are known.
 
@@ -100,14 +101,19 @@ def solve(
     cost, damping = _cost(now.residual, loss), _DAMPING
     slopes = known.slopes if known else _slopes(problem, runs)
     jacobian = _jacobian(problem, x, noise, together, now, filters, slopes)
-    course, done, late = [cost], len(x) == 0, False
-    for left in range(max_rounds if len(x) else 0, 0, -1):
+    done, late = len(x) == 0, False
+    for taken in range(max_rounds if len(x) else 0):
         gram, gradient = _normal(jacobian, now.residual, len(x), loss)
+        if goal < inf and taken >= _SETTLED:
+            whole = _step(x, gram, gradient, 0.0, low, high)
+            late = cost - _TIMES * _expected(whole, gram, gradient) > goal
+            if late:
+                break
         found = None
         while damping < _HOPELESS:
             moved = np.clip(x + _step(x, gram, gradient, damping, low, high), low, high)
             change = moved - x
-            expected = -float(gradient @ change) - 0.5 * float(change @ gram @ change)
+            expected = _expected(change, gram, gradient)
             if np.all(np.abs(change) <= _STILL * (1.0 + np.abs(x))):
                 break
             try:
@@ -135,9 +141,7 @@ def solve(
         cost = _cost(now.residual, loss)
         slopes = _slopes(problem, now.trajectories)
         jacobian = _jacobian(problem, x, noise, together, now, filters, slopes)
-        course.append(cost)
-        late = len(course) > _PACE and cost - left * (course[-1 - _PACE] - cost) / _PACE > goal
-        if done or late:
+        if done:
             break
     square = float(now.residual @ now.residual)
     gram = _normal(jacobian, now.residual, len(x), "linear")[0]
@@ -208,6 +212,11 @@ def _normal(jacobian: Jacobian, residual: Array, unknowns: int, loss: Loss) -> t
         gram[np.ix_(acting, acting)] += weighted.T @ weighted
         done = here.stop
     return gram, gradient
+
+
+def _expected(change: Array, gram: Array, gradient: Array) -> float:
+    """What a step takes off the cost, if residuals move in straight lines."""
+    return -float(gradient @ change) - 0.5 * float(change @ gram @ change)
 
 
 def _step(x: Array, gram: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:

@@ -60,6 +60,21 @@ def test_heat_that_nobody_records_says_nothing_of_the_flows() -> None:
     assert wetted().coarse < 0.5
 
 
+def test_what_does_not_act_is_scored_once() -> None:
+    """Its evidence is none under every noise."""
+    one = scored(dry(), wetted().hypotheses, wetted().fit)
+    index = [u.name for u in one.fit.problem.unknowns].index(one.hypotheses[0].amplitudes[0])
+    low, _ = one.fit.problem.bounds
+    theta = one.fit.theta.copy()
+    theta[index] = low[index]
+    none = scored(dry(), one.hypotheses, replace(one.fit, theta=theta))
+    assert one.acts
+    assert len(one.settings) > 1
+    assert not none.acts
+    assert len(none.settings) == 1
+    assert none.evidence == -np.inf
+
+
 def test_an_interval_is_of_95_percent() -> None:
     one = wetted()
     (name,) = one.hypotheses[0].amplitudes

@@ -149,8 +149,8 @@ def test_outliers_pull_less_with_a_robust_loss() -> None:
 
 def test_a_fit_that_will_not_come_near_its_goal_ends_early(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the heat a model cannot reach what the whole one leaves. With a goal in reach, the end is the
-    same as without one. One step is enough here to judge the pace: so simple a fit takes few."""
-    monkeypatch.setattr("discovery.fitting.solve._PACE", 1)
+    same as without one. One step is enough here to judge: so simple a fit takes few."""
+    monkeypatch.setattr("discovery.fitting.solve._SETTLED", 1)
     r = campaign(recording(3))
     poor = replace(model(g=Parameter(0.0, fixed=True)), terms=model().terms[::2])
     whole = fit_model(model(), r, ["r3"])
