@@ -268,19 +268,26 @@ def _interval_means(ends: Value) -> Value:
     return 0.5 * (ends[0::2] + ends[1::2]) if isinstance(ends, np.ndarray) and ends.ndim else float(ends)
 
 
+def _least(ends: Value) -> Value:
+    """The smaller of both ends of each interval (K,) of a series at its ends (2K,)."""
+    return np.minimum(ends[0::2], ends[1::2]) if isinstance(ends, np.ndarray) and ends.ndim else float(ends)
+
+
 def flows(trajectory: Trajectory) -> Array:
     """Size (K, n) of the flow through each state in each interval: the root of its summed squared terms.
 
-    In W at a body, otherwise in the unit of the state per time unit.
+    In W at a body, otherwise in the unit of the state per time unit. A term counts with the smaller of its
+    sizes at both ends: a gap between two bodies that are as good as one closes within an interval, and what
+    flows at its beginning, megawatts if the joint is stiff enough, moves next to no heat.
     """
     system = trajectory.system
     squares = np.zeros((len(system.grid.step), len(system.states)))
     found = _term_rates(system, trajectory.values, trajectory.x)
     for dual, i, j in zip(found, system.into, system.source, strict=True):
-        mean = _interval_means(np.square(dual.value))
-        squares[:, i] += mean
+        lasting = _least(np.square(dual.value))
+        squares[:, i] += lasting
         if j >= 0:
-            squares[:, j] += mean
+            squares[:, j] += lasting
     return np.sqrt(squares)
 
 

@@ -10,7 +10,9 @@ from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import make_context
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
+from discovery.dynamics import make_grid, make_system, simulate
 from discovery.effects.catalogue import catalogue
+from discovery.evidence.process_noise import flow_sizes
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -70,6 +72,28 @@ def best(*seeds: int) -> Scored:
     after = {run: tuple(names[k:]) for k, run in enumerate(names)}
     effects = [e for e in catalogue().values() if e.word in WORDS]
     return Search(make_context(seen, model, names, ("coil", "frame"), effects, after)).run().best
+
+
+@pytest.mark.parametrize("g", [1e3, 1e5, 1e7])
+def test_a_joint_as_good_as_rigid_is_no_larger_flow(g: float) -> None:
+    """Two halves of a coil that begin 1 K apart are as warm within seconds. What flows between them then is
+    what heats the second half, half of the heat; `g` times 1 K at first would be the largest flow by far.
+    """
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "coil": Channel("coil", "temperature", "degC", 0.01, "linear"),
+    }
+    time, power = STEP * np.arange(600.0), np.repeat([0.0, 400.0, 100.0], 200)
+    read = Recording("r", time, {"P": power, "coil": np.full(600, 22.0)})
+    campaign = Campaign("halves", channels, {"r": read})
+    terms = (Term("power", "coil", parse("P")), Term("joint", "coil", parse("G*(core - coil)"), "core"))
+    states = {n: State(n, "degC", 4000.0, parse("22"), 0.3, 1 / 4000.0) for n in ("coil", "core")}
+    model = Model("halves", {"G": Parameter(g, "W/K")}, states, terms, {})
+    system = make_system(model, make_grid(campaign, "r", ["P"], ["coil"]))
+    found = flow_sizes([simulate(system, {"G": g}, np.array([23.0, 22.0]))])
+    heat = np.sqrt(np.mean(power**2))
+    assert found["core"] == pytest.approx(heat / 2, rel=0.02)
+    assert found["coil"] == pytest.approx(np.hypot(heat, heat / 2), rel=0.02)
 
 
 def test_laws_that_are_off_for_minutes_are_no_event(monkeypatch: pytest.MonkeyPatch) -> None:
