@@ -96,7 +96,7 @@ def dense(trajectory: Trajectory, noise: Noise) -> Array:
 
 
 def sizes_of_flows(trajectory: Trajectory) -> Array:
-    """Root of the sum of squares of what flows through each body, (K, 2), each term the smaller of its ends."""
+    """Root of the sum of squares of what flows through each body, (K, 2), each term at its smaller end."""
     ends = {name: np.asarray(series) for name, series in trajectory.at_ends().items()}
     link, air = 20.0 * (ends["b"] - ends["a"]), 6.0 * (ends["T"] - ends["b"])
 
