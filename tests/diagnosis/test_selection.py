@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
-from discovery.diagnosis.selection import not_twice
+import pytest
+
+from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.selection import FAR, Search, not_twice
+from tests.diagnosis.parts import dry
 
 
 def claim(*amplitudes: str) -> SimpleNamespace:
@@ -20,3 +25,30 @@ def test_two_effects_never_share_a_size() -> None:
     pool = [claim("jet_b", "jet_c"), claim("jet_c", "jet_d"), claim("lag")]
     assert not_twice(pool, [first]) == pool[1:]  # type: ignore[arg-type, list-item]
     assert not_twice(pool, []) == pool  # type: ignore[arg-type]
+
+
+def test_what_grew_is_questioned_under_another_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Growing questions nothing. Under another noise the models that matter are scored again, and the search
+    goes on from the best of them.
+    """
+    asked: list[tuple[Search, Scored]] = []
+
+    def questioned(search: Search, current: Scored) -> Scored:
+        asked.append((search, current))
+        return current
+
+    monkeypatch.setattr(Search, "_questioned", questioned)
+    grown = Search(dry()).grow()
+    assert asked == []
+    assert grown.best.hypotheses[0].effect.word == "fluid_convection"
+    settings = dry().settings
+    louder = replace(settings.white, white=tuple(1.3 * w for w in settings.white.white))
+    other = grown.under(replace(dry(), settings=replace(settings, white=louder)))
+    kept = {key for key, one in grown.tried.items() if not key or one.evidence > grown.best.evidence - FAR}
+    assert other.tried.keys() == kept
+    assert other.best.noise.white == louder.white
+    assert other.best.fit is grown.tried[other.best.keys].fit  # not fitted again
+    other.run()
+    search, current = asked[0]
+    assert search is other
+    assert "fluid_convection" in {h.effect.word for h in current.hypotheses}
