@@ -22,7 +22,7 @@ from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
 from discovery.diagnosis.scored import Scored, with_unknown
 from discovery.diagnosis.selection import Search
-from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, decide
+from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
 from discovery.diagnosis.withdrawal import idle, refuted, runs_away, unfinished, unforeseen
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
@@ -33,6 +33,7 @@ from discovery.evidence import late, noisy
 from discovery.evidence.latent_force import Force, latent_forces
 from discovery.fitting import Fit, fit_model
 from discovery.models import Model
+from discovery.models.units import differences
 from discovery.recordings import Campaign
 from discovery.threads import one_thread
 
@@ -295,6 +296,18 @@ def _gain(context: Context, answer: Scored, seen: Campaign, before: Fit, after: 
     return found.explained / size_of(seen, answer.noise)
 
 
+def _set_aside(context: Context) -> list[str]:
+    """A sentence on single wrong readings, if there are any."""
+    if not (wrong := context.outliers):
+        return []
+    o = max(wrong, key=lambda one: abs(one.size / one.noise))
+    unit = differences(context.campaign.channels[o.output].unit)
+    what = f"{o.output} is off by {o.size:+.3g} {unit} in '{o.recording}' at {o.time:.0f} s"
+    if len(wrong) == 1:
+        return [f"a single wrong reading is set aside: {what}"]
+    return [f"{len(wrong)} single wrong readings are set aside; the worst: {what}"]
+
+
 def _reasons(
     context: Context,
     verdict: Verdict,
@@ -311,6 +324,8 @@ def _reasons(
         said.append(
             f"the readings of {idle_readings} take no part: list them under `outputs` of the experiment"
         )
+    if verdict.word != FAULT:  # there, they are part of the answer
+        said += _set_aside(context)
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
     if verdict.word == UNEXPLAINED:  # what a fit finds of its inputs may stand for the unknown cause

@@ -220,6 +220,24 @@ def test_a_single_wrong_reading_is_a_fault_of_the_measuring_chain(size: float) -
     assert value["value"] == pytest.approx(size, rel=0.2)
 
 
+@pytest.mark.parametrize(
+    ("offs", "said"), [((-40.0,), "a single"), ((-40.0, 15.0), "2 single")]
+)
+def test_single_wrong_readings_are_told_next_to_what_is_missing(offs: tuple[float, ...], said: str) -> None:
+    one, other = simulated(1), simulated(2)
+    wrong = other.values["E_Z"].copy()
+    places = np.flatnonzero(np.isfinite(wrong))[[40, 90]]
+    for at, off in zip(places, offs, strict=False):
+        wrong[at] += off
+    found = document(diagnose(model(wet=False), campaign(one, changed(other, E_Z=wrong)), ["r1", "r2"]))
+    assert [p["effect"] for p in found["physics"]] == ["fluid_convection"]
+    (told,) = (r for r in found["reasons"] if "wrong reading" in r)
+    assert told.startswith(said)
+    assert f"in 'r2' at {other.time[places[0]]:.0f} s" in told
+    (size,) = re.findall(r"E_Z is off by (\S+) um", told)
+    assert float(size) == pytest.approx(-40.0, rel=0.2)
+
+
 def small_heat(seed: int) -> Callable[[float, Array, Inputs], tuple[float, float, float]]:
     """First-order random heat of 3 W rms and three hours at the motor and at the bed."""
     rng = np.random.default_rng(1000 + seed)
