@@ -220,9 +220,7 @@ def test_a_single_wrong_reading_is_a_fault_of_the_measuring_chain(size: float) -
     assert value["value"] == pytest.approx(size, rel=0.2)
 
 
-@pytest.mark.parametrize(
-    ("offs", "said"), [((-40.0,), "a single"), ((-40.0, 15.0), "2 single")]
-)
+@pytest.mark.parametrize(("offs", "said"), [((-40.0,), "a single"), ((-40.0, 15.0), "2 single")])
 def test_single_wrong_readings_are_told_next_to_what_is_missing(offs: tuple[float, ...], said: str) -> None:
     one, other = simulated(1), simulated(2)
     wrong = other.values["E_Z"].copy()
