@@ -108,6 +108,7 @@ def make_context(
     outputs: Sequence[str],
     effects: Sequence[Effect],
     after: Mapping[str, tuple[str, ...]],
+    begin: Fit | None = None,
 ) -> Context:
     """Fit the baseline to all recordings together and find the noise levels for the tests.
 
@@ -115,6 +116,7 @@ def make_context(
 
     Args:
         after: by recording, those of the whole campaign that were made then or later.
+        begin: a fit of the same model to the same recordings.
     """
     inputs = recorded_inputs(campaign, recordings, outputs)
     whole = {r: make_grid(campaign, r, inputs, outputs, coarse=NODES, most=2 * NODES) for r in recordings}
@@ -125,7 +127,7 @@ def make_context(
         return fit_model(model, campaign, recordings, outputs, grids=grids, belief=belief, begin=begin)
 
     grids = thinned(whole)
-    fit = fitted(grids)
+    fit = fitted(grids, begin)
     whole = perhaps_late(fit, campaign, whole, thresholds.SHORT)
     if any(g.unsure for g in whole.values()):
         grids = thinned(whole)

@@ -171,7 +171,8 @@ def diagnose(
     entries = [*(e for e in catalogue().values() if e.word not in own), *effects]
     seen = replace(campaign, recordings={r: campaign.recordings[r] for r in fit})  # nothing else can leak in
     tell("fitting the baseline and its noise")
-    context = make_context(seen, model, fit, outputs, entries, _after(campaign, fit))
+    before = fitted or fit_model(model, seen, fit, outputs, minima=True)
+    context = make_context(seen, model, fit, outputs, entries, _after(campaign, fit), before)
     tell("scoring the catalogue")
     found = Search(context, lambda what: tell(f"found so far: {what}")).grow()
     for _ in range(2):  # each answer is questioned under the reading noise that it leaves
@@ -180,7 +181,6 @@ def diagnose(
     tell("weighing the answers")
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
     tell("proving in free runs")
-    before = fitted or fit_model(model, seen, fit, outputs)
     whole = _repaired(context, found.best, found.best.hypotheses, model, seen)
     verdict = decide(context, found, chances, _gain(context, found.best, seen, before, whole))
     named = [n.hypothesis for n in verdict.named]

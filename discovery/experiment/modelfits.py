@@ -105,7 +105,7 @@ def fit_of(
     loss: Loss = getattr(entry, "loss", "linear")
 
     def fitted(some: Model) -> Fit:
-        return fit_model(some, campaign, recordings, given, loss=loss, max_rounds=max_rounds)
+        return fit_model(some, campaign, recordings, given, loss=loss, max_rounds=max_rounds, minima=True)
 
     fit = fitted(model)
     if isinstance(entry, FileEntry):

@@ -19,6 +19,9 @@ from discovery.terms import names
 Array = NDArray[np.float64]
 
 _BEGINS = 0.05  # of what a state moves in a recording, how far from its start it may begin
+_APART, _SEVERAL = 0.7, 5  # of logarithms of sizes: how far other beginnings are, and how many are drawn
+_LOOK, _ROUGHLY = 15, 1e-3  # steps from each of them, and the relative change of the cost that ends them
+_CLEARLY = 10.0  # by which the cost of another minimum has to be smaller
 _SMALL = 0.01  # of the spread of readings: the least noise to begin with, where none is stated
 
 
@@ -42,6 +45,41 @@ def gains_first(
     except RunsAwayError:
         return theta, runs
     return found.theta, found.trajectories
+
+
+def another_minimum(
+    problem: Problem, theta: Array, cost: float, noise: Noise, together: float
+) -> dict[str, float] | None:
+    """Parameters from which a fit comes clearly below a minimum that it has found; None if there are none.
+
+    A model of several bodies has several minima: one path between bodies at zero, and another one too large.
+    Steps are taken from its start values, a third and three times of them, and each within a factor of two of
+    its own (drawn with a fixed seed), under the noise that the fit has found. A beginning that cannot come
+    below ends early.
+
+    Args:
+        theta: (U,) the minimum.
+        cost: there.
+        together: as in `solve`.
+    """
+    free = [u.prior is None and u.low < u.high and not u.is_nuisance for u in problem.unknowns]
+    if sum(free) < 2:
+        return None
+    start = np.array([u.start for u in problem.unknowns])
+    draws = np.random.default_rng(0).normal(0.0, _APART, (_SEVERAL, len(theta)))
+    low, high = problem.bounds
+    best, least = None, cost - _CLEARLY
+    for log in [np.zeros(len(theta)), *(np.full(len(theta), side * np.log(3.0)) for side in (-1, 1)), *draws]:
+        place = np.clip(np.where(free, start * np.exp(log), theta), low, high)
+        try:
+            found = solve(problem, place, noise, "linear", _LOOK, _ROUGHLY, together, least)
+        except RunsAwayError:
+            continue
+        if found.cost < least:
+            best, least = found.theta, found.cost
+    if best is None:
+        return None
+    return {u.name: float(x) for u, x, f in zip(problem.unknowns, best, free, strict=True) if f}
 
 
 def _gains(model: Model) -> set[str]:

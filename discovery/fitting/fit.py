@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
 from discovery.errors import RunsAwayError
-from discovery.fitting.begin import first_noise, first_spreads, gains_first
+from discovery.fitting.begin import another_minimum, first_noise, first_spreads, gains_first
 from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.kalman import innovations
 from discovery.fitting.noise import Noise, readings_as_one, resolution, white_noise
@@ -142,6 +142,7 @@ def fit_model(
     max_rounds: int = 60,
     tolerance: float = 1e-9,
     goal: float = inf,
+    minima: bool = False,
 ) -> Fit:
     """Fit the free parameters and start values of a model to recordings.
 
@@ -167,6 +168,7 @@ def fit_model(
         max_rounds: of Levenberg-Marquardt.
         tolerance: relative change of the cost that ends them.
         goal: the cost that is good enough to matter; a fit that would not reach it ends early.
+        minima: look for a better minimum from other values, too.
 
     Returns:
         The fit. `model` has the fitted values with 95 % intervals, `residuals()` gives readings minus model
@@ -221,6 +223,16 @@ def fit_model(
         if settled and solution.converged:
             break
     assert solution is not None
+    other = (
+        another_minimum(problem, theta, solution.cost, current, together)
+        if minima and loss == "linear"
+        else None
+    )
+    if other is not None:
+        further: dict[str, Any] = {"noise": noise, "loss": loss, "grids": grids, "priors": priors}
+        limits: dict[str, Any] = {"belief": belief, "max_rounds": max_rounds, "tolerance": tolerance}
+        better = fit_model(model, campaign, recordings, outputs, guess=other, **further, **limits)
+        return replace(better, seconds=clock.perf_counter() - began)
     excess = _excess(problem, solution) if noise is None and loss == "linear" else 1.0
     covariance, lost = _covariance(problem, solution, together, excess)
     fit = Fit(
