@@ -181,8 +181,8 @@ def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
         most = f" to {found[high][0]:+.2g} {unit} in '{high}'" if high != low else ""
         notes.append(
             f"{name} is known within {channels[name].spread:.3g} {unit}; estimated offset: "
-            f"{found[low][0]:+.2g} {unit} in '{low}'{most}; a held-out recording begins with the mean of "
-            "these, and only its first reading corrects it"
+            f"{found[low][0]:+.2g} {unit} in '{low}'{most}; in a held-out recording, only the first "
+            "reading is used to estimate it"
         )
     return notes
 

@@ -79,14 +79,13 @@ class Fit:
 
     @property
     def zeros(self) -> dict[str, tuple[float, float]]:
-        """Of each output with a zero of its own in each recording, and of each input known only within a
-        spread: its mean and spread in another one.
+        """Of each output with a zero of its own in each recording: its mean and spread in another one.
 
         A mixture: recordings of the fit count once each, the spread that they show as one part of their
         number.
         """
         found = {}
-        for name in self.offsets:
+        for name in {*self.offsets}.intersection(self.problem.outputs):
             shown = max(
                 u.prior[1] for u in self.problem.unknowns if u.is_offset and u.name == name and u.prior
             )

@@ -109,7 +109,7 @@ def test_what_may_stand_for_an_unknown_cause_is_not_said(
     monkeypatch.setattr(module.late, "sentences", lambda _: ["late"])
     monkeypatch.setattr(module.noisy, "sentences", lambda *_: [])
     monkeypatch.setattr(module, "not_offered", lambda *_: [])
-    context = SimpleNamespace(unused_readings=[], model=None, scene=None)
+    context = SimpleNamespace(unused_readings=[], model=None, scene=None, outliers=())
     answer = SimpleNamespace(fit=None, noise=None)
     assert module._reasons(context, SimpleNamespace(word=word, answer=answer), [], {}, [], []) == said
 
