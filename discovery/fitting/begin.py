@@ -62,7 +62,8 @@ def another_minimum(
         cost: there.
         together: as in `solve`.
     """
-    free = [u.prior is None and u.low < u.high and not u.is_nuisance for u in problem.unknowns]
+    common = [u for u in problem.unknowns if u.recording is None and u.prior is None and not u.is_nuisance]
+    free = [u in common and u.low < u.high for u in problem.unknowns]
     if sum(free) < 2:
         return None
     start = np.array([u.start for u in problem.unknowns])

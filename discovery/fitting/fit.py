@@ -231,7 +231,8 @@ def fit_model(
         further: dict[str, Any] = {"noise": noise, "loss": loss, "grids": grids, "priors": priors}
         limits: dict[str, Any] = {"belief": belief, "max_rounds": max_rounds, "tolerance": tolerance}
         better = fit_model(model, campaign, recordings, outputs, guess=other, **further, **limits)
-        return replace(better, seconds=clock.perf_counter() - began)
+        if _unlikely(better.problem, better.cost, better.noise) < _unlikely(problem, solution.cost, current):
+            return replace(better, seconds=clock.perf_counter() - began)
     excess = _excess(problem, solution) if noise is None and loss == "linear" else 1.0
     covariance, lost = _covariance(problem, solution, together, excess)
     fit = Fit(
@@ -253,6 +254,12 @@ def fit_model(
     ends: dict[str, Any] = {"max_rounds": max_rounds, "tolerance": tolerance, "goal": goal}
     again = fit_model(model, campaign, recordings, outputs, grids=finer, begin=fit, **options, **ends)
     return replace(again, seconds=clock.perf_counter() - began)
+
+
+def _unlikely(problem: Problem, cost: float, noise: Noise) -> float:
+    """-log likelihood of a fit, up to a constant; its reading noise may be estimated."""
+    grids = [system.grid for system in problem.systems]
+    return cost + sum(float(np.sum(np.log(g.sd(noise.white)[g.measured]))) for g in grids)
 
 
 def _covariance(
