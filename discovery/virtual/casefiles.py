@@ -30,6 +30,7 @@ def case_files(title: str, world: World, logs: Mapping[str, Columns], *, stated:
         "experiment.toml": {
             "name": title,
             "campaign": "campaign.toml",
+            "outputs": list(machine.outputs),  # thermometers of bodies, too: by default it is errors only
             "fit": list(FIT),
             "held_out": [r for r in RECORDINGS if r not in FIT],
             "models": {"baseline": {"file": "baseline.toml"}},

@@ -1,14 +1,18 @@
 """What every family promises, and what every effect does to every machine that can have it."""
 
+import tomllib
 from dataclasses import replace
 from functools import reduce
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from discovery.models import read_model, write_model
+from discovery.virtual.casefiles import case_files
 from discovery.virtual.effects import EFFECTS, OUTSIDE, Effect, Shapes
 from discovery.virtual.families import FAMILIES
 from discovery.virtual.log import observe, reading_instants
@@ -51,6 +55,14 @@ def test_a_baseline_is_a_model_file(family: str, tmp_path: Path) -> None:
     for body, bar in m.bodies.items():
         assert read.states[body].capacity == pytest.approx(bar.capacity, rel=1e-3)
         assert sum(m.network.nodes[node] for node in bar.nodes) == pytest.approx(bar.capacity)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_case_asks_for_all_readings_that_its_key_counts(family: str) -> None:
+    """A fault of a thermometer, or an effect that shows in one, is in a case that reads it."""
+    world: Any = SimpleNamespace(machine=machine_of(family), origins=None, noise=1.0)
+    experiment = tomllib.loads(case_files("a case", world, {}, stated=True)["experiment.toml"].decode())
+    assert tuple(experiment["outputs"]) == world.machine.outputs
 
 
 @pytest.mark.parametrize("family", FAMILIES)
