@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from discovery.fitting.problem import Problem
 from discovery.fitting.solve import solve
 from discovery.models import Model
 from discovery.terms import names
+from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -69,16 +71,18 @@ def another_minimum(
     start = np.array([u.start for u in problem.unknowns])
     draws = np.random.default_rng(0).normal(0.0, _APART, (_SEVERAL, len(theta)))
     low, high = problem.bounds
-    best, least = None, cost - _CLEARLY
-    for log in [np.zeros(len(theta)), *(np.full(len(theta), side * np.log(3.0)) for side in (-1, 1)), *draws]:
+    begins = [np.zeros(len(theta)), *(np.full(len(theta), side * np.log(3.0)) for side in (-1, 1)), *draws]
+
+    def ended(log: Array) -> tuple[float, Array]:
         place = np.clip(np.where(free, start * np.exp(log), theta), low, high)
         try:
-            found = solve(problem, place, noise, "linear", _LOOK, _ROUGHLY, together, least)
+            found = solve(problem, place, noise, "linear", _LOOK, _ROUGHLY, together, cost - _CLEARLY)
         except RunsAwayError:
-            continue
-        if found.cost < least:
-            best, least = found.theta, found.cost
-    if best is None:
+            return inf, theta
+        return found.cost, found.theta
+
+    least, best = min(side_by_side(ended, begins), key=lambda one: one[0])
+    if least >= cost - _CLEARLY:
         return None
     return {u.name: float(x) for u, x, f in zip(problem.unknowns, best, free, strict=True) if f}
 
