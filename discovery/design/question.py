@@ -9,7 +9,7 @@ from discovery.diagnosis.context import Context
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import RIVAL
-from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, Verdict
+from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict
 from discovery.diagnosis.when import in_words, instants
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Score
@@ -21,6 +21,11 @@ INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these rec
 NOTHING_CLOSE = (
     "look at what happened in the windows with missing heat, and record what is not recorded yet at that "
     "body: its temperature, and everything else that heats or cools it"
+)
+
+READ = (
+    "add {channels} to the `outputs` of the experiment and diagnose again: what is measured at bodies tells "
+    "apart what these outputs alone cannot"
 )
 
 APART = Aim("separates the rivals", "the two answers differ there")
@@ -35,6 +40,8 @@ def ask(context: Context, found: Search, verdict: Verdict) -> str:
         return (
             "check the device and repeat the recording; a fault of the measuring chain needs no new physics"
         )
+    if verdict.word == UNEXPLAINED and context.unused_readings:
+        return READ.format(channels=" and ".join(context.unused_readings))
     shown = verdict.named or verdict.candidates
     if not shown:
         return NOTHING_CLOSE

@@ -322,7 +322,7 @@ def _reasons(
         said.append(f"the free run of the model diverges on {lost}, so the repair cannot be tested there")
     if idle_readings := ", ".join(context.unused_readings):
         said.append(
-            f"the readings of {idle_readings} take no part: list them under `outputs` of the experiment"
+            f"the readings of {idle_readings} take no part: add them to the `outputs` of the experiment"
         )
     if verdict.word != FAULT:  # there, they are part of the answer
         said += _set_aside(context)

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from discovery.design.next_experiment import STEPS, _designs, believed, next_experiment
-from discovery.design.question import APART, CONFIRM, _smallest, aim, look_back
+from discovery.design.question import APART, CONFIRM, _smallest, aim, ask, look_back
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.diagnose import diagnose
+from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
+from discovery.diagnosis.verdict import UNEXPLAINED, Verdict
 from discovery.dynamics import make_grid
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Score
@@ -273,3 +275,11 @@ def test_what_is_only_measured_is_not_stepped() -> None:
             ),
         )
         assert any(words.startswith("step pump") for words in _designs(where, 43200.0)) == there
+
+
+def test_what_is_measured_already_is_asked_before_a_new_experiment() -> None:
+    """A machine without a cause, whose thermometers no output shows, needs no new recording yet."""
+    where = cast(Context, SimpleNamespace(unused_readings=["T_front", "T_rear"]))
+    verdict = Verdict(UNEXPLAINED, cast(Scored, None), (), (), ())
+    said = ask(where, cast(Search, None), verdict)
+    assert said.startswith("add T_front and T_rear to the `outputs` of the experiment and diagnose again")
