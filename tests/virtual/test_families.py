@@ -66,6 +66,13 @@ def test_a_case_asks_for_all_readings_that_its_key_counts(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
+def test_unrecorded_heat_is_in_proportion_to_what_the_machine_makes(family: str) -> None:
+    """About one percent of it, rms, at each body: small machines are not noisier than large ones."""
+    m = machine_of(family)
+    assert 0.005 <= m.pace.heat_w / m.heat <= 0.015
+
+
+@pytest.mark.parametrize("family", FAMILIES)
 def test_a_plant_is_finer_than_its_baseline_and_moves(family: str) -> None:
     m = machine_of(family)
     assert len(m.network.nodes) >= 2 * len(m.baseline.states)

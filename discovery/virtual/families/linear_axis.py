@@ -17,7 +17,7 @@ from discovery.virtual.materials import CAST_IRON, STEEL, Bar
 from discovery.virtual.network import Array, Form, Gate, Inputs, Law, heat, link, natural, times
 from discovery.virtual.signals import Draw, levels, room, shifts
 
-PACE = Pace(noise=(0.3, 1.4))
+PACE = Pace(noise=(0.3, 1.4), heat_w=1.2)
 WORDS = Words(speed="speed", top_speed=3000.0, power="P_servo")
 SECTIONS = ("screw_1", "screw_2", "screw_3")
 

@@ -16,7 +16,7 @@ from discovery.virtual.network import Form, Inputs, Law, Switch, heat, link
 from discovery.virtual.signals import Draw, lagged, levels, noise, room, shifts
 
 PACE = Pace(
-    hours=96.0, step_s=30.0, log_s=120.0, read_s=(420.0, 900.0), before_h=48.0, noise=(0.15, 0.8), heat_w=0.7
+    hours=96.0, step_s=30.0, log_s=120.0, read_s=(420.0, 900.0), before_h=48.0, noise=(0.15, 0.8), heat_w=0.15
 )
 WORDS = Words(power="P_drives")
 
