@@ -34,9 +34,9 @@ class Blocks:
 
 def make_blocks(times: Sequence[Array], count: int) -> Blocks:
     """Cut recordings with readings at `times` [s] into about `count` blocks of equal duration, at least one
-    each.
+    each. A piece without readings, as in a pause of the logger, is no block: it has nothing to leave out.
 
-    A single recording gets at least eight, so that it can be left out in parts.
+    A single recording is cut into at least eight, so that it can be left out in parts.
     """
     spans = [max(float(t[-1] - t[0]), 1.0) if len(t) else 1.0 for t in times]
     width = sum(spans) / count
@@ -44,9 +44,11 @@ def make_blocks(times: Sequence[Array], count: int) -> Blocks:
     for i, (t, span) in enumerate(zip(times, spans, strict=True)):
         pieces = max(8 if len(times) == 1 else 1, round(span / width))
         share = (t - t[0]) / span if len(t) else t
-        of.append(first + np.minimum((share * pieces).astype(np.intp), pieces - 1))
-        recording += [i] * pieces
-        first += pieces
+        piece = np.minimum((share * pieces).astype(np.intp), pieces - 1)
+        filled, block = np.unique(piece, return_inverse=True)
+        of.append(first + block.astype(np.intp))
+        recording += [i] * max(len(filled), 1)
+        first += max(len(filled), 1)
     return Blocks(tuple(of), np.array(recording, dtype=np.intp))
 
 

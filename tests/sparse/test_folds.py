@@ -28,6 +28,13 @@ def test_a_quarter_of_each_recording_is_left_out_where_all_are_needed() -> None:
     assert [fold.tolist() for fold in folds] == [[0, 1, 8], [2, 3, 9], [4, 5, 10], [6, 7, 11]]
 
 
+def test_a_pause_of_the_logger_is_no_block() -> None:
+    time = np.r_[np.arange(0.0, 300.0, 5.0), np.arange(1000.0, 1200.0, 5.0)]
+    blocks = make_blocks([time], 12)
+    assert sorted(set(blocks.of[0])) == list(range(blocks.count))
+    assert all(np.isin(fold, blocks.of[0]).all() for fold in make_folds(blocks))
+
+
 def test_the_sparsest_of_equals_is_chosen() -> None:
     rng = np.random.default_rng(0)
     noise = rng.uniform(0.8, 1.2, 24)
