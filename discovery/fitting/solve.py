@@ -104,6 +104,9 @@ def solve(
     done, late = len(x) == 0, False
     for taken in range(max_rounds if len(x) else 0):
         gram, gradient = _normal(jacobian, now.residual, len(x), loss)
+        if not (np.isfinite(gram).all() and np.isfinite(gradient).all()):  # no step from here
+            done = True
+            break
         if goal < inf and taken >= _SETTLED:
             whole = _step(x, gram, gradient, 0.0, low, high)
             late = cost - _TIMES * _expected(whole, gram, gradient) > goal
@@ -202,15 +205,18 @@ def _jacobian(
 
 
 def _normal(jacobian: Jacobian, residual: Array, unknowns: int, loss: Loss) -> tuple[Array, Array]:
-    """Normal equations (U, U) and the slope (U,) of the cost."""
+    """Normal equations (U, U) and the slope (U,) of the cost; not finite where a model is so nearly unstable
+    that the squares of its sensitivities overflow.
+    """
     weight, slope = _weights(residual, loss)
     gram, gradient, done = np.zeros((unknowns, unknowns)), np.zeros(unknowns), 0
-    for acting, rows in jacobian:
-        here = slice(done, done + len(rows))
-        gradient[acting] += rows.T @ slope[here]
-        weighted = rows if loss == "linear" else rows * weight[here, None]
-        gram[np.ix_(acting, acting)] += weighted.T @ weighted
-        done = here.stop
+    with np.errstate(over="ignore", invalid="ignore"):
+        for acting, rows in jacobian:
+            here = slice(done, done + len(rows))
+            gradient[acting] += rows.T @ slope[here]
+            weighted = rows if loss == "linear" else rows * weight[here, None]
+            gram[np.ix_(acting, acting)] += weighted.T @ weighted
+            done = here.stop
     return gram, gradient
 
 
@@ -240,8 +246,6 @@ def _step(x: Array, gram: Array, gradient: Array, damping: float, low: Array, hi
 
 
 def _solved(matrix: Array, vector: Array) -> Array:
-    if not np.isfinite(matrix).all():  # sensitivities that overflow: no step from here
-        return np.zeros(len(vector))
     try:
         root = np.linalg.cholesky(matrix)
         return np.asarray(np.linalg.solve(root.T, np.linalg.solve(root, vector)))

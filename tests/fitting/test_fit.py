@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from discovery.fitting import fit_model, make_problem, predict_recording
 from discovery.fitting.covariance import covariance_of
 from discovery.fitting.problem import FARTHEST
-from discovery.fitting.solve import Solution, solve
+from discovery.fitting.solve import Solution, _normal, solve
 from discovery.fitting.starts import warm_start
 from discovery.models import Model, Parameter, State
 from discovery.models.reduced import reduced
@@ -350,3 +350,9 @@ def test_a_noise_that_is_not_stated_begins_with_how_rough_readings_are(
     assert begun[0] == pytest.approx(expected, rel=0.35 if every == 1 else 1e-9)
     assert begun[-1] == pytest.approx(fit.noise.white[0], rel=0.03)
     assert float(np.std(fit.residuals()["r5"])) == pytest.approx(fit.noise.white[0], rel=0.03)
+
+
+def test_sensitivities_whose_squares_overflow_are_told_by_the_normal_equations_alone() -> None:
+    """A model that is nearly unstable: pytest turns a warning into an error."""
+    gram, _ = _normal([([0], np.full((2, 1), 1e200))], np.ones(2), 1, "linear")
+    assert np.isinf(gram).all()
