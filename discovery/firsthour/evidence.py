@@ -133,6 +133,8 @@ def evidence(
         if named and _of_quantity(word) <= _HAS:
             says = {key: odds for key, odds in says.items() if key in PLACES}
         found.add(f"'{_spelled(word, name)}' in its name", says)
+    if of_name and all(_only_a_place(word) for word in of_name):
+        found.add("nothing but a place in its name", {"temperature": 3.0})
     if unit is not None:
         odds = dict(dimension_of(unit))
         if odds and max(odds.values()) > 4:  # a quantity that cannot have the unit is out
@@ -147,6 +149,11 @@ def evidence(
     for why, more in hints:
         found.add(why, more)
     return found
+
+
+def _only_a_place(word: Word) -> bool:
+    """Whether a word says where, and nothing of what is measured there: room, ambient, hall."""
+    return set(word.says) <= {*PLACES, "temperature"} and _of_quantity(word) < _HAS
 
 
 def _clear(word: Word) -> float:

@@ -16,6 +16,7 @@ from discovery.firsthour.tableguess import guess_all
 
 CASES = [
     ("T_room", "", np.linspace(20, 23, 50), "ambient temperature", "degC"),
+    ("Room", "", 24.4 + np.arange(50) // 10 % 2 / 2, "ambient temperature", "degC"),
     ("Ambient", "", np.linspace(70, 74, 50), "ambient temperature", "degF"),
     ("bed temperature", "°F", np.linspace(70, 74, 50), "temperature", "degF"),
     ("T3", "", np.linspace(294, 305, 50), "temperature", "K"),
