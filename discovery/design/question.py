@@ -44,7 +44,7 @@ def ask(context: Context, found: Search, verdict: Verdict) -> str:
         return READ.format(channels=" and ".join(context.unused_readings))
     shown = verdict.named or verdict.candidates
     if not shown:
-        return NOTHING_CLOSE
+        return f"{_not_used(context)}{NOTHING_CLOSE}"
     rivals = [
         r.hypothesis
         for n in shown
@@ -60,6 +60,12 @@ def ask(context: Context, found: Search, verdict: Verdict) -> str:
     noise = answer.noise
     other = rival or _without(answer)
     return next_experiment(context, answer.fit.model, other, noise, purpose, believed(context))
+
+
+def _not_used(context: Context) -> str:
+    """What is recorded already and could act: inputs that no term of the model uses."""
+    unused = ", ".join(sorted(context.scene.unused))
+    return f"give the model what is recorded and it does not use ({unused}), and compare; " if unused else ""
 
 
 def aim(shown: Sequence[Hypothesis], rival: Hypothesis | None, answered: bool) -> Aim:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from discovery.design.next_experiment import STEPS, _designs, believed, next_experiment
-from discovery.design.question import APART, CONFIRM, _smallest, aim, ask, look_back
+from discovery.design.question import APART, CONFIRM, NOTHING_CLOSE, _smallest, aim, ask, look_back
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.diagnose import diagnose
 from discovery.diagnosis.scored import Scored
@@ -180,6 +180,18 @@ def test_what_has_no_answer_is_not_confirmed() -> None:
     assert "answer" not in said.does + said.differ
     assert aim([law, event], None, answered=True).does == "would confirm friction_speed at motor"
     assert aim([law], None, answered=True).does == "would confirm the answer"
+
+
+def test_what_is_recorded_and_not_used_is_asked_for_before_more_is_recorded() -> None:
+    nothing = cast(Verdict, SimpleNamespace(word=UNEXPLAINED, named=(), candidates=()))
+    for unused, first in (
+        (frozenset({"fan"}), "give the model what is recorded and it does not use (fan)"),
+        (frozenset(), NOTHING_CLOSE),
+    ):
+        where = cast(Context, SimpleNamespace(scene=SimpleNamespace(unused=unused), unused_readings=[]))
+        said = ask(where, cast(Search, None), nothing)
+        assert said.startswith(first)
+        assert said.endswith(NOTHING_CLOSE)
 
 
 def test_an_event_is_looked_at_where_it_was() -> None:
