@@ -10,7 +10,7 @@ from discovery.errors import RunsAwayError
 from discovery.fitting import Fit, Noise, predict_recording
 from discovery.models import Model
 from discovery.sparse.folds import make_folds
-from discovery.sparse.ratedata import RateData, has_reading
+from discovery.sparse.ratedata import RateData
 from discovery.sparse.rates import masked, refit
 
 Array = NDArray[np.float64]
@@ -58,8 +58,7 @@ def block_errors(data: RateData, fit: Fit) -> Array:
             fit.model, data.campaign, r, data.outputs, fit.noise.white, data.grids[r]
         )
         left = ((data.grids[r].readings - predict(trajectory)) / size) ** 2
-        # a block without a reading says nothing: it must not decide between the sizes
-        for b in (b for b in np.unique(block) if has_reading(data, b)):
+        for b in np.unique(block):
             here = left[block == b]
             errors[b] = np.nanmean(here) if np.isfinite(here).any() else RAN_AWAY
     return np.where(np.isfinite(errors), errors, RAN_AWAY)

@@ -195,12 +195,6 @@ def rough_noise(data: RateData) -> Noise:
     )
 
 
-def has_reading(data: RateData, block: int) -> bool:
-    """Whether any output was read in a block of time."""
-    of, readings = zip(data.blocks.of, data.recordings, strict=True), data.grids
-    return any(np.isfinite(readings[r].readings[b == block]).any() for b, r in of)
-
-
 def nearer(data: RateData, first: Model, second: Model) -> Model:
     """The second model if its start values run far nearer to the readings, otherwise the first.
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from discovery.recordings import Campaign, Channel, Recording, sample_input
 from discovery.sparse.ratedata import (
-    has_reading,
     make_rate_data,
     readings_that_show,
     rough_noise,
@@ -57,12 +56,13 @@ def test_the_first_weights_are_stated_or_a_fiftieth_of_what_was_seen() -> None:
     assert rough_noise(data).white == pytest.approx((0.02 * 3.0, 0.7))
 
 
-def test_a_block_has_a_reading_where_one_was_taken() -> None:
-    """The third quarter of the hours holds none."""
+def test_every_block_has_a_reading() -> None:
+    """The third quarter of the hours holds none: two of eight blocks."""
     readings = np.where((np.arange(400) >= 200) & (np.arange(400) < 300), np.nan, 1.0)
     data = make_rate_data(campaign(400, readings), ["r"], ["E"], ["P", "air"], 4)
-    found = [has_reading(data, block) for block in range(data.blocks.count)]
-    assert found == [True] * 4 + [False] * 2 + [True] * 2
+    of, grid = data.blocks.of[0], data.grids["r"]
+    assert data.blocks.count == 6
+    assert all(np.isfinite(grid.readings[of == block]).any() for block in range(6))
 
 
 def test_what_rings_keeps_eight_readings_a_period_and_noise_keeps_none() -> None:
