@@ -60,6 +60,16 @@ def test_the_note_on_an_uncertain_room_names_each_recording_once() -> None:
     assert "-0.2 K in 'b' to +0.5 K in 'a'" in offset_notes(two, {"T_env": room})[0]
 
 
+def test_a_room_that_the_fit_moves_far_beyond_its_spread_is_told_so() -> None:
+    """A housing 16 K warmer than the guess of the room: the fit put it 67 K off."""
+    room = Channel("T_env", "ambient temperature", "degC", None, "linear", spread=5.0)
+    far = cast("Fit", SimpleNamespace(offsets={"T_env": {"a": (-67.0, 1.0), "b": (20.0, 1.0)}}))
+    near = cast("Fit", SimpleNamespace(offsets={"T_env": {"a": (-8.0, 1.0)}}))
+    said = "far beyond it: the model lacks something, or `spread` is too small"
+    assert said in offset_notes(far, {"T_env": room})[0]
+    assert said not in offset_notes(near, {"T_env": room})[0]
+
+
 def test_a_room_that_the_fit_leaves_where_it_was_is_no_note() -> None:
     room = Channel("T_env", "ambient temperature", "degC", None, "linear", spread=1.0)
     none = cast("Fit", SimpleNamespace(offsets={"T_env": {"a": (2.4e-12, 0.1), "b": (-3e-4, 0.1)}}))

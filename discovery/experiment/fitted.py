@@ -28,6 +28,7 @@ from discovery.recordings import Channel
 Array = NDArray[np.float64]
 _AT_BOUND = 1e-4  # share of a bound that counts as at it
 _NEGLIGIBLE = 0.01  # of the spread of an input: a smaller offset is not reported
+_FAR = 3.0  # spreads of an input: a larger offset is told to be too large
 
 
 @dataclass(frozen=True)
@@ -179,9 +180,11 @@ def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
         low, high = (pick(found, key=lambda r: found[r][0]) for pick in (min, max))
         unit = differences(channels[name].unit)
         most = f" to {found[high][0]:+.2g} {unit} in '{high}'" if high != low else ""
+        times = max(abs(value) for value, _ in found.values()) / channels[name].spread
+        far = ", far beyond it: the model lacks something, or `spread` is too small" if times > _FAR else ""
         notes.append(
             f"{name} is known within {channels[name].spread:.3g} {unit}; estimated offset: "
-            f"{found[low][0]:+.2g} {unit} in '{low}'{most}; in a held-out recording, only the first "
+            f"{found[low][0]:+.2g} {unit} in '{low}'{most}{far}; in a held-out recording, only the first "
             "reading is used to estimate it"
         )
     return notes
