@@ -151,7 +151,7 @@ def free_runs(
         scale = one / white
         first = readings - predict(old)
         then = None if new is None else readings - predict(new)
-        started = None if new is None or then is None else _started(after, new, then) * scale
+        started = None if new is None or then is None else _started(after, new, then, white) * scale
         last = with_noise(campaign, new or old) if noise.rough else new or old
         found[run] = FreeRuns(
             first * scale,
@@ -159,15 +159,17 @@ def free_runs(
             one * noise_in_free_runs(last, noise),
             1 / scale,
             one * _unsure(new or old, white, known) if known else 0.0,
-            (_started(before, old, first) * scale, started),
+            (_started(before, old, first, white) * scale, started),
         )
     return found
 
 
-def _started(fit: Fit, run: Trajectory, left: Array) -> Array:
-    """Residuals (R, Y) of a free run from the starts that all its readings show."""
+def _started(fit: Fit, run: Trajectory, left: Array, reading: Array) -> Array:
+    """Residuals (R, Y) of a free run from the starts that all its readings show; `reading`: (Y,) their noise.
+    A model that misses much is not less sure where a body began that was read.
+    """
     known = fit.offset_in(run.system.grid.recording)
-    return from_known_starts(run, left, np.array(fit.noise.white), known, fit.together)
+    return from_known_starts(run, left, np.array(fit.noise.white), known, fit.together, reading)
 
 
 def _unsure(trajectory: Trajectory, white: Array, known: Known) -> float:

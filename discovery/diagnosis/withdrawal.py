@@ -72,17 +72,26 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
 
 
 def unfinished(verdict: Verdict, fitting: Improvement, unit: str) -> Verdict:
-    """The verdict where the repaired model misses the recordings that it was fitted to by more than noise
-    makes likely: something else acts as well. Where that is more than the names explain, they are withdrawn:
-    they may stand for it.
+    """The verdict where the model misses the recordings that it was fitted to by more than noise makes
+    likely: something acts beside what is named, or where nothing is. Where it is more than the names
+    explain, they are withdrawn: they may stand for it.
     """
-    if not verdict.named or not _misses(fitting, fitting.judged[1], power=2):
+    rms = fitting.judged[1 if verdict.named else 0]
+    if not (verdict.named or verdict.word == NO_MISMATCH) or not _misses(fitting, rms, power=2):
         return verdict
-    still = f"free runs on the fitted recordings still miss by {_size(fitting, fitting.judged[1])} {unit}"
-    if fitting.mostly:
-        reason = f"something else acts as well, or the named laws are not exact: {still}"
+    missed = f"miss by {_size(fitting, rms)} {unit}"
+    if verdict.named and fitting.mostly:
+        reason = (
+            "something else acts as well, or the named laws are not exact: "
+            f"free runs on the fitted recordings still {missed}"
+        )
         return replace(verdict, reasons=(reason, *verdict.reasons))
-    reason = f"the effects that are sure enough leave more than they explain: {still}"
+    reason = (
+        "the effects that are sure enough leave more than they explain: "
+        f"free runs on the fitted recordings still {missed}"
+        if verdict.named
+        else f"no effect is sure, but free runs on the fitted recordings {missed}"
+    )
     return replace(
         verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
     )

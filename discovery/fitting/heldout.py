@@ -89,6 +89,7 @@ def from_known_starts(
     white: Array,
     known: Collection[str] = (),
     together: float = 1.0,
+    reading: Array | None = None,
 ) -> Array:
     """Residuals (R, Y) of a free run as they would be from the starts that all its readings show.
 
@@ -97,11 +98,12 @@ def from_known_starts(
 
     Args:
         residual: readings minus model (R, Y).
-        white: (Y,) reading noise.
+        white: (Y,) what a reading misses a free run by.
         known: inputs whose offsets are known in this recording.
         together: readings that count as one, as in the fit (`Fit.together`).
+        reading: (Y,) reading noise, within which a start is known that was read; default `white`.
     """
-    unsure = _unsure(run.system, white, known)
+    unsure = _unsure(run.system, white if reading is None else reading, known)
     if not any(unsure) or not len(residual):
         return residual
     shift, moved = _shift(run, residual, white, unsure, together)

@@ -583,6 +583,18 @@ def test_names_that_leave_more_than_they_explain_are_withdrawn() -> None:
     assert unfinished(named, noisy, "um") is named
 
 
+def test_a_model_that_misses_its_own_recordings_does_not_lack_nothing() -> None:
+    """A cooler whose fan the model leaves out: 5.2 K where noise is 1.4, and no effect was sure. A repair
+    whose names were withdrawn does not count.
+    """
+    nothing = said(Tried([Model((), 0.0)]), {})
+    far, near = (Improvement(rms, 0.5, 1.38, 0.0, 0.0, {}) for rms in (5.2, 1.9))
+    other = unfinished(nothing, far, "K")
+    assert (nothing.word, other.word) == ("no mismatch", "unexplained")
+    assert "free runs on the fitted recordings miss by 5.2 (1.38 expected) K" in other.reasons[0]
+    assert unfinished(nothing, near, "K") is nothing
+
+
 def test_one_recording_of_another_machine_is_told_and_refutes_nothing() -> None:
     """Twice as good on two, a third worse on one: the mean of the logarithms decides."""
     named = said(WET, {"fluid_convection": 0.9})
