@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from discovery.dynamics import make_grid, make_system, predict, sensitivities, simulate
 from discovery.dynamics.system import shifted
-from discovery.fitting import Fit, fit_model, predict_recording
+from discovery.fitting import Fit, fit_model, from_known_starts, predict_recording
 from discovery.fitting.covariance import spread_elsewhere
 from discovery.fitting.fit import likeliest_spread
 from discovery.fitting.ridge import fit_ridge
@@ -205,3 +205,15 @@ def test_the_spread_of_a_parameter_is_that_of_one_more_value_about_their_mean() 
     found = np.sqrt(np.mean([spread_elsewhere(row[:4].tolist()) ** 2 for row in draws[:2000]]))
     assert found == pytest.approx(true, rel=0.05)
     assert spread_elsewhere([-7.0]) == 7.0
+
+
+def test_a_start_that_was_read_is_known_within_the_reading_noise() -> None:
+    """A plate without losses: all its readings but the first are 10 K lower than the model says."""
+    channels = {"T": Channel("T", "temperature", "degC", 0.1, "linear")}
+    seen = Recording("a", np.arange(50.0), {"T": np.r_[20.0, np.full(49, 10.0)]})
+    campaign = Campaign("plate", channels, {"a": seen})
+    plate = Model("plate", {}, {"T": State("T")}, (Term("none", "T", parse("0*T")),), {})
+    run = predict_recording(plate, campaign, "a", ["T"], [0.1])
+    left, misses = run.system.grid.readings - predict(run), np.array([5.0])
+    assert np.abs(from_known_starts(run, left, misses)[1:]).max() < 1.0
+    assert np.abs(from_known_starts(run, left, misses, reading=np.array([0.1]))[1:]).min() > 9.0
