@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.proof import FreeRuns, Improvement, improvement
+from discovery.diagnosis.proof import FreeRuns, Improvement, block_sums, improvement
 from discovery.diagnosis.refit import ENOUGH, with_effects
 from discovery.diagnosis.scored import Scored
 from discovery.dynamics import predict
@@ -21,16 +23,44 @@ from discovery.fitting.kalman import innovations
 from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
+Residuals = tuple[Array, Array]  # (R, Y) of a free run and of the filter
 
 
-def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> dict[Key, Improvement | None]:
+@dataclass(frozen=True)
+class LeftOut:
+    """What effects change of recordings that are left out of the fit.
+
+    `free`: rms of free runs in reading noises. `better`: of so many `blocks` of time in which readings say
+    which of both models predicts them better, those that are better predicted with the effects.
+    """
+
+    free: Improvement
+    better: int
+    blocks: int
+
+    @property
+    def sure(self) -> bool:
+        """Whether so many blocks are hardly better by chance, which is never excluded beyond `SUREST`: the
+        sign test, for which hours that go badly wrong are one block and do not outvote all others (Diebold
+        and Mariano, J. Business & Economic Statistics 13, 1995).
+
+        >>> run = Improvement(1.0, 0.9, 0.5, 0.0, 0.0, {})
+        >>> LeftOut(run, 13, 16).sure, LeftOut(run, 12, 16).sure
+        (True, False)
+        """
+        as_good = sum(comb(self.blocks, k) for k in range(self.better, self.blocks + 1))
+        return bool(1.0 - as_good / 2**self.blocks >= thresholds.SUREST)
+
+
+def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> dict[Key, LeftOut | None]:
     """What each of some effects of a model changes of free runs on recordings that are left out of the fit in
     turn: of the outputs that it shows in, or of all where it acts in the machine.
 
     Models are fitted anew to the others, under the process noise of the answer: a single recording does not
     determine a model whose fit takes hours of unrecorded heat for its own. They start as those of an
     experiment do; rms in reading noises. Whether it is by chance is judged by what each reading says beyond
-    those before it, under the same noise (log predictive density): these hours decide the rms of a free run.
+    those before it, under the same noise (log predictive density), block by block: hours of process noise
+    decide the rms of a free run.
     None where nothing can be left out, or where recordings left out can say nothing of an effect because it
     does not act in all of them.
     """
@@ -38,7 +68,7 @@ def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> 
     return {h.key: found.get((h.key,)) for h in chosen}
 
 
-def together_left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> Improvement | None:
+def together_left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> LeftOut | None:
     """What several effects of a model change together, as in `left_out`. One alone may make free runs worse:
     the lag of a sensor on a body that is really two.
     """
@@ -48,7 +78,7 @@ def together_left_out(context: Context, answer: Scored, chosen: Sequence[Hypothe
 
 def _changed(
     context: Context, answer: Scored, groups: Sequence[tuple[Hypothesis, ...]]
-) -> dict[tuple[Key, ...], Improvement]:
+) -> dict[tuple[Key, ...], LeftOut]:
     """What each group of effects of a model changes, by its keys."""
     groups = groups if len(context.recordings) > 1 else ()
     keys = [tuple(h.key for h in group) for group in groups]
@@ -58,7 +88,7 @@ def _changed(
         for effects in ([answer.hypotheses, *sets] if groups else [])
         for fold in folds(context.campaign, context.recordings, blocks=0)
     ]
-    left: dict[frozenset[Key], dict[str, tuple[Array, Array]]] = {}
+    left: dict[frozenset[Key], dict[str, Residuals]] = {}
     parts = side_by_side(lambda task: _residuals(context, answer, *task), tasks)
     for (effects, _), part in zip(tasks, parts, strict=True):
         left.setdefault(frozenset(o.key for o in effects), {}).update(part)
@@ -67,35 +97,34 @@ def _changed(
         everywhere = any(h.terms or not h.shown for h in group)
         only = set(context.outputs) if everywhere else {name for h in group for name in h.shown}
         mine = [y for y, name in enumerate(context.outputs) if name in only]
-        if not left[answer.keys - {*own}]:
-            continue
-        free, beyond = (
-            improvement(runs, [context.outputs[y] for y in mine])
-            for runs in _compared(context, left[answer.keys - {*own}], left[answer.keys], mine)
-        )
-        found[own] = replace(free, started=(*free.judged, beyond.low, beyond.high))
+        without, with_it = left[answer.keys - {*own}], left[answer.keys]
+        if without:
+            outputs = [context.outputs[y] for y in mine]
+            found[own] = _compared(context.recordings, outputs, without, with_it, mine)
     return found
 
 
 def _compared(
-    context: Context,
-    without: Mapping[str, tuple[Array, Array]],
-    with_it: Mapping[str, tuple[Array, Array]],
+    recordings: Sequence[str],
+    outputs: Sequence[str],
+    without: Mapping[str, Residuals],
+    with_it: Mapping[str, Residuals],
     mine: Sequence[int],
-) -> Iterator[list[FreeRuns]]:
-    """Residuals of some outputs without and with an effect: of free runs, and of the filter."""
-    one = np.ones(len(mine))
-    for kind in (0, 1):
-        yield [
-            FreeRuns(without[r][kind][:, mine], with_it[r][kind][:, mine] if r in with_it else None, 1.0, one)
-            for r in context.recordings
-            if r in without
-        ]
+) -> LeftOut:
+    """Residuals of some outputs without and with effects, compared."""
+    one, runs, gains = np.ones(len(mine)), list[FreeRuns](), list[Array]()
+    for r in (r for r in recordings if r in without):
+        (free, beyond), (then, after) = without[r], with_it.get(r, (None, None))
+        runs.append(FreeRuns(free[:, mine], None if then is None else then[:, mine], 1.0, one))
+        old, new, _ = block_sums(beyond[:, mine], beyond[:, mine] if after is None else after[:, mine])
+        gains.append(old - new)
+    gain = np.concatenate(gains)
+    return LeftOut(improvement(runs, outputs), int(np.sum(gain > 0)), int(np.sum(gain != 0)))
 
 
 def _residuals(
     context: Context, answer: Scored, chosen: Sequence[Hypothesis], fold: Fold
-) -> dict[str, tuple[Array, Array]]:
+) -> dict[str, Residuals]:
     """Residuals (R, Y) over the reading noise on left-out recordings, if the free run stays finite, and what
     each reading says beyond those before it, in its standard deviations.
     """

@@ -6,7 +6,6 @@ import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from html import escape
-from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +16,7 @@ from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
 from discovery.diagnosis.own import Searched, searched
 from discovery.diagnosis.posterior import IN_PLAY, Posterior, posterior
-from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, size_of, unit_of
+from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, unit_of
 from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
 from discovery.diagnosis.scored import Scored, with_unknown
@@ -181,12 +180,11 @@ def diagnose(
     tell("weighing the answers")
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
     tell("proving in free runs")
-    whole = _repaired(context, found.best, found.best.hypotheses, model, seen)
-    verdict = decide(context, found, chances, _gain(context, found.best, seen, before, whole))
+    verdict = decide(context, found, chances)
     named = [n.hypothesis for n in verdict.named]
     keys = frozenset(h.key for h in named)
     alone = found.tried.get(keys, verdict.answer) if named else verdict.answer
-    after = whole if keys == found.best.keys else _repaired(context, alone, named, model, seen)
+    after = _repaired(context, alone, named, model, seen)
     if named and after is None:
         verdict = runs_away(verdict)
     noise = verdict.answer.noise
@@ -283,17 +281,6 @@ def _repaired(
         )
     except RunsAwayError:
         return None
-
-
-def _gain(context: Context, answer: Scored, seen: Campaign, before: Fit, after: Fit | None) -> float:
-    """rms in reading noises that an answer explains in free runs of the fitted recordings; inf if that is not
-    known, because nothing has a name or its model does not run.
-    """
-    if after is None:
-        return inf
-    runs = free_runs(seen, context.recordings, before, after, answer.noise)
-    found = improvement(list(runs.values()), context.outputs)
-    return found.explained / size_of(seen, answer.noise)
 
 
 def _set_aside(context: Context) -> list[str]:

@@ -101,11 +101,6 @@ class Improvement:
         before, after = self.judged
         return 2 * after**2 < before**2
 
-    @property
-    def sure(self) -> bool:
-        """Whether the recordings are predicted better than without the repair, beyond chance."""
-        return (self.started[2] if self.started else self.low) > 0
-
 
 @dataclass(frozen=True)
 class FreeRuns:
@@ -205,7 +200,7 @@ def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement
 
 def _bounds(pairs: Sequence[tuple[Array, Array]]) -> tuple[float, float]:
     """Bounds of the fall of the rms, 95 %, by bootstrap of blocks of time."""
-    sums = [_block_sums(before, after) for before, after in pairs]
+    sums = [block_sums(before, after) for before, after in pairs]
     old, new, count = (np.concatenate(column) for column in zip(*sums, strict=True))
     draw = np.random.default_rng(0).integers(0, len(old), (DRAWS, len(old)))
     total = np.maximum(count[draw].sum(axis=1), 1)
@@ -258,7 +253,7 @@ def _run(fit: Fit, campaign: Campaign, run: str) -> Trajectory | None:
     return trajectory
 
 
-def _block_sums(before: Array, after: Array) -> tuple[Array, Array, Array]:
+def block_sums(before: Array, after: Array) -> tuple[Array, Array, Array]:
     """Sums of squares in blocks of time before and after, and the number of readings in each."""
     starts = np.arange(0, len(before), max(1, len(before) // BLOCKS))
     old, new = (np.add.reduceat(np.nansum(z**2, axis=1), starts) for z in (before, after))

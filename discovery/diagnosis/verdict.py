@@ -13,9 +13,8 @@ from math import inf, isfinite, sqrt
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.crossvalidation import left_out, together_left_out
+from discovery.diagnosis.crossvalidation import LeftOut, left_out, together_left_out
 from discovery.diagnosis.posterior import Posterior
-from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.refit import score
 from discovery.diagnosis.scored import Scored, with_unknown
 from discovery.diagnosis.selection import Search
@@ -61,12 +60,8 @@ class Verdict:
     reasons: tuple[str, ...]
 
 
-def decide(context: Context, found: Search, posterior: Posterior, gain: float) -> Verdict:
-    """What the recordings to fit say.
-
-    Args:
-        gain: what the best answer explains of the free runs of the fitted recordings, rms in reading noises.
-    """
+def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
+    """What the recordings to fit say."""
     answer = found.best
     candidates = tuple(
         sorted(
@@ -74,8 +69,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
             key=lambda n: -_added(found, answer, n.hypothesis),
         )
     )
-    matters = gain >= thresholds.MATTERS
-    probable = [n for n in candidates if matters and n.together >= thresholds.NAMED]
+    probable = [n for n in candidates if n.together >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
     least = by_chance(found.gain)
     sure = _needed(
@@ -91,19 +85,19 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
         """Whether the effects without a name improve free runs outside the fit, all together."""
         return _supports(together_left_out(context, answer, others))
 
-    # what changes no free run outside the fit is not lacking either; what may do so by chance can be
-    nothing = {key for key in idle if not _changes(proofs[key])} if idle and not acts() else set[Key]()
+    # what does not improve free runs outside the fit is not lacking either
+    nothing = set(idle) if idle and not acts() else set[Key]()
     reasons = [*refused.values(), *(text for key, text in idle.items() if key not in nothing)]
     # a law has no name: it matters only where a name may stand for it
     lacking = (found.baseline, answer) if named else ()
     laws = [law for m in lacking for law in with_law(context, m, found.goal(m.noise))]
     rest = [m for m in (*posterior.models, *found.tried.values(), *laws) if not m.keys & nothing]
-    alone = _alone(context, found, answer, named) if matters else answer.evidence
+    alone = _alone(context, found, answer, named)
     best, without = _unknown_cause(rest, alone, bool(named))
     # names hold next to effects that are not sure, and next to something that no effect explains if they
     # explain more than they leave, and still add as much as a name needs
     if best.evidence - without > thresholds.SHORT and (best.forced or named or acts()):
-        mostly = [n for n in named if (proof := proofs[n.hypothesis.key]) and proof.mostly]
+        mostly = [n for n in named if (proof := proofs[n.hypothesis.key]) and proof.free.mostly]
         by_law = any(best is one for one in laws)
         named = tuple(
             _needed(
@@ -124,7 +118,7 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
                 f"{max(m.evidence for m in rest) - alone:.0f} more log evidence"
             )
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
-    further = (*(idle[key] for key in nothing), *_apart(found, answer, unsure, least, matters))
+    further = (*(idle[key] for key in nothing), *_apart(found, answer, unsure, least))
     every = (*reasons, *further)
     if named:
         kinds = {n.hypothesis.effect.is_physics for n in named}
@@ -136,12 +130,12 @@ def decide(context: Context, found: Search, posterior: Posterior, gain: float) -
 
 def _proved(
     context: Context, found: Search, answer: Scored, chosen: Sequence[Named]
-) -> tuple[tuple[Named, ...], dict[Key, str], dict[Key, Improvement | None]]:
+) -> tuple[tuple[Named, ...], dict[Key, str], dict[Key, LeftOut | None]]:
     """Effects that improve free runs outside the fit, why each other one is not named, and what each changes
     there.
     """
     kept, idle = tuple(chosen), dict[Key, str]()
-    proofs = dict[Key, Improvement | None]()
+    proofs = dict[Key, LeftOut | None]()
     while kept:
         whole = _only(context, found, answer, kept) or answer
         proofs |= left_out(context, whole, [n.hypothesis for n in kept])
@@ -170,24 +164,17 @@ def _unknown_cause(rest: Sequence[Scored], alone: float, named: bool) -> tuple[S
     return best, max(m.evidence for m in effects)
 
 
-def _changes(outside: Improvement | None) -> bool:
-    """Whether an effect improves free runs outside the fit by as much as matters, be it by chance; true where
-    nothing can be left out.
-    """
-    return outside is None or outside.explained >= thresholds.MATTERS
-
-
-def _supports(outside: Improvement | None) -> bool:
+def _supports(outside: LeftOut | None) -> bool:
     """Whether left-out recordings support what was added; true where nothing can be left out."""
-    return outside is None or (outside.sure and _changes(outside))
+    return outside is None or (outside.sure and outside.free.explained >= thresholds.MATTERS)
 
 
-def _idle(h: Hypothesis, proofs: Mapping[Key, Improvement | None]) -> str | None:
+def _idle(h: Hypothesis, proofs: Mapping[Key, LeftOut | None]) -> str | None:
     """Why left-out recordings do not support an effect; None if they do."""
     outside = proofs[h.key]
     if outside is None or _supports(outside):
         return None
-    old, new = outside.judged
+    old, new = outside.free.judged
     rms = f"{printed(old)} without it, {printed(new)} with it"
     return (
         f"{h.effect.word} at {h.where} does not improve free runs enough on recordings that are left out of "
@@ -285,14 +272,11 @@ def coarse(found: Search) -> tuple[str, ...]:
     )
 
 
-def _apart(
-    found: Search, answer: Scored, rest: Sequence[Named], least: float, matters: bool
-) -> tuple[str, ...]:
+def _apart(found: Search, answer: Scored, rest: Sequence[Named], least: float) -> tuple[str, ...]:
     """A sentence for each effect of the answer that is not sure enough to be named, with its rival.
 
     Args:
         least: log evidence that a name has to add.
-        matters: whether the answer changes free runs at all.
     """
     sentences = []
     for n in rest:
@@ -301,7 +285,7 @@ def _apart(
         if n.rivals and n.rivals[0].below < added:
             other, below = n.rivals[0].hypothesis, n.rivals[0].below
             sentence += f"; {other.effect.word} at {other.where} instead has {below:.1f} less"
-        sentences.append(sentence if matters else f"{sentence}; it does too little for free runs")
+        sentences.append(sentence)
     return tuple(sentences)
 
 

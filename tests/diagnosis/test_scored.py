@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.stats import binomtest, norm
 
 from discovery.diagnosis import crossvalidation, thresholds
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.crossvalidation import left_out
+from discovery.diagnosis.crossvalidation import LeftOut, left_out
+from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.refit import MOVED, refit, score
 from discovery.diagnosis.scan import scan_model
 from discovery.diagnosis.scored import Scored, is_usual, scored, with_change, with_force, with_unknown
@@ -208,8 +209,9 @@ def test_what_is_there_predicts_recordings_that_are_left_out() -> None:
     proofs = left_out(dry(), wetted(), [h, event])
     found = proofs[h.key]
     assert found is not None
-    assert found.after < 1.2 < found.before
-    assert found.low > 0
+    assert found.free.after < 1.2 < found.free.before
+    assert found.free.low > 0
+    assert found.better == found.blocks > 10
     assert proofs[event.key] is None  # other recordings say nothing of it
     alone = replace(dry(), recordings=("r1",))
     assert left_out(alone, wetted(), [h]) == {h.key: None}
@@ -250,9 +252,37 @@ def test_whether_it_is_by_chance_is_judged_under_the_process_noise(
     (h,) = wetted().hypotheses
     found = left_out(dry(), wetted(), [h])[h.key]
     assert found is not None
-    assert found.explained > 1.0
-    assert found.low < 0  # of the free runs alone
+    assert found.free.explained > 1.0
+    assert found.free.low < 0  # of the free runs alone
     assert found.sure == sure
+
+
+def test_an_hour_that_goes_wrong_does_not_outvote_all_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A printer whose base cools by free convection: free runs of 2.0 reading noises became 1.3, all blocks
+    but three were better predicted, and one so much worse that the mean told nothing.
+    """
+    gains = [10.2, 20.9, 21.8, 21.3, 0.5, 0.3, 1.3, -0.5, -0.1, -92.8, 5.6, 38.7, 41.9, 15.3, 2.5, 3.3]
+
+    def residuals(_: Context, answer: Scored, chosen: Sequence[Hypothesis], __: Fold) -> Residuals:
+        acts = len(chosen) == len(answer.hypotheses)
+        z = np.sqrt(100.0 - acts * np.array(gains))
+        free = np.full((8, 1), 1.3 if acts else 2.0)
+        return {"r1": (free, z[:8, None]), "r2": (free, z[8:, None])}
+
+    monkeypatch.setattr(crossvalidation, "_residuals", residuals)
+    (h,) = wetted().hypotheses
+    found = left_out(replace(dry(), outputs=("E_Y",)), wetted(), [h])[h.key]
+    assert found is not None
+    assert (found.better, found.blocks) == (13, 16)
+    assert found.sure
+
+
+def test_as_many_blocks_are_better_by_chance_as_coins_show_heads() -> None:
+    free = Improvement(1.0, 0.9, 0.5, 0.0, 0.0, {})
+    for blocks in (0, 1, 5, 6, 16, 27, 300):
+        for better in range(blocks + 1):
+            by_chance = binomtest(better, blocks, alternative="greater").pvalue if blocks else 1.0
+            assert LeftOut(free, better, blocks).sure == (by_chance <= 0.02)
 
 
 def test_a_fit_settles_under_the_noise_that_it_makes_likely() -> None:
