@@ -118,7 +118,10 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
                 f"{max(m.evidence for m in rest) - alone:.0f} more log evidence"
             )
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
-    further = (*(idle[key] for key in nothing), *_apart(found, answer, unsure, least))
+    further = (
+        *(text for key, text in idle.items() if key in nothing),
+        *_apart(found, answer, unsure, least),
+    )
     every = (*reasons, *further)
     if named:
         kinds = {n.hypothesis.effect.is_physics for n in named}
