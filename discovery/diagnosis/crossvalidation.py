@@ -30,8 +30,8 @@ Residuals = tuple[Array, Array]  # (R, Y) of a free run and of the filter
 class LeftOut:
     """What effects change of recordings that are left out of the fit.
 
-    `free`: rms of free runs in reading noises. `better`: of so many `blocks` of time in which readings say
-    which of both models predicts them better, those that are better predicted with the effects.
+    `free`: rms of free runs in reading noises. `blocks`: of time, where the models with and without the
+    effects predict differently. `better`: those of them that the model with the effects predicts better.
     """
 
     free: Improvement
@@ -40,9 +40,9 @@ class LeftOut:
 
     @property
     def sure(self) -> bool:
-        """Whether so many blocks are hardly better by chance, which is never excluded beyond `SUREST`: the
-        sign test, for which hours that go badly wrong are one block and do not outvote all others (Diebold
-        and Mariano, J. Business & Economic Statistics 13, 1995).
+        """Whether chance gives so many better blocks with a probability of 1 - SUREST at most: the sign test
+        (Diebold and Mariano, J. Business & Economic Statistics 13, 1995). Hours that go badly wrong are one
+        block there; in a mean they outweigh all others.
 
         >>> run = Improvement(1.0, 0.9, 0.5, 0.0, 0.0, {})
         >>> LeftOut(run, 13, 16).sure, LeftOut(run, 12, 16).sure

@@ -33,7 +33,7 @@ FACTOR = 3.5  # 68 % of sizes lie within this factor of their median (log-normal
 JUMP = 8.0  # median size of what a sensor shows too much, in reading noises
 
 # --- what is said -----------------------------------------------------------------------------------------
-SUREST = 0.98  # probability that is never exceeded: causes that nobody thought of
+SUREST = 0.98  # probability that is never exceeded: causes that nobody thought of; of tests by blocks, too
 NAMED = 0.7  # probability from which an effect is named
 MATTERS = 0.15  # reading noises, rms: what explains less of free runs (1 % of their rms) has no name
 SHORT = 16.0  # log evidence that a name has to add, and that an unknown cause has to add to refute names
