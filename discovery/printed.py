@@ -21,6 +21,18 @@ def counted(count: int, word: str) -> str:
     return f"{count} {word}{'s' * (count != 1)}"
 
 
+def lasting(seconds: float) -> str:
+    """A duration as one says it.
+
+    >>> lasting(59.6), lasting(1373.0), lasting(7200.0)
+    ('60 s', '23 min', '2 h')
+    """
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= size:
+            return f"{printed(seconds / size, 2)} {unit}"
+    return f"{printed(seconds, 2)} s"
+
+
 def sized(value: float, unit: str, digits: int = 3) -> str:
     """The size of an effect with its unit; without a unit it is a share.
 

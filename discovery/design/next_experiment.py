@@ -18,7 +18,7 @@ from discovery.dynamics.samples import Samples
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise
 from discovery.models import Model
-from discovery.printed import printed
+from discovery.printed import lasting
 from discovery.terms import Name
 
 Array = NDArray[np.float64]
@@ -86,16 +86,14 @@ def next_experiment(
     every = length / READINGS
     times = ceil(DECISIVE / max(float(gained[-1]), 1e-9))
     if times > HOPELESS:
-        sentence = f"no input pattern of {_duration(length)} {purpose.does} with these outputs alone"
+        sentence = f"no input pattern of {lasting(length)} {purpose.does} with these outputs alone"
     elif times > 1:
-        often = f"{times} recordings of {_duration(length)}, readings every {_duration(every)}"
+        often = f"{times} recordings of {lasting(length)}, readings every {lasting(every)}"
         sentence = f"{text}: {purpose.does} with {often}"
     else:
         instants = a.system.grid.time[a.system.grid.read]
         soon = max(float(instants[np.argmax(gained >= DECISIVE)]), every)
-        sentence = (
-            f"{text}: {purpose.does} within about {_duration(soon)} of readings every {_duration(every)}"
-        )
+        sentence = f"{text}: {purpose.does} within about {lasting(soon)} of readings every {lasting(every)}"
     if sensor and spread[sensor] > 0.02:
         apart = f"{purpose.differ} by {spread[sensor]:.2f} K rms"
         sentence += f"; a temperature sensor on {sensor} helps most ({apart})"
@@ -106,14 +104,6 @@ def _read(context: Context) -> set[str]:
     """States that a measured output shows directly: they have their sensor."""
     shown = {n: context.model.outputs.get(n, Name(n)) for n in context.outputs}
     return {y.id for y in shown.values() if isinstance(y, Name)}
-
-
-def _duration(seconds: float) -> str:
-    """A duration as one says it."""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= size:
-            return f"{printed(seconds / size, 2)} {unit}"
-    return f"{printed(seconds, 2)} s"
 
 
 def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
@@ -154,7 +144,7 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
     names = called("rotation speed", "speed"), called("heat load", "load")
     moving = " and ".join(name for name, there in zip(names, (speed, load), strict=True) if there)
     dry, still = ", dry" if wet else "", "stand still" if speed else "leave everything off"
-    half, two, hour = (_duration(length / n) for n in (2, 6, 12))
+    half, two, hour = (lasting(length / n) for n in (2, 6, 12))
     wanted: dict[str, Mapping[str, Array]] = {}
     if wet:
         wanted[f"switch the pump every {two} at standstill with warm fluid"] = build(zero, zero, sixth, True)

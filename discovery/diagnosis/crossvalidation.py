@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import comb
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.proof import FreeRuns, Improvement, block_sums, improvement
+from discovery.diagnosis.proof import FreeRuns, Improvement, block_sums, improvement, surely_better
 from discovery.diagnosis.refit import ENOUGH, with_effects
 from discovery.diagnosis.scored import Scored
-from discovery.dynamics import predict
+from discovery.dynamics import Grid, predict
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
 from discovery.evaluation.crossvalidation import Fold, folds
 from discovery.fitting import fit_model, from_known_starts, predict_recording
 from discovery.fitting.kalman import innovations
+from discovery.recordings import Campaign
 from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
@@ -40,16 +40,13 @@ class LeftOut:
 
     @property
     def sure(self) -> bool:
-        """Whether chance gives so many better blocks with a probability of 1 - SUREST at most: the sign test
-        (Diebold and Mariano, J. Business & Economic Statistics 13, 1995). Hours that go badly wrong are one
-        block there; in a mean they outweigh all others.
+        """Whether more blocks are better than chance makes them.
 
         >>> run = Improvement(1.0, 0.9, 0.5, 0.0, 0.0, {})
         >>> LeftOut(run, 13, 16).sure, LeftOut(run, 12, 16).sure
         (True, False)
         """
-        as_good = sum(comb(self.blocks, k) for k in range(self.better, self.blocks + 1))
-        return bool(1.0 - as_good / 2**self.blocks >= thresholds.SUREST)
+        return surely_better(self.better, self.blocks)
 
 
 def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> dict[Key, LeftOut | None]:
@@ -74,6 +71,30 @@ def together_left_out(context: Context, answer: Scored, chosen: Sequence[Hypothe
     """
     lasting = tuple(h for h in chosen if h.recording is None)
     return next(iter(_changed(context, answer, [lasting] if lasting else []).values()), None)
+
+
+def model_left_out(context: Context) -> dict[str, Array]:
+    """What free runs of the model without effects leave of recordings (R, Y) that are left out of its fit in
+    turn, in the unit of each output; without those on which it runs away. It is fitted as in any experiment.
+    """
+
+    def left(fold: Fold) -> dict[str, Array]:
+        seen, kept, grids = _without(context, fold)
+        options: dict[str, Any] = {"grids": grids, "belief": context.belief, "tolerance": ENOUGH}
+        out = {}
+        try:
+            fit = fit_model(context.model, seen, kept, context.outputs, begin=context.baseline, **options)
+            for r in fold.recordings:
+                run = predict_recording(
+                    fit.model, context.campaign, r, context.outputs, context.white.white, context.grids[r]
+                )
+                out[r] = run.system.grid.readings - predict(run)
+        except RunsAwayError:
+            pass
+        return out
+
+    every = folds(context.campaign, context.recordings, blocks=0)
+    return {name: one for part in side_by_side(left, every) for name, one in part.items()}
 
 
 def _changed(
@@ -131,9 +152,7 @@ def _residuals(
     model, found = with_effects(context.model, chosen), answer.fit.model.parameters
     model = model.with_values({n: found[n].value for n in model.free if n in found})
     white = np.array(context.white.white)
-    kept = [r for r in context.recordings if r not in fold.recordings]
-    seen = replace(context.campaign, recordings={r: context.campaign.recordings[r] for r in kept})
-    grids = {r: context.grids[r] for r in kept}
+    seen, kept, grids = _without(context, fold)
     out = {}
     try:
         fit = fit_model(
@@ -162,3 +181,10 @@ def _residuals(
     except RunsAwayError:
         pass
     return out
+
+
+def _without(context: Context, fold: Fold) -> tuple[Campaign, list[str], dict[str, Grid]]:
+    """Campaign, names and grids of the recordings that a fold keeps."""
+    kept = [r for r in context.recordings if r not in fold.recordings]
+    seen = replace(context.campaign, recordings={r: context.campaign.recordings[r] for r in kept})
+    return seen, kept, {r: context.grids[r] for r in kept}

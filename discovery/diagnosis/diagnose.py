@@ -19,6 +19,7 @@ from discovery.diagnosis.posterior import IN_PLAY, Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, unit_of
 from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
+from discovery.diagnosis.response import Response, responses
 from discovery.diagnosis.scored import Scored, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
@@ -61,6 +62,7 @@ class Diagnosis:
     fit: Improvement  # free runs of the recordings to fit
     held_out: dict[str, Improvement]
     description: Description | None
+    responses: tuple[Response, ...]
     curves: tuple[Curve, ...]
     question: str
     seconds: float
@@ -222,6 +224,7 @@ def diagnose(
         fit=fitting,
         held_out=proof,
         description=describe(context, found.baseline, shown[0]) if unexplained else None,
+        responses=tuple(responses(context)) if verdict.word == UNEXPLAINED else (),
         curves=tuple(curves(found.baseline, shown[0])) if shown and verdict.word != NO_MISMATCH else (),
         question=ask(context, found, verdict),
         seconds=clock.perf_counter() - began,

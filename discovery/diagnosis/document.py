@@ -22,11 +22,14 @@ from discovery.diagnosis.form import (
     Number,
     OwnEffect,
     Physics,
+    ResponseDocument,
+    ResponsePart,
     Size,
     Window,
     WrongReading,
 )
 from discovery.diagnosis.proof import Improvement, unit_of
+from discovery.diagnosis.response import Response
 from discovery.diagnosis.thresholds import RIVALS_SHOWN
 from discovery.diagnosis.verdict import FAULT, UNEXPLAINED, Named
 from discovery.diagnosis.when import instants
@@ -88,6 +91,7 @@ def document(d: Diagnosis) -> DiagnosisDocument:
         )
         if d.description
         else None,
+        responses=[_response(one) for one in d.responses],
         next_experiment=d.question,
         seconds=round(d.seconds, 2),
     )
@@ -105,6 +109,27 @@ def _claim(h: Hypothesis) -> _Claimed:
         "recording": h.recording,
         "channels": list(h.follows),
     }
+
+
+def _response(one: Response) -> ResponseDocument:
+    return ResponseDocument(
+        output=one.output,
+        unit=one.unit,
+        parts=[
+            ResponsePart(
+                input=p.input,
+                gain=number(p.gain, 4),
+                unit=p.unit,
+                time_constant_s=number(p.seconds, 4),
+                low_s=number(p.low, 4),
+                high_s=number(p.high, 4),
+            )
+            for p in one.parts
+        ],
+        rms_left_out=number(one.left),
+        rms_of_model=number(one.left_by_model),
+        sentence=one.sentence(),
+    )
 
 
 def _stated_at(d: Diagnosis, h: Hypothesis) -> str | None:

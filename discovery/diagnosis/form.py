@@ -169,6 +169,29 @@ class DescriptionDocument(Strict):
     note: str = "describes the missing heat; it is not its cause"
 
 
+class ResponsePart(Strict):
+    """An output follows an input with a gain, after a time constant."""
+
+    input: str
+    gain: Number
+    unit: str
+    time_constant_s: Number
+    low_s: Number = Field(description="the shortest over the fits without a recording")
+    high_s: Number = Field(description="the longest over them")
+
+
+class ResponseDocument(Strict):
+    """How an output follows inputs, as a sum of lags that is found without the model."""
+
+    output: str
+    unit: str
+    parts: list[ResponsePart]
+    rms_left_out: Number = Field(description="on recordings that are left out of the fit in turn")
+    rms_of_model: Number = Field(description="of the model on the same recordings, left out of its fit, too")
+    sentence: str
+    note: str = "describes the readings; it is not the cause of what is missing"
+
+
 class DiagnosisDocument(Strict):
     """The content of diagnosis.json."""
 
@@ -189,5 +212,8 @@ class DiagnosisDocument(Strict):
     set_aside: list[WrongReading]
     missing_heat: MissingHeat | None
     description: DescriptionDocument | None
+    responses: list[ResponseDocument] = Field(
+        default_factory=list, description="of a mismatch without a name: where a short sum beats the model"
+    )
     next_experiment: str
     seconds: float

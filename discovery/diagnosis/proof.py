@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import copysign, hypot, inf, isfinite, sqrt
+from math import comb, copysign, hypot, inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.diagnosis import thresholds
 from discovery.dynamics import Trajectory, predict, sensitivities
 from discovery.errors import RunsAwayError
 from discovery.evidence.noisy import with_noise
@@ -251,6 +252,18 @@ def _run(fit: Fit, campaign: Campaign, run: str) -> Trajectory | None:
     except RunsAwayError:
         return None
     return trajectory
+
+
+def surely_better(better: int, blocks: int) -> bool:
+    """Whether chance makes so many of some blocks better with a probability of 1 - SUREST at most: the sign
+    test (Diebold and Mariano, J. Business & Economic Statistics 13, 1995). Hours that go badly wrong are one
+    block there; in a mean they outweigh all others.
+
+    >>> surely_better(13, 16), surely_better(12, 16)
+    (True, False)
+    """
+    as_good = sum(comb(blocks, k) for k in range(better, blocks + 1))
+    return bool(1.0 - as_good / 2**blocks >= thresholds.SUREST)
 
 
 def block_sums(before: Array, after: Array) -> tuple[Array, Array, Array]:

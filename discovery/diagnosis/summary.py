@@ -33,6 +33,7 @@ def lines_of(d: dict[str, Any]) -> list[str]:
     if about := d["description"]:
         what = f"the missing heat at {about['state']} follows {about['formula']}"
         lines.append(f"  {what} (a description, not a cause)")
+    lines += [f"  {one['sentence']}" for one in d.get("responses") or ()]
     worse, unit = d["improvement"]["contradicted_by"], _unit(d["improvement"])
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
         after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])

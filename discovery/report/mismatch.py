@@ -38,7 +38,7 @@ def section(run: Run) -> dict[str, Any] | None:
         "tables": [table for table in tables if table.rows],
         "charts": heat_charts(run),
         "heat_note": _HEAT_NOTE,
-        "formula": _formula(d),
+        "descriptions": _descriptions(d),
         "next": _sentence(d.get("next_experiment") or ""),
         "next_title": "What would have been detected"
         if d.get("verdict") == "no mismatch"
@@ -253,10 +253,9 @@ def _considered(d: Mapping[str, Any]) -> Printed:
     return Printed("Closest effects of the catalogue", header, tuple(rows), frozenset({1, 3}))
 
 
-def _formula(d: Mapping[str, Any]) -> str:
-    found = d.get("description") or {}
-    return (
-        f"{found['formula']} at {found.get('state')} describes the missing heat; it is not its cause."
-        if found.get("formula")
-        else ""
-    )
+def _descriptions(d: Mapping[str, Any]) -> list[str]:
+    """What describes a mismatch without a name: missing heat, and outputs that follow inputs."""
+    heat, said = d.get("description") or {}, []
+    if heat.get("formula"):
+        said = [f"{heat['formula']} at {heat.get('state')} describes the missing heat; it is not its cause."]
+    return [*said, *(_sentence(one["sentence"]) for one in d.get("responses") or ())]

@@ -1,0 +1,245 @@
+"""How an output follows what is recorded, where no effect of the catalogue explains what a model misses:
+gains and time constants that are found without the model. A description, not a cause.
+
+    y(t) = z_run + sum_k g_k lag(u_k, tau_k)
+
+Two time constants are two masses or two paths; gains of opposite sign are a path that acts early and another
+one that works against it later. A sum is said only if it predicts each recording that it was not fitted to
+better than the model does, fitted without it, too, if it leaves at most half of the squares that the model
+leaves there, and if each of these fits finds the same inputs.
+
+Terms are found one after the other (orthogonal least squares: S. Chen, S. Billings and W. Luo, Int. J.
+Control 50, 1989, 1873); time constants are refined together after each step (variable projection: G. Golub
+and V. Pereyra, SIAM J. Numerical Analysis 10, 1973, 413).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.context import Context
+from discovery.diagnosis.crossvalidation import model_left_out
+from discovery.diagnosis.proof import block_sums, surely_better
+from discovery.dynamics import Grid
+from discovery.dynamics.grid import interleaved
+from discovery.dynamics.series import lag_ends
+from discovery.evaluation.crossvalidation import folds
+from discovery.models.units import differences
+from discovery.printed import lasting, printed
+from discovery.recordings import Campaign
+
+Array = NDArray[np.float64]
+Lagged = tuple[str, float]  # an input, and the time constant [s] with which an output follows it
+Sum = tuple[tuple[Lagged, ...], Array]  # and their gains
+
+MOST_TERMS = 3
+TRIED = 14  # time constants of each input, from half the usual distance of readings to the longest recording
+MOST_STEPS = 60  # of a refinement
+
+
+@dataclass(frozen=True)
+class Part:
+    """An output follows an input: `gain` in its unit per unit of the input, and a time constant.
+
+    `low` and `high` [s] are the shortest and the longest over the fits without a recording.
+    """
+
+    input: str
+    gain: float
+    unit: str
+    seconds: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Response:
+    """How an output follows inputs, and the rms [its unit] of what is left of recordings that are left out.
+
+    `shortest` [s]: shorter time constants cannot be told from none.
+    """
+
+    output: str
+    unit: str
+    parts: tuple[Part, ...]
+    left: float
+    left_by_model: float
+    shortest: float
+
+    def sentence(self) -> str:
+        """What was found, in words."""
+        inputs = list(dict.fromkeys(p.input for p in self.parts))
+        said = "; ".join(self._of(name) for name in inputs)
+        left = f"{printed(self.left)} {self.unit} of recordings left out of the fit".replace(" 1 of", " of")
+        judged = f"leaves {left}, the model {printed(self.left_by_model)}"
+        return f"{self.output} follows {said} ({judged}; a description, not a cause)"
+
+    def _of(self, name: str) -> str:
+        """An input in words: `bed with two time constants of opposite sign: +3 um/K after 1 min, ...`."""
+        own = [p for p in self.parts if p.input == name]
+        several = ("", "", "with two time constants", "with three time constants")[len(own)]
+        opposite = " of opposite sign" if len({p.gain > 0 for p in own}) > 1 else ""
+        head = f"{name} {several}{opposite}: " if several else f"{name}: "
+        return head + ", ".join(self._term(p) for p in own)
+
+    def _term(self, p: Part) -> str:
+        gain = f"{'+' if p.gain > 0 else '-'}{printed(abs(p.gain))} {p.unit}"
+        if p.seconds <= self.shortest:
+            return f"{gain} at once"
+        ends = f" ({lasting(p.low)} to {lasting(p.high)})" if lasting(p.low) != lasting(p.high) else ""
+        return f"{gain} after {lasting(p.seconds)}{ends}"
+
+
+def responses(context: Context) -> list[Response]:
+    """How outputs follow inputs, of those that a short sum predicts better than the model; none where no
+    recording can be left out.
+    """
+    left, campaign = model_left_out(context), context.campaign
+    found = []
+    for y, output in enumerate(context.outputs):
+        read = [r for r in context.recordings if r in left and np.isfinite(left[r][:, y]).sum() > MOST_TERMS]
+        data = _Readings({r: context.grids[r] for r in read}, y, campaign)
+        by_model = {r: _centred(left[r][:, y]) for r in read}
+        one = data.response(output, by_model) if len(read) > 1 and data.inputs else None
+        found += [one] if one else []
+    return found
+
+
+@dataclass(frozen=True)
+class _Readings:
+    """Readings of one output in several recordings, each from its own mean: its zero is its own."""
+
+    grids: Mapping[str, Grid]
+    output: int
+    campaign: Campaign
+
+    @property
+    def inputs(self) -> list[str]:
+        """Recorded channels that move."""
+        grids = list(self.grids.values())
+        names = [n for n in (grids[0].samples if grids else ()) if n in self.campaign.channels]
+        return [n for n in names if any(np.ptp(g.nodes[n]) > 1e-9 for g in grids)]
+
+    def response(self, output: str, by_model: Mapping[str, Array]) -> Response | None:
+        """The sum whose terms surely predict; None if the model predicts about as well."""
+        read = list(self.grids)
+        parts = [
+            (fold.recordings, self.sums([r for r in read if r not in fold.recordings]))
+            for fold in folds(self.campaign, read, blocks=0)
+        ]
+        whole, chosen = self.sums(read), 0
+        best = {r: _centred(self.readings(r)) for r in read}
+        for k, (terms, _) in enumerate(whole):
+            if any(len(sums) <= k or _inputs(sums[k]) != _inputs(whole[k]) for _, sums in parts):
+                continue
+            left = {r: self.left(r, sums[k]) for group, sums in parts for r in group}
+            if _surely(best, left):
+                best, chosen = left, len(terms)
+        worse = any(_rms([best[r]]) >= _rms([by_model[r]]) for r in read)
+        rms = _rms(list(best.values())), _rms(list(by_model.values()))
+        if not chosen or worse or thresholds.MISSED * rms[0] ** 2 > rms[1] ** 2:
+            return None
+        unit = differences(self.campaign.channels[output].unit)
+        terms, gains = whole[chosen - 1]
+        folded = [sorted(sums[chosen - 1][0]) for _, sums in parts]
+        found = []
+        for place, k in enumerate(sorted(range(chosen), key=lambda k: terms[k])):
+            name, seconds = terms[k]
+            ends = [seconds, *(one[place][1] for one in folded)]
+            per = f"{unit}/{differences(self.campaign.channels[name].unit)}"
+            found.append(Part(name, float(gains[k]), per, seconds, min(ends), max(ends)))
+        return Response(output, unit, tuple(found), *rms, 1.01 * self.limits[0])
+
+    def sums(self, recordings: Sequence[str]) -> list[Sum]:
+        """The best sums of one term, two terms, ..., each with one term more than the one before."""
+        bank = [(n, float(t)) for n in self.inputs for t in np.geomspace(*self.limits, TRIED)]
+        x, y = self.rows(recordings, bank)
+        size, found, terms = np.sum(x**2, axis=0), list[Sum](), tuple[Lagged, ...]()
+        while len(terms) < MOST_TERMS:
+            own = np.linalg.qr(self.rows(recordings, terms)[0])[0]
+            free = x - own @ (own.T @ x)
+            new = np.sum(free**2, axis=0)
+            gain = np.where(new > 1e-8 * size, (free.T @ y) ** 2 / np.maximum(new, 1e-300), 0.0)
+            if not gain.any():
+                break
+            terms = self.refined(recordings, (*terms, bank[int(np.argmax(gain))]))
+            found.append((terms, _gains(*self.rows(recordings, terms))))
+        return found
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The shortest and the longest time constant [s]."""
+        steps = np.concatenate([np.diff(g.time[g.read]) for g in self.grids.values()])
+        return float(np.median(steps)) / 2, max(float(np.ptp(g.time)) for g in self.grids.values())
+
+    def refined(self, recordings: Sequence[str], terms: Sequence[Lagged]) -> tuple[Lagged, ...]:
+        """The terms with the time constants that fit best together."""
+        names = [name for name, _ in terms]
+        low, high = np.log(self.limits)
+
+        def left(logs: Array) -> Array:
+            x, y = self.rows(recordings, list(zip(names, np.exp(logs).tolist(), strict=True)))
+            return np.asarray(y - x @ _gains(x, y))
+
+        inside = 1e-6 * (high - low)
+        begin = np.clip(np.log([t for _, t in terms]), low + inside, high - inside)
+        logs = least_squares(left, begin, bounds=(low, high), max_nfev=MOST_STEPS).x
+        return tuple(zip(names, np.exp(logs).tolist(), strict=True))
+
+    def rows(self, recordings: Sequence[str], terms: Sequence[Lagged]) -> tuple[Array, Array]:
+        """Lagged inputs (R, P) and readings (R,) of recordings, each from its mean."""
+        columns, readings = [], []
+        for r in recordings:
+            seen = np.isfinite(self.readings(r))
+            x, y = self.lagged(r, terms)[seen], self.readings(r)[seen]
+            columns.append(x - x.mean(axis=0))
+            readings.append(y - y.mean())
+        return np.concatenate(columns), np.concatenate(readings)
+
+    def readings(self, recording: str) -> Array:
+        """The readings (R,), NaN where the output was not read."""
+        return np.asarray(self.grids[recording].readings[:, self.output])
+
+    def lagged(self, recording: str, terms: Sequence[Lagged]) -> Array:
+        """Lagged inputs (R, P) at the readings; each begins settled."""
+        grid = self.grids[recording]
+        columns = np.empty((len(grid.read), len(terms)))
+        for k, (name, seconds) in enumerate(terms):
+            nodes = np.asarray(grid.nodes[name], dtype=float)
+            after = lag_ends(interleaved(nodes[:-1], nodes[1:]), grid.step, seconds)
+            columns[:, k] = np.concatenate((after[:1], after[1::2]))[grid.read]
+        return columns
+
+    def left(self, recording: str, found: Sum) -> Array:
+        """What a sum leaves of the readings of a recording (R,), from its mean."""
+        terms, gains = found
+        return _centred(self.readings(recording) - self.lagged(recording, terms) @ gains)
+
+
+def _inputs(found: Sum) -> list[str]:
+    return sorted(name for name, _ in found[0])
+
+
+def _gains(x: Array, y: Array) -> Array:
+    return np.asarray(np.linalg.lstsq(x, y, rcond=1e-10)[0])
+
+
+def _surely(before: Mapping[str, Array], after: Mapping[str, Array]) -> bool:
+    """Whether more blocks of time get better than chance makes them."""
+    pairs = [block_sums(before[r][:, None], after[r][:, None]) for r in before]
+    better = np.concatenate([new < old for old, new, _ in pairs])
+    return surely_better(int(better.sum()), len(better))
+
+
+def _centred(left: Array) -> Array:
+    return np.asarray(left - np.nanmean(left))
+
+
+def _rms(parts: Sequence[Array]) -> float:
+    return float(np.sqrt(np.nanmean(np.concatenate(parts) ** 2)))
