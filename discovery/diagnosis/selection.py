@@ -13,7 +13,7 @@ from math import inf
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.refit import score
 from discovery.diagnosis.scan import Scan, attempt, scan_model
-from discovery.diagnosis.scored import Scored, light, scored
+from discovery.diagnosis.scored import Scored, is_usual, light, scored
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score
 from discovery.fitting import Noise
@@ -67,13 +67,31 @@ class Search:
         return self.best.evidence - self.baseline.evidence
 
     def run(self) -> Search:
-        """Search from the most likely model that was tried, or from the baseline."""
-        current = self.grow().best
+        """Search from the most likely model that was tried, or from the baseline.
+
+        If the answer is coarse, search from each other first effect that was about as likely, too: the best
+        first step need not lead furthest.
+        """
+        self._settled(self.grow().best)
+        for first in self._as_likely():
+            coarse = not is_usual(self.best.settings[self.best.best])
+            if coarse and not first.keys <= self.best.keys:
+                self._settled(first)
+        return self
+
+    def _settled(self, current: Scored) -> None:
+        """Add effects and question them until nothing changes."""
         while True:
             start = current.keys
             current = self._questioned(self._grown(current))
             if current.keys == start or len(current.hypotheses) >= MOST:
-                return self
+                return
+
+    def _as_likely(self) -> list[Scored]:
+        """Models with a single effect that are about as likely as the best of them."""
+        single = [one for one in self.tried.values() if len(one.hypotheses) == 1]
+        best = max((one.evidence for one in single), default=inf)
+        return sorted((one for one in single if one.evidence > best - NEAR), key=lambda one: -one.evidence)
 
     def grow(self) -> Search:
         """Add effects to the most likely model that was tried, or to the baseline, and question none."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
+from discovery.diagnosis import selection
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import FAR, Search, not_twice
 from tests.diagnosis.parts import dry
@@ -52,3 +54,22 @@ def test_what_grew_is_questioned_under_another_noise(monkeypatch: pytest.MonkeyP
     search, current = asked[0]
     assert search is other
     assert "fluid_convection" in {h.effect.word for h in current.hypotheses}
+
+
+@pytest.mark.parametrize(("coarse", "begun"), [(True, ["heat", "mass"]), (False, ["heat"])])
+def test_a_coarse_answer_is_sought_from_another_beginning_too(
+    coarse: bool, begun: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Heat is 5 more likely than a second mass as the first effect, and a lag 50 less than both."""
+    found = Search(dry())
+    for word, evidence in (("heat", 105.0), ("mass", 100.0), ("lag", 55.0)):
+        one = SimpleNamespace(
+            hypotheses=(word,), keys=frozenset({word}), evidence=evidence, settings=[coarse], best=0
+        )
+        found.tried[one.keys] = cast(Scored, one)
+    settled: list[str] = []
+    monkeypatch.setattr(Search, "grow", lambda self: self)
+    monkeypatch.setattr(Search, "_settled", lambda _, current: settled.extend(current.hypotheses))
+    monkeypatch.setattr(selection, "is_usual", lambda setting: not setting)
+    found.run()
+    assert settled == begun
