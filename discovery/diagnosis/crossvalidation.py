@@ -121,7 +121,7 @@ def _changed(
         without, with_it = left[answer.keys - {*own}], left[answer.keys]
         if without:
             outputs = [context.outputs[y] for y in mine]
-            found[own] = _compared(context.recordings, outputs, without, with_it, mine)
+            found[own] = _compared(context.recordings, outputs, without, with_it, mine, context.blocks)
     return found
 
 
@@ -131,13 +131,16 @@ def _compared(
     without: Mapping[str, Residuals],
     with_it: Mapping[str, Residuals],
     mine: Sequence[int],
+    blocks: int,
 ) -> LeftOut:
-    """Residuals of some outputs without and with effects, compared."""
+    """Residuals of some outputs without and with effects, compared in so many blocks of each recording."""
     one, runs, gains = np.ones(len(mine)), list[FreeRuns](), list[Array]()
     for r in (r for r in recordings if r in without):
         (free, beyond), (then, after) = without[r], with_it.get(r, (None, None))
         runs.append(FreeRuns(free[:, mine], None if then is None else then[:, mine], 1.0, one))
-        old, new, _ = block_sums(beyond[:, mine], beyond[:, mine] if after is None else after[:, mine])
+        old, new, _ = block_sums(
+            beyond[:, mine], beyond[:, mine] if after is None else after[:, mine], blocks
+        )
         gains.append(old - new)
     gain = np.concatenate(gains)
     return LeftOut(improvement(runs, outputs), int(np.sum(gain > 0)), int(np.sum(gain != 0)))

@@ -266,9 +266,9 @@ def surely_better(better: int, blocks: int) -> bool:
     return bool(1.0 - as_good / 2**blocks >= thresholds.SUREST)
 
 
-def block_sums(before: Array, after: Array) -> tuple[Array, Array, Array]:
+def block_sums(before: Array, after: Array, blocks: int = BLOCKS) -> tuple[Array, Array, Array]:
     """Sums of squares in blocks of time before and after, and the number of readings in each."""
-    starts = np.arange(0, len(before), max(1, len(before) // BLOCKS))
+    starts = np.linspace(0, len(before), min(blocks, len(before)) + 1).astype(int)[:-1]
     old, new = (np.add.reduceat(np.nansum(z**2, axis=1), starts) for z in (before, after))
     return old, new, np.add.reduceat(np.isfinite(before).sum(axis=1), starts)
 

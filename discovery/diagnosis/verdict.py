@@ -6,7 +6,7 @@ seen, and if no law of physics forbids it. Held-out recordings may withdraw a na
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import inf, isfinite, sqrt
@@ -135,18 +135,21 @@ def _proved(
     context: Context, found: Search, answer: Scored, chosen: Sequence[Named]
 ) -> tuple[tuple[Named, ...], dict[Key, str], dict[Key, LeftOut | None]]:
     """Effects that improve free runs outside the fit, why each other one is not named, and what each changes
-    there.
+    there. Of several that do not, the one that explains least goes first: two that stand in for each other
+    look idle as long as both are there.
     """
     kept, idle = tuple(chosen), dict[Key, str]()
     proofs = dict[Key, LeftOut | None]()
     while kept:
         whole = _only(context, found, answer, kept) or answer
         proofs |= left_out(context, whole, [n.hypothesis for n in kept])
-        more = {n.hypothesis.key: text for n in kept if (text := _idle(n.hypothesis, proofs))}
-        if not more:
+        outside = [(n, proofs[n.hypothesis.key]) for n in kept]
+        unsupported = [(n, one) for n, one in outside if one is not None and not _supports(one)]
+        if not unsupported:
             break
-        idle |= more
-        kept = tuple(n for n in kept if n.hypothesis.key not in more)
+        last, its = min(unsupported, key=lambda pair: pair[1].free.explained)
+        idle[last.hypothesis.key] = _idle(last.hypothesis, its)
+        kept = tuple(n for n in kept if n is not last)
     return kept, idle, proofs
 
 
@@ -172,11 +175,8 @@ def _supports(outside: LeftOut | None) -> bool:
     return outside is None or (outside.sure and outside.free.explained >= thresholds.MATTERS)
 
 
-def _idle(h: Hypothesis, proofs: Mapping[Key, LeftOut | None]) -> str | None:
-    """Why left-out recordings do not support an effect; None if they do."""
-    outside = proofs[h.key]
-    if outside is None or _supports(outside):
-        return None
+def _idle(h: Hypothesis, outside: LeftOut) -> str:
+    """Why an effect is not named that left-out recordings do not support."""
     old, new = outside.free.judged
     rms = f"{printed(old)} without it, {printed(new)} with it"
     return (

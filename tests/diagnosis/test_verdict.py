@@ -426,6 +426,24 @@ def test_what_improves_by_chance_is_not_lacking(monkeypatch: pytest.MonkeyPatch)
     assert [n.hypothesis for n in found.named] == [FLUID]
 
 
+def test_one_of_two_effects_that_stand_in_for_each_other_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second mass and a path of its own: next to the other one, neither improves enough blocks; without the
+    one that explains less, the other one does.
+    """
+    beside = {FLUID.key: proof_of(1.0, 0.7, 12), FRICTION.key: proof_of(0.8, 0.7, 11)}
+    alone = {FLUID.key: proof_of(5.0, 0.8, 16), FRICTION.key: proof_of(5.0, 1.0, 16)}
+
+    def outside(_: Context, __: Scored, chosen: Sequence[Hypothesis]) -> dict[Key, LeftOut]:
+        return {h.key: (beside if len(chosen) > 1 else alone)[h.key] for h in chosen}
+
+    monkeypatch.setattr(verdict, "left_out", outside)
+    found = said(
+        pair(FLUID, FRICTION, 150.0, 100.0, 50.0), {"fluid_convection": 0.98, "friction_speed": 0.98}
+    )
+    assert [n.hypothesis for n in found.named] == [FLUID]
+    assert "0.8 without it, 0.7 with it" in found.reasons[0]
+
+
 @pytest.mark.parametrize(
     ("after", "better", "word"),
     [
