@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 COARSE = 60  # steps per recording in the first look for heat
 TOGETHER = 256  # jumps looked at at a time: their columns are large
-LEAST = 2 * MOST  # readings before and after a jump, and while heat acts: fewer may be wrong ones
+LEAST = 2 * MOST  # readings on each side of a jump, and of each edge of heat: fewer may be wrong ones
 FINE = 8  # steps on each side of an edge in the second, closer look
 CLOSER = 6  # claims that get one
 
@@ -120,9 +120,15 @@ class _Search:
         return np.linspace(time[0], time[-1], COARSE + 1)
 
     def _allowed(self, gains: Array, instants: Array) -> Array:
-        """Windows in which there are readings enough."""
-        before = np.searchsorted(self.read, instants, side="right")
-        gains[before[None, :] - before[:, None] < LEAST] = -np.inf
+        """Windows with readings enough on each side of both edges: heat during all but a few readings at an
+        end says no more than these readings do. An edge at an end of the recording is none.
+        """
+        time, count = self.trajectory.system.grid.time, len(self.read)
+        sooner = np.searchsorted(self.read, instants, side="right")
+        inside = sooner[None, :] - sooner[:, None]
+        first = np.where(instants > time[0], sooner, count)[:, None]
+        last = np.where(instants < time[-1], count - sooner, count)[None, :]
+        gains[np.minimum(inside, np.minimum(first, last)) < LEAST] = -np.inf
         return gains
 
     def _windows(self, body: str, instants: Array, slab: Slab) -> Array:

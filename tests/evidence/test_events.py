@@ -11,8 +11,9 @@ from scipy.stats import norm
 from discovery.dynamics import make_grid
 from discovery.effects.candidates import Scene, candidates
 from discovery.effects.catalogue import catalogue
+from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Slab, project, project_one, scan
-from discovery.evidence.events import _span, heat_steps, place_events
+from discovery.evidence.events import LEAST, _span, heat_steps, place_events
 from discovery.evidence.settings import Setting
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Noise, fit_model
@@ -113,9 +114,8 @@ def plate(seed: int, jump: int) -> Recording:
     return Recording("r", 15.0 * np.arange(len(warm), dtype=float), {"P": power, "plate": read})
 
 
-@pytest.mark.parametrize("jump", [864, 1008])
-def test_a_jump_is_found_where_a_filter_forgets_it_after_some_readings(jump: int) -> None:
-    """With slow noise and process noise it shows in one innovation, and nothing six readings away."""
+def placed(run: Recording, word: str, noise: Noise) -> Hypothesis:
+    """The event of this word at the plate, at the instants that a recording makes most likely."""
     channels = {
         "P": Channel("P", "heat load", "W", None, "held"),
         "plate": Channel("plate", "temperature", "degC", 0.1, "linear"),
@@ -123,14 +123,31 @@ def test_a_jump_is_found_where_a_filter_forgets_it_after_some_readings(jump: int
     terms = Term("power", "plate", parse("P")), Term("air", "plate", parse("hA*(21 - plate)"))
     states = {"plate": State("plate", "degC", 1200.0, parse("21"), 0.1, 1 / 1200.0)}
     model = Model("plate", {"hA": Parameter(1.0, "W/K", 0.0)}, states, terms, {})
-    seen = Campaign("plate", channels, {"r": plate(3, jump)})
-    fit = fit_model(model, seen, ["r"], ["plate"])
+    fit = fit_model(model, Campaign("plate", channels, {"r": run}), ["r"], ["plate"])
+    scene = Scene(channels, ("plate",), ("r",), {"r": ("r",)}, {"P": 150.0}, frozenset(), 0.02, 0.02)
+    effects = [e for name, e in catalogue().items() if name == word]
+    claims = [h for h in candidates(model, effects, scene) if h.outputs or h.states]
+    (first, *_) = place_events(Whitened(fit, 12), replace(SETTING, noise=noise), claims, [SLAB] * len(claims))
+    return first
+
+
+@pytest.mark.parametrize("jump", [864, 1008])
+def test_a_jump_is_found_where_a_filter_forgets_it_after_some_readings(jump: int) -> None:
+    """With slow noise and process noise it shows in one innovation, and nothing six readings away."""
     noise = Noise(
         ("plate",), (0.1,), slow=(0.3,), heat={"plate": 2.0}, share=0.02, slow_time=1800.0, heat_time=2700.0
     )
-    scene = Scene(channels, ("plate",), ("r",), {"r": ("r",)}, {"P": 150.0}, frozenset(), 0.02, 0.02)
-    offsets = [e for word, e in catalogue().items() if word == "sensor_offset"]
-    claims = [h for h in candidates(model, offsets, scene) if h.outputs]
-    placed = place_events(Whitened(fit, 12), replace(SETTING, noise=noise), claims, [SLAB])
-    (instant,) = placed[0].shapes.values()
+    (instant,) = placed(plate(3, jump), "sensor_offset", noise).shapes.values()
     assert instant == 15.0 * jump
+
+
+@pytest.mark.parametrize("wrong", [-1, 1])
+def test_heat_neither_begins_nor_ends_beside_the_ends_of_a_recording(wrong: int) -> None:
+    """One odd reading there is not heat during all the rest of the recording."""
+    run = plate(3, 2000)
+    few = Recording("r", run.time[:90], {name: v[:90].copy() for name, v in run.values.items()})
+    few.values["plate"][wrong] += 3.0
+    noise = Noise(("plate",), (0.1,), heat={"plate": 2.0}, share=0.02, heat_time=2700.0)
+    for edge in placed(few, "unmeasured_heat", noise).shapes.values():
+        beside = int(np.sum(few.time <= edge)), int(np.sum(few.time >= edge))
+        assert min(beside) >= LEAST or edge in (few.time[0], few.time[-1])
