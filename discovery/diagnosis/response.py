@@ -1,12 +1,15 @@
 """How an output follows what is recorded, where no effect of the catalogue explains what a model misses:
 gains and time constants that are found without the model. A description, not a cause.
 
-    y(t) = z_run + sum_k g_k lag(u_k, tau_k)
+    y(t) = z_run + sum_k (g_k lag(u_k, tau_k) + s_run,k exp(-t/tau_k))
 
 Two time constants are two masses or two paths; gains of opposite sign are a path that acts early and another
-one that works against it later. A sum is said only if it predicts each recording that it was not fitted to
-better than the model does, fitted without it, too, if it leaves at most half of the squares that the model
-leaves there, and if each of these fits finds the same inputs.
+one that works against it later. What was before a recording is not known: a heater may be on at its first
+instant, at a machine that is cold or still warm. So each lag begins in each recording with a value of its
+own, s, also in a recording that is left out. What these starts explain counts neither for the sum nor
+against the model. A sum is said only if it predicts each recording that it was not fitted to better than the
+model does, fitted without it, too, if it leaves at most half of the squares that the model leaves there, and
+if each of these fits finds the same inputs.
 
 Terms are found one after the other (orthogonal least squares: S. Chen, S. Billings and W. Luo, Int. J.
 Control 50, 1989, 1873); time constants are refined together after each step (variable projection: G. Golub
@@ -105,7 +108,7 @@ def responses(context: Context) -> list[Response]:
     for y, output in enumerate(context.outputs):
         read = [r for r in context.recordings if r in left and np.isfinite(left[r][:, y]).sum() > MOST_TERMS]
         data = _Readings({r: context.grids[r] for r in read}, y, campaign)
-        by_model = {r: _centred(left[r][:, y]) for r in read}
+        by_model = {r: left[r][:, y] for r in read}
         one = data.response(output, by_model) if len(read) > 1 and data.inputs else None
         found += [one] if one else []
     return found
@@ -113,7 +116,7 @@ def responses(context: Context) -> list[Response]:
 
 @dataclass(frozen=True)
 class _Readings:
-    """Readings of one output in several recordings, each from its own mean: its zero is its own."""
+    """Readings of one output in several recordings; the zero of each is its own."""
 
     grids: Mapping[str, Grid]
     output: int
@@ -133,44 +136,57 @@ class _Readings:
             (fold.recordings, self.sums([r for r in read if r not in fold.recordings]))
             for fold in folds(self.campaign, read, blocks=0)
         ]
-        whole, chosen = self.sums(read), 0
-        best = {r: _centred(self.readings(r)) for r in read}
+        whole, chosen, used = self.sums(read), 0, dict[str, Sum]()
+        best = {r: self.readings(r) for r in read}
         for k, (terms, _) in enumerate(whole):
             if any(len(sums) <= k or _inputs(sums[k]) != _inputs(whole[k]) for _, sums in parts):
                 continue
-            left = {r: self.left(r, sums[k]) for group, sums in parts for r in group}
-            if _surely(best, left):
-                best, chosen = left, len(terms)
-        worse = any(_rms([best[r]]) >= _rms([by_model[r]]) for r in read)
-        rms = _rms(list(best.values())), _rms(list(by_model.values()))
-        if not chosen or worse or thresholds.MISSED * rms[0] ** 2 > rms[1] ** 2:
+            found = {r: sums[k] for group, sums in parts for r in group}
+            left = {r: self.left(r, found[r]) for r in read}
+            if _surely({r: self.begun(r, best[r], found[r][0]) for r in read}, left):
+                best, chosen, used = left, len(terms), found
+        if not chosen:
+            return None
+        model = {r: self.begun(r, by_model[r], used[r][0]) for r in read}
+        worse = any(_rms([best[r]]) >= _rms([model[r]]) for r in read)
+        rms = _rms(list(best.values())), _rms(list(model.values()))
+        if worse or thresholds.MISSED * rms[0] ** 2 > rms[1] ** 2:
             return None
         unit = differences(self.campaign.channels[output].unit)
         terms, gains = whole[chosen - 1]
         folded = [sorted(sums[chosen - 1][0]) for _, sums in parts]
-        found = []
+        said = []
         for place, k in enumerate(sorted(range(chosen), key=lambda k: terms[k])):
             name, seconds = terms[k]
             ends = [seconds, *(one[place][1] for one in folded)]
             per = f"{unit}/{differences(self.campaign.channels[name].unit)}"
-            found.append(Part(name, float(gains[k]), per, seconds, min(ends), max(ends)))
-        return Response(output, unit, tuple(found), *rms, 1.01 * self.limits[0])
+            said.append(Part(name, float(gains[k]), per, seconds, min(ends), max(ends)))
+        return Response(output, unit, tuple(said), *rms, 1.01 * self.limits[0])
 
     def sums(self, recordings: Sequence[str]) -> list[Sum]:
         """The best sums of one term, two terms, ..., each with one term more than the one before."""
-        bank = [(n, float(t)) for n in self.inputs for t in np.geomspace(*self.limits, TRIED)]
-        x, y = self.rows(recordings, bank)
-        size, found, terms = np.sum(x**2, axis=0), list[Sum](), tuple[Lagged, ...]()
+        times = [float(t) for t in np.geomspace(*self.limits, TRIED)]
+        found, terms = list[Sum](), tuple[Lagged, ...]()
         while len(terms) < MOST_TERMS:
-            own = np.linalg.qr(self.rows(recordings, terms)[0])[0]
-            free = x - own @ (own.T @ x)
-            new = np.sum(free**2, axis=0)
-            gain = np.where(new > 1e-8 * size, (free.T @ y) ** 2 / np.maximum(new, 1e-300), 0.0)
-            if not gain.any():
+            tried = [one for t in times for one in self._with_one_more(recordings, terms, t)]
+            best, chosen = min(tried, default=(np.inf, ("", 0.0)))
+            if not np.isfinite(best):
                 break
-            terms = self.refined(recordings, (*terms, bank[int(np.argmax(gain))]))
+            terms = self.refined(recordings, (*terms, chosen))
             found.append((terms, _gains(*self.rows(recordings, terms))))
         return found
+
+    def _with_one_more(
+        self, recordings: Sequence[str], terms: Sequence[Lagged], seconds: float
+    ) -> list[tuple[float, Lagged]]:
+        """What is left, as a sum of squares, with each input in addition, if it follows it so late."""
+        new = [(name, seconds) for name in self.inputs]
+        x, y = self.rows(recordings, [*terms, *new])
+        own = np.linalg.qr(x[:, : len(terms)])[0]
+        y, free = y - own @ (own.T @ y), x[:, len(terms) :] - own @ (own.T @ x[:, len(terms) :])
+        size, whole = np.sum(free**2, axis=0), np.sum(x[:, len(terms) :] ** 2, axis=0)
+        left = y @ y - (free.T @ y) ** 2 / np.maximum(size, 1e-300)
+        return [(float(v), one) for v, one, s, w in zip(left, new, size, whole, strict=True) if s > 1e-8 * w]
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -193,14 +209,34 @@ class _Readings:
         return tuple(zip(names, np.exp(logs).tolist(), strict=True))
 
     def rows(self, recordings: Sequence[str], terms: Sequence[Lagged]) -> tuple[Array, Array]:
-        """Lagged inputs (R, P) and readings (R,) of recordings, each from its mean."""
+        """Lagged inputs (R, P) and readings (R,) of recordings, without what their starts explain."""
         columns, readings = [], []
         for r in recordings:
             seen = np.isfinite(self.readings(r))
-            x, y = self.lagged(r, terms)[seen], self.readings(r)[seen]
-            columns.append(x - x.mean(axis=0))
-            readings.append(y - y.mean())
+            x, start = self.lagged(r, terms)[seen], self.starts(r, seen, terms)
+            rest = x - start @ (start.T @ x)
+            rest[:, np.sum(rest**2, axis=0) < 1e-12 * np.sum(x**2, axis=0)] = 0.0  # it did not move
+            y = self.readings(r)[seen]
+            columns.append(rest)
+            readings.append(y - start @ (start.T @ y))
         return np.concatenate(columns), np.concatenate(readings)
+
+    def starts(self, recording: str, seen: NDArray[np.bool_], terms: Sequence[Lagged]) -> Array:
+        """What the zero of a recording and the starts of its lags may explain of its readings: orthonormal
+        columns (R, S).
+        """
+        grid = self.grids[recording]
+        time = (grid.time[grid.read] - grid.time[0])[seen]
+        falling = [np.exp(-time / seconds) for seconds in sorted({t for _, t in terms})]
+        u, size, _ = np.linalg.svd(np.column_stack([np.ones_like(time), *falling]), full_matrices=False)
+        return np.asarray(u[:, size > 1e-6 * size[0]])
+
+    def begun(self, recording: str, left: Array, terms: Sequence[Lagged]) -> Array:
+        """What is left of a recording (R,) without what the starts of these lags explain of it."""
+        seen, rest = np.isfinite(left), left.copy()
+        start = self.starts(recording, seen, terms)
+        rest[seen] -= start @ (start.T @ left[seen])
+        return rest
 
     def readings(self, recording: str) -> Array:
         """The readings (R,), NaN where the output was not read."""
@@ -217,9 +253,9 @@ class _Readings:
         return columns
 
     def left(self, recording: str, found: Sum) -> Array:
-        """What a sum leaves of the readings of a recording (R,), from its mean."""
+        """What a sum leaves of the readings of a recording (R,)."""
         terms, gains = found
-        return _centred(self.readings(recording) - self.lagged(recording, terms) @ gains)
+        return self.begun(recording, self.readings(recording) - self.lagged(recording, terms) @ gains, terms)
 
 
 def _inputs(found: Sum) -> list[str]:
@@ -235,10 +271,6 @@ def _surely(before: Mapping[str, Array], after: Mapping[str, Array]) -> bool:
     pairs = [block_sums(before[r][:, None], after[r][:, None]) for r in before]
     better = np.concatenate([new < old for old, new, _ in pairs])
     return surely_better(int(better.sum()), len(better))
-
-
-def _centred(left: Array) -> Array:
-    return np.asarray(left - np.nanmean(left))
 
 
 def _rms(parts: Sequence[Array]) -> float:

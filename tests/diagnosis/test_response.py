@@ -40,6 +40,12 @@ def campaign(*answers: tuple[float, float], seeds: tuple[int, ...] = (1, 2)) -> 
     return Campaign("frame", CHANNELS, {run.name: run for run in runs})
 
 
+def cut(run: Recording, begin: float) -> Recording:
+    """A recording from an instant on, on its own clock."""
+    rows = run.time >= begin
+    return Recording(run.name, run.time[rows] - begin, {name: v[rows] for name, v in run.values.items()})
+
+
 def one_mass() -> Model:
     """A mass that follows the bed."""
     return Model(
@@ -66,6 +72,30 @@ def test_two_times_of_opposite_sign_are_found_with_their_gains() -> None:
     assert found.left == pytest.approx(1.0, abs=0.1)  # the noise of the readings
     assert found.left_by_model > 5
     assert "Z follows bed with two time constants of opposite sign: +" in found.sentence()
+
+
+def test_a_recording_may_begin_with_the_heater_on_and_the_machine_unsettled() -> None:
+    """The lags of the first hours before each recording: what it began with is not known."""
+    gains = (EARLY, LATE)
+    runs = [cut(recording(seed, *gains), 3000.0 + 500 * seed) for seed in (1, 2)]
+    seen = Campaign("frame", CHANNELS, {run.name: run for run in runs})
+    (found,) = responses(context_of(seen, one_mass(), outputs=("Z",)))
+    early, late = sorted(found.parts, key=lambda p: p.seconds)
+    for part, (gain, tau) in ((early, EARLY), (late, LATE)):
+        assert part.gain == pytest.approx(gain, rel=0.05)
+        assert part.seconds == pytest.approx(tau, rel=0.1)
+    assert found.left == pytest.approx(1.0, abs=0.1)
+
+
+def test_nothing_is_said_where_starts_alone_explain_the_readings() -> None:
+    """A machine that only cools, and an input that moves without any effect."""
+    runs = []
+    for seed in (1, 2):
+        run = recording(seed)
+        warm = 60.0 * np.exp(-run.time / 1400.0)
+        runs.append(replace(run, values={**run.values, "Z": run.values["Z"] + warm}))
+    seen = Campaign("frame", CHANNELS, {run.name: run for run in runs})
+    assert responses(context_of(seen, one_mass(), outputs=("Z",))) == []
 
 
 def test_nothing_is_said_where_the_model_predicts_as_well() -> None:
