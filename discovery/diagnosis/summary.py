@@ -63,10 +63,20 @@ def _left(improvement: dict[str, Any]) -> list[str]:
     }
     unit = _unit(improvement)
     return [
-        f"  {which}: rms {printed(i['rms_before'])}{unit} ({_by_noise(i, unit)})"
+        f"  {which}: rms {printed(i['rms_before'])}{unit} ({_by_noise(i, unit)}){_by_start(i, unit)}"
         for which, i in runs.items()
         if i["rms_before"] is not None
     ]
+
+
+def _by_start(one: dict[str, Any], unit: str) -> str:
+    """The rms with start values from all readings, where most of the rms from the first ones is how the
+    recording began: that one decides.
+    """
+    begun, expected = (one.get("from_known_starts") or [None])[0], one.get("expected") or one["noise_floor"]
+    if begun is None or one["rms_before"] < _OPEN * max(begun, expected):
+        return ""
+    return f"; with start values from all readings, which decide, rms {printed(begun)}{unit}"
 
 
 def _by_noise(one: dict[str, Any], unit: str) -> str:

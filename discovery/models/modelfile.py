@@ -8,7 +8,7 @@ from itertools import count
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from discovery.errors import UserError
 from discovery.files import dotted, locate, read_text, read_toml, write_toml
@@ -69,6 +69,16 @@ class StateForm(Strict):
         "is then the spread of the rest (written by a discovery)",
     )
     memory: bool = Field(False, description="true: what a lag() remembers, no body (written by a fit)")
+
+    @field_validator("capacity", mode="before")
+    @classmethod
+    def _is_number(cls, capacity: object) -> object:
+        if isinstance(capacity, str):
+            raise ValueError(
+                f"should be a number of J/K, not '{capacity}': a fit finds heat flows, not capacities; "
+                "give mass times specific heat, or leave `capacity` out and write each term as a rate, as P/C"
+            )
+        return capacity
 
 
 class TermForm(Strict):

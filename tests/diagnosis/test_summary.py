@@ -143,3 +143,30 @@ def test_starts_that_turn_the_proof_around_are_said(tmp_path: Path, starts: list
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
     noise = "reading noise and heat that nobody records explain up to 3.18 K"
     assert summary(tmp_path)[2] == f"  held-out recording last: rms 2.02 -> 5.94 K ({noise}){said}"
+
+
+@pytest.mark.parametrize(("before", "known"), [(1.24, 0.24), (1.24, 1.2), (0.25, 0.1)])
+def test_a_miss_that_is_how_the_recording_began_is_told_from_one_that_is_not(
+    tmp_path: Path, before: float, known: float
+) -> None:
+    """`no mismatch` beside a large rms would read as a contradiction."""
+    fit = {
+        "rms_before": before,
+        "rms_after": before,
+        "noise_floor": 0.23,
+        "from_known_starts": [known, known],
+    }
+    document: dict[str, Any] = {
+        "verdict": "no mismatch",
+        "model": "m",
+        "physics": [],
+        "alternatives": [],
+        "reasons": [],
+        "description": None,
+        "improvement": {"unit": "K", "fit": fit, "held_out": {}, "contradicted_by": []},
+        "next_experiment": "none",
+    }
+    (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
+    (line,) = summary(tmp_path)[1:-1]
+    told = line.endswith("; with start values from all readings, which decide, rms 0.24 K")
+    assert told == ((before, known) == (1.24, 0.24))

@@ -197,6 +197,7 @@ def test_a_memory_of_memories_starts_settled(tmp_path: Path) -> None:
         ("G*(b - a)", "G*(b - a", ["line 19", "not a formula"]),
         ("G*(b - a)", "__import__('os')", ["line 19", "unknown function"]),
         ("capacity = 44.7e3", "capacity = -1", ["line 11", "greater than 0"]),
+        ("capacity = 44.7e3", 'capacity = "C"', ["line 11", "not 'C'", "write each term as a rate, as P/C"]),
         ("min = 0.0", "min = 30.0", ["line 6", "start 24"]),
         ("[states]", "[state]", ["unknown key", "did you mean 'states'"]),
         ("fixed = true", "fixd = true", ["line 8", "did you mean 'fixed'"]),
