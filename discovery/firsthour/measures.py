@@ -144,6 +144,8 @@ def unit_in(header: str) -> tuple[str, str] | None:
     (('oil', 'C'), None, None)
     >>> unit_in("oil_in"), unit_in("T_in"), unit_in("Disp X in"), unit_in("x [in]")
     (None, None, ('Disp X', 'in'), ('x', 'in'))
+    >>> unit_in("CPU_Power_W_Actual"), unit_in("speed_rpm_set"), unit_in("axis_C_motor")
+    (('CPU_Power_Actual', 'W'), ('speed_set', 'rpm'), None)
     """
     for form in _WITH_UNIT:
         found = form.fullmatch(header)
@@ -155,7 +157,19 @@ def unit_in(header: str) -> tuple[str, str] | None:
             return name, unit
         if meant and _is_range(name, unit):
             return name, unit
-    return None
+    return _before_a_word(header)
+
+
+def _before_a_word(header: str) -> tuple[str, str] | None:
+    """Name and unit where a word that names no quantity stands behind the unit, as in P_W_actual."""
+    front, _, last = header.rpartition("_")
+    names_one = any(odds > 0 for word in words_of(last) for odds in word.says.values())
+    if not front or names_one or not re.fullmatch(r"[^\W\d_]{3,}", last) or _is_unit(last, True):
+        return None
+    found = unit_in(front)
+    if found is None or time_unit(found[1]):  # T_min_left is the least temperature
+        return None
+    return f"{found[0]}_{last}", found[1]
 
 
 def _of_a_clock(name: str, unit: str) -> bool:
