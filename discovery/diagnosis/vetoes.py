@@ -36,11 +36,20 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | No
     )
 
 
-def far_from_the_machine(_: Context, answer: Scored, h: Hypothesis) -> str | None:
+def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis) -> str | None:
     """Events of one recording and faults of the measuring chain can only be recognised with a model that is
-    nearly right.
+    nearly right. One with events in the place of a law is not.
     """
-    if answer.coarse < thresholds.NAMED or (h.effect.is_physics and not h.effect.is_event):
+    if h.effect.is_physics and not h.effect.is_event:
+        return None
+    heat = [o for o in answer.hypotheses if o.effect.search == "window"]
+    law = next((o for o in heat if every_recording(context, answer, o)), None)
+    if law and len(context.recordings) > 1:
+        return (
+            f"{h.effect.word} at {h.where} is not named: {law.effect.word} at {law.where} stands for a law "
+            "that the model leaves out, and may make up for what that heat does not show of it"
+        )
+    if answer.coarse < thresholds.NAMED:
         return None
     return (
         f"{h.effect.word} at {h.where} is not named: the flows of the model are wrong by about "

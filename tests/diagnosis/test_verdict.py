@@ -495,6 +495,12 @@ def test_effects_that_improve_free_runs_only_together_are_no_nothing(monkeypatch
         ),
         ([Model((OFFSET,), 50.0, off=0.24)], World(), {"sensor_offset": 0.98}, "wrong by about 24 %"),
         (
+            [Model((*(claim("unmeasured_heat", recording=r) for r in ("r1", "r2")), OFFSET), 90.0)],
+            World(),
+            {"unmeasured_heat": 0.98, "sensor_offset": 0.98},
+            "stands for a law that the model leaves out",
+        ),
+        (
             [Model(tuple(claim("clock_shift", recording=r) for r in ("r1", "r2")), 50.0)],
             World(),
             {"clock_shift": 0.98},
