@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.proof import FreeRuns, Improvement, block_sums, improvement, surely_better
+from discovery.diagnosis.proof import BLOCKS, FreeRuns, Improvement, block_sums, improvement, surely_better
 from discovery.diagnosis.refit import ENOUGH, with_effects
 from discovery.diagnosis.scored import Scored
 from discovery.dynamics import Grid, predict
@@ -121,7 +121,8 @@ def _changed(
         without, with_it = left[answer.keys - {*own}], left[answer.keys]
         if without:
             outputs = [context.outputs[y] for y in mine]
-            found[own] = _compared(context.recordings, outputs, without, with_it, mine, context.blocks)
+            blocks = max(BLOCKS, context.blocks)  # few blocks of many recordings say less than they could
+            found[own] = _compared(context.recordings, outputs, without, with_it, mine, blocks)
     return found
 
 
