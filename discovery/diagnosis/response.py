@@ -33,7 +33,7 @@ from discovery.dynamics import Grid
 from discovery.dynamics.grid import interleaved
 from discovery.dynamics.series import lag_ends
 from discovery.evaluation.crossvalidation import folds
-from discovery.models.units import differences
+from discovery.models.units import differences, per
 from discovery.printed import lasting, printed
 from discovery.recordings import Campaign
 
@@ -159,8 +159,8 @@ class _Readings:
         for place, k in enumerate(sorted(range(chosen), key=lambda k: terms[k])):
             name, seconds = terms[k]
             ends = [seconds, *(one[place][1] for one in folded)]
-            per = f"{unit}/{differences(self.campaign.channels[name].unit)}"
-            said.append(Part(name, float(gains[k]), per, seconds, min(ends), max(ends)))
+            by = f"{unit}{per(differences(self.campaign.channels[name].unit))}"
+            said.append(Part(name, float(gains[k]), by, seconds, min(ends), max(ends)))
         return Response(output, unit, tuple(said), *rms, 1.01 * self.limits[0])
 
     def sums(self, recordings: Sequence[str]) -> list[Sum]:

@@ -8,6 +8,7 @@ from itertools import product
 
 from discovery.firsthour.guess import Guess, drives, squared
 from discovery.firsthour.measures import DEGREES
+from discovery.models.units import per
 from discovery.recordings.units import UnitError, conversion
 
 _FAST, _SLOW = "5e-3", "2e-4"  # 1/s, where a fit begins: 3 minutes and 1.4 hours
@@ -140,13 +141,12 @@ def _error(output: str, guesses: Mapping[str, Guess], inputs: Sequence[str], mas
             zero = block.parameter(f"zero_{state}", "0.0", f"{unit}/s")
             block.term(f"zero balance of {state}", state, zero)
         for name in inputs:
-            per = canonical(guesses[name])
-            per = {"degC": "K"}.get(per, per)
+            other = canonical(guesses[name])
+            other = {"degC": "K"}.get(other, other)
             heat = name
             if squared(guesses[name]):
-                heat, per = f"{name}**2", f"{per}**2"
-            by = "" if per == "1" else f"/({per})" if set("/* ") & set(per) else f"/{per}"
-            gain = block.parameter(f"gain_{state}_{name}", "0.0", f"{unit}{by}/s")
+                heat, other = f"{name}**2", f"{other}**2"
+            gain = block.parameter(f"gain_{state}_{name}", "0.0", f"{unit}{per(other)}/s")
             block.term(f"{name} on {state}", state, f"{gain}*{heat}")
     return block
 

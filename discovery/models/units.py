@@ -110,6 +110,15 @@ def differences(unit: str) -> str:
     return bare.replace("degC", "K").replace("degF", "delta_degF")
 
 
+def per(unit: str) -> str:
+    """What stands behind a unit that is per another one.
+
+    >>> per("K"), per("1"), per("l/min")
+    ('/K', '', '/(l/min)')
+    """
+    return "" if unit == "1" else f"/({unit})" if set("/* ") & set(unit) else f"/{unit}"
+
+
 def spell(measured: Dimension, exact: bool = False) -> str:
     """A dimension as a unit, with the fewest parts; `exact`: of that size, too, or nothing.
 
