@@ -79,8 +79,8 @@ class Response:
         """What was found, in words."""
         inputs = list(dict.fromkeys(p.input for p in self.parts))
         said = "; ".join(self._of(name) for name in inputs)
-        left = f"{printed(self.left)} {self.unit} of recordings left out of the fit".replace(" 1 of", " of")
-        judged = f"leaves {left}, the model {printed(self.left_by_model)}"
+        left = f"{printed(self.left)} {self.unit}".removesuffix(" 1")
+        judged = f"rms {left} on recordings left out of the fit, {printed(self.left_by_model)} with the model"
         return f"{self.output} follows {said} ({judged}; a description, not a cause)"
 
     def _of(self, name: str) -> str:
