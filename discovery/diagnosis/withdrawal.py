@@ -49,13 +49,13 @@ def runs_away(verdict: Verdict) -> Verdict:
 
 def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     """The verdict with its names withdrawn where unseen recordings are predicted worse with them, on average
-    over the recordings (of the logarithm of the rms).
+    over the recordings (of the logarithm of the rms). An event of a recording to fit does not act there, but
+    parameters that are fitted beside one that is real predict better, not worse.
     """
-    lasting = [n for n in verdict.named if not n.hypothesis.effect.is_event]
     worse = [run for run, i in proof.items() if i.contradicts]
-    if not lasting or not worse:
+    if not verdict.named or not worse:
         return verdict
-    names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in lasting)
+    names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in verdict.named)
     if _lower(proof.values()) >= 0:
         shown, check = "", "whether the machine was the same there, and how it began"
         if all(proof[run].only_from_its_first_reading for run in worse):

@@ -231,7 +231,7 @@ class Effect:
 
     @property
     def is_event(self) -> bool:
-        """Whether it belongs to one recording: other recordings neither confirm nor refute it."""
+        """Whether it belongs to one recording: it does not act in any other."""
         return self.acts == "in one recording"
 
     @property
