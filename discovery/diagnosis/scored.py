@@ -106,8 +106,10 @@ class Scored:
 
     @cached_property
     def coarse(self) -> float:
-        """Probability that the error is larger than usual for a lumped model, over the settings tried."""
-        coarse = np.array([not is_usual(s) for s in self.settings])
+        """Probability that the model's laws and flows are off by more than is usual for a lumped model, over
+        the settings tried. Heat that nobody records does not follow its flows: it says nothing of them.
+        """
+        coarse = np.array([_off_by(s) > thresholds.SHARE for s in self.settings])
         return float(np.exp(self.levels - log_sum_exp(self.levels)) @ coarse)
 
     @property
@@ -121,7 +123,12 @@ class Scored:
     @property
     def off(self) -> float:
         """Share of the flows by which the model is wrong under the most likely noise."""
-        return off_by(self.settings[self.best])
+        return _off_by(self.settings[self.best])
+
+    @property
+    def unrecorded(self) -> float:
+        """Heat that nobody records under the most likely noise, as a share of what flows."""
+        return _unrecorded(self.settings[self.best])
 
     def level(self, k: int) -> float:
         """Log marginal likelihood under one noise setting."""
@@ -288,13 +295,18 @@ def _walked(
 
 
 def is_usual(setting: Setting) -> bool:
-    """Whether the error of a model is not larger than usual."""
-    return off_by(setting) <= thresholds.SHARE
+    """Whether process noise is no larger than usual, whatever it is: more may have absorbed an effect."""
+    return max(_off_by(setting), _unrecorded(setting)) <= thresholds.SHARE
 
 
-def off_by(setting: Setting) -> float:
-    """Share of the flows by which a model is wrong: its laws, its flows, or unrecorded heat."""
-    return max(setting.noise.share, setting.noise.form, setting.level * thresholds.FLOOR)
+def _off_by(setting: Setting) -> float:
+    """Share of the flows by which a model is wrong: its laws, or its flows."""
+    return max(setting.noise.share, setting.noise.form)
+
+
+def _unrecorded(setting: Setting) -> float:
+    """Heat that nobody records, as a share of what flows."""
+    return setting.level * thresholds.FLOOR
 
 
 def with_force(context: Context, one: Scored, state: str, goal: float = -inf) -> Scored:

@@ -262,7 +262,17 @@ def _nothing(
     if context.outliers:
         reason = f"only {len(context.outliers)} single wrong readings were found"
         return Verdict(FAULT, answer, (), (), (reason,))
-    return Verdict(NO_MISMATCH, answer, (), (), further)
+    return Verdict(NO_MISMATCH, answer, (), (), (*_unrecorded(found), *further))
+
+
+def _unrecorded(found: Search) -> tuple[str, ...]:
+    """A sentence about much heat that nobody records; nothing about as much as is usual."""
+    if found.baseline.unrecorded <= thresholds.SHARE:
+        return ()
+    return (
+        f"heat that nobody records is about {100 * found.baseline.unrecorded:.0f} % of what flows, more than "
+        "in most machines: it follows no input that is recorded, so log what else warms or cools the machine",
+    )
 
 
 def coarse(found: Search) -> tuple[str, ...]:
