@@ -100,9 +100,9 @@ def _facts(world: World) -> Key:
         "noise": world.sigma.round(4).tolist(),
         "lumping_over_noise": round(world.lumping, 3),
         "also_true": [
-            {"effect": lack.effect, "states": list(lack.states), "rms_over_noise": round(rms, 3)}
-            | ({"also": list(also)} if (also := EFFECTS[lack.effect].also) else {})
-            for lack, rms in world.lacks
+            {"effect": effect, "states": list(states), "rms_over_noise": round(rms, 3)}
+            | ({"also": list(also)} if (also := EFFECTS[effect].also) else {})
+            for effect, states, rms in world.lacks
         ],
     }
 

@@ -62,6 +62,16 @@ class Refit:
         systems = _systems(machine, self.model, recordings)
         return _Problem(systems, self.model, self.sigma).residual(self.theta)
 
+    def slope(self, machine: Machine, recordings: Mapping[str, Columns]) -> Array:
+        """The slope (R,), in units of noise, along a parameter that the baseline of this machine has beyond
+        that of the fit, where it is zero.
+        """
+        model = believed_of(machine, recordings)
+        problem = _Problem(_systems(machine, model, recordings), model, self.sigma)
+        mine = _Problem(self.systems, self.model, self.sigma)
+        theta = np.concatenate([self.theta[: len(mine.size)], [0.0], self.theta[len(mine.size) :]])
+        return np.asarray(problem.jacobian(theta)[:, len(mine.size)])
+
 
 def refit(
     machine: Machine, recordings: Mapping[str, Columns], sigma: Array, begin: Refit | None = None
@@ -75,8 +85,7 @@ def refit(
     """
     from scipy.optimize import least_squares
 
-    channels = campaign_of(machine, recordings).channels
-    model = expanded(machine.baseline.with_values(machine.nominal), channels)
+    model = believed_of(machine, recordings)
     systems = _systems(machine, model, recordings)
     problem = _Problem(systems, model, sigma)
     start = problem.start if begin is None else begin.theta
@@ -90,6 +99,12 @@ def refit(
         ftol=1e-5,
     )
     return Refit(systems, model, sigma, found.x, found.fun, np.asarray(found.jac))
+
+
+def believed_of(machine: Machine, recordings: Mapping[str, Columns]) -> Model:
+    """The baseline of a machine at the values of its drawing, its memories written out."""
+    channels = campaign_of(machine, recordings).channels
+    return expanded(machine.baseline.with_values(machine.nominal), channels)
 
 
 def _systems(machine: Machine, model: Model, recordings: Mapping[str, Columns]) -> tuple[System, ...]:

@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from discovery.virtual.log import Chain, Columns, observe, reading_instants
-from discovery.virtual.machine import Lack, Machine
+from discovery.virtual.machine import Machine
+from discovery.virtual.masses import hidden_masses
 from discovery.virtual.network import Array, Inputs, heat
 from discovery.virtual.refit import Refit, refit
 from discovery.virtual.signals import HOUR, Draw, noise
@@ -22,7 +23,10 @@ LUMPING = (
     0.6,
 )  # rms over noise that a baseline leaves of its machine without effect; the noise is set by it
 TRIES = 8
+MASS = "second_thermal_mass"
 APART = 3.0  # log evidence within which readings do not tell two models apart
+
+Known = tuple[str, tuple[str, ...], float]  # effect, states, rms over noise
 
 
 @dataclass(frozen=True)
@@ -74,13 +78,17 @@ class World:
         return float(np.sqrt(np.mean(self.fitted.left(self.change(machine)) ** 2)))
 
     @cached_property
-    def lacks(self) -> list[tuple[Lack, float]]:
-        """Laws that the baseline lacks in silence, each with the rms over noise that a refit leaves of it.
+    def lacks(self) -> list[Known]:
+        """Effects that the baseline lacks in silence, each with its states and the rms over noise that a
+        refit leaves of it; of the insides of the bodies, what a second mass takes out of that.
 
         Only those that the readings can tell: N readings hold at most N rms^2/2 of log evidence about a law.
         """
-        sizes = [(lack, self.size(self.machine.as_believed(lack))) for lack in self.machine.lacks]
-        return [(lack, rms) for lack, rms in sizes if len(self.fitted.residual) * rms**2 / 2.0 > APART]
+        own = [lack for lack in self.machine.lacks if lack.effect != MASS]
+        laws = [(lack.effect, lack.states, self.size(self.machine.as_believed(lack))) for lack in own]
+        hidden = hidden_masses(self.machine, self.fitted, self.logs(self.machine, FIT))
+        every = [*((MASS, (body,), rms) for body, rms in hidden.items()), *laws]
+        return [one for one in every if len(self.fitted.residual) * one[2] ** 2 / 2.0 > APART]
 
     def visible(self, logs: dict[str, Columns]) -> float:
         """Rms over noise by which the residual of a full refit differs with an effect and without it."""

@@ -177,7 +177,7 @@ def test_a_key_lists_what_nature_has_and_the_baseline_has_not(world: World) -> N
     assert ("natural_convection", "base") in own
     assert ("friction_speed", "front") not in own  # by Palmgren in the plant and in the baseline
     assert all(e["rms_over_noise"] < 1.0 for e in own.values())  # the noise was drawn so that it hides them
-    found = {(lack.effect, *lack.states): rms for lack, rms in world.lacks}
+    found = {(effect, *states): rms for effect, states, rms in world.lacks}
     linear = next(lack for lack in world.machine.lacks if lack.laws == ("air base",))
     plain = world.machine.as_believed(linear)
     assert all(law.form == Form.LINK for law in plain.network.laws if law.name == "air base")
