@@ -60,7 +60,7 @@ def recorded(rng: Draw, machine: Machine, start: str) -> Columns:
         u[name] = np.where(np.arange(n) < first, 0.0, u[name])
     u["clock"] = np.asarray((np.arange(n) - first + 0.5) * pace.step_s)
     u |= {"number": np.zeros(n), "age": np.zeros(n)}
-    small = {f"everyday {b}": noise(rng, n, pace.step_s, HOUR, pace.heat_w) for b in machine.bodies}
+    small = {f"unrecorded {b}": noise(rng, n, pace.step_s, HOUR, pace.heat_w) for b in machine.bodies}
     run = simulate(machine.network, u | small, pace.step_s, float(u[machine.words.air][0]))
     at = reading_instants(rng, replace(pace, hours=HOURS), (READ_S, READ_S))
     return observe(machine, run, first, at, rng, Chain(NOISE))
@@ -73,7 +73,7 @@ def campaigns(seed: int, start: str) -> tuple[dict[str, Campaign], Model]:
     machine = FAMILIES[family](rng)
     machine = machine.plus(
         [
-            heat("everyday", node, share, f"everyday {body}")
+            heat("unrecorded", node, share, f"unrecorded {body}")
             for body, bar in machine.bodies.items()
             for node, share in bar.span()
         ]

@@ -67,17 +67,17 @@ def ran(order: Order) -> tuple[Machine, Cycle, Run]:
     if order.change:
         cycle = replace(cycle, inputs=order.change(cycle.inputs))
     n = len(cycle.inputs["T_env"])
-    initial, everyday, *_ = _streams(order)
+    initial, unrecorded, *_ = _streams(order)
     machine = concealing(order.machine, order.effects)
-    own = {b: noise(everyday, n, STEP_S, 3 * HOUR, machine.pace.heat_w) for b in machine.bodies}
+    own = {b: noise(unrecorded, n, STEP_S, 3 * HOUR, machine.pace.heat_w) for b in machine.bodies}
     machine = machine.plus(
         [
-            heat("everyday", node, share, f"everyday {b}")
+            heat("unrecorded", node, share, f"unrecorded {b}")
             for b, bar in machine.bodies.items()
             for node, share in bar.span()
         ]
     )
-    inputs = {**cycle.inputs, **{f"everyday {b}": x for b, x in own.items()}}
+    inputs = {**cycle.inputs, **{f"unrecorded {b}": x for b, x in own.items()}}
     inputs |= {"number": np.full(n, 0.0), "age": np.full(n, order.age)}
     room = float(cycle.inputs["T_env"][0]) + initial.normal(0.0, 0.1)
     start = State(dict.fromkeys(("sump", "hose"), cycle.fluid_start), {}, room)

@@ -112,7 +112,7 @@ def draw_world(rng: Draw, family: Callable[[Draw], Machine], *, coloured: bool) 
         if coloured:
             machine = machine.plus(
                 [
-                    heat("everyday", node, share, f"everyday {body}")
+                    heat("unrecorded", node, share, f"unrecorded {body}")
                     for body, bar in machine.bodies.items()
                     for node, share in bar.span()
                 ]
@@ -124,7 +124,7 @@ def draw_world(rng: Draw, family: Callable[[Draw], Machine], *, coloured: bool) 
         low, high = machine.pace.noise
         seed = int(rng.integers(2**31))
         quiet = {
-            r: {k: np.zeros_like(v) if k.startswith("everyday") else v for k, v in u.items()}
+            r: {k: np.zeros_like(v) if k.startswith("unrecorded") else v for k, v in u.items()}
             for r, u in inputs.items()
         }
         blank = World(machine, quiet, instants, origins, low, coloured, seed, 0.0, None)  # type: ignore[arg-type]
@@ -157,7 +157,7 @@ def draw_inputs(rng: Draw, machine: Machine, number: int, age: float) -> Inputs:
     """Inputs of a recording and of the hours before it; the machine rests for a part of these.
 
     Adds `clock` [s since the recording began], `number` and `age` of the recording, and the heat that no
-    channel shows at each body, `everyday ...`.
+    channel shows at each body, `unrecorded ...`.
     """
     pace = machine.pace
     u = dict(machine.cycle(rng, pace.hours + pace.before_h))
@@ -170,7 +170,7 @@ def draw_inputs(rng: Draw, machine: Machine, number: int, age: float) -> Inputs:
     u["clock"] = np.asarray((np.arange(n) - first + 0.5) * pace.step_s)
     u |= {"number": np.full(n, float(number)), "age": np.full(n, age)}
     tau = pace.hours * HOUR / 24.0
-    return u | {f"everyday {b}": noise(rng, n, pace.step_s, tau, pace.heat_w) for b in machine.bodies}
+    return u | {f"unrecorded {b}": noise(rng, n, pace.step_s, tau, pace.heat_w) for b in machine.bodies}
 
 
 def draw_calendar(rng: Draw) -> tuple[dict[str, str] | None, tuple[float, ...]]:

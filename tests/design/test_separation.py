@@ -44,7 +44,7 @@ def test_readings_add_up_as_densities_do(count: int) -> None:
     assert found[count - 1] == pytest.approx(expected(0.001 * TIME[:count], covariance[:count, :count]))
 
 
-def test_everyday_heat_hides_what_looks_like_it() -> None:
+def test_unrecorded_heat_hides_what_looks_like_it() -> None:
     """The covariance of the integral of first-order noise; heat at a body that is not there hides nothing."""
     sd, tau = 0.05, 3 * 3600.0
     heat = Noise(("E",), (0.3,), (), {"x": sd, "gone": 9.0}, heat_time=tau)

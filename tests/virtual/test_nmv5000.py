@@ -201,7 +201,7 @@ def test_the_campaign_file_is_regenerated_and_small() -> None:
     assert str(DEMONSTRATION_SEED) in page
 
 
-def test_noise_and_everyday_heat_have_their_size() -> None:
+def test_noise_and_unrecorded_heat_have_their_size() -> None:
     order = Order("x", seed=4, hours=24.0)
     noisy = take(order).columns
     clean = take(replace(order, chain=Chain(white=1e-9))).columns
