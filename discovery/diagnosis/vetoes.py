@@ -42,12 +42,11 @@ def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis) -> str
     """
     if h.effect.is_physics and not h.effect.is_event:
         return None
-    heat = [o for o in answer.hypotheses if o.effect.search == "window"]
-    law = next((o for o in heat if every_recording(context, answer, o)), None)
+    law = next((o for o in answer.hypotheses if every_recording(context, answer, o)), None)
     if law and len(context.recordings) > 1:
         return (
             f"{h.effect.word} at {h.where} is not named: {law.effect.word} at {law.where} stands for a law "
-            "that the model leaves out, and may make up for what that heat does not show of it"
+            "that the model leaves out, and may make up for what that does not show of it"
         )
     if answer.coarse < thresholds.NAMED:
         return None
