@@ -263,7 +263,13 @@ def _said(tables: Sequence[OwnTable], found: Recorded, guesses: Mapping[str, Gue
 def _predicted(outputs: Sequence[str], found: Recorded, guesses: Mapping[str, Guess]) -> str:
     """Say which columns the models predict. If no error was recognised, also say how to name one."""
     line = f"predicted: {', '.join(outputs)}"
-    if any(guesses[name].role in ("error", "other output") for name in outputs):
+    roles = {name: guesses[name].role for name in outputs}
+    headers = {column.name: column.header for column in found.seen}
+    others = [headers.get(name, name) for name, role in roles.items() if role == "other output"]
+    if others and len(others) < len(roles):  # thermal masses explain no voltage
+        leave = " ".join(f'--is "{header}=other input"' for header in others)
+        return f"{line}; for first models of thermal masses leave out what is none: {leave}"
+    if others or "error" in roles.values():
         return line
     other = [
         column.header

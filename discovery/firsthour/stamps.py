@@ -34,6 +34,7 @@ from discovery.recordings.timeunit import time_odds
 Array = NDArray[np.float64]
 
 _FEWEST = 5  # different stamps
+_EVEN, _MOST = 0.02, 0.5  # a clock's step is its usual one within this share, in so many of the rows
 _EPOCH = (7e8, 4.2e9)  # s since 1970: 1992 to 2103
 # what programs count since a day of their own -> unit [s], that day in s since 1970
 _COUNTED_SINCE = {
@@ -104,7 +105,7 @@ def find_clock(
             notes = [*notes, *said]
         steps = np.diff(seconds)
         if np.isfinite(seconds).all() and (steps >= 0).all() and np.sum(steps > 0) >= _FEWEST:
-            if not sure and ((steps == 0).any() or (backwards and one.counted)):
+            if not sure and ((steps == 0).any() or (one.counted and (backwards or not _ticks(steps)))):
                 continue  # a temperature that only rises is no clock, least of all where one is called time
             return replace(one, seconds=seconds, about=about, order=order, notes=tuple(notes))
         if not backwards and sure and (steps < 0).any():
@@ -115,6 +116,16 @@ def find_clock(
         f"{sheet.path}: no column of time was found; call one 'time' (seconds, or instants as "
         "2026-03-01T08:00:00), or add one if the file has none"
     )
+
+
+def _ticks(steps: Array) -> bool:
+    """Whether most of the steps (N - 1,) are alike, as those of a logger are.
+
+    >>> _ticks(np.array([10.0, 10.0, 11.0, 10.0])), _ticks(np.array([0.06, 0.10, 0.09, 0.14]))
+    (True, False)
+    """
+    usual = float(np.median(steps))
+    return bool(np.mean(np.abs(steps - usual) <= _EVEN * usual) >= _MOST)
 
 
 def _stated(sheet: Sheet, column: int, name: str, unit: str) -> bool:

@@ -201,6 +201,6 @@ def _content_findings(
         yield from small_findings(file, columns.lines, channels[name], column)
         if name not in recording.set:
             yield from frozen_findings(file, columns.lines, channels[name], column)
-            yield from odd_findings(file, columns.lines, channels[name], column)
+            yield from odd_findings(file, columns.lines, channels[name], column, columns.time)
             if channels[name].measured:
                 yield from few_findings(file, channels[name], column)

@@ -59,12 +59,12 @@ _TRACE = 3.0  # times the usual steps, or those next to it: a response leaves mo
 _SOME = 3  # readings that are none: no slip any more
 _MANY, _MANY_SHARE = 5, 0.01  # so many lone readings, or such a share of all, pull at a fit
 _ZERO, _FALL = 15.0, 3.0  # median steps, and large ones, that a reading falls to be exactly zero
-_HOLE = 3.0  # times the usual rows between readings: so far apart says nothing about a jump
+_HOLE = 3.0  # times the usual time between readings: so far apart says nothing about a jump
 _STEP = 12.0  # times the largest of the steps around it: a jump, not a response
 
 
-def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
-    """All of these. `column` (T,): canonical unit."""
+def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array, time: Array) -> Iterator[Finding]:
+    """All of these. `column` (T,): canonical unit. `time` (T,) in s."""
     known = np.flatnonzero(np.isfinite(column))
     read = column[known]
     if not known.size:
@@ -119,7 +119,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> I
         yield Finding("warning", file, line, what + more(lone.size), do, "outlier", channel.name, 2.0)
     if not channel.measured and channel.role in SENSORS:  # the air may jump: a door
         return
-    for row in _steps(read, known, np.unique(np.concatenate((words, zeros, lone, listed)))):
+    for row in _steps(read, time[known], np.unique(np.concatenate((words, zeros, lone, listed)))):
         what = (
             f"'{channel.name}' jumps from {read[row]:g} to {read[row + 1]:g} {channel.unit} and stays there"
         )
@@ -256,17 +256,17 @@ def _zeros(channel: Channel, read: Array) -> Lines:
     return np.asarray(rows[(near > max(_ZERO * usual, _FALL * largest)) & between])
 
 
-def _steps(read: Array, known: Lines, wrong: Lines) -> Iterator[int]:
+def _steps(read: Array, time: Array, wrong: Lines) -> Iterator[int]:
     """Yield the rows after which the readings jump and stay: the step is far larger than all steps around
     it. Between readings far apart, a machine may have moved.
 
     Args:
-        known: (R,) rows of the file that hold the readings.
+        time: (R,) of the readings, s.
         wrong: rows of the readings that are set aside.
     """
     kept = np.delete(np.arange(read.size), wrong.astype(np.intp))
     steps = np.abs(np.diff(read[kept]))
-    apart = np.diff(known[kept])
+    apart = np.diff(time[kept])
     near = apart <= _HOLE * np.median(apart) if apart.size else apart.astype(bool)
     usual = 1.4826 * float(np.median(steps)) if steps.size else 0.0
     if usual == 0.0 or steps.size < FEW:

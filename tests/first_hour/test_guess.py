@@ -354,6 +354,11 @@ def test_what_a_logger_writes_above_and_between(tmp_path: Path) -> None:
         ),
         (["time,T1", *(f"{k},{k}" for k in range(12)), "12,5,6"], r"line 14: 3 cells where the header has 2"),
         (["T1,T2", *("1,2" for _ in range(12))], "no column of time was found.* or add one"),
+        # a motor that warms is no clock, though it never falls
+        (
+            ["T1,T2", *(f"{k % 3},{28 + 4 * (1 - 0.9**k):.3f}" for k in range(30))],
+            "no column of time was found",
+        ),
         ([f"{k},0,{299.5 + k}" for k in range(12)], r"line 1: numbers where the names .* line of 3 names"),
         (["T (a)", *(f"{k},{k}" for k in range(12))], "no header above the rows of 2 cells"),
         (["time,T1", "0,1", "1,2"], "only 2 rows"),

@@ -368,3 +368,15 @@ def test_sensors_are_inputs_of_an_error_that_a_person_names(tmp_path: Path) -> N
     result = CliRunner().invoke(app, [*command, "--from", str(tmp_path / "run.csv")])
     assert result.exit_code == 0, result.output
     assert _campaign(tmp_path / "rig")["channels"]["T_bed"]["role"] == "other input"
+
+
+def test_a_battery_is_told_how_to_get_thermal_masses(tmp_path: Path) -> None:
+    """Its voltage answers to the current as its temperature does, but no thermal mass explains a voltage."""
+    step = np.arange(200)
+    current = 2.0 * (step % 40 < 20)
+    rows = zip(step * 10, current, 3.7 - 0.05 * current - step / 900, 20 + 5 * np.sin(step / 60), strict=True)
+    lines = [",".join(f"{value:.4f}" for value in row) for row in rows]
+    cell = tmp_path / "cell.csv"
+    cell.write_text("\n".join(["time [s],current [A],voltage [V],T_cell [degC]", *lines]), "utf-8")
+    said = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), "--from", str(cell), "--quick"])
+    assert 'thermal masses leave out what is none: --is "voltage [V]=other input"' in said.output

@@ -1,12 +1,14 @@
 """Readings that only a fault explains, up to three in a row, and what is none."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from discovery.recordings import load_campaign
 from discovery.recordings.campaign import Channel
-from discovery.recordings.oddvalues import impossible_readings, odd_readings
+from discovery.recordings.oddvalues import impossible_readings, odd_findings, odd_readings
 from tests.recordings.conftest import Write, found, with_column
 
 PROBE = Channel("z", "error", "um", None, "linear")
@@ -106,3 +108,14 @@ def test_what_is_left_out_does_not_disturb_the_comparison_of_recordings(rows: li
     read = slow()
     read[rows] += 4300.0
     assert odd_readings(PROBE, read).tolist() == rows
+
+
+@pytest.mark.parametrize(("gap", "jumps"), [(0.0, 1), (1200.0, 0)])
+def test_a_jump_is_none_where_nothing_was_read_for_long(gap: float, jumps: int) -> None:
+    """A cell that warms, read every 10 s: 10 K warmer at the next reading, or after 20 minutes of pause."""
+    read = 20.0 + 0.02 * np.arange(100) + np.random.default_rng(3).normal(0.0, 0.05, 100)
+    read[50:] += 10.0
+    time = 10.0 * np.arange(100) + gap * (np.arange(100) >= 50)
+    cell = Channel("T_cell", "temperature", "degC", None, "linear")
+    said = list(odd_findings(Path("a.csv"), np.arange(2, 102), cell, read, time))
+    assert sum("jumps" in finding.what for finding in said) == jumps
