@@ -23,7 +23,7 @@ from discovery.diagnosis.response import Response, responses
 from discovery.diagnosis.scored import Scored, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
-from discovery.diagnosis.withdrawal import idle, refuted, runs_away, unfinished, unforeseen
+from discovery.diagnosis.withdrawal import idle, refuted, runs_away, unfinished, unforeseen, wrong_readings
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis
@@ -201,7 +201,7 @@ def diagnose(
     verdict = refuted(unfinished(idle(found, verdict, each), fitting, unit), proof)
     if not verdict.named and after is not None:
         after = None
-    verdict = unforeseen(verdict, proof, unit)
+    verdict = wrong_readings(unforeseen(verdict, proof, unit), len(context.outliers))
     mine = tuple(searched(found, verdict, effects))
     further = _reasons(context, verdict, read, proof, effects, mine)
     verdict = replace(verdict, reasons=(*verdict.reasons, *further))

@@ -107,7 +107,8 @@ def responses(context: Context) -> list[Response]:
     found = []
     for y, output in enumerate(context.outputs):
         read = [r for r in context.recordings if r in left and np.isfinite(left[r][:, y]).sum() > MOST_TERMS]
-        data = _Readings({r: context.grids[r] for r in read}, y, campaign)
+        warm = campaign.channels[output].role == "temperature"
+        data = _Readings({r: context.grids[r] for r in read}, y, campaign, warm)
         by_model = {r: left[r][:, y] for r in read}
         one = data.response(output, by_model) if len(read) > 1 and data.inputs else None
         found += [one] if one else []
@@ -116,17 +117,19 @@ def responses(context: Context) -> list[Response]:
 
 @dataclass(frozen=True)
 class _Readings:
-    """Readings of one output in several recordings; the zero of each is its own."""
+    """Readings of one output in several recordings; the zero of each is its own. `warm`: a thermometer."""
 
     grids: Mapping[str, Grid]
     output: int
     campaign: Campaign
+    warm: bool
 
     @property
     def inputs(self) -> list[str]:
-        """Recorded channels that move."""
-        grids = list(self.grids.values())
-        names = [n for n in (grids[0].samples if grids else ()) if n in self.campaign.channels]
+        """Recorded channels that move. A thermometer does not follow another one: both answer."""
+        grids, channels = list(self.grids.values()), self.campaign.channels
+        names = [n for n in (grids[0].samples if grids else ()) if n in channels]
+        names = [n for n in names if channels[n].is_input or not self.warm]
         return [n for n in names if any(np.ptp(g.nodes[n]) > 1e-9 for g in grids)]
 
     def response(self, output: str, by_model: Mapping[str, Array]) -> Response | None:

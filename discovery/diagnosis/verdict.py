@@ -128,7 +128,7 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
         return Verdict(MISSING if True in kinds else FAULT, answer, named, (), every)
     if reasons:
         return Verdict(UNEXPLAINED, answer, (), candidates, every)
-    return _nothing(context, found, answer, candidates, further)
+    return _nothing(found, answer, candidates, further)
 
 
 def _proved(
@@ -252,16 +252,13 @@ def _only(
 
 
 def _nothing(
-    context: Context, found: Search, answer: Scored, candidates: tuple[Named, ...], further: tuple[str, ...]
+    found: Search, answer: Scored, candidates: tuple[Named, ...], further: tuple[str, ...]
 ) -> Verdict:
     """Verdict without a name: "no mismatch", or "unexplained" if the model is so coarse that process noise
     explains any residual. `further`: about effects that are not named.
     """
     if said := coarse(found):
         return Verdict(UNEXPLAINED, answer, (), candidates, (*said, *further))
-    if context.outliers:
-        reason = f"only {len(context.outliers)} single wrong readings were found"
-        return Verdict(FAULT, answer, (), (), (reason,))
     return Verdict(NO_MISMATCH, answer, (), (), (*_unrecorded(found), *further))
 
 

@@ -9,7 +9,7 @@ from math import expm1, inf, isfinite, log
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.selection import Search
-from discovery.diagnosis.verdict import NO_MISMATCH, UNEXPLAINED, Verdict, coarse
+from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, coarse
 from discovery.printed import printed
 
 
@@ -126,3 +126,11 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
     )
     word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
     return replace(verdict, word=word, reasons=(*verdict.reasons, reason))
+
+
+def wrong_readings(verdict: Verdict, count: int) -> Verdict:
+    """The verdict where nothing but single wrong readings was found."""
+    if verdict.word != NO_MISMATCH or not count:
+        return verdict
+    reason = f"only {count} single wrong readings were found"
+    return replace(verdict, word=FAULT, candidates=(), reasons=(reason, *verdict.reasons))

@@ -87,6 +87,15 @@ def test_a_recording_may_begin_with_the_heater_on_and_the_machine_unsettled() ->
     assert found.left == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.parametrize("role", ["error", "temperature"])
+def test_a_thermometer_does_not_follow_another_one(role: str) -> None:
+    """Both answer to the same heat; an error does follow what thermometers show."""
+    channels = CHANNELS | {"bed": replace(CHANNELS["bed"], role="temperature")}
+    channels["Z"] = replace(CHANNELS["Z"], role=role, unit="um" if role == "error" else "degC")
+    seen = replace(campaign(EARLY, LATE), channels=channels)
+    assert bool(responses(context_of(seen, one_mass(), outputs=("Z",)))) is (role == "error")
+
+
 def test_nothing_is_said_where_starts_alone_explain_the_readings() -> None:
     """A machine that only cools, and an input that moves without any effect."""
     runs = []
