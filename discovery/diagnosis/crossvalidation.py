@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.proof import BLOCKS, FreeRuns, Improvement, block_sums, improvement, surely_better
 from discovery.diagnosis.refit import ENOUGH, with_effects
@@ -47,6 +48,11 @@ class LeftOut:
         (True, False)
         """
         return surely_better(self.better, self.blocks)
+
+    @property
+    def improves(self) -> bool:
+        """Whether they improve free runs, by more than a name needs and not by chance."""
+        return self.sure and self.free.explained >= thresholds.MATTERS
 
 
 def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> dict[Key, LeftOut | None]:

@@ -22,6 +22,7 @@ from discovery.diagnosis.repair import written
 from discovery.diagnosis.response import Response, responses
 from discovery.diagnosis.scored import Scored, with_unknown
 from discovery.diagnosis.selection import Search
+from discovery.diagnosis.unknown_law import instead
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
 from discovery.diagnosis.withdrawal import idle, refuted, runs_away, unfinished, unforeseen, wrong_readings
 from discovery.effects.catalogue import catalogue
@@ -202,8 +203,10 @@ def diagnose(
     if not verdict.named and after is not None:
         after = None
     verdict = wrong_readings(unforeseen(verdict, proof, unit), len(context.outliers))
+    law = instead(context, verdict.answer) if verdict.word == UNEXPLAINED else None
     mine = tuple(searched(found, verdict, effects))
-    further = _reasons(context, verdict, read, proof, effects, mine)
+    further = [law] if law else []
+    further += _reasons(context, verdict, read, proof, effects, mine)
     verdict = replace(verdict, reasons=(*verdict.reasons, *further))
     tell("locating")
     setting = found.baseline.settings[found.baseline.best]
@@ -223,7 +226,7 @@ def diagnose(
         forces=tuple(forces),
         fit=fitting,
         held_out=proof,
-        description=describe(context, found.baseline, shown[0]) if unexplained else None,
+        description=describe(context, found.baseline, shown[0]) if unexplained and not law else None,
         responses=tuple(responses(context)) if verdict.word == UNEXPLAINED else (),
         curves=tuple(curves(found.baseline, shown[0])) if shown and verdict.word != NO_MISMATCH else (),
         question=ask(context, found, verdict),

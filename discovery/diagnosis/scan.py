@@ -37,7 +37,7 @@ def scan_model(context: Context, current: Scored) -> Scan:
     """Score every effect at every place on the residual of a model."""
     offered = [h for h in context.candidates if h.key not in current.keys]
     offered = [h for h in offered if h.effect.search != "single readings"]
-    settings = _in_play(context, current)
+    settings = in_play(context, current)
     events = [h for h in offered if h.effect.search in ("window", "step")]
     placed = place_events(current.seen, settings[0], events, [context.slab([h]) for h in events])
     moved = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
@@ -79,7 +79,7 @@ def _without(current: Scored, h: Hypothesis) -> Without:
     return Without(shown, np.array(mine, dtype=np.intp))
 
 
-def _in_play(context: Context, current: Scored) -> list[Setting]:
+def in_play(context: Context, current: Scored) -> list[Setting]:
     """Noise settings for the scan: the most likely one, and one with little process noise, because process
     noise may have absorbed the missing physics.
     """

@@ -14,12 +14,15 @@ from math import inf, log
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
+from discovery.diagnosis.crossvalidation import left_out
 from discovery.diagnosis.refit import score
-from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.scan import attempt, in_play
+from discovery.diagnosis.scored import Scored, is_usual
 from discovery.effects.form import Amplitude, Effect
 from discovery.effects.hypothesis import Hypothesis
 from discovery.effects.places import TEMPERATURES
 from discovery.evidence.bayes import scan
+from discovery.printed import printed
 from discovery.terms import Apply, Expression, Name, Number, Term
 
 _SIZE = "q_unknown_law"  # W where both inputs are largest
@@ -53,10 +56,56 @@ def with_law(context: Context, one: Scored, goal: float = inf) -> list[Scored]:
     found = score(context, (*one.hypotheses, h), one.noise, one.fit, sizes, goal)
     if found is None:
         return []
-    (body,), inputs = h.states, " times ".join(h.channels)
-    what = f"heat at {body} that follows {inputs}"
-    odds = h.log_odds
-    return [replace(found, hypotheses=one.hypotheses, forced=what, forced_state=body, log_odds_force=odds)]
+    (body,), odds = h.states, h.log_odds
+    return [replace(found, hypotheses=one.hypotheses, forced=_law(h), forced_state=body, log_odds_force=odds)]
+
+
+def instead(context: Context, one: Scored) -> str | None:
+    """A law of two inputs that a model lacks whose flows are wrong by more than usual, in words: with it they
+    are not, and recordings that are left out are predicted better. None if there is none.
+    """
+    made = _made_usual(context, one)
+    if made is None:
+        return None
+    found, h = made
+    outside = left_out(context, found, [h])[h.key]
+    if outside is None or not outside.improves:
+        return None
+    old, new = (printed(rms) for rms in outside.free.judged)
+    beside = " and ".join(f"{o.effect.word} at {o.where}" for o in one.hypotheses)
+    return (
+        f"{_law(h)} is a law to look for: with it{f', next to {beside}' if beside else ''}, the flows of the "
+        f"model are wrong by {printed(100 * found.off)} %, not {printed(100 * one.off)} %, and it misses "
+        f"recordings that are left out of the fit by {new} times the reading noise, not {old}"
+    )
+
+
+def _made_usual(context: Context, one: Scored) -> tuple[Scored, Hypothesis] | None:
+    """A model whose flows are wrong by more than usual, with the law of two inputs that it lacks: with it,
+    they are not. None if no law does that, or if the model is no such one.
+
+    Large process noise and form errors explain any law. So laws are scored as if there were little of them.
+    """
+    offered = list(_laws(context))
+    if is_usual(one.settings[one.best]) or not offered:
+        return None
+    found = scan(one.seen, in_play(context, one), offered, context.slab(offered))
+    claims = [*found.claims[:1], *found.quiet[:1]]
+    tries = [(attempt(context, one, one.hypotheses, c), c.hypothesis) for c in claims if c.odds > 0]
+    enough = [(m, h) for m, h in tries if m is not None and is_usual(m.settings[m.best])]
+    return max(enough, key=lambda pair: pair[0].evidence, default=None)
+
+
+def _law(h: Hypothesis) -> str:
+    """A law in words.
+
+    >>> from types import SimpleNamespace as Law
+    >>> _law(Law(states=("cell",), channels=("I", "I"))), _law(Law(states=("motor",), channels=("I", "n")))
+    ('heat at cell that follows the square of I', 'heat at motor that follows I times n')
+    """
+    (body,), (one, other) = h.states, h.channels
+    inputs = f"the square of {one}" if one == other else f"{one} times {other}"
+    return f"heat at {body} that follows {inputs}"
 
 
 def _laws(context: Context) -> Iterator[Hypothesis]:

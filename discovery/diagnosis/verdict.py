@@ -172,7 +172,7 @@ def _unknown_cause(rest: Sequence[Scored], alone: float, named: bool) -> tuple[S
 
 def _supports(outside: LeftOut | None) -> bool:
     """Whether left-out recordings support what was added; true where nothing can be left out."""
-    return outside is None or (outside.sure and outside.free.explained >= thresholds.MATTERS)
+    return outside is None or outside.improves
 
 
 def _idle(h: Hypothesis, outside: LeftOut) -> str:
