@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ class Part:
 class Response:
     """How an output follows inputs, and the rms [its unit] of what is left of recordings that are left out.
 
-    `shortest` [s]: shorter time constants cannot be told from none.
+    `shortest` [s]: shorter time constants cannot be told from none, and those of `longest` from a ramp.
     """
 
     output: str
@@ -74,6 +75,7 @@ class Response:
     left: float
     left_by_model: float
     shortest: float
+    longest: float
 
     def sentence(self) -> str:
         """What was found, in words."""
@@ -95,6 +97,9 @@ class Response:
         gain = f"{'+' if p.gain > 0 else '-'}{printed(abs(p.gain))} {p.unit}"
         if p.seconds <= self.shortest:
             return f"{gain} at once"
+        if p.seconds >= self.longest:
+            rate = f"{'+' if p.gain > 0 else '-'}{printed(60.0 * abs(p.gain) / p.seconds)} {p.unit}"
+            return f"{rate} each minute, for longer than a recording ({lasting(p.seconds)})"
         ends = f" ({lasting(p.low)} to {lasting(p.high)})" if lasting(p.low) != lasting(p.high) else ""
         return f"{gain} after {lasting(p.seconds)}{ends}"
 
@@ -164,7 +169,8 @@ class _Readings:
             ends = [seconds, *(one[place][1] for one in folded)]
             by = f"{unit}{per(differences(self.campaign.channels[name].unit))}"
             said.append(Part(name, float(gains[k]), by, seconds, min(ends), max(ends)))
-        return Response(output, unit, tuple(said), *rms, 1.01 * self.limits[0])
+        shortest, longest = self.limits
+        return Response(output, unit, tuple(said), *rms, 1.01 * shortest, 0.99 * longest)
 
     def sums(self, recordings: Sequence[str]) -> list[Sum]:
         """The best sums of one term, two terms, ..., each with one term more than the one before."""
@@ -176,6 +182,8 @@ class _Readings:
             if not np.isfinite(best):
                 break
             terms = self.refined(recordings, (*terms, chosen))
+            if _twice(terms, times[1] / times[0]):
+                break
             found.append((terms, _gains(*self.rows(recordings, terms))))
         return found
 
@@ -263,6 +271,19 @@ class _Readings:
 
 def _inputs(found: Sum) -> list[str]:
     return sorted(name for name, _ in found[0])
+
+
+def _twice(terms: Sequence[Lagged], ratio: float) -> bool:
+    """Whether an input stands twice with time constants that cannot be told apart: gains that cancel.
+
+    Args:
+        ratio: of neighbouring time constants that are tried.
+
+    >>> _twice((("P", 60.0), ("P", 70.0)), 1.5), _twice((("P", 60.0), ("F", 70.0), ("P", 90.0)), 1.5)
+    (True, False)
+    """
+    logs = [(name, float(np.log(seconds))) for name, seconds in sorted(terms)]
+    return any(a[0] == b[0] and b[1] - a[1] < 0.999 * np.log(ratio) for a, b in pairwise(logs))
 
 
 def _gains(x: Array, y: Array) -> Array:

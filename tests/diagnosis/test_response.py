@@ -130,6 +130,14 @@ def test_file_and_summary_of_a_diagnosis_say_it() -> None:
 
 def test_what_cannot_be_told_from_an_answer_at_once_is_called_so() -> None:
     parts = (Part("P", -0.8, "um/W", 300.0, 300.0, 310.0), Part("F", 0.1, "um/W", 7200.0, 5400.0, 9000.0))
-    said = Response("E", "um", parts, 0.9, 1.7, 303.0).sentence()
+    said = Response("E", "um", parts, 0.9, 1.7, 303.0, 9000.0).sentence()
     assert said.startswith("E follows P: -0.8 um/W at once; F: +0.1 um/W after 2 h (1.5 h to 2.5 h) (rms ")
     assert "(rms 0.9 um on recordings left out of the fit, 1.7 with the model; " in said
+
+
+def test_a_time_constant_as_long_as_the_recordings_is_a_ramp() -> None:
+    """A roast of 10 min: `+1 K/percent after 10 min` would say a gain that nothing shows."""
+    said = Response("BT", "K", (Part("air", 1.2, "K/percent", 600.0, 600.0, 600.0),), 0.9, 1.7, 5.0, 594.0)
+    assert said.sentence().startswith(
+        "BT follows air: +0.12 K/percent each minute, for longer than a recording (10 min) (rms 0.9 K"
+    )
