@@ -43,8 +43,9 @@ def ask(context: Context, found: Search, verdict: Verdict) -> str:
     if verdict.word == UNEXPLAINED and context.unused_readings:
         return READ.format(channels=" and ".join(context.unused_readings))
     shown = verdict.named or verdict.candidates
+    first = _not_used(context) if verdict.word == UNEXPLAINED else ""
     if not shown:
-        return f"{_not_used(context)}{NOTHING_CLOSE}"
+        return f"{first}{NOTHING_CLOSE}"
     rivals = [
         r.hypothesis
         for n in shown
@@ -55,11 +56,11 @@ def ask(context: Context, found: Search, verdict: Verdict) -> str:
     rival = _rival_model(found, answer, rivals[0]) if rivals else None
     claims = [n.hypothesis for n in shown]
     if rival is None and all(h.recording for h in claims):
-        return look_back(context, claims)
+        return f"{first}{look_back(context, claims)}"
     purpose = aim(claims, rivals[0] if rival else None, bool(verdict.named))
     noise = answer.noise
     other = rival or _without(answer)
-    return next_experiment(context, answer.fit.model, other, noise, purpose, believed(context))
+    return f"{first}{next_experiment(context, answer.fit.model, other, noise, purpose, believed(context))}"
 
 
 def _not_used(context: Context) -> str:

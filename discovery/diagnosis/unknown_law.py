@@ -92,7 +92,7 @@ def _made_usual(context: Context, one: Scored) -> tuple[Scored, Hypothesis] | No
     found = scan(one.seen, in_play(context, one), offered, context.slab(offered))
     claims = [*found.claims[:1], *found.quiet[:1]]
     tries = [(attempt(context, one, one.hypotheses, c), c.hypothesis) for c in claims if c.odds > 0]
-    enough = [(m, h) for m, h in tries if m is not None and is_usual(m.settings[m.best])]
+    enough = [(m, h) for m, h in tries if m and is_usual(m.settings[m.best]) and m.off < one.off]
     return max(enough, key=lambda pair: pair[0].evidence, default=None)
 
 

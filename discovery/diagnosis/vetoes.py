@@ -13,17 +13,25 @@ Veto = Callable[[Context, Scored, Hypothesis], str | None]
 
 
 def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | None:
-    """What every recording shows is no event: unrecorded heat for some hours, or a clock that is wrong."""
+    """What every recording shows is no event: unrecorded heat for some hours, or a clock that is wrong. An
+    offset that is another one in every recording is no offset.
+    """
     is_clock = h.effect.place == "inputs of a recording"
-    if not is_clock and h.effect.search != "window":
+    is_offset = h.effect.place == "input temperature" and len(context.recordings) > 1
+    if not is_clock and not is_offset and h.effect.search != "window":
         return None
-    alike = [o for o in answer.hypotheses if o.effect.place == h.effect.place and o.states == h.states]
+    alike = [o for o in answer.hypotheses if o.effect.place == h.effect.place and o.places == h.places]
     if h.recording is not None and not {o.recording for o in alike} >= set(context.recordings):
         return None
     if is_clock:
         return (
             "the clock of every recording would be shifted; a dead time between the inputs and the readings "
             "explains this as well"
+        )
+    if is_offset:
+        return (
+            f"{h.effect.word} at {h.where} would be another one in every recording; heat that the model "
+            "leaves out explains this as well"
         )
     if len(context.recordings) > 1:
         return (

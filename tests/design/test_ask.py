@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 import pytest
 
+from discovery.design import question
 from discovery.design.next_experiment import STEPS, _designs, believed, next_experiment
 from discovery.design.question import APART, CONFIRM, NOTHING_CLOSE, _smallest, aim, ask, look_back
 from discovery.diagnosis.context import Context
@@ -192,6 +193,18 @@ def test_what_is_recorded_and_not_used_is_asked_for_before_more_is_recorded() ->
         said = ask(where, cast(Search, None), nothing)
         assert said.startswith(first)
         assert said.endswith(NOTHING_CLOSE)
+
+
+def test_what_is_not_used_is_asked_for_also_where_something_came_close(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A cell without its current: the lag of its thermometer came closest."""
+    near = SimpleNamespace(hypothesis=SimpleNamespace(recording="r1"), rivals=())
+    close = cast(Verdict, SimpleNamespace(word=UNEXPLAINED, named=(), candidates=(near,), answer=None))
+    where = cast(Context, SimpleNamespace(scene=SimpleNamespace(unused={"current"}), unused_readings=[]))
+    monkeypatch.setattr(question, "look_back", lambda *_: "look at r1")
+    said = ask(where, cast(Search, None), close)
+    assert said == "give the model what is recorded and it does not use (current), and compare; look at r1"
 
 
 def test_an_event_is_looked_at_where_it_was() -> None:

@@ -522,6 +522,12 @@ def test_effects_that_improve_free_runs_only_together_are_no_nothing(monkeypatch
             {"clock_shift": 0.98},
             "the clock of every recording would be shifted",
         ),
+        (
+            [Model(tuple(claim("sensor_offset_input", recording=r) for r in ("r1", "r2")), 50.0)],
+            World(),
+            {"sensor_offset": 0.98},
+            "would be another one in every recording; heat that the model leaves out",
+        ),
     ],
 )
 def test_a_veto_of_physics_stands_against_any_probability(
