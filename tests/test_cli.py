@@ -45,6 +45,16 @@ def test_reading_an_experiment_does_not_load_pysindy() -> None:
     assert done.stdout.strip() == "False"
 
 
+def test_a_diagnosis_loads_no_optimiser_of_scipy_and_no_figures() -> None:
+    """Half a second: most diagnoses need neither."""
+    code = (
+        "import sys, discovery.diagnosis.diagnose, discovery.commands.runs, discovery.experiment.pipeline\n"
+        "print(sorted({'scipy.optimize', 'scipy.stats', 'matplotlib', 'sklearn'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_version() -> None:
     result = runner.invoke(app, ["--version"])
     assert result.exit_code == 0

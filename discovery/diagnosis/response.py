@@ -24,7 +24,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
@@ -207,6 +206,8 @@ class _Readings:
 
     def refined(self, recordings: Sequence[str], terms: Sequence[Lagged]) -> tuple[Lagged, ...]:
         """The terms with the time constants that fit best together."""
+        from scipy.optimize import least_squares  # a third of a second that most diagnoses do not need
+
         names = [name for name, _ in terms]
         low, high = np.log(self.limits)
 
