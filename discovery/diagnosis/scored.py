@@ -109,7 +109,7 @@ class Scored:
         """Probability that the model's laws and flows are off by more than is usual for a lumped model, over
         the settings tried. Heat that nobody records does not follow its flows: it says nothing of them.
         """
-        coarse = np.array([_off_by(s) > thresholds.SHARE for s in self.settings])
+        coarse = np.array([is_large(_off_by(s)) for s in self.settings])
         return float(np.exp(self.levels - log_sum_exp(self.levels)) @ coarse)
 
     @property
@@ -296,7 +296,12 @@ def _walked(
 
 def is_usual(setting: Setting) -> bool:
     """Whether process noise is no larger than usual, whatever it is: more may have absorbed an effect."""
-    return max(_off_by(setting), _unrecorded(setting)) <= thresholds.SHARE
+    return not is_large(max(_off_by(setting), _unrecorded(setting)))
+
+
+def is_large(share: float) -> bool:
+    """Whether a share of what flows is more than a usual lumped model is off by."""
+    return share > thresholds.SHARE
 
 
 def _off_by(setting: Setting) -> float:

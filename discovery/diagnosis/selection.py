@@ -203,20 +203,23 @@ class Search:
         own, pool = [o.key for o in others], not_twice(pool, others)
         keys = [frozenset((*own, claim.hypothesis.key)) for claim in pool]
         known = {*self.tried, *self.lost}
-        fresh = {k: claim for k, claim in zip(keys, pool, strict=True) if k not in known}
+        # an effect may have several formulas at a place
+        fresh = {
+            (key, claim.hypothesis.amplitudes): claim
+            for key, claim in zip(keys, pool, strict=True)
+            if key not in known
+        }
 
         def tried(claim: Score) -> Scored | None:
             one = attempt(self.context, start, others, claim, self.goal)
             return light(one) if one is not None and one.evidence > -inf else None
 
-        found = dict(zip(fresh, side_by_side(tried, list(fresh.values())), strict=True))
-        self.lost |= {key for key, one in found.items() if one is None}
-        best = start
-        for key in dict.fromkeys(keys):
-            one = found[key] if key in found else self.tried.get(key)
-            if one is not None and self.keep(one).evidence > best.evidence:
-                best = one
-        return best
+        for one in side_by_side(tried, list(fresh.values())):
+            if one is not None:
+                self.keep(one)
+        self.lost |= {key for key, _ in fresh if key not in self.tried}
+        among = [self.tried[key] for key in keys if key in self.tried]
+        return max([start, *among], key=lambda one: one.evidence)
 
     def goal(self, noise: Noise, below: float = 0.0) -> float:
         """Cost of a fit from which it can be part of the answer, or `below` it in log evidence."""

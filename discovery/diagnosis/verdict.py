@@ -16,7 +16,7 @@ from discovery.diagnosis.context import Context
 from discovery.diagnosis.crossvalidation import LeftOut, left_out, together_left_out
 from discovery.diagnosis.posterior import Posterior
 from discovery.diagnosis.refit import score
-from discovery.diagnosis.scored import Scored, with_unknown
+from discovery.diagnosis.scored import Scored, is_large, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.unknown_law import with_law
 from discovery.diagnosis.vetoes import vetoed
@@ -264,7 +264,7 @@ def _nothing(
 
 def _unrecorded(found: Search) -> tuple[str, ...]:
     """A sentence about much heat that nobody records; nothing about as much as is usual."""
-    if found.baseline.unrecorded <= thresholds.SHARE:
+    if not is_large(found.baseline.unrecorded):
         return ()
     return (
         f"heat that nobody records is about {100 * found.baseline.unrecorded:.0f} % of what flows, more than "

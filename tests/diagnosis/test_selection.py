@@ -11,6 +11,7 @@ import pytest
 from discovery.diagnosis import selection
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import FAR, Search, not_twice
+from discovery.evidence.bayes import Score
 from tests.diagnosis.parts import dry
 
 
@@ -54,6 +55,28 @@ def test_what_grew_is_questioned_under_another_noise(monkeypatch: pytest.MonkeyP
     search, current = asked[0]
     assert search is other
     assert "fluid_convection" in {h.effect.word for h in current.hypotheses}
+
+
+@pytest.mark.parametrize("likely", ["warms", "moves"])
+def test_each_formula_of_an_effect_is_refitted(likely: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hidden mass may warm its body or move an error by itself. The last in the pool took the place of the
+    other: on the frame of a printer it had -2153 log evidence, and the other -1826.
+    """
+
+    def refit(*arguments: object) -> Scored:
+        claim = cast(Score, arguments[3])
+        evidence = 100.0 if claim.hypothesis.amplitudes == (likely,) else 50.0
+        return cast(Scored, SimpleNamespace(keys=frozenset({"mass"}), evidence=evidence, hypotheses=()))
+
+    monkeypatch.setattr(selection, "attempt", refit)
+    monkeypatch.setattr(selection, "light", lambda one: one)
+    start = cast(Scored, SimpleNamespace(keys=frozenset(), evidence=0.0))
+    pool = [
+        SimpleNamespace(hypothesis=SimpleNamespace(key="mass", amplitudes=(a,))) for a in ("warms", "moves")
+    ]
+    found = Search(dry())
+    assert found._refitted(start, [], cast(list[Score], pool)).evidence == 100.0
+    assert [one.evidence for one in found.tried.values()] == [100.0]
 
 
 @pytest.mark.parametrize(("coarse", "begun"), [(True, ["heat", "mass"]), (False, ["heat"])])
