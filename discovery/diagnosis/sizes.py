@@ -12,7 +12,7 @@ from discovery.diagnosis import thresholds
 from discovery.dynamics import Trajectory
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Slab
-from discovery.evidence.process_noise import flow_sizes
+from discovery.evidence.process_noise import flows_at_least
 from discovery.evidence.signatures import signatures
 from discovery.fitting import Noise
 from discovery.models import Model
@@ -56,8 +56,8 @@ class Sizes:
 
     @cached_property
     def _flows(self) -> dict[str, float]:
-        """rms of what flows through each state of the model."""
-        return {n: v for n, v in flow_sizes(self.trajectories).items() if n in self.model.states}
+        """rms of what flows through each state of the model, or of what would have to."""
+        return {n: v for n, v in flows_at_least(self.trajectories).items() if n in self.model.states}
 
     def _shown(self, h: Hypothesis) -> list[tuple[float, float]]:
         """For each amplitude: rms of the outputs for an amplitude of one, and the reading noise there."""

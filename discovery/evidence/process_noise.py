@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Trajectory
+from discovery.dynamics import Trajectory, predict
 from discovery.dynamics.trajectory import answers, flows
 from discovery.evidence.settings import Prior, Setting, with_levels
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Fit, Noise
 from discovery.fitting.kalman import make_filter
 from discovery.fitting.noise import resolution
+from discovery.terms import Name
 
 Array = NDArray[np.float64]
 
@@ -85,7 +86,7 @@ def floors(
         apart: rms difference [K] of the air at a body from these.
         own: what flows through a body counts; not for what comes to a machine later, which may be anywhere.
     """
-    largest = flow_sizes(fit.trajectories)
+    largest = flows_at_least(fit.trajectories)
     states = {n: s for n, s in fit.problem.model.states.items() if not s.memory}
     top = {
         kind: max((largest[n] for n, s in states.items() if bool(s.capacity) == kind), default=0.0)
@@ -109,6 +110,32 @@ def flow_sizes(trajectories: Sequence[Trajectory]) -> dict[str, float]:
         for name, one in zip(trajectory.system.states, size.tolist(), strict=True):
             found[name] = max(found.get(name, 0.0), one)
     return found
+
+
+def flows_at_least(trajectories: Sequence[Trajectory]) -> dict[str, float]:
+    """As `flow_sizes`, but at least what would have to flow for what a free run misses of a body that is read
+
+        C rms(reading - model) / time of process noise    [W, or a rate]
+
+    A model without its only heat has next to no flow, and nothing could be usual there.
+    """
+    found = flow_sizes(trajectories)
+    for run in trajectories:
+        system = run.system
+        left = system.grid.readings - predict(run)
+        for y, output in enumerate(system.grid.outputs):
+            shown = system.model.outputs.get(output, Name(output))
+            if not isinstance(shown, Name) or shown.id not in found or not system.grid.measured[:, y].any():
+                continue
+            missed = float(np.sqrt(np.nanmean(left[:, y] ** 2)))
+            rate = missed / _process_time(float(system.grid.time[-1]))
+            found[shown.id] = max(found[shown.id], rate / system.model.states[shown.id].scale)
+    return found
+
+
+def _process_time(duration: float) -> float:
+    """The longest time constant of process noise that is likely, in s as the duration of a recording."""
+    return min(10800.0, duration / 8)
 
 
 def neighbours(places: Sequence[tuple[int, ...]]) -> tuple[tuple[int, ...], ...]:
@@ -158,7 +185,7 @@ def reading_noise(
     outputs = fit.problem.outputs
     known = np.array([stated.get(name) is not None for name in outputs])
     duration = max(float(t.system.grid.time[-1]) for t in fit.trajectories)
-    times = min(7200.0, duration / 12), min(10800.0, duration / 8)
+    times = min(7200.0, duration / 12), _process_time(duration)
     start = Noise(outputs, tuple(fit.noise.white), (), None, slow_time=times[0], heat_time=times[1])
     best, lowest = np.array(fit.noise.white), np.inf
     if not known.all():
