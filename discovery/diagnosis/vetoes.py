@@ -48,7 +48,7 @@ def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis) -> str
     """Events of one recording and faults of the measuring chain can only be recognised with a model that is
     nearly right. One with events in the place of a law is not.
     """
-    if h.effect.is_physics and not h.effect.is_event:
+    if h.effect.is_law:
         return None
     law = next((o for o in answer.hypotheses if every_recording(context, answer, o)), None)
     if law and len(context.recordings) > 1:

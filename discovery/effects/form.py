@@ -235,6 +235,11 @@ class Effect:
         return self.acts == "in one recording"
 
     @property
+    def is_law(self) -> bool:
+        """Whether it acts in the machine whenever it may: no event, and no fault of the measuring chain."""
+        return self.is_physics and not self.is_event
+
+    @property
     def at(self) -> str:
         """The speed that the amplitude is a size at, "1000 rpm", where the formula divides by one; of what a
         speed adds to, it is the size at standstill.

@@ -176,7 +176,7 @@ def effect_form(trajectories: Sequence[Trajectory], hypotheses: Sequence[Hypothe
     a size makes of it.
     """
     scales = scales_of(trajectories)
-    lasting = [h for h in hypotheses if not h.effect.is_event and h.effect.is_physics]
+    lasting = [h for h in hypotheses if h.effect.is_law]
     paths = [h for h in lasting if h.shown and h.effect.amplitude.fixed is None]
     lasting = [h for h in lasting if h.terms]
     sensors = [h for h in hypotheses if h.shown and not h.recording and h.effect.amplitude.fixed is not None]

@@ -621,6 +621,19 @@ def test_names_that_leave_more_than_they_explain_are_withdrawn() -> None:
     assert unfinished(named, noisy, "um") is named
 
 
+def test_a_fault_beside_what_a_model_still_misses_has_no_name() -> None:
+    """A cold finger without the braid that cools its detector: a sensor that jumps explained 24 to 8 K of the
+    rms, where noise is 2.5 K. A law that explains as much keeps its name.
+    """
+    run = Improvement(23.8, 8.0, 2.5, 10.0, 20.0, {})
+    fault = said(Tried([Model((OFFSET,), 50.0), Model((), 0.0)]), {"sensor_offset": 0.98})
+    assert fault.word == "measurement fault"
+    withdrawn = unfinished(fault, run, "K")
+    assert (withdrawn.word, withdrawn.named) == ("unexplained", ())
+    assert "with a model that is nearly right: free runs on the fitted" in withdrawn.reasons[0]
+    assert unfinished(said(WET, {"fluid_convection": 0.9}), run, "K").named
+
+
 def test_a_model_that_misses_its_own_recordings_does_not_lack_nothing() -> None:
     """A cooler whose fan the model leaves out: 5.2 K where noise is 1.4, and no effect was sure. A repair
     whose names were withdrawn does not count.
