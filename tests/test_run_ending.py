@@ -173,3 +173,9 @@ def test_a_ridge_regression_is_the_closed_form(folder: Path) -> None:
     size = table[:, :2].std(axis=0)
     assert np.linalg.norm(found[1:] * size) <= 1.001 * np.linalg.norm(plain[1:] * size)
     assert float(np.mean(x @ found)) == pytest.approx(float(np.mean(table[:, 2])), abs=0.05)
+
+
+def test_a_single_model_wins_against_none() -> None:
+    lines = ended().lines()
+    assert lines[0].startswith("winner: a, the only model, on 1 held-out recording: rms 1 um")
+    assert lines[1] == "how sure: there is no other model to compare with"

@@ -79,10 +79,8 @@ class Ending:
                 f"winner: no model; the best one, {self.best}, has {share} of the rms without a model "
                 f"on {where}: do not use it"
             )
-        return (
-            f"winner: {self.winner} predicts best on {where}: rms {rms}, {1 - none.ratio:.0%} less "
-            "than without a model"
-        )
+        what = f"{self.winner} predicts best" if self.runner_up else f"{self.winner}, the only model,"
+        return f"winner: {what} on {where}: rms {rms}, {1 - none.ratio:.0%} less than without a model"
 
     def _sure(self) -> str:
         lead, other = self.against_runner_up, self.runner_up

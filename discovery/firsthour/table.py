@@ -220,13 +220,17 @@ def _without_doubles(
     doubles = [k for k in same.tolist() if all(one[order[k]] == one[order[k - 1]] for one in cells)]
     if not doubles:
         return clock, order, []
-    said = f"{len(doubles)} rows repeat the row before: left out"
+    said = f"{len(doubles)} {'row repeats' if len(doubles) == 1 else 'rows repeat'} the row before: left out"
     return replace(clock, seconds=np.delete(clock.seconds, doubles)), np.delete(order, doubles), [said]
 
 
 def _spread(clock: Clock) -> tuple[Array, list[str]]:
     same = int(np.sum(np.diff(clock.seconds) == 0))
-    said = [f"{same} rows have the time of the row before: spread evenly"] if same else []
+    said = (
+        [f"{same} {'row has' if same == 1 else 'rows have'} the time of the row before: spread evenly"]
+        if same
+        else []
+    )
     return spread_evenly(clock.seconds), said
 
 

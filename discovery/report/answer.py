@@ -91,7 +91,8 @@ def _models(run: Run) -> Part:
         points.append(
             "No recording was held out: these figures say how well the models fit, not how well they predict."
         )
-    headline = f"The {origin(run, best)} model{named} predicts best {where}."
+    what = "predicts best" if order[1:] else "is the only one that was run"
+    headline = f"The {origin(run, best)} model{named} {what} {where}."
     return Part(headline, tuple(points), tuple(figures))
 
 
