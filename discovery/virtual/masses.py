@@ -1,8 +1,8 @@
 """Where the insides of the bodies show: second masses that the baseline lacks in silence.
 
 Each body of the plant is a bar of cells, and others join a stretch of it. What a lumped model lacks of that
-is a hidden mass, but not always where the cells are: the part of a housing around a ring moves with the ring,
-and shows as a mass behind the ring. So it is measured which body a second mass helps at,
+is a hidden mass, but it does not only show where the cells are: the part of a housing around a ring moves
+with the ring, and is a mass behind the ring. So it is measured which body a second mass helps at,
 
     q = G_m (lag(body, t_m) - body),
 

@@ -80,14 +80,16 @@ class World:
     @cached_property
     def lacks(self) -> list[Known]:
         """Effects that the baseline lacks in silence, each with its states and the rms over noise that a
-        refit leaves of it; of the insides of the bodies, what a second mass takes out of that.
+        refit leaves of it: the laws of the plant, and bodies where the insides of others show as well.
 
         Only those that the readings can tell: N readings hold at most N rms^2/2 of log evidence about a law.
         """
-        own = [lack for lack in self.machine.lacks if lack.effect != MASS]
+        own = self.machine.lacks
         laws = [(lack.effect, lack.states, self.size(self.machine.as_believed(lack))) for lack in own]
         hidden = hidden_masses(self.machine, self.fitted, self.logs(self.machine, FIT))
-        every = [*((MASS, (body,), rms) for body, rms in hidden.items()), *laws]
+        known = {states for effect, states, _ in laws if effect == MASS}
+        beside = [(MASS, (body,), rms) for body, rms in hidden.items() if (body,) not in known]
+        every = [*laws, *beside]
         return [one for one in every if len(self.fitted.residual) * one[2] ** 2 / 2.0 > APART]
 
     def visible(self, logs: dict[str, Columns]) -> float:
