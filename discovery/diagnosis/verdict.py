@@ -259,10 +259,10 @@ def _nothing(
     """
     if said := coarse(found):
         return Verdict(UNEXPLAINED, answer, (), candidates, (*said, *further))
-    return Verdict(NO_MISMATCH, answer, (), (), (*_unrecorded(found), *further))
+    return Verdict(NO_MISMATCH, answer, (), (), (*unrecorded(found), *further))
 
 
-def _unrecorded(found: Search) -> tuple[str, ...]:
+def unrecorded(found: Search) -> tuple[str, ...]:
     """A sentence about much heat that nobody records; nothing about as much as is usual."""
     if not is_large(found.baseline.unrecorded):
         return ()

@@ -9,7 +9,7 @@ from math import expm1, inf, isfinite, log
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.selection import Search
-from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, coarse
+from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, coarse, unrecorded
 from discovery.printed import printed
 
 
@@ -20,8 +20,8 @@ def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdic
     if not verdict.named or _lower(runs) >= 0.5 * thresholds.MATTERS**2:
         return verdict
     reason = f"the surest effects {_does(_lower(runs))}"
-    reasons = (reason, *coarse(found), *verdict.reasons)
     word = UNEXPLAINED if coarse(found) else NO_MISMATCH
+    reasons = (reason, *(coarse(found) or unrecorded(found)), *verdict.reasons)
     return replace(verdict, word=word, named=(), candidates=(), reasons=reasons)
 
 

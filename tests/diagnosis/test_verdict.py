@@ -570,6 +570,8 @@ def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
         "recordings)"
     )
     assert idle(cast(Any, WET), named, [large, large, another_machine]) is named
+    heated = Tried([Model((FLUID,), 50.0), Model((), 0.0, unrecorded=0.1)])
+    assert "about 10 % of what flows" in idle(cast(Any, heated), named, [small, small]).reasons[1]
     far = Tried([Model((FLUID,), 50.0), Model((), 0.0, off=0.24)])
     assert idle(cast(Any, far), named, [small, small]).word == "unexplained"
 
