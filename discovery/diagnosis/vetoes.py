@@ -54,7 +54,7 @@ def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis) -> str
     if law and len(context.recordings) > 1:
         return (
             f"{h.effect.word} at {h.where} is not named: {law.effect.word} at {law.where} stands for a law "
-            "that the model leaves out, and may make up for what that does not show of it"
+            f"that the model leaves out, and {h.effect.word} may make up for the rest of that law"
         )
     if answer.coarse < thresholds.NAMED:
         return None

@@ -133,5 +133,6 @@ def wrong_readings(verdict: Verdict, count: int) -> Verdict:
     """The verdict where nothing but single wrong readings was found."""
     if verdict.word != NO_MISMATCH or not count:
         return verdict
-    reason = f"only {count} single wrong readings were found"
+    what = "one single wrong reading was" if count == 1 else f"{count} single wrong readings were"
+    reason = f"only {what} found"
     return replace(verdict, word=FAULT, candidates=(), reasons=(reason, *verdict.reasons))

@@ -514,7 +514,7 @@ def test_effects_that_improve_free_runs_only_together_are_no_nothing(monkeypatch
             [Model((*(claim("clock_shift", recording=r) for r in ("r1", "r2")), OFFSET), 90.0)],
             World(),
             {"clock_shift": 0.98, "sensor_offset": 0.98},
-            "stands for a law that the model leaves out",
+            "stands for a law that the model leaves out, and sensor_offset may make up for the rest",
         ),
         (
             [Model(tuple(claim("clock_shift", recording=r) for r in ("r1", "r2")), 50.0)],
