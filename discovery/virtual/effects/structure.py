@@ -63,8 +63,10 @@ def _second_mass(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
 
 
 def _bed(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
-    """A bed that follows the room over a day or two, and is warmed a little by the body itself."""
-    tau, air = shapes("bed h", 20.0, 30.0, 50.0) * 3600.0, shapes("bed W/K", 10.0, 20.0, 40.0)
+    """A bed that follows the room over a day or two, and is warmed a little by the body itself: air around it
+    takes half to three times what the body gives. With less it would be a second mass of the body.
+    """
+    tau, air = shapes("bed h", 20.0, 30.0, 50.0) * 3600.0, size * shapes("bed air", 0.5, 1.0, 3.0)
     laws = [link("bed", node, "bed behind", size * share) for node, share in stretch(m, at[0], shapes)]
     return m.plus([*laws, link("bed air", "bed behind", m.words.air, air)], {"bed behind": air * tau})
 
