@@ -4,8 +4,8 @@
 
 As the formula has it: t_bed = C_bed/(G_bed + G_air) and r_bed = G_air/G_bed. Without G_air the bed is a
 second thermal mass; with a large one it follows the room alone. G_bed in W/K, 2 to 50; t_bed of 5 to 50 h;
-r_bed of 0.3 to 4. Source: Bryan's thermal memory; energy balance of one mass between body and room. Limits: settled at
-the first instant; a recording shorter than t_bed hardly shows r_bed.
+r_bed of 0.3 to 4. Source: Bryan's thermal memory; energy balance of one mass between body and room. Limits:
+settled at the first instant; a recording shorter than t_bed hardly shows r_bed.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape
