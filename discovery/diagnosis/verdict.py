@@ -72,12 +72,15 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     probable = [n for n in candidates if n.together >= thresholds.NAMED]
     refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
     least = by_chance(found.gain)
-    sure = _needed(
-        [n for n in probable if n.hypothesis.key not in refused],
-        least,
-        lambda some, goal: _alone(context, found, answer, some, found.best.evidence - goal),
-    )
-    named, idle, proofs = _proved(context, found, answer, sure)
+
+    def level(some: Sequence[Named], goal: float) -> float:
+        return _alone(context, found, answer, some, found.best.evidence - goal)
+
+    sure = _needed([n for n in probable if n.hypothesis.key not in refused], least, level)
+    proved, idle, proofs = _proved(context, found, answer, sure)
+    # what is named must not owe its evidence to what is not
+    named = tuple(_needed(proved, least, level)) if idle else proved
+    sure = [n for n in sure if n in named or n.hypothesis.key in idle]
     others = [n.hypothesis for n in candidates if n not in named]
 
     @cache

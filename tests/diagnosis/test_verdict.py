@@ -423,6 +423,20 @@ def test_what_changes_no_free_run_is_not_lacking(monkeypatch: pytest.MonkeyPatch
     assert "does not improve free runs enough" in found.reasons[0]
 
 
+def test_a_name_does_not_owe_its_evidence_to_what_lost_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A heat exchanger: offsets counted only beside a lag, and the lag did not help recordings left out."""
+    idle = proof_of(1.0, 1.0, 8)
+    monkeypatch.setattr(
+        verdict, "left_out", lambda _, __, chosen: {h.key: idle if h == FRICTION else None for h in chosen}
+    )
+    words = {"sensor_offset": 0.98, "friction_speed": 0.98}
+    for alone, named in ((10.0, []), (50.0, [OFFSET])):
+        found = said(pair(OFFSET, FRICTION, 150.0, alone, 50.0), words)
+        assert [n.hypothesis for n in found.named] == named
+        why = "counts only next to effects that are not named either"
+        assert any(why in text for text in found.reasons) != bool(named)
+
+
 def test_what_improves_by_chance_is_not_lacking(monkeypatch: pytest.MonkeyPatch) -> None:
     """Friction improves 8 of 16 blocks of time: what is unknown beside it does not count."""
     proofs = {FLUID.key: proof_of(1.0, 0.9, 16), FRICTION.key: proof_of(1.0, 0.8, 8)}
