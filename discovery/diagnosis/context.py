@@ -149,7 +149,7 @@ def make_context(
     form, kinds = model_form(fit, np.array(white.white), thermometers)
     spreads = fit.problem.start_spreads()
     own = {n: replace(s, start_sd=spreads.get(n, s.start_sd)) for n, s in model.states.items()}
-    scene = make_scene(campaign, model, recordings, outputs, after)
+    scene = replace(make_scene(campaign, model, recordings, outputs, after), spacing=_spacing(grids))
     model = replace(model, states=own)  # how far states begin from their starts is found once
     noises = _settings(white, floor, grids)
     return Context(
@@ -240,19 +240,23 @@ def make_scene(
     )
 
 
+def _spacing(grids: Mapping[str, Grid]) -> float:
+    """Seconds between two readings, of the recording where they come most often."""
+    return min(float(np.median(np.diff(g.time[g.read]))) for g in grids.values() if len(g.read) > 1)
+
+
 def shown_by(grids: Mapping[str, Grid], effects: Sequence[Effect], scene: Scene) -> list[Effect]:
     """The effects, their generic time constants limited to those that the recordings can show, their sizes at
     a speed that the machine has. What users state counts at the speed that they state.
     """
     duration = max(float(g.time[-1] - g.time[0]) for g in grids.values())
-    spacing = min(float(np.median(np.diff(g.time[g.read]))) for g in grids.values() if len(g.read) > 1)
     top = max(
         (v for n, v in scene.largest.items() if scene.channels[n].role == ROLE_OF["speed"]), default=0.0
     )
     return [
         replace(
             e if e.group == "user" else e.up_to(top),
-            shapes=tuple(s.within(0.5 * spacing, duration) for s in e.shapes),
+            shapes=tuple(s.within(0.5 * _spacing(grids), duration) for s in e.shapes),
         )
         for e in effects
     ]

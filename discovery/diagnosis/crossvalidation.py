@@ -50,9 +50,14 @@ class LeftOut:
         return surely_better(self.better, self.blocks)
 
     @property
+    def matters(self) -> bool:
+        """Whether they improve free runs by what a name needs, be it by chance."""
+        return self.free.explained >= thresholds.MATTERS
+
+    @property
     def improves(self) -> bool:
         """Whether they improve free runs, by more than a name needs and not by chance."""
-        return self.sure and self.free.explained >= thresholds.MATTERS
+        return self.sure and self.matters
 
 
 def left_out(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> dict[Key, LeftOut | None]:

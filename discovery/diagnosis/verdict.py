@@ -182,6 +182,12 @@ def _idle(h: Hypothesis, outside: LeftOut) -> str:
     """Why an effect is not named that left-out recordings do not support."""
     old, new = outside.free.judged
     rms = f"{printed(old)} without it, {printed(new)} with it"
+    if outside.matters:
+        return (
+            f"{h.effect.word} at {h.where} makes free runs better on recordings that are left out of the fit "
+            f"(rms over the reading noise: {rms}), but from one reading to the next it predicts only "
+            f"{outside.better} of {outside.blocks} blocks of time better, no more than by chance"
+        )
     return (
         f"{h.effect.word} at {h.where} does not improve free runs enough on recordings that are left out of "
         f"the fit (rms over the reading noise: {rms})"

@@ -12,8 +12,10 @@ from discovery.effects.form import INPUT, LEVEL, RATE, REPLACED, ROLE_OF, TERM, 
 from discovery.effects.hypothesis import BEFORE, Hypothesis
 from discovery.effects.places import TEMPERATURES, Spot, spots
 from discovery.models import Model
+from discovery.models.model import TIME_UNITS
 from discovery.models.units import differences, same_dimension
 from discovery.recordings import Channel
+from discovery.recordings.roles import ROLES
 from discovery.terms import (
     Apply,
     Expression,
@@ -37,7 +39,7 @@ class Scene:
     `after`: by recording to fit, the recordings of the campaign that were made then or later, it included.
     `largest`: the largest magnitude of each input that moves, over the recordings to fit.
     `unused`: inputs that the model does not use. `odds` of each effect to act, `event_odds` of each event in
-    each recording.
+    each recording. `spacing`: seconds between readings.
     """
 
     channels: Mapping[str, Channel]
@@ -48,6 +50,7 @@ class Scene:
     unused: frozenset[str]
     odds: float
     event_odds: float
+    spacing: float = 0.0
 
 
 def candidates(model: Model, effects: Sequence[Effect], scene: Scene) -> list[Hypothesis]:
@@ -188,6 +191,7 @@ def _claim(
     scene: Scene,
 ) -> Hypothesis:
     channels = (*chosen, *((spot.channel,) if spot.channel else ()))
+    effect = _between_two(effect, model, spot, channels, scene)
     naming = _naming(effect, model, spot, run, channels, binding, scene)
     terms, shown = _changes(effect, model, spot, naming, scene)
     acting = () if run is None else (run,) if effect.is_event else scene.after[run]
@@ -205,6 +209,18 @@ def _claim(
         channels,
     )
     return replace(h, units=_units(h, model, scene.channels))
+
+
+def _between_two(effect: Effect, model: Model, spot: Spot, channels: tuple[str, ...], scene: Scene) -> Effect:
+    """The exchange of a body with what another thermometer reads, no faster than readings come: where most of
+    a difference is gone at the next one, both read one body, and neither is known to heat the other.
+    """
+    thermometer = any(ROLES[scene.channels[name].role].measured for name in channels)
+    if not thermometer or effect.amplitude.unit != "W/K" or len(spot.bodies) != 1 or not scene.spacing:
+        return effect
+    capacity = model.states[spot.bodies[0]].capacity or TIME_UNITS[model.time_unit]
+    most = min(effect.amplitude.most, capacity / scene.spacing)
+    return replace(effect, amplitude=replace(effect.amplitude, most=most))
 
 
 def _naming(

@@ -466,6 +466,8 @@ def test_one_of_two_effects_that_stand_in_for_each_other_is_named(monkeypatch: p
     )
     assert [n.hypothesis for n in found.named] == [FLUID]
     assert "0.8 without it, 0.7 with it" in found.reasons[0]
+    assert "makes free runs better" in found.reasons[0]
+    assert "only 11 of 16 blocks of time better, no more than by chance" in found.reasons[0]
 
 
 @pytest.mark.parametrize(

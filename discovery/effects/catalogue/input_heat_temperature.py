@@ -4,7 +4,7 @@
 
 T_in: a recorded temperature that is neither the room, the fluid nor the coolant, and that the model does not
 predict: a heated bed, a neighbouring part; G_in in W/K, 1 to 100. Source: Fourier's law. Limits: no storage
-on the way.
+on the way. A body that follows another thermometer faster than readings come is what that thermometer reads.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example
