@@ -107,11 +107,20 @@ def test_what_stands_for_a_late_channel_is_written_read_and_simulated(word: str,
     for h in claims(baseline, catalogue()[word]):
         start = dict.fromkeys(h.amplitudes, h.effect.amplitude.fixed or h.effect.amplitude.plausible)
         on = inside(h).added_to(baseline, start)
-        on = written(on, [h])
-        write_model(tmp_path / "m.toml", on)
+        write_model(tmp_path / "m.toml", written(on, [h]))
         found = predict(trajectory(read_model(tmp_path / "m.toml")))
         assert np.isfinite(found).all()
         assert np.allclose(found, predict(trajectory(on)), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("word", [w for w, e in catalogue().items() if e.amplitude.fixed is not None])
+def test_what_is_written_of_an_effect_that_is_on_predicts_as_before(word: str) -> None:
+    """A field of collectors "repaired" by the exponent of its flow lost the "- 1": 1.6 K became 13 K."""
+    baseline = sample()[0]
+    for h in claims(baseline, catalogue()[word]):
+        on = inside(h).added_to(baseline, dict.fromkeys(h.amplitudes, h.effect.amplitude.fixed or 0.0))
+        before = predict(trajectory(on))
+        assert np.allclose(predict(trajectory(written(on, [h]))), before, rtol=0, atol=1e-6)
 
 
 def test_a_joint_conducts_a_share_more_at_each_link() -> None:
