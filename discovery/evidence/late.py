@@ -90,4 +90,9 @@ def sentences(fit: Fit) -> list[str]:
         if u.is_late and u.prior and abs(value) > max(SAID * error, SMALL * u.prior[1]):
             late = f"{abs(value):.0f} s {'late' if value > 0 else 'early'} in {u.recording}"
             found.setdefault(u.name, []).append(late)
-    return [f"{name} is logged {', '.join(runs)}; the fit allows for it" for name, runs in found.items()]
+    runs = len(fit.trajectories)
+    return [
+        f"{name} is logged {', '.join(late)}; the fit allows for it"
+        + (", and a dead time looks the same" if 1 < runs == sum("early" in text for text in late) else "")
+        for name, late in found.items()
+    ]
