@@ -175,7 +175,7 @@ class Search:
             # an infinite gain: what is left has a size of the wrong sign, so that nothing is reached
             reached = own if own < inf else -inf
             pool = hopeful(scan.without[h.key], RIVALS, reached)
-            pool = [*pool, *_alike(h, scan.without[h.key]), *self._in_its_place(h, current)]
+            pool = [*pool, *look_alikes(h, scan.without[h.key]), *self._in_its_place(h, current)]
             best = self._refitted(without, others, pool)
             if max(best.evidence, without.evidence) > current.evidence:
                 return self._questioned(max(best, without, key=lambda a: a.evidence))
@@ -232,13 +232,13 @@ def _lighter(one: Scored) -> Scored:
     return light(one) if one.hypotheses else one
 
 
-def _alike(h: Hypothesis, claims: Sequence[Score]) -> list[Score]:
-    """The best candidate of the same effect elsewhere, and of each effect that looks the same: to first order
-    the scan need not show which is better.
+def look_alikes(h: Hypothesis, claims: Sequence[Score]) -> list[Score]:
+    """The best candidate of the same effect elsewhere, and of each effect that looks the same, whatever their
+    odds in a scan: to first order it shows neither which is better nor that a large effect is there at all.
     """
     words = (h.effect.word, *h.effect.confused_with)
     found = [next((c for c in claims if c.hypothesis.effect.word == word), None) for word in words]
-    return [c for c in found if c is not None and c.odds > 0]
+    return [c for c in found if c is not None]
 
 
 def not_twice(claims: Sequence[Score], others: Sequence[Hypothesis]) -> list[Score]:

@@ -10,7 +10,8 @@ import pytest
 
 from discovery.diagnosis import selection
 from discovery.diagnosis.scored import Scored
-from discovery.diagnosis.selection import FAR, Search, not_twice
+from discovery.diagnosis.selection import FAR, Search, look_alikes, not_twice
+from discovery.effects.catalogue import catalogue
 from discovery.evidence.bayes import Score
 from tests.diagnosis.parts import dry
 
@@ -28,6 +29,20 @@ def test_two_effects_never_share_a_size() -> None:
     pool = [claim("jet_b", "jet_c"), claim("jet_c", "jet_d"), claim("lag")]
     assert not_twice(pool, [first]) == pool[1:]  # type: ignore[arg-type, list-item]
     assert not_twice(pool, []) == pool  # type: ignore[arg-type]
+
+
+def test_what_looks_the_same_is_refitted_whatever_the_scan_says() -> None:
+    """The loss of a solar field to the air had odds of -3.9 in the scan, and in a refit as many as a bed."""
+
+    def candidate(word: str, odds: float) -> SimpleNamespace:
+        return SimpleNamespace(hypothesis=SimpleNamespace(effect=catalogue()[word]), odds=odds)
+
+    bed, air, lag = (
+        candidate("bed_memory", 3.0),
+        candidate("air_convection", -3.9),
+        candidate("sensor_lag", 9),
+    )
+    assert look_alikes(bed.hypothesis, [lag, air]) == [air]  # type: ignore[list-item]
 
 
 def test_what_grew_is_questioned_under_another_noise(monkeypatch: pytest.MonkeyPatch) -> None:
