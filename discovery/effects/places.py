@@ -48,7 +48,7 @@ def layout(model: Model, channels: Mapping[str, Channel]) -> Layout:
     """The parts of a model. A body is a state with a capacity, or one that is a temperature."""
     states = {n: s for n, s in model.states.items() if not s.memory}
     bodies = tuple(n for n, s in states.items() if s.capacity or s.unit in TEMPERATURES)
-    role = {name: channel.role for name, channel in channels.items()}
+    role = _roles(channels)
     own = tuple(t for t in model.terms if not t.effect and not model.states[t.into].memory)
 
     def fed(wanted: str) -> tuple[str, ...]:
@@ -81,7 +81,7 @@ def spots(
             pairs = (p for p in combinations(alone, 2) if frozenset(p) in parts.links)
             yield from (Spot(p, each=True, sizes=True) for p in pairs)
         return
-    role = {name: channel.role for name, channel in channels.items()}
+    role = _roles(channels)
     match effect.place:
         case "pair" | "any pair" | "link":
             for a, b in combinations(parts.bodies, 2):
@@ -207,6 +207,11 @@ def _of_inputs(model: Model, parts: Layout, channels: Mapping[str, Channel]) -> 
         terms = tuple(t for t in parts.own if name in names(t.expression))
         if terms and name not in model.states and channel.unit in TEMPERATURES:
             yield Spot(terms=terms, channel=name)
+
+
+def _roles(channels: Mapping[str, Channel]) -> dict[str, str]:
+    """What each channel is to a place. What shines on a body is no stroke of a press: nothing rubs there."""
+    return {n: "irradiance" if same_dimension(c.unit, "W/m**2") else c.role for n, c in channels.items()}
 
 
 def _holds(term: Term, wanted: str, role: Mapping[str, str]) -> bool:

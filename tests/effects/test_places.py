@@ -254,6 +254,19 @@ def test_every_recorded_input_may_be_heat_a_path_or_a_factor() -> None:
     assert left == heat - {(("cut",), ("bed",))}
 
 
+def test_nothing_rubs_in_the_sun() -> None:
+    """A solar field with a constant flow lacked "oil that gets thinner", 98 %, in the heat of the sun."""
+    model, channels = sample()
+    lit = {**channels, "cut": Channel("cut", "other input", "W/m**2", None, "linear")}
+    shone = replace(model, terms=(*model.terms, Term("cut", "bed", parse("loss*cut"))))
+    for word in ("wear", "viscosity_friction"):
+        found = {t.name for h in claims(shone, catalogue()[word], channels) for t in h.terms}
+        assert any(name.endswith(": cut") for name in found)
+        found = {t.name for h in claims(shone, catalogue()[word], lit) for t in h.terms}
+        assert found
+        assert not any(name.endswith(": cut") for name in found)
+
+
 def test_no_path_reaches_a_temperature_but_as_heat() -> None:
     """An error may follow an input at once; a thermometer shows what its body takes up."""
     model, channels = sample()
