@@ -16,6 +16,7 @@ from discovery.evidence.bayes import Score
 from discovery.models import Model
 from discovery.printed import sized
 
+SAID = 2  # events to look at
 INVISIBLE = 0.05  # share of a signature that a refit leaves; below it these recordings decide nothing
 
 NOTHING_CLOSE = (
@@ -87,8 +88,14 @@ def aim(shown: Sequence[Hypothesis], rival: Hypothesis | None, answered: bool) -
 
 
 def look_back(context: Context, events: Sequence[Hypothesis]) -> str:
-    """What to do about events, which no pattern brings back: look at what happened, and wait for it again."""
-    what = " and ".join(_happened(context, h) for h in events)
+    """What to do about events, which no pattern brings back: look at what happened, and wait for it again. Of
+    many, which stand for a law rather, the first two are said.
+    """
+    every = list(dict.fromkeys(_happened(context, h) for h in events))
+    first, *others = every[:SAID]
+    alike = "what happened " if first.startswith("what happened ") else ""
+    what = " and ".join([first, *(text.removeprefix(alike) for text in others)])
+    what += f" (and {len(every) - SAID} more)" if len(every) > SAID else ""
     runs = " and ".join(dict.fromkeys(str(h.recording) for h in events))
     return f"look at {what}; repeat {runs} and see whether it comes again"
 

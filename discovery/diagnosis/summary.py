@@ -10,6 +10,7 @@ from discovery.printed import printed, undetermined
 from discovery.runfolder import read_diagnosis
 
 _NOISE = "reading noise and heat that nobody records explain"
+_COARSE = "reading noise and process noise as large as this model needs explain"
 _OPEN = 1.5  # times the noise: from there on, the uncertainty of the parameters is said
 
 
@@ -41,7 +42,7 @@ def lines_of(d: dict[str, Any]) -> list[str]:
         rms += ", worse than without" if run in worse else _otherwise(i, unit)
         lines.append(f"  held-out recording {run}: {rms}")
     if not d["physics"]:
-        lines += _left(d["improvement"])
+        lines += _left(d["improvement"], _COARSE if d["verdict"] == "unexplained" else _NOISE)
     lines.append(f"  next: {d['next_experiment']}")
     return lines
 
@@ -56,14 +57,16 @@ def _otherwise(one: dict[str, Any], unit: str) -> str:
     return f"; with start values from all readings, rms {printed(before)} -> {printed(after)}{unit}"
 
 
-def _left(improvement: dict[str, Any]) -> list[str]:
-    """rms of free runs of the model, and the rms that noise explains."""
+def _left(improvement: dict[str, Any], noise: str) -> list[str]:
+    """rms of free runs of the model, and the rms that noise explains. `noise`: what it is. Where nothing
+    explains a mismatch, process noise stands for what the model lacks: it is no heat.
+    """
     runs = {"recordings to fit": improvement["fit"]} | {
         f"held-out recording {run}": i for run, i in improvement["held_out"].items()
     }
     unit = _unit(improvement)
     return [
-        f"  {which}: rms {printed(i['rms_before'])}{unit} ({_by_noise(i, unit)}){_by_start(i, unit)}"
+        f"  {which}: rms {printed(i['rms_before'])}{unit} ({_by_noise(i, unit, noise)}){_by_start(i, unit)}"
         for which, i in runs.items()
         if i["rms_before"] is not None
     ]
@@ -79,16 +82,16 @@ def _by_start(one: dict[str, Any], unit: str) -> str:
     return f"; with start values from all readings, which decide, rms {printed(begun)}{unit}"
 
 
-def _by_noise(one: dict[str, Any], unit: str) -> str:
+def _by_noise(one: dict[str, Any], unit: str, noise: str = _NOISE) -> str:
     """What noise explains of an rms, and the uncertainty of the parameters where it explains much more; where
     noise explains all of it, its size says nothing more.
     """
     floor, rms = one["noise_floor"], (one["rms_before"], one["rms_after"])
     if all(r is not None and r < floor for r in rms):
-        return f"{_NOISE} all of it"
+        return f"{noise} all of it"
     expected = one.get("expected") or floor
     unsure = f", with what the fit leaves open {printed(expected)}{unit}" if expected > _OPEN * floor else ""
-    return f"{_NOISE} up to {printed(floor)}{unit}{unsure}"
+    return f"{noise} up to {printed(floor)}{unit}{unsure}"
 
 
 def _unit(improvement: dict[str, Any]) -> str:

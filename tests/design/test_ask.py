@@ -219,6 +219,17 @@ def test_an_event_is_looked_at_where_it_was() -> None:
     assert said.endswith(" h; repeat r2 and see whether it comes again")
 
 
+def test_of_many_events_the_first_two_are_said() -> None:
+    """A heat exchanger: "what happened at ... and what happened at ..." six times, two of them alike."""
+    seen = campaign(simulated(1), simulated(2))
+    where = cast(Context, SimpleNamespace(campaign=seen))
+    offsets = [h for h in machine.claims(model(), "sensor_offset") if h.recording == "r2"][:3]
+    assert len({h.where for h in offsets}) == 3
+    said = look_back(where, [offsets[0], offsets[0], *offsets[1:]])
+    a, b, _ = (f"at {', '.join(h.places)} in r2" for h in offsets)
+    assert re.fullmatch(rf"look at what happened {a}.* and {b}.* \(and 1 more\); repeat r2 and .*", said)
+
+
 def test_a_loss_that_is_another_was_changed_before() -> None:
     seen = campaign(simulated(1), simulated(2))
     wear = next(h for h in machine.claims(model(), "wear") if h.states == ("motor",))

@@ -120,6 +120,10 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
     (line,) = summary(tmp_path)[1:-1]
     assert line.endswith("with what the fit leaves open 9.87 times the reading noise)")
+    (tmp_path / "diagnosis.json").write_text(json.dumps(document | {"verdict": "unexplained"}), "utf-8")
+    (line,) = summary(tmp_path)[1:-1]
+    assert "process noise as large as this model needs explain up to 4.6" in line
+    assert "nobody records" not in line
 
 
 @pytest.mark.parametrize(
