@@ -68,7 +68,8 @@ class Rows:
 class Grams:
     """A fit under one noise setting. Columns are the residual, then the unknowns that do not press against a
     bound: `rows` of the readings, `prior` (1 + U, 1 + U) of the priors, `constant` what their densities add.
-    `scale` (1 + U,) multiplies the columns: form errors of any share are the same rows.
+    `scale` (1 + U,) multiplies the columns: form errors of any share are the same rows. The last `form` of
+    them are form errors: how wide these are is part of the noise.
     """
 
     noise: Noise
@@ -76,6 +77,7 @@ class Grams:
     prior: Array
     constant: float
     scale: Array
+    form: int = 0
 
     def level(self) -> float:
         """Log-likelihood with all unknowns integrated out."""
@@ -99,7 +101,8 @@ class Grams:
         """The same without the last columns, whose coefficients have the spreads `extra` (E,)."""
         kept = self.prior.shape[0] - len(extra)
         constant = self.constant + float(np.sum(np.log(extra)))
-        return Grams(self.noise, self.rows, self.prior[:kept, :kept], constant, self.scale[:kept])
+        form = self.form - len(extra)
+        return Grams(self.noise, self.rows, self.prior[:kept, :kept], constant, self.scale[:kept], form)
 
     def marginal(
         self, sizes: Ints, weights: Array | None = None, widths: Sequence[float] = (1.0,)
@@ -111,7 +114,7 @@ class Grams:
         Args:
             sizes: (A,) indices of the unknowns.
             weights: (D, B) how often each block counts; default each once.
-            widths: (W,) of the priors, relative to what they are.
+            widths: (W,) of the priors, relative to what they are; form errors keep theirs.
         """
         return self.marginals(sizes, np.zeros(0), weights, widths)[-1]
 
@@ -134,7 +137,11 @@ class Grams:
         places = np.add.outer(order * self.rows.size, order).ravel()
         whole = np.take(pieces.reshape(len(pieces), -1), places, axis=1)
         whole *= np.outer(self.scale[order], self.scale[order]).ravel()
-        prior = self.prior[np.ix_(order, order)].ravel()
+        prior = self.prior[np.ix_(order, order)]
+        of_form = order >= count - self.form
+        fixed = np.where(np.logical_and.outer(of_form, of_form), prior, 0.0).ravel()
+        prior = prior.ravel() - fixed
+        widened = np.count_nonzero(np.diag(self.prior)[1 : count - self.form])
         often = np.ones((1, 1)) if weights is None else weights
         volume = np.empty((len(widths), len(often)))
         corner = np.empty((*volume.shape, count - first, count - first))
@@ -142,21 +149,19 @@ class Grams:
             some = slice(begin, begin + _TOGETHER)
             total = often[some] @ whole
             for k, wide in enumerate(widths):
-                chol = _factor((total + prior / wide**2).reshape(-1, count, count))
+                chol = _factor((total + fixed + prior / wide**2).reshape(-1, count, count))
                 volume[k, some] = np.sum(np.log(np.einsum("dii->di", chol)[:, :first]), axis=1)
                 corner[k, some] = chol[:, first:, first:]
         dets = -float(self.rows.logdet.sum()) if weights is None else -weights @ self.rows.logdet
-        wider = np.log(widths)[:, None]
+        wider = widened * np.log(widths)[:, None]
         found = []
         if more:
             rest = corner[:, :, more:]  # without the form errors
             bare = np.linalg.cholesky(rest @ rest.swapaxes(2, 3))
-            widened = np.count_nonzero(np.diag(self.prior)[1:-more]) * wider
             constant = self.constant + float(np.sum(np.log(extra)))
-            found.append(_concluded(bare, few, dets - volume + constant - widened))
+            found.append(_concluded(bare, few, dets - volume + constant - wider))
         volume = volume + np.sum(np.log(np.diagonal(corner[:, :, :more, :more], 0, 2, 3)), axis=2)
-        widened = np.count_nonzero(np.diag(self.prior)[1:]) * wider
-        found.append(_concluded(corner[:, :, more:, more:], few, dets - volume + self.constant - widened))
+        found.append(_concluded(corner[:, :, more:, more:], few, dets - volume + self.constant - wider))
         return found
 
 
@@ -326,7 +331,7 @@ class Whitened:
             known.append((unit, same))
             del known[:-_REMEMBERED]
         prior, constant = self.prior
-        return Grams(noise, same, prior, constant, self._scale(noise))
+        return Grams(noise, same, prior, constant, self._scale(noise), len(self.spread))
 
     def _under(self, unit: Noise) -> Rows:
         """The rows with a form error of one, recording by recording."""

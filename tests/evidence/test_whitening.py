@@ -209,9 +209,16 @@ def test_a_wider_prior_is_that_prior() -> None:
     assert abs(level[1, 0] - level[0, 0]) > 0.1
 
 
+def test_form_errors_are_as_wide_as_the_noise_says() -> None:
+    rows, spread, block = rows_of(8)
+    whole = replace(grams_of(rows, spread, block), form=1)
+    expected = grams_of(rows, spread * [3.0, 3.0, 1.0], block).level()
+    assert whole.marginal(np.arange(2), widths=(3.0,))[0][0, 0] == pytest.approx(expected)
+
+
 def test_columns_that_are_taken_out_leave_the_model_without_them() -> None:
     rows, spread, block = rows_of(4)
-    whole = grams_of(rows, spread, block)
+    whole = replace(grams_of(rows, spread, block), form=1)
     assert whole.without(spread[2:]).level() == pytest.approx(
         grams_of(rows[:, :3], spread[:2], block).level()
     )
@@ -219,7 +226,7 @@ def test_columns_that_are_taken_out_leave_the_model_without_them() -> None:
 
 def test_one_factor_gives_what_a_model_is_without_its_last_columns_and_with_them() -> None:
     rows, spread, block = rows_of(9)
-    whole, sizes = grams_of(rows, spread, block), np.array([0])
+    whole, sizes = replace(grams_of(rows, spread, block), form=2), np.array([0])
     draws = np.random.default_rng(0).multinomial(6, np.full(6, 1 / 6), 40).astype(float)
     widths = (0.5, 2.0)
     both = whole.marginals(sizes, spread[1:], draws, widths)
