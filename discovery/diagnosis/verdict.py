@@ -97,10 +97,11 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     rest = [m for m in (*posterior.models, *found.tried.values(), *laws) if not m.keys & nothing]
     alone = _alone(context, found, answer, named)
     best, without = _unknown_cause(rest, alone, bool(named))
-    # names hold next to effects that are not sure, and next to something that no effect explains if they
-    # explain more than they leave, and still add as much as a name needs
+    # names hold next to effects that are not sure, and next to something that no effect explains if they are
+    # laws that explain more than they leave, and still add as much as a name needs
     if best.evidence - without > thresholds.SHORT and (best.forced or named or acts()):
-        mostly = [n for n in named if (proof := proofs[n.hypothesis.key]) and proof.free.mostly]
+        laws_only = [n for n in named if n.hypothesis.effect.is_law]
+        mostly = [n for n in laws_only if (proof := proofs[n.hypothesis.key]) and proof.free.mostly]
         by_law = any(best is one for one in laws)
         named = tuple(
             _needed(
