@@ -88,8 +88,8 @@ class World:
         laws = [(lack.effect, lack.states, self.size(self.machine.as_believed(lack))) for lack in own]
         hidden = hidden_masses(self.machine, self.fitted, self.logs(self.machine, FIT))
         known = {states for effect, states, _ in laws if effect == MASS}
-        beside = [(MASS, (body,), rms) for body, rms in hidden.items() if (body,) not in known]
-        every = [*laws, *beside]
+        others = [(MASS, (body,), rms) for body, rms in hidden.items() if (body,) not in known]
+        every = [*laws, *others]
         return [one for one in every if len(self.fitted.residual) * one[2] ** 2 / 2.0 > APART]
 
     def visible(self, logs: dict[str, Columns]) -> float:
