@@ -12,7 +12,8 @@ from discovery.diagnosis.refit import with_effects
 from discovery.effects.hypothesis import Hypothesis
 from discovery.recordings import Recording
 from discovery.terms import Apply, Expression, names
-from tests.machine import SEEN, campaign, changed, claims, model, simulated
+from tests import machine
+from tests.machine import NOISE, SEEN, campaign, changed, claims, model, simulated
 
 
 def claim(word: str) -> Hypothesis:
@@ -59,6 +60,32 @@ def test_a_drift_in_every_recording_is_a_drift() -> None:
     assert answer.after is not None
     assert answer.after.model.parameters["drift_E_Z"].value == pytest.approx(12.0, abs=0.6)
     assert answer.held_out["r3"].after < 1.1 * answer.held_out["r3"].floor < answer.held_out["r3"].before
+
+
+def test_the_play_of_long_sliding_parts_is_no_lag(monkeypatch: pytest.MonkeyPatch) -> None:
+    """25 um, ten times the play of a machine tool: four fifths of the error pass through it."""
+    monkeypatch.setattr(machine, "EVERY", machine.STEP)  # a joint also moves between two readings
+    runs = [_with_play(simulated(seed, noise=0.0), 0.8, 25.0, seed) for seed in (1, 2, 3)]
+    answer = diagnose(model(), campaign(*runs), ["r1", "r2"], ["r3"])
+    (named,) = answer.verdict.named
+    assert (named.hypothesis.effect.word, named.hypothesis.places) == ("joint_hysteresis", ("E_Z",))
+    assert answer.after is not None
+    found = answer.after.model.parameters
+    assert found["slip_E_Z"].value == pytest.approx(0.8, abs=0.05)
+    assert found["width_E_Z"].value == pytest.approx(25.0, rel=0.05)
+    assert answer.held_out["r3"].after < 1.1 * answer.held_out["r3"].floor < answer.held_out["r3"].before
+
+
+def _with_play(recording: Recording, slip: float, width: float, seed: int) -> Recording:
+    """A share of E_Z moves only where the error is `width` ahead of it; then noise on all errors."""
+    true = recording.values["E_Z"]
+    held, shown = true[0], true.copy()
+    for k, y in enumerate(true):
+        held = min(max(held, y - width), y + width)
+        shown[k] = y + slip * (held - y)
+    rng = np.random.default_rng(seed)
+    without = {name: recording.values[name] for name in SEEN} | {"E_Z": shown}
+    return changed(recording, **{name: e + rng.normal(0.0, NOISE, len(true)) for name, e in without.items()})
 
 
 def test_clocks_that_are_all_late_may_be_a_dead_time() -> None:

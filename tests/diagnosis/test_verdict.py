@@ -33,6 +33,7 @@ def claim(word: str, *places: str, recording: str | None = None) -> Hypothesis:
 
 
 FLUID, FRICTION = claim("fluid_convection", "table"), claim("friction_speed", "motor")
+DRIFT = claim("sensor_drift", "E_Y")
 OFFSET, SUN = (
     claim("sensor_offset", "E_Y", recording="r2"),
     claim("unmeasured_heat", "bed", recording="r2"),
@@ -322,6 +323,24 @@ def test_a_law_that_explains_most_is_named_beside_heat_of_unknown_cause(
     if answer.named:
         assert "heat of unknown cause at bed acts as well" in answer.reasons[0]
         assert "100 more log evidence" in answer.reasons[0]
+
+
+@pytest.mark.parametrize(("what", "word"), [(FLUID, "missing physics"), (DRIFT, "unexplained")])
+def test_a_fault_has_no_name_beside_heat_of_unknown_cause(
+    what: Hypothesis, word: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A slow change that nothing explains looks like a drift; a law of the machine follows its inputs."""
+    monkeypatch.setattr(
+        verdict, "left_out", lambda _, __, chosen: {h.key: proof_of(1.0, 0.5, 16) for h in chosen}
+    )
+    monkeypatch.setattr(
+        verdict,
+        "with_unknown",
+        lambda _, models, __: [replace(m, evidence=300.0 if m.hypotheses else 250.0) for m in models],
+    )
+    unknown = Model((what,), 300.0, forced="a slow change of E_Y of unknown cause")
+    found = Tried([Model((what,), 200.0), Model((), 0.0)])
+    assert said(found, {what.effect.word: 0.95}, unknown=unknown).word == word
 
 
 @pytest.mark.parametrize(("more", "word"), [(-0.1, "missing physics"), (0.1, "unexplained")])
