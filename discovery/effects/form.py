@@ -86,6 +86,7 @@ _PER_SPEED = r"(\bspeed\s*/\s*)(\d+(?:\.\d+)?)"  # at which speed the size of an
 _RATIO = 3.0  # between neighbouring values of a shape in a search: signatures of both are much alike
 _REACH = 2.0  # standard deviations of a prior that a search covers
 _FARTHEST = 4.0  # ... and beyond which a law is another one
+_SHIFTED = 1 / 8  # of the longest recording: usual shifts in time are no longer, however slow a machine is
 _HALVES = 6  # cells on either side of zero, each half as wide as the next: down to a thirtieth of the spread
 
 
@@ -148,7 +149,8 @@ class Shape:
     def within(self, shortest: float, longest: float) -> Shape:
         """The shape for recordings that show time constants from `shortest` to `longest` [s]."""
         if self.middle is not None:
-            return self
+            is_shift = self.unit == "s" and self.spread > 0
+            return replace(self, spread=min(self.spread, _SHIFTED * longest)) if is_shift else self
         middle, factor = sqrt(shortest * longest), (longest / shortest) ** (0.5 / _REACH)
         return replace(self, middle=middle, factor=factor, least=middle * factor**-_REACH)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pytest
@@ -10,8 +10,9 @@ import pytest
 from discovery.diagnosis import diagnose
 from discovery.diagnosis.refit import with_effects
 from discovery.effects.hypothesis import Hypothesis
-from discovery.recordings import Recording
-from discovery.terms import Apply, Expression, names
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Apply, Expression, Term, names, parse
 from tests import machine
 from tests.machine import NOISE, SEEN, campaign, changed, claims, model, simulated
 
@@ -88,6 +89,44 @@ def _with_play(recording: Recording, slip: float, width: float, seed: int) -> Re
     return changed(recording, **{name: e + rng.normal(0.0, NOISE, len(true)) for name, e in without.items()})
 
 
+def lamp(seed: int) -> Recording:
+    """A lamp of 8 J/K that loses 0.3 W/K, with another power every 20 s, read every 4 s: closed form."""
+    rng, time = np.random.default_rng(seed), np.arange(0.0, 481.0, 4.0)
+    power = np.repeat(rng.uniform(0.0, 40.0, 25), 5)[: time.size]
+    warm = [21.0]
+    for watts in power[:-1]:
+        level = 21.0 + watts / 0.3
+        warm.append(level + (warm[-1] - level) * np.exp(-4.0 * 0.3 / 8.0))
+    read = np.array(warm) + rng.normal(0.0, 0.3, time.size)
+    return Recording(f"r{seed}", time, {"P": power, "room": np.full(time.size, 21.0), "T": read})
+
+
+def test_a_clock_may_be_late_by_more_than_a_fast_body_needs() -> None:
+    """40 s, where the power changes every 20 s: this is no heat of unknown cause."""
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+        "T": Channel("T", "temperature", "degC", None, "linear"),
+    }
+    terms = (Term("power", "T", parse("k*P")), Term("air", "T", parse("hA*(room - T)")))
+    states = {"T": State("T", "degC", 8.0, parse("room"), None, 1 / 8.0)}
+    begun = {"hA": Parameter(0.2, "W/K", 0.0), "k": Parameter(1.3, "1", 0.0)}
+    shifted = _late(lamp(2), 40.0, ["T"])
+    runs = {r.name: r for r in (lamp(1), shifted, lamp(3))}
+    answer = diagnose(
+        Model("lamp", begun, states, terms, {}),
+        Campaign("lamps", channels, runs),
+        ["r1", "r2"],
+        ["r3"],
+        ["T"],
+    )
+    (named,) = answer.verdict.named
+    assert (named.hypothesis.effect.word, named.hypothesis.recording) == ("clock_shift", "r2")
+    assert answer.after is not None
+    assert answer.after.model.parameters["t_shift_r2"].value == pytest.approx(40.0, abs=2.0)
+    assert answer.held_out["r3"].after < 0.1 * answer.held_out["r3"].before
+
+
 def test_clocks_that_are_all_late_may_be_a_dead_time() -> None:
     """Readings that come ten minutes late in every recording: heat may take as long."""
     late = [_late(simulated(seed), 600.0) for seed in (1, 2)]
@@ -96,10 +135,10 @@ def test_clocks_that_are_all_late_may_be_a_dead_time() -> None:
     assert any("dead time" in reason for reason in answer.verdict.reasons)
 
 
-def _late(recording: Recording, by: float) -> Recording:
+def _late(recording: Recording, by: float, seen: Iterable[str] = SEEN) -> Recording:
     """The recording with its readings `by` seconds late."""
     steps = round(by / (recording.time[1] - recording.time[0]))
-    moved = {name: np.roll(recording.values[name], steps) for name in SEEN}
+    moved = {name: np.roll(recording.values[name], steps) for name in seen}
     for values in moved.values():
         values[:steps] = np.nan
     return changed(recording, **moved)

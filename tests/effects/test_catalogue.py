@@ -165,6 +165,15 @@ def test_a_time_without_a_middle_is_any_that_the_recordings_show() -> None:
     assert given.within(30.0, 600.0) == given  # a bed keeps its time constants or is no bed
 
 
+def test_a_clock_is_off_by_no_more_than_a_part_of_a_recording() -> None:
+    """Loggers are started within seconds for a test of minutes, and half an hour apart for one of days."""
+    shift = Shape("t_shift", "s", 0.0, spread=1800.0)
+    assert shift.within(2.0, 480.0).spread == pytest.approx(60.0)
+    assert shift.within(300.0, 259200.0) == shift
+    exponent = Shape("m", "1", 0.0, spread=0.5)
+    assert exponent.within(2.0, 1.0) == exponent
+
+
 @entries
 def test_an_effect_is_offered_where_its_roles_are_and_nowhere_else(effect: Effect) -> None:
     found = expand(effect)
