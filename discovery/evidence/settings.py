@@ -79,6 +79,7 @@ class Settings:
             rough=rough,
             form=form,
             edge=edge,
+            slow_time=part * self.white.slow_time,
             heat_time=part * self.white.heat_time,
         )
         weights = (log(a[k][1] / sum(w for _, w in a)) for a, k in zip(self.axes, place, strict=True))

@@ -7,12 +7,14 @@ import pytest
 from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
-from discovery.diagnosis.context import make_context
+from discovery.diagnosis.context import make_context, process_prior
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.dynamics import make_grid, make_system, simulate
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.process_noise import flow_sizes
+from discovery.evidence.settings import settings
+from discovery.fitting import Noise
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -103,3 +105,11 @@ def test_laws_that_are_off_for_minutes_are_no_event(monkeypatch: pytest.MonkeyPa
     assert 0.5 * 60 * MINUTES < found.noise.heat_time < 3 * 60 * MINUTES
     monkeypatch.setattr(thresholds, "TIMES", {1.0: 1.0})
     assert best(1, 2).hypotheses != ()
+
+
+def test_slow_noise_may_be_as_fast_as_process_noise() -> None:
+    """A sensor that is updated every few seconds shows stairs: noise of seconds, not of a whole test."""
+    white = Noise(("T",), (0.1,), slow_time=7200.0, heat_time=10800.0)
+    grid = settings(white, {"coil": 1.0}, process_prior(), unsure=False, noisy=False)
+    found = {(s.noise.slow_time / 7200.0, s.noise.heat_time / 10800.0) for s in grid}
+    assert found == {(part, part) for part in thresholds.TIMES}
