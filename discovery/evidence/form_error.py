@@ -122,15 +122,13 @@ def inner_columns(run: Trajectory) -> Array:
 
 
 def _outputs_of(run: Trajectory, state: str) -> list[int]:
-    """Indices of the outputs that a state is a part of. A state that is read itself is the place that its
-    sensor sees, and not the mean of a body.
+    """Indices of the outputs that a state is a part of. A state that nothing shows but its own sensor is the
+    place that the sensor sees, and not the mean of a body.
     """
     shown = run.system.model.outputs
-    return [
-        y
-        for y, name in enumerate(run.system.grid.outputs)
-        if name in shown and state in names(shown[name]) and shown[name] != Name(state)
-    ]
+    found = [y for y, n in enumerate(run.system.grid.outputs) if n in shown and state in names(shown[n])]
+    others = [y for y in found if shown[run.system.grid.outputs[y]] != Name(state)]
+    return found if others else []
 
 
 def _only(seen: Array, y: int) -> Array:

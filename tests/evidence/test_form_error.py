@@ -24,16 +24,20 @@ TIME = np.arange(0.0, 57601.0, 60.0)
 @pytest.fixture(scope="module")
 def run() -> Trajectory:
     """One body that a step of power warms, seen with 3 um/K."""
-    channels = {
-        "y": Channel("y", "error", "um", None, "linear"),
-        "u": Channel("u", "heat load", "W", None, "held"),
-    }
-    values = {"y": np.zeros(len(TIME)), "u": np.where(TIME >= ON, POWER, 0.0)}
+    return warmed(y="3*(T - 20)")
+
+
+def warmed(**shown: str) -> Trajectory:
+    """One body that a step of power warms, and what is shown of it."""
+    errors = {name: Channel(name, "error", "um", None, "linear") for name in shown}
+    channels = {**errors, "u": Channel("u", "heat load", "W", None, "held")}
+    values = dict.fromkeys(shown, np.zeros(len(TIME))) | {"u": np.where(TIME >= ON, POWER, 0.0)}
     state = State("T", "degC", C, parse("20"), 0.0, 1 / C)
     terms = (Term("load", "T", parse("u")), Term("air", "T", parse("hA*(20 - T)")))
-    model = Model("one", {"hA": Parameter(HA)}, {"T": state}, terms, {"y": parse("3*(T - 20)")})
+    outputs = {name: parse(formula) for name, formula in shown.items()}
+    model = Model("one", {"hA": Parameter(HA)}, {"T": state}, terms, outputs)
     campaign = Campaign("c", channels, {"r": Recording("r", TIME, values)})
-    return simulate(make_system(model, make_grid(campaign, "r", ["u"], ("y",))), model.values())
+    return simulate(make_system(model, make_grid(campaign, "r", ["u"], tuple(shown))), model.values())
 
 
 def test_a_place_rises_as_much_as_its_body_in_a_part_of_its_time(run: Trajectory) -> None:
@@ -42,6 +46,16 @@ def test_a_place_rises_as_much_as_its_body_in_a_part_of_its_time(run: Trajectory
     since = np.maximum(TIME - ON, 0.0)
     for column, part in zip(found.T, INNER, strict=True):
         assert column == pytest.approx(POWER / HA * (1 - np.exp(-since * HA / (part * C))), abs=1e-6)
+
+
+def test_a_thermometer_sees_a_place_of_a_body_that_also_bends_the_machine() -> None:
+    """A body that only its own thermometer shows is the place where this one sits."""
+    assert inner_columns(warmed(sensor="T")).shape[2] == 0
+    places = inner_columns(warmed(y="3*(T - 20)", sensor="T"))
+    assert places.shape[2] == 2 * 2 * len(INNER)  # two flows, two outputs
+    alone = inner_columns(warmed(y="3*(T - 20)"))
+    seen = [m for m in range(places.shape[2]) if places[:, 1, m].any()]
+    assert 3 * places[:, 1, seen] == pytest.approx(alone[:, 0])
 
 
 def test_places_explain_what_lumping_a_bar_of_two_cells_leaves(run: Trajectory) -> None:
