@@ -105,7 +105,7 @@ class Improvement:
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """Residuals (R, Y) of two models on one recording, wrong readings left out, over the size of one unit.
+    """Residuals (R, Y) of two models on one recording, wrong readings left out, over the size of a unit (Y,).
 
     `started`: the same from the starts that all readings show, if they differ.
     """
@@ -136,7 +136,7 @@ def free_runs(
     Args:
         known: how well the parameters are known, for recordings that no fit has seen.
     """
-    one, white, found = size_of(campaign, noise), np.array(noise.white), {}
+    size, white, found = size_of(campaign, noise), np.array(noise.white), {}
     for run in recordings:
         old, new = _run(before, campaign, run), _run(after, campaign, run)
         if old is None:
@@ -144,18 +144,17 @@ def free_runs(
         grids = {run: old.system.grid}
         wrong = find_outliers(before, grids, white)
         readings = without(grids, wrong)[run].readings
-        scale = one / white
         first = readings - predict(old)
         then = None if new is None else readings - predict(new)
-        started = None if new is None or then is None else _started(after, new, then, white) * scale
+        started = None if new is None or then is None else _started(after, new, then, white) / size
         last = with_noise(campaign, new or old) if noise.rough else new or old
         found[run] = FreeRuns(
-            first * scale,
-            None if then is None else then * scale,
-            one * noise_in_free_runs(last, noise),
-            1 / scale,
-            one * _unsure(new or old, white, known) if known else 0.0,
-            (_started(before, old, first, white) * scale, started),
+            first / size,
+            None if then is None else then / size,
+            noise_in_free_runs(last, noise, size),
+            size,
+            _unsure(new or old, size, known) if known else 0.0,
+            (_started(before, old, first, white) / size, started),
         )
     return found
 
@@ -168,11 +167,11 @@ def _started(fit: Fit, run: Trajectory, left: Array, reading: Array) -> Array:
     return from_known_starts(run, left, np.array(fit.noise.white), known, fit.together, reading)
 
 
-def _unsure(trajectory: Trajectory, white: Array, known: Known) -> float:
-    """rms of a free run from the uncertainty of parameters, in reading noises."""
-    moved = sensitivities(trajectory, known.names) / white[None, :, None]
+def _unsure(trajectory: Trajectory, size: Array, known: Known) -> float:
+    """rms of the readings of a free run from the uncertainty of parameters, in units of a size (Y,)."""
+    moved = sensitivities(trajectory, known.names) / size[None, :, None]
     variance = np.einsum("ryp,pq,ryq->ry", moved, known.covariance, moved, optimize=True)
-    return float(np.sqrt(np.mean(variance)))
+    return float(np.sqrt(np.mean(variance[trajectory.system.grid.measured])))
 
 
 def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement:
@@ -215,14 +214,12 @@ def unit_of(campaign: Campaign, outputs: Sequence[str]) -> str:
     return units.pop() if len(units) == 1 else MULTIPLES
 
 
-def size_of(campaign: Campaign, noise: Noise) -> float:
-    """What one reading noise is in the unit of a proof: the mean noise of outputs of one unit, else 1.
-
-    Outputs of one unit weigh alike; those of several weigh by their noise.
+def size_of(campaign: Campaign, noise: Noise) -> Array:
+    """What one unit of a proof is in the unit of each output (Y,): outputs of one unit weigh alike, those of
+    several by their reading noise.
     """
-    if unit_of(campaign, noise.outputs) == MULTIPLES:
-        return 1.0
-    return float(np.sqrt(np.mean(np.square(noise.white))))
+    white = np.array(noise.white)
+    return white if unit_of(campaign, noise.outputs) == MULTIPLES else np.ones_like(white)
 
 
 def explained(found: Mapping[str, Improvement]) -> float | None:

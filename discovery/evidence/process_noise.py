@@ -227,7 +227,9 @@ def _white_with(
     return white, cost
 
 
-def noise_in_free_runs(trajectory: Trajectory, noise: Noise) -> float:
-    """rms of a free run from reading noise, slow noise, process noise and inputs, in reading noises."""
-    around = make_filter(trajectory).spread(noise) / np.array(noise.white) ** 2
-    return float(np.sqrt(np.mean(1.0 + around)))
+def noise_in_free_runs(trajectory: Trajectory, noise: Noise, size: Array) -> float:
+    """rms of the readings of a free run from reading noise, slow noise, process noise and inputs, in units of
+    a size (Y,).
+    """
+    variance = (np.array(noise.white) ** 2 + make_filter(trajectory).spread(noise)) / size**2
+    return float(np.sqrt(np.mean(variance[trajectory.system.grid.measured])))
