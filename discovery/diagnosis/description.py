@@ -2,8 +2,8 @@
 
 SINDy in the filtered form. The library has powers, products, thresholds, saturations and lags of the inputs
 and of the temperature of the body, and what opens or shuts there to the temperatures around it, each filtered
-through the model. A temperature that is read counts as it was read: the model misses it. Evidence chooses one
-term after the other.
+through the model. A temperature that is read counts as it was read: the model misses it. That it lags behind
+itself would only say that heat is what warms the body. Evidence chooses one term after the other.
 """
 
 from __future__ import annotations
@@ -162,10 +162,9 @@ def _library(context: Context, current: Scored, state: str, body: Array) -> list
         texts += [f"max({state} - {limit:.4g}, 0)"]
         texts += [f"({state} > {limit:.4g})*({name} - {state})" for name in around]
     middle = float(np.median(body))
-    texts += [
-        f"abs({state} - {middle:.4g})*({state} - {middle:.4g})",
-        *(f"(lag({state}, {lag}) - {state})" for lag in slow),
-    ]
+    texts += [f"abs({state} - {middle:.4g})*({state} - {middle:.4g})"]
+    if state not in shown_states(current.fit.model, context.outputs):
+        texts += [f"(lag({state}, {lag}) - {state})" for lag in slow]
     return [(text, parse(text)) for text in dict.fromkeys(texts)]
 
 

@@ -68,6 +68,7 @@ def test_a_description_has_lags_that_recordings_can_show() -> None:
     assert min(times) == pytest.approx(600.0 / 150)
     assert max(times) == pytest.approx(600.0 / 40)
     assert "heater" in said
+    assert "lag(T" not in said  # it is read: the heat that warms it follows its own rise whatever is lacking
 
 
 def valve() -> Recording:
