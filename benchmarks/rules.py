@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1] / "discovery"
 FOLDERS = ("evidence", "diagnosis")
 VERDICTS = ("diagnosis/verdict.py", "diagnosis/withdrawal.py")
 AIM_RULES, AIM_CONSTANTS = 15, 20
-TODAY_RULES, TODAY_CONSTANTS = 16, 27  # what a test holds: the aim is not reached yet
+TODAY_RULES, TODAY_CONSTANTS = 15, 27  # what a test holds: constants are still more than wanted
 
 RESOLUTION = {  # finer gives the same answer in more time
     "evidence/bayes.py": "_BATCH _NARROW _ROUNDING",

@@ -104,13 +104,12 @@ class Scored:
         """The noise that is most likely."""
         return self.settings[self.best].noise
 
-    @cached_property
-    def coarse(self) -> float:
-        """Probability that the model's laws and flows are off by more than is usual for a lumped model, over
-        the settings tried. Heat that nobody records does not follow its flows: it says nothing of them.
+    @property
+    def coarse(self) -> bool:
+        """Whether its laws and flows are off by more than is usual for a lumped model, under the most likely
+        noise. Heat that nobody records does not follow its flows: it says nothing of them.
         """
-        coarse = np.array([is_large(_off_by(s)) for s in self.settings])
-        return float(np.exp(self.levels - log_sum_exp(self.levels)) @ coarse)
+        return is_large(self.off)
 
     @property
     def ahead(self) -> float:

@@ -102,6 +102,12 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     if best.evidence - without > thresholds.SHORT and (best.forced or named or acts()):
         laws_only = [n for n in named if n.hypothesis.effect.is_law]
         mostly = [n for n in laws_only if (proof := proofs[n.hypothesis.key]) and proof.free.mostly]
+        faults = [n.hypothesis for n in named if not n.hypothesis.effect.is_law]
+        reasons += [
+            f"{h.effect.word} at {h.where} is not named: something else acts as well, and an event or a "
+            "fault can only be recognised with a model that is nearly right"
+            for h in faults
+        ]
         by_law = any(best is one for one in laws)
         named = tuple(
             _needed(
@@ -284,7 +290,7 @@ def unrecorded(found: Search) -> tuple[str, ...]:
 
 def coarse(found: Search) -> tuple[str, ...]:
     """A sentence about a model whose error is larger than usual; nothing about any other."""
-    if found.baseline.coarse < thresholds.NAMED:
+    if not found.baseline.coarse:
         return ()
     return (
         f"the flows of the model are wrong by about {100 * found.baseline.off:.0f} %, more than is usual for "

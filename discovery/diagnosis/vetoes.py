@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.scored import Scored
 from discovery.effects.hypothesis import Hypothesis
@@ -56,7 +55,7 @@ def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis) -> str
             f"{h.effect.word} at {h.where} is not named: {law.effect.word} at {law.where} stands for a law "
             f"that the model leaves out, and {h.effect.word} may make up for the rest of that law"
         )
-    if answer.coarse < thresholds.NAMED:
+    if not answer.coarse:
         return None
     return (
         f"{h.effect.word} at {h.where} is not named: the flows of the model are wrong by about "

@@ -58,10 +58,10 @@ def test_heat_that_nobody_records_says_nothing_of_the_flows() -> None:
     count, every = len(bare().settings), list(dry().settings)
     wrong = [s for s in every if s.noise.share > 0.08 or s.noise.form > 0.08]
     heated = [s for s in every if s.level > 2.0 and s not in wrong]
-    assert replace(bare(), settings=tuple(wrong[:count])).coarse == pytest.approx(1.0)
-    assert replace(bare(), settings=tuple(heated[:count])).coarse == 0.0
-    assert bare().coarse == pytest.approx(1.0)  # it lacks the fluid
-    assert wetted().coarse < 0.5
+    assert replace(bare(), settings=tuple(wrong[:count])).coarse
+    assert not replace(bare(), settings=tuple(heated[:count])).coarse
+    assert bare().coarse  # it lacks the fluid
+    assert not wetted().coarse
 
 
 def test_what_does_not_act_is_scored_once() -> None:

@@ -55,8 +55,8 @@ class Model:
         return frozenset(h.key for h in self.hypotheses)
 
     @property
-    def coarse(self) -> float:
-        return float(self.off > thresholds.SHARE)
+    def coarse(self) -> bool:
+        return self.off > thresholds.SHARE
 
     @property
     def noise(self) -> Any:
@@ -340,7 +340,10 @@ def test_a_fault_has_no_name_beside_heat_of_unknown_cause(
     )
     unknown = Model((what,), 300.0, forced="a slow change of E_Y of unknown cause")
     found = Tried([Model((what,), 200.0), Model((), 0.0)])
-    assert said(found, {what.effect.word: 0.95}, unknown=unknown).word == word
+    answer = said(found, {what.effect.word: 0.95}, unknown=unknown)
+    assert answer.word == word
+    withheld = "sensor_drift at E_Y is not named: something else acts as well"
+    assert any(reason.startswith(withheld) for reason in answer.reasons) == (what is DRIFT)
 
 
 @pytest.mark.parametrize(("more", "word"), [(-0.1, "missing physics"), (0.1, "unexplained")])
