@@ -5,12 +5,14 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from discovery.diagnosis import thresholds
+from discovery.diagnosis.centred import centred
 from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
@@ -81,6 +83,12 @@ class Diagnosis:
             return None
         return explained(self.held_out)
 
+    @cached_property
+    def _centred(self) -> tuple[Scored, ...]:
+        """The model with the named effects alone, and next to those that are not sure."""
+        both = {one.keys: one for one in (self.alone, self.verdict.answer)}
+        return tuple(centred(self.context, one) for one in both.values())
+
     def interval(self, h: Hypothesis, name: str) -> tuple[float | None, float | None]:
         """95 % interval of a parameter of a named effect.
 
@@ -91,10 +99,11 @@ class Diagnosis:
         assert self.after is not None
         p = self.after.model.parameters[name]
         wider = thresholds.FORM * abs(p.value) if h.effect.is_physics and name in h.amplitudes else 0.0
-        every = (self.alone.interval(name), self.verdict.answer.interval(name), (p.low, p.high))
+        every = (*(one.interval(name) for one in self._centred), (p.low, p.high))
         known = [s for s in every if s and None not in s]
-        lows = [p.value - np.hypot(p.value - s[0], wider) for s in known if s[0] is not None]
-        highs = [p.value + np.hypot(s[1] - p.value, wider) for s in known if s[1] is not None]
+        # one that lies on one side of the value does not widen the other
+        lows = [p.value - np.hypot(max(p.value - s[0], 0.0), wider) for s in known if s[0] is not None]
+        highs = [p.value + np.hypot(max(s[1] - p.value, 0.0), wider) for s in known if s[1] is not None]
         low, high = min(lows, default=None), max(highs, default=None)
         return None if low is None else max(low, p.min), None if high is None else min(high, p.max)
 

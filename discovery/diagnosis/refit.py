@@ -8,7 +8,7 @@ from math import inf
 import numpy as np
 
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.scored import Scored, scored
+from discovery.diagnosis.scored import MOVED, Scored, scored
 from discovery.effects.form import Shape
 from discovery.effects.hypothesis import Hypothesis
 from discovery.errors import RunsAwayError
@@ -17,7 +17,6 @@ from discovery.models import Model
 
 ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
 ROUNDS = 3  # of refits under a noise that is more likely
-MOVED = 1.0  # log-likelihood that calls for another one
 
 
 def with_effects(model: Model, chosen: Sequence[Hypothesis]) -> Model:

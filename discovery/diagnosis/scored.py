@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 Node = tuple[Place, int]  # a noise setting, and something of unknown cause
 
 _ERRORS = slice(2, 6)  # of the place of a setting: slow noise, unrecorded heat, errors of flows and of laws
+MOVED = 1.0  # log-likelihood that calls for another look
 KEPT = 4  # noise settings of a model, the most likely ones
 # what something of unknown cause changes of a score
 _OF_FORCE = ("settings", "grams", "forced", "forced_state", "log_odds_force")
@@ -160,6 +161,26 @@ class Scored:
             level = level + sizes.sum(axis=-1) + 0.5 * count * float(np.log(2 * np.pi))
         return log_sum_exp(level) + self.settings[k].log_weight - float(np.log(len(forms)))
 
+    def beyond(self) -> tuple[float, float]:
+        """Log-likelihood at the optimum under the most likely noise, form errors of the model integrated out,
+        and by how much it lies above the unknowns of the fit, to first order.
+        """
+        level, step, covariance = self._forms(self.best)[0].solved()
+        count = len(self.seen.moving)  # after them come the form errors
+        own, spread = step[:count], covariance[:count, :count]
+        return level, 0.5 * float(own @ np.linalg.solve(spread, own)) if count else 0.0
+
+    def stepped(self, part: float) -> Array:
+        """The unknowns of the fit after a part of the step to that optimum, within their bounds."""
+        _, step, _ = self._forms(self.best)[0].solved()
+        theta = np.array(self.fit.theta)
+        for k, i in enumerate(self.seen.moving):
+            unknown, move = self.fit.problem.unknowns[i], part * float(step[k])
+            at = theta[i]
+            theta[i] = at * np.exp(np.clip(move / at, -5, 5)) if unknown.is_log else at + move
+            theta[i] = min(max(theta[i], unknown.low), unknown.high)
+        return theta
+
     def interval(self, name: str) -> tuple[float, float] | None:
         """The 95 % interval of a parameter under the most likely noise; None where it is at a bound."""
         unknowns = self.fit.problem.unknowns
@@ -168,6 +189,8 @@ class Scored:
         if not len(place):
             return None
         _, step, covariance = self._forms(self.best)[0].solved()
+        if self.beyond()[1] >= MOVED:
+            step = np.zeros_like(step)  # where a linear look reaches too far (`centred.py`)
         k, unknown = int(place[0]), unknowns[index]
         at, half = float(self.fit.theta[index]), Z95 * float(np.sqrt(covariance[k, k]))
         if unknown.is_log:  # a time constant is known within a factor

@@ -122,12 +122,20 @@ def test_a_size_lies_within_the_intervals_of_both_fits() -> None:
     assert low <= min(own[0], p.low)
     assert high >= max(own[1], p.high)
     assert low < p.value < high
-    unsure = SimpleNamespace(interval=lambda _: (0.5 * low, 2.0 * high))  # of a model with more effects
+    unsure = SimpleNamespace(  # a model with more effects
+        interval=lambda _: (0.5 * low, 2.0 * high), keys=frozenset({"more"}), acts=False
+    )
     wider = replace(found, verdict=replace(found.verdict, answer=unsure)).interval(h, size)  # type: ignore[arg-type]
     assert wider[0] is not None
     assert wider[1] is not None
     assert wider[0] <= 0.5 * low
     assert wider[1] >= 2.0 * high
+    below = SimpleNamespace(
+        interval=lambda _: (-3.0 * high, -2.0 * high), keys=frozenset({"more"}), acts=False
+    )
+    other = replace(found, verdict=replace(found.verdict, answer=below)).interval(h, size)  # type: ignore[arg-type]
+    assert other[0] == max(-3.0 * high, p.min)
+    assert other[1] == pytest.approx(high)  # not as far above as it lies below
 
 
 def test_a_device_set_to_zero_is_named_where_it_jumps() -> None:

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest, norm
 
 from discovery.diagnosis import crossvalidation, thresholds
+from discovery.diagnosis.centred import centred
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.crossvalidation import LeftOut, left_out
 from discovery.diagnosis.proof import Improvement
-from discovery.diagnosis.refit import MOVED, refit, score
+from discovery.diagnosis.refit import refit, score
 from discovery.diagnosis.scan import scan_model
-from discovery.diagnosis.scored import Scored, is_usual, scored, with_change, with_force, with_unknown
+from discovery.diagnosis.scored import MOVED, Scored, is_usual, scored, with_change, with_force, with_unknown
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evaluation.crossvalidation import Fold
 from discovery.evidence.process_noise import unknown_heat
@@ -80,7 +81,7 @@ def test_what_does_not_act_is_scored_once() -> None:
 
 
 def test_an_interval_is_of_95_percent() -> None:
-    one = wetted()
+    one = centred(dry(), wetted())
     (name,) = one.hypotheses[0].amplitudes
     interval = one.interval(name)
     assert interval is not None
