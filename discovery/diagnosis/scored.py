@@ -165,10 +165,8 @@ class Scored:
         """Log-likelihood at the optimum under the most likely noise, form errors of the model integrated out,
         and by how much it lies above the unknowns of the fit, to first order.
         """
-        level, step, covariance = self._forms(self.best)[0].solved()
-        count = len(self.seen.moving)  # after them come the form errors
-        own, spread = step[:count], covariance[:count, :count]
-        return level, 0.5 * float(own @ np.linalg.solve(spread, own)) if count else 0.0
+        gram = self._forms(self.best)[0]
+        return gram.solved()[0], gram.ahead
 
     def stepped(self, part: float) -> Array:
         """The unknowns of the fit after a part of the step to that optimum, within their bounds."""

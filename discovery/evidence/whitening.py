@@ -93,9 +93,12 @@ class Grams:
 
     @property
     def ahead(self) -> float:
-        """Log-likelihood by which the optimum under this noise lies above the fit, to first order."""
+        """Log-likelihood by which the optimum under this noise lies above the fit, to first order; form
+        errors, which come last, are free at both.
+        """
         _, step, covariance = self.solved()
-        return 0.5 * float(step @ np.linalg.solve(covariance, step)) if len(step) else 0.0
+        own = len(step) - self.form
+        return 0.5 * float(step[:own] @ np.linalg.solve(covariance[:own, :own], step[:own])) if own else 0.0
 
     def without(self, extra: Array) -> Grams:
         """The same without the last columns, whose coefficients have the spreads `extra` (E,)."""

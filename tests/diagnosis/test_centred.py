@@ -26,10 +26,12 @@ def index(one: Scored) -> int:
     return [u.name for u in one.fit.problem.unknowns].index(h.amplitudes[0])
 
 
-def test_a_fit_that_stands_beside_its_optimum_is_moved_there() -> None:
-    beside = moved(wetted(), 1.6)
-    assert beside.beyond()[1] > MOVED
-    found = centred(dry(), beside)
+def test_a_fit_that_stands_off_its_optimum_is_moved_there() -> None:
+    elsewhere = moved(wetted(), 1.6)
+    assert elsewhere.beyond()[1] > MOVED
+    gram = elsewhere.grams[0]
+    assert len(gram.solved()[1]) - gram.form == len(elsewhere.seen.moving)  # form errors come last
+    found = centred(dry(), elsewhere)
     assert found.beyond()[1] < MOVED
     best = float(wetted().fit.theta[index(wetted())])
     assert float(found.fit.theta[index(found)]) == pytest.approx(best, rel=0.1)
@@ -42,10 +44,10 @@ def test_a_fit_that_stands_at_its_optimum_stays() -> None:
 
 def test_a_look_that_reaches_too_far_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     """No part of the step is better: the interval is centred where the fit stands."""
-    beside = moved(wetted(), 1.6)
-    (name,) = beside.hypotheses[0].amplitudes
-    at = float(beside.fit.theta[index(beside)])
-    monkeypatch.setattr(module, "_here", lambda one: 0.0 if one is beside else -1.0)
-    assert centred(dry(), beside) is beside
-    low, high = beside.interval(name) or (np.nan, np.nan)
+    elsewhere = moved(wetted(), 1.6)
+    (name,) = elsewhere.hypotheses[0].amplitudes
+    at = float(elsewhere.fit.theta[index(elsewhere)])
+    monkeypatch.setattr(module, "_here", lambda one: 0.0 if one is elsewhere else -1.0)
+    assert centred(dry(), elsewhere) is elsewhere
+    low, high = elsewhere.interval(name) or (np.nan, np.nan)
     assert (low + high) / 2 == pytest.approx(at, rel=1e-6)
