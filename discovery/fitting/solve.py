@@ -30,6 +30,7 @@ _HOPELESS = 1e10  # damping at which no shorter step helps any more
 _STILL = 1e-11  # relative change of the unknowns below which the search has ended
 _SETTLED = 2  # steps after which the linear look says whether a search comes near its goal ...
 _TIMES = 10.0  # ... if it would not by so many times what that look expects
+_IDLE = 0.01  # of the tolerance: a step that promises no more than this is not made
 _FAR = 0.5  # what a step has to take off the cost for the whitening filters to be made anew behind it
 
 
@@ -107,11 +108,11 @@ def solve(
         if not (np.isfinite(gram).all() and np.isfinite(gradient).all()):  # no step from here
             done = True
             break
-        if goal < inf and taken >= _SETTLED:
-            whole = _step(x, gram, gradient, 0.0, low, high)
-            late = cost - _TIMES * _expected(whole, gram, gradient) > goal
-            if late:
-                break
+        promised = _expected(_step(x, gram, gradient, 0.0, low, high), gram, gradient)
+        done = promised < _IDLE * tolerance * cost
+        late = taken >= _SETTLED and cost - _TIMES * promised > goal
+        if done or late:
+            break
         found = None
         while damping < _HOPELESS:
             moved = np.clip(x + _step(x, gram, gradient, damping, low, high), low, high)
