@@ -30,5 +30,9 @@ def is_word(name: str) -> bool:
 
 
 def is_taken(name: str) -> bool:
-    """Whether a word has a meaning of its own in expressions."""
-    return name == "time" or name in FUNCTIONS
+    """Whether a word has a meaning of its own in expressions, which Python's parser reads.
+
+    >>> is_taken("lag"), is_taken("global"), is_taken("sun")
+    (True, True, False)
+    """
+    return name == "time" or name in FUNCTIONS or keyword.iskeyword(name)

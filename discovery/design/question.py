@@ -134,10 +134,10 @@ def _smallest(found: Search) -> str:
         "second_thermal_mass",
     ):
         claims = [c for c in scanned if c.hypothesis.effect.word == word]
-        seen = [c for c in claims if _size_is_known(c)]
+        seen = [c for c in claims if _size_is_known(c) and _visible(c) <= c.hypothesis.effect.amplitude.most]
         if not seen:
             continue
-        size, c = max(((4.5 * abs(c.size[0] / c.t), c) for c in seen), key=lambda item: item[0])
+        size, c = max(((_visible(c), c) for c in seen), key=lambda item: item[0])
         h = c.hypothesis
         speed = f" at {h.effect.at}" if h.effect.at else ""
         places = list(dict.fromkeys(" and ".join(c.hypothesis.places) for c in seen))
@@ -150,6 +150,11 @@ def _smallest(found: Search) -> str:
         if texts
         else "no missing physics was detected that these recordings could show"
     )
+
+
+def _visible(claim: Score) -> float:
+    """The size that would have been seen."""
+    return 4.5 * abs(claim.size[0] / claim.t)
 
 
 def _size_is_known(claim: Score) -> bool:

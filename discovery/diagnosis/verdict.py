@@ -318,13 +318,19 @@ def _apart(found: Search, answer: Scored, rest: Sequence[Named], least: float) -
 def _unsure(n: Named, added: float, least: float) -> str:
     """Why an effect of the answer has no name."""
     name = f"{n.hypothesis.effect.word} at {n.hypothesis.where}"
-    chance = f"probability {n.probability:.2f}"
+    chance = f"probability {_chance(n.probability)}"
     if added >= least and n.together >= thresholds.NAMED:
         return (
             f"{name} is not named: its log evidence of {added:.0f} ({chance}) counts only next to effects "
             "that are not named either"
         )
+    if n.together < thresholds.NAMED:
+        chance += f" of the {thresholds.NAMED:g} that a name needs"
     return f"{name} is possible but not sure enough to be named ({chance}, log evidence {_of(added, least)})"
+
+
+def _chance(probability: float) -> str:
+    return f"{probability:.2f}" if probability >= 0.005 else "below 0.01"
 
 
 def _of(added: float, least: float) -> str:

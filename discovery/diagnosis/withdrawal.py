@@ -29,7 +29,7 @@ def _does(lower: float) -> str:
     """What effects do to free runs. `lower`: the logarithm by which the rms falls."""
     if not isfinite(lower):
         return "make free runs run away"
-    change = f"{100 * expm1(-lower):+.3g} %"
+    change = f"{round(100 * expm1(-lower), 2):+g} %"
     return f"do too little for free runs (the rms changes by {change} on average over the recordings)"
 
 

@@ -11,15 +11,17 @@ from discovery.recordings.columns import TIME
 from discovery.recordings.roles import CORRECTION, Between, Role, is_input
 from discovery.schema import Strict
 
+_ANOTHER = 'choose another one, and say column = "{}" where the header of the files has to stay'
+
 
 def _channel_name(name: str) -> str:
+    if is_taken(name):
+        raise ValueError(f"this word has a meaning of its own in expressions; {_ANOTHER.format(name)}")
     if not is_word(name):
         raise ValueError(
-            "a channel's name is a word of letters, digits and _ (expressions use it); choose one, and say"
-            f' column = "{name}" where the header of the files has to stay'
+            "a channel's name is a word of letters, digits and _ (expressions use it); "
+            + _ANOTHER.format(name)
         )
-    if is_taken(name):
-        raise ValueError("this word has a meaning of its own in expressions; choose another name")
     return name
 
 

@@ -254,6 +254,9 @@ def test_a_size_without_a_unit_is_a_share() -> None:
     seen = Score(h, 0.0, 2.0, (0.124,), 1.0, 0)
     said = _smallest(cast(Search, SimpleNamespace(claims=[seen])))
     assert said == "these recordings would have shown second_thermal_mass of 28 % at E_Z"
+    whole = replace(h.effect, amplitude=replace(h.effect.amplitude, most=1.0))
+    blind = Score(replace(h, effect=whole), 0.0, 2.0, (0.5,), 1.0, 0)  # it would have to be 113 %
+    assert "second_thermal_mass" not in _smallest(cast(Search, SimpleNamespace(claims=[blind])))
 
 
 def test_patterns_move_what_the_machine_has() -> None:

@@ -189,8 +189,8 @@ def test_a_name_needs_its_probability(probability: float, word: str) -> None:
     assert found.word == word
     if word == "unexplained":
         assert found.candidates[0].hypothesis is FLUID
-        said_of = "is possible but not sure enough to be named (probability 0.69, log evidence 100)"
-        assert any(said_of in text for text in found.reasons)
+        chance = "(probability 0.69 of the 0.7 that a name needs, log evidence 100)"
+        assert any(f"is possible but not sure enough to be named {chance}" in text for text in found.reasons)
     else:
         assert found.named[0].probability == pytest.approx(min(probability, 0.98))
         assert found.reasons == ()

@@ -31,3 +31,12 @@ def test_a_level_that_stays_long_is_no_limit(clipped: bool, found: int) -> None:
     power = np.asarray(np.minimum(blocks(3, 800.0), 500.0)) if clipped else blocks(3, 500.0)
     others = [seen("monday", blocks(1, 800.0)), seen("tuesday", blocks(2, 800.0))]
     assert len(list(_full_range([*others, seen("friday", power)], POWER))) == found
+
+
+def test_rest_before_anything_moves_is_no_limit() -> None:
+    """An incubator stands still for 24 s before its heater is switched on."""
+    oven = Channel("P", "temperature", "degC", None, "linear")
+    warm = np.cumsum(np.random.default_rng(4).uniform(0.01, 0.2, 300))
+    rest = seen("monday", np.concatenate([np.zeros(20), warm]) + 25.0)
+    others = [seen("tuesday", warm + 20.0), seen("friday", warm + 21.0)]
+    assert list(_full_range([rest, *others], oven)) == []

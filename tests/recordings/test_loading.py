@@ -173,7 +173,7 @@ def test_what_cannot_be_used_is_refused(write: Write, data: str | list[str], sai
         ),
         ("noise = 0.5", "noise = -1", "line 6: channels.E_Y0C.noise: should be greater than 0, not -1"),
         ("T_env =", "T-env =", "line 4: channels.T-env: a channel's name is a word"),
-        ("T_env =", "lambda =", "line 4: channels.lambda: a channel's name is a word"),
+        ("T_env =", "lambda =", "line 4: channels.lambda: this word has a meaning of its own"),
         ("T_env =", "time =", "line 4: channels.time: this word has a meaning of its own"),
         (
             'csv" }',

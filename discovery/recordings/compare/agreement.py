@@ -198,7 +198,8 @@ def _candidates(
     if known.has_room:  # otherwise a drift may be the air around, which nobody recorded
         for y, reading in read.items():
             left = known.residual(predicted, y, reading)
-            yield drifting(one, y, float(np.polyfit(reading.at, left, 1)[0]))
+            rate = float(np.polyfit(reading.at, left, 1)[0])
+            yield drifting(one, y, rate, known.channels[y].unit)
     for y, reading in read.items():
         left = known.residual(predicted, y, reading)
         since, size = _offset(reading.at, left)

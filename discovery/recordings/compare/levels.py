@@ -113,8 +113,9 @@ def _full_range(recordings: Sequence[Seen], channel: Channel) -> Iterator[Findin
         for sign in (1.0, -1.0):
             top = float(np.max(sign * read))
             tops[one.name, sign] = top
-            clipped = _piles_up(sign * read) and not _is_a_setting(sign * read)
-            flat[one.name, sign] = float(np.mean(sign * read == top)) if clipped else 0.0
+            moved = read[int(np.argmax(read != read[0])) :]  # before, it is at rest
+            clipped = moved.size > _NEXT and _piles_up(sign * moved) and not _is_a_setting(sign * moved)
+            flat[one.name, sign] = float(np.mean(sign * moved == top)) if clipped else 0.0
     for one in recordings:
         for sign in (1.0, -1.0):
             if (one.name, sign) not in flat or flat[one.name, sign] < _FLAT:

@@ -170,11 +170,11 @@ def paced(one: Seen, factor: float) -> Repair:
     )
 
 
-def drifting(one: Seen, name: str, per_second: float) -> Repair:
+def drifting(one: Seen, name: str, per_second: float, unit: str) -> Repair:
     """An output that creeps away by so much a second."""
     whole = per_second * float(one.time[-1])
     made = one.values[name] - per_second * one.time
-    what = f"'{name}' drifts by {whole:.3g} over the recording; no recorded input explains it"
+    what = f"'{name}' drifts by {whole:.3g} {unit} over the recording; no recorded input explains it"
     return Repair("drift", (name,), what, "check its zero and its holder", one.having({name: made}))
 
 
