@@ -18,7 +18,9 @@ from discovery.dynamics.samples import Samples
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise
 from discovery.models import Model
+from discovery.models.units import same_dimension
 from discovery.printed import lasting
+from discovery.recordings import Channel
 from discovery.terms import Name
 
 Array = NDArray[np.float64]
@@ -160,8 +162,7 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
         wanted[f"run at half {names[0]} and full {names[1]}{dry}"] = build(0.5 * one, one, zero, False)
     wanted[f"{still} and follow the room"] = build(zero, zero, zero, False)
     stepped = ("other input",) if wet else ("other input", "fluid flow")  # a coolant never stays off
-    # what is set stays until it is set anew; what moves in between, as a temperature, is only measured
-    for n in (n for n, role in roles.items() if role in stepped and channels[n].between == "held"):
+    for n in (n for n, role in roles.items() if role in stepped and _is_set(channels[n])):
         low, high = np.quantile(series[n], (0.05, 0.95))
         if high > low:
             wanted[f"step {n} every {hour}{dry}"] = {
@@ -169,6 +170,13 @@ def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
                 n: low + (high - low) * twelfth,
             }
     return wanted
+
+
+def _is_set(channel: Channel) -> bool:
+    """Whether somebody sets an input: it stays until it is set anew. What moves in between, as a temperature,
+    is only measured, and nobody steps the sun.
+    """
+    return channel.between == "held" and not same_dimension(channel.unit, "W/m**2")
 
 
 def _run(context: Context, model: Model, inputs: Mapping[str, Array], length: float) -> Trajectory:

@@ -300,11 +300,11 @@ def test_a_coolant_is_stepped_but_never_stays_off() -> None:
 
 
 def test_what_is_only_measured_is_not_stepped() -> None:
-    """Nobody sets the temperature of a column, though a model may be driven by it."""
+    """Nobody sets the temperature of a column, though a model may be driven by it, nor the sun."""
     seen = campaign(simulated(1))
     fan = replace(seen.channels["pump"], name="pump", role="other input")
-    column = replace(fan, between="linear")
-    for channel, there in ((fan, True), (column, False)):
+    column, sun = replace(fan, between="linear"), replace(fan, unit="W/m^2")
+    for channel, there in ((fan, True), (column, False), (sun, False)):
         where = cast(
             Context,
             SimpleNamespace(
