@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from discovery import __version__, limits, read_model, run
 from discovery.diagnosis import thresholds
+from discovery.evidence.outliers import FAR
 from discovery.experiment.form import ExperimentForm
 from discovery.models.modelfile import ModelForm
 from discovery.recordings.campaignfile import CampaignForm
@@ -117,7 +118,7 @@ def test_the_numbers_of_the_diagnosis_are_those_that_decide() -> None:
         f"{t.FLOOR:.0%} of the geometric mean of the flow".replace("%", " %"),
         f"{numbers(t.SLOW)} times the reading noise, weights {', '.join(map(str, t.SLOW.values()))}",
         f"odds of {t.ODDS} for each word",
-        f"within a factor of {t.FACTOR} (jumps of a sensor: {t.JUMP:g} reading noises",
+        f"within a factor of {t.FACTOR:g} (jumps of a sensor: {FAR:g} reading noises",
         f"width {t.BELIEF} of the logarithm",
         f"drawn again {t.DRAWS} times",
         f"It is at most {t.SUREST}",

@@ -24,7 +24,7 @@ from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
-WIDTHS = (1 / 3, 1.0, 3.0)  # of the priors, relative to what they are
+WIDTHS = (1 / thresholds.FACTOR, 1.0, thresholds.FACTOR)  # of the priors, relative to what they are
 FAR = 25.0  # log evidence below the best from which a model takes no part
 MOST = 25  # models that take part
 IN_PLAY = 8.0  # log evidence below the best of a model within which a noise setting counts

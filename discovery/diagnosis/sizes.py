@@ -12,6 +12,7 @@ from discovery.diagnosis import thresholds
 from discovery.dynamics import Trajectory
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Slab
+from discovery.evidence.outliers import FAR
 from discovery.evidence.process_noise import flows_at_least
 from discovery.evidence.signatures import signatures
 from discovery.fitting import Noise
@@ -45,7 +46,7 @@ class Sizes:
             return [(amplitude.plausible, thresholds.FACTOR, float(amplitude.sign))] * count
         if h.shown:
             return [
-                (thresholds.JUMP * noise / max(size, 1e-12), thresholds.FACTOR, float(amplitude.sign))
+                (FAR * noise / max(size, 1e-12), thresholds.FACTOR, float(amplitude.sign))
                 for size, noise in self._shown(h)
             ]
         states = {t.into for t in h.terms}

@@ -15,22 +15,21 @@ from __future__ import annotations
 FLOOR = 0.02  # of the mean of the flows of a body and of the busiest, rms, at level one: unrecorded heat
 AIR = 0.1  # K: the air at a body differs from what is measured, at level one; zeros of thermometers are off
 LEVELS = {0.1: 0.15, 0.3: 0.35, 1.0: 0.3, 2.0: 0.12, 5.0: 0.06, 10.0: 0.02}  # of this heat, with weights
-SHARE = 0.08  # off by more than this share of its flows a lumped model is coarse
 SHARES = {0.02: 0.5, 0.08: 0.35, 0.25: 0.12, 0.8: 0.03}  # of what flows through a body, off from hour to hour
+SHARE = max(share for share, weight in SHARES.items() if weight > 1 / len(SHARES))  # off by more: coarse
 TIMES = {1.0: 0.5, 0.3: 0.3, 0.1: 0.2}  # its time constant, over 3 h or an eighth of the longest recording
 FORMS = {(0.0, 0.0): 0.25, (0.0, 0.1): 0.25, (0.025, 0.1): 0.25, (0.08, 0.1): 0.15, (0.25, 0.25): 0.1}
 # shares by which laws are off at an operating point, and of flows that enter the neighbours of a body
 SLOW = {0.0: 0.35, 0.3: 0.35, 1.0: 0.2, 3.0: 0.08, 10.0: 0.02}  # slow noise of outputs, in reading noises
-FORM = 0.2  # of the flow of a named effect, at each operating point: no law is quite that of nature
-UNKNOWN_HEAT = (1.0, 3.0, 10.0, 30.0)  # "none of these": times the unrecorded heat of a body ...
-UNKNOWN_SHARES = (0.0, *(share for share in SHARES if share > SHARE))  # ... and of its flows; pairs alike
+FORM = max(law for law, _ in FORMS)  # of the flow of a named effect, too: no law is quite that of nature
 
 # --- effects ----------------------------------------------------------------------------------------------
 BELIEF = 0.5  # log of the factor within which the start values of a hand-built model are believed
 ODDS = 0.02  # prior odds of an effect of the catalogue to act, over all places; of an event in each recording
 USUAL = 0.2  # median size of an effect: what it makes flow, as a share of the largest flow of the model
-FACTOR = 3.5  # 68 % of sizes lie within this factor of their median (log-normal: zero at zero)
-JUMP = 8.0  # median size of what a sensor shows too much, in reading noises
+FACTOR = 3.0  # 68 % of sizes lie within this factor of their median (log-normal: zero at zero)
+UNKNOWN_HEAT = tuple(FACTOR**k for k in range(4))  # "none of these": times the unrecorded heat of a body ...
+UNKNOWN_SHARES = (0.0, *(share for share in SHARES if share > SHARE))  # ... and of its flows; pairs alike
 
 # --- what is said -----------------------------------------------------------------------------------------
 SUREST = 0.98  # probability that is never exceeded: causes that nobody thought of; of tests by blocks, too

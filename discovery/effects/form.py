@@ -85,7 +85,7 @@ DRIVING = (  # roles of the inputs that an error may follow by a law of its own
 _PER_SPEED = r"(\bspeed\s*/\s*)(\d+(?:\.\d+)?)"  # at which speed the size of an effect counts
 _RATIO = 3.0  # between neighbouring values of a shape in a search: signatures of both are much alike
 _REACH = 2.0  # standard deviations of a prior that a search covers
-_FARTHEST = 4.0  # ... and beyond which a law is another one
+FARTHEST = 4.0  # ... and beyond which a law is another one, and a reading is wrong
 _SHIFTED = 1 / 8  # of the longest recording: usual shifts in time are no longer, however slow a machine is
 _HALVES = 6  # cells on either side of zero, each half as wide as the next: down to a thirtieth of the spread
 
@@ -176,7 +176,7 @@ class Shape:
             return 0.0, inf
         if not self.factor:
             return -inf, inf
-        return max(self.least, self.middle * self.factor**-_FARTHEST), self.middle * self.factor**_FARTHEST
+        return max(self.least, self.middle * self.factor**-FARTHEST), self.middle * self.factor**FARTHEST
 
 
 @dataclass(frozen=True)

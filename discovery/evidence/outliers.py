@@ -15,8 +15,8 @@ from discovery.fitting import Fit
 Array = NDArray[np.float64]
 
 FAR = 6.5  # reading noises from the median of the readings around, which scatter less, too
-AROUND = 3  # readings on each side that a reading is compared with
 MOST = 2  # wrong readings in a row
+AROUND = MOST + 1  # readings on each side that a reading is compared with: most of them are right
 
 
 @dataclass(frozen=True)

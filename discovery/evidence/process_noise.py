@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory, predict
 from discovery.dynamics.trajectory import answers, flows
+from discovery.effects.form import FARTHEST
 from discovery.evidence.settings import Prior, Setting, with_levels
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Fit, Noise
@@ -27,7 +28,6 @@ from discovery.terms import Name
 Array = NDArray[np.float64]
 
 _TRIED = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # levels with which a reading noise is sought where none is stated
-_CLIPPED = 4.0  # standard deviations beyond which an innovation counts no more: single wrong readings
 
 
 @dataclass(frozen=True)
@@ -216,7 +216,7 @@ def _white_with(
         for part, residual in zip(seen.filters, seen.residuals, strict=True):
             z, log = part.whitened(noise, residual[:, :, None])
             innovation = np.full(residual.shape, np.nan)
-            innovation[part.measured] = np.clip(z[:, 0], -_CLIPPED, _CLIPPED)
+            innovation[part.measured] = np.clip(z[:, 0], -FARTHEST, FARTHEST)  # wrong readings
             squares += np.nansum(innovation**2, axis=0)
             counts += part.measured.sum(axis=0)
             cost += float(np.sum(log)) + 0.5 * float(np.nansum(innovation**2))
