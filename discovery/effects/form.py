@@ -30,6 +30,7 @@ Place = Literal[
     "current terms",  # terms in which an electric current stands
     "loss terms",  # terms in which a heat load stands, or a law of the speed or another input
     "air terms",  # terms in which the ambient temperature stands
+    "heat of a body",  # the loss terms that enter one body
     "error state",  # a state that is an error: its terms are rates
     "seat",  # a body as all errors see it; the formula is added to its temperature there
     "lever",  # a body; each error sees the formula with a lever of its own
@@ -49,6 +50,7 @@ TERM_PLACES = (
     "cooling terms",
     "current terms",
     "loss terms",
+    "heat of a body",
     "air terms",
     "input temperature",
 )

@@ -93,7 +93,9 @@ def spots(
         case "current terms":
             currents = {n for n, c in channels.items() if same_dimension(c.unit, "A")}
             yield from _of(effect, tuple(t for t in parts.own if names(t.expression) & currents))
-        case "fluid terms" | "coolant terms" | "cooling terms" | "loss terms" | "air terms":
+        case (
+            "fluid terms" | "coolant terms" | "cooling terms" | "loss terms" | "air terms" | "heat of a body"
+        ):
             yield from _of_terms(effect, model, parts, role)
         case "input temperature":
             yield from _of_inputs(model, parts, channels)
@@ -171,7 +173,12 @@ def _group(effect: Effect, parts: Layout, alone: tuple[str, ...]) -> tuple[str, 
 
 
 def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, str]) -> Iterator[Spot]:
-    """Terms of a kind."""
+    """Terms of a kind. Heat that enters a body has a source of its own."""
+    if effect.place == "heat of a body":
+        heats = _heats(model, parts, role)
+        for body in dict.fromkeys(t.into for t in heats):
+            yield Spot((body,), tuple(t for t in heats if t.into == body))
+        return
     wanted = {
         "fluid terms": "fluid temperature",
         "coolant terms": "coolant temperature",
@@ -179,12 +186,13 @@ def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, st
         "loss terms": "heat load",
         "air terms": "ambient temperature",
     }[effect.place]
-    terms = tuple(
-        t
-        for t in parts.own
-        if _holds(t, wanted, role) or (wanted == "heat load" and _is_loss(t, model, role))
-    )
-    yield from _of(effect, terms)
+    heats = _heats(model, parts, role) if wanted == "heat load" else ()
+    yield from _of(effect, heats or tuple(t for t in parts.own if _holds(t, wanted, role)))
+
+
+def _heats(model: Model, parts: Layout, role: Mapping[str, str]) -> tuple[Term, ...]:
+    """Terms in which a heat load stands, or a law of the speed or another input."""
+    return tuple(t for t in parts.own if _holds(t, "heat load", role) or _is_loss(t, model, role))
 
 
 def _between(parts: Layout, a: str, b: str) -> tuple[Term, ...]:

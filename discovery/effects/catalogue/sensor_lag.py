@@ -21,6 +21,7 @@ EFFECT = Effect(
     confused_with=(
         "clock_shift",
         "second_thermal_mass",
+        "heater_mass",
     ),
     source="sensors behind a wall or in a housing: 30 to 300 s",
     examples=(Example({"lagged": 1.0, "y": 10.0, "t_lag": 60.0}, -3.679, {"y": 0.0}, 60.0),),
