@@ -77,6 +77,9 @@ class Search:
             coarse = not is_usual(self.best.settings[self.best.best])
             if coarse and not first.keys <= self.best.keys:
                 self._settled(first)
+        for one in self._by_itself():
+            if one.evidence >= self.best.evidence:
+                self._settled(one)
         return self
 
     def _settled(self, current: Scored) -> None:
@@ -86,6 +89,17 @@ class Search:
             current = self._questioned(self._grown(current))
             if current.keys == start or len(current.hypotheses) >= MOST:
                 return
+
+    def _by_itself(self) -> list[Scored]:
+        """Each effect of an answer of several alone: those that came before it may have stood in for it, and
+        removing them one at a time does not show that none of them is needed.
+        """
+        answer = self.best
+        alone = [(h,) for h in answer.hypotheses if len(answer.hypotheses) > 2]
+        fresh = [own for own in alone if frozenset((own[0].key,)) not in self.tried]
+        goal = self.goal(answer.noise) if fresh else inf
+        found = side_by_side(lambda own: score(self.context, own, answer.noise, answer.fit, goal=goal), fresh)
+        return [self.keep(one) for one in found if one is not None]
 
     def _as_likely(self) -> list[Scored]:
         """Models with a single effect that are about as likely as the best of them."""

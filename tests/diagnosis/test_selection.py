@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import pytest
 
@@ -111,3 +111,37 @@ def test_a_coarse_answer_is_sought_from_another_beginning_too(
     monkeypatch.setattr(selection, "is_usual", lambda setting: not setting)
     found.run()
     assert settled == begun
+
+
+def test_an_effect_of_an_answer_may_be_all_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lag comes third: without any one of the other two, the answer is worse; without both it is better."""
+    words = ("mass", "heater", "lag")
+    claims = tuple(SimpleNamespace(key=word) for word in words)
+    answer = SimpleNamespace(
+        hypotheses=claims,
+        keys=frozenset(words),
+        evidence=340.0,
+        settings=[False],
+        best=0,
+        noise=None,
+        fit=None,
+    )
+    alone = {"mass": 300.0, "heater": 10.0, "lag": 420.0}
+    found = Search(dry())
+    found.tried[answer.keys] = cast(Scored, answer)
+    asked: list[str] = []
+
+    def scored(_context: object, own: Any, *_: object, **_limits: object) -> Any:
+        asked.append(own[0].key)
+        return SimpleNamespace(hypotheses=own, keys=frozenset({own[0].key}), evidence=alone[own[0].key])
+
+    settled: list[str] = []
+    monkeypatch.setattr(Search, "grow", lambda self: self)
+    monkeypatch.setattr(Search, "_settled", lambda _, one: settled.append("+".join(sorted(one.keys))))
+    monkeypatch.setattr(Search, "goal", lambda _, _noise: 0.0)
+    monkeypatch.setattr(selection, "is_usual", lambda setting: not setting)
+    monkeypatch.setattr(selection, "score", scored)
+    monkeypatch.setattr(selection, "light", lambda one: one)
+    found.run()
+    assert asked == [*words]
+    assert settled == ["heater+lag+mass", "lag"]
