@@ -40,6 +40,8 @@ Place = Literal[
     "output that is no temperature",  # the same; what a thermometer shows beyond the model is heat
     "output of errors",  # the same, of a model whose states are errors
     "output of a recording",  # one error in one recording
+    "output next to others",  # one output of several
+    "output that is a temperature",  # where an error would count from a zero of its own
     "input temperature",  # one recorded temperature, wherever the model uses it
     "inputs of a recording",  # every input in one recording
     "recording",  # all errors of one recording

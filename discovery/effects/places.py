@@ -136,6 +136,10 @@ def _single_outputs(
             return tuple(n for n in outputs if states & names(model.outputs.get(n, Name(n))))
         case "output of errors" if parts.bodies:
             return ()
+        case "output next to others" if len(outputs) == 1:
+            return ()
+        case "output that is a temperature":
+            return tuple(n for n in outputs if same_dimension(channels[n].unit, "degC"))
         case "output that is no temperature":
             return tuple(n for n in outputs if not same_dimension(channels[n].unit, "degC"))
     return outputs
