@@ -119,6 +119,7 @@ def test_the_numbers_of_the_diagnosis_are_those_that_decide() -> None:
         f"{numbers(t.SLOW)} times the reading noise, weights {', '.join(map(str, t.SLOW.values()))}",
         f"odds of {t.ODDS} for each word",
         f"within a factor of {t.FACTOR:g} (jumps of a sensor: {FAR:g} reading noises",
+        f"what it adds to an output: {t.FORM:.0%} or none".replace("%", " %"),
         f"width {t.BELIEF} of the logarithm",
         f"drawn again {t.DRAWS} times",
         f"It is at most {t.SUREST}",

@@ -190,8 +190,8 @@ def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, st
         "loss terms": "heat load",
         "air terms": "ambient temperature",
     }[effect.place]
-    heats = _heats(model, parts, role) if wanted == "heat load" else ()
-    yield from _of(effect, heats or tuple(t for t in parts.own if _holds(t, wanted, role)))
+    every = tuple(t for t in parts.own if _holds(t, wanted, role))
+    yield from _of(effect, _heats(model, parts, role) if wanted == "heat load" else every)
 
 
 def _heats(model: Model, parts: Layout, role: Mapping[str, str]) -> tuple[Term, ...]:
