@@ -32,6 +32,7 @@ RESOLUTION = {  # finer gives the same answer in more time
     "diagnosis/context.py": "MOST_READINGS NODES",
     "diagnosis/diagnose.py": "ANOTHER_NOISE",
     "diagnosis/posterior.py": "FAR MOST IN_PLAY SETTINGS",
+    "diagnosis/coarse_bodies.py": "OPENED",
     "diagnosis/proof.py": "DRAWS BLOCKS",
     "diagnosis/centred.py": "ROUNDS PARTS",
     "diagnosis/refit.py": "ENOUGH ROUNDS",

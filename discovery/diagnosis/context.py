@@ -181,12 +181,19 @@ def with_noise_of(context: Context, fit: Fit) -> Context:
     """The context with the reading noise of a better fit, if the campaign states none."""
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
     white = reading_noise(fit, stated, context.floor, process_prior())
-    return replace(context, settings=_settings(white, context.floor, context.grids))
+    return replace(context, settings=_settings(white, context.floor, context.grids, context.settings.coarser))
 
 
-def _settings(white: Noise, floor: Mapping[str, float], grids: Mapping[str, Grid]) -> Settings:
+def with_coarser(context: Context, states: tuple[str, ...]) -> Context:
+    """The context with states that may be off by more than the others."""
+    return replace(context, settings=_settings(context.white, context.floor, context.grids, states))
+
+
+def _settings(
+    white: Noise, floor: Mapping[str, float], grids: Mapping[str, Grid], coarser: tuple[str, ...] = ()
+) -> Settings:
     unsure, noisy = any(g.unsure for g in grids.values()), any(g.noisy for g in grids.values())
-    return settings(white, floor, process_prior(), unsure, noisy)
+    return settings(white, floor, process_prior(), unsure, noisy, coarser)
 
 
 def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:

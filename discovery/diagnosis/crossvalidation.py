@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
+from discovery.diagnosis.coarse_bodies import judging
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.proof import BLOCKS, FreeRuns, Improvement, block_sums, improvement, surely_better
 from discovery.diagnosis.refit import ENOUGH, with_effects
@@ -128,7 +129,8 @@ def _changed(
     for own, group in zip(keys, groups, strict=True):
         everywhere = any(h.terms or not h.shown for h in group)
         only = set(context.outputs) if everywhere else {name for h in group for name in h.shown}
-        mine = [y for y, name in enumerate(context.outputs) if name in only]
+        judged = judging(context, answer, group)
+        mine = [y for y in judged if context.outputs[y] in only]
         without, with_it = left[answer.keys - {*own}], left[answer.keys]
         if without:
             outputs = [context.outputs[y] for y in mine]

@@ -13,6 +13,7 @@ import numpy as np
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.centred import centred
+from discovery.diagnosis.coarse_bodies import judging, sentences, with_coarse_bodies
 from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
@@ -22,7 +23,7 @@ from discovery.diagnosis.proof import Improvement, explained, free_runs, improve
 from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
 from discovery.diagnosis.response import Response, responses
-from discovery.diagnosis.scored import Scored, with_unknown
+from discovery.diagnosis.scored import Scored, is_usual, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.unknown_law import instead
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
@@ -64,6 +65,7 @@ class Diagnosis:
     forces: tuple[Force, ...]  # on what the baseline leaves
     fit: Improvement  # free runs of the recordings to fit
     held_out: dict[str, Improvement]
+    contradicted_by: tuple[str, ...]  # held-out recordings where the names make it worse
     description: Description | None
     responses: tuple[Response, ...]
     curves: tuple[Curve, ...]
@@ -185,10 +187,12 @@ def diagnose(
     before = fitted or fit_model(model, seen, fit, outputs, minima=True)
     context = make_context(seen, model, fit, outputs, entries, _after(campaign, fit), before)
     tell("scoring the catalogue")
-    found = Search(context, lambda what: tell(f"found so far: {what}")).grow()
+    found = Search(context, lambda what: tell(f"found so far: {what}"))
+    found = _with_coarse_bodies(found.begun()).grow()
     for _ in range(2):  # each answer is questioned under the reading noise that it leaves
-        context, found = _under_own_noise(context, found, tell)
+        found = _under_own_noise(found, tell)
         found.run()
+    context = found.context
     tell("weighing the answers")
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
     tell("proving in free runs")
@@ -201,17 +205,25 @@ def diagnose(
         verdict = runs_away(verdict)
     noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
-    runs = free_runs(campaign, fit, before, after or before, noise)
     known = (alone if after else found.baseline).known().beside(context.thermometers, thresholds.AIR)
-    runs |= free_runs(campaign, read, before, after or before, noise, known)
-    fitting = improvement([runs[r] for r in fit if r in runs], outputs)
-    proof = {r: improvement([runs[r]], outputs) for r in read if r in runs}
-    each = [improvement([one], outputs) for one in runs.values()]
+
+    def proved(only: Sequence[int]) -> tuple[Improvement, dict[str, Improvement], list[Improvement]]:
+        """Free runs of some outputs: on all fitted recordings, on each held-out one, and on each of all."""
+        shown = [outputs[y] for y in only]
+        runs = free_runs(campaign, fit, before, after or before, noise, only=only)
+        runs |= free_runs(campaign, read, before, after or before, noise, known, only)
+        each = {r: improvement([one], shown) for r, one in runs.items()}
+        fitting = improvement([runs[r] for r in fit if r in runs], shown)
+        return fitting, {r: each[r] for r in read if r in each}, list(each.values())
+
+    every, judged = list(range(len(outputs))), judging(context, verdict.answer, named)
+    fitting, proof, each = proved(every)
+    fitted_to, unseen, all_runs = (fitting, proof, each) if judged == every else proved(judged)
     unit = unit_of(campaign, outputs)
-    verdict = refuted(unfinished(idle(found, verdict, each), fitting, unit), proof)
+    verdict = refuted(unfinished(idle(found, verdict, all_runs), fitted_to, unit), unseen)
     if not verdict.named and after is not None:
         after = None
-    verdict = wrong_readings(unforeseen(verdict, proof, unit), len(context.outliers))
+    verdict = wrong_readings(unforeseen(verdict, unseen, unit), len(context.outliers))
     law = instead(context, verdict.answer) if verdict.word == UNEXPLAINED else None
     mine = tuple(searched(found, verdict, effects))
     further = [law] if law else []
@@ -235,6 +247,7 @@ def diagnose(
         forces=tuple(forces),
         fit=fitting,
         held_out=proof,
+        contradicted_by=tuple(run for run, i in unseen.items() if i.contradicts and verdict.named),
         description=describe(context, found.baseline, shown[0]) if unexplained and not law else None,
         responses=tuple(responses(context)) if verdict.word == UNEXPLAINED else (),
         curves=tuple(curves(found.baseline, shown[0])) if shown and verdict.word != NO_MISMATCH else (),
@@ -244,14 +257,27 @@ def diagnose(
     )
 
 
-def _under_own_noise(context: Context, found: Search, tell: Callable[[str], None]) -> tuple[Context, Search]:
-    """Context and search under the reading noise that the best model leaves, where it is another one."""
-    other = with_noise_of(context, found.best.fit)
-    change = np.log(np.array(other.white.white) / np.array(context.white.white))
+def _with_coarse_bodies(found: Search) -> Search:
+    """The search with bodies that may be off by more than the others, where its best model shows some: they
+    hide nothing as long as both this and the model without effects are off by no more than usual.
+    """
+    if all(is_usual(one.settings[one.best]) for one in (found.baseline, found.best)):
+        return found
+    other = with_coarse_bodies(found.context, found.best)
+    return found if other is found.context else found.under(other)
+
+
+def _under_own_noise(found: Search, tell: Callable[[str], None]) -> Search:
+    """The search under the reading noise that the best model leaves, and with the bodies that it leaves
+    coarse, where they are others.
+    """
+    found = _with_coarse_bodies(found)
+    other = with_noise_of(found.context, found.best.fit)
+    change = np.log(np.array(other.white.white) / np.array(found.context.white.white))
     if not found.best.hypotheses or np.max(np.abs(change)) <= ANOTHER_NOISE:
-        return context, found
+        return found
     tell("repeating with the reading noise of the answer")
-    return other, found.under(other)
+    return found.under(other)
 
 
 def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -328,6 +354,7 @@ def _reasons(
         )
     if verdict.word != FAULT:  # there, they are part of the answer
         said += _set_aside(context)
+    said += sentences(verdict.answer)
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
     if verdict.word == UNEXPLAINED:  # what a fit finds of its inputs may stand for the unknown cause

@@ -291,7 +291,7 @@ def _improvement(d: Diagnosis) -> ImprovementDocument:
         unit=unit_of(d.context.campaign, d.context.outputs),
         fit=_gain(d.fit),
         held_out={run: _gain(i) for run, i in d.held_out.items()},
-        contradicted_by=[run for run, i in d.held_out.items() if i.contradicts and d.verdict.named],
+        contradicted_by=list(d.contradicted_by),
         explained=number(d.explained, 4),
     )
 

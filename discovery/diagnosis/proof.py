@@ -130,12 +130,15 @@ def free_runs(
     after: Fit,
     noise: Noise,
     known: Known | None = None,
+    only: Sequence[int] | None = None,
 ) -> dict[str, FreeRuns]:
     """Free runs on each recording; a recording on which the baseline diverges is left out.
 
     Args:
         known: how well the parameters are known, for recordings that no fit has seen.
+        only: outputs that are compared; default all.
     """
+    mine = list(range(len(noise.outputs)) if only is None else only)
     size, white, found = size_of(campaign, noise), np.array(noise.white), {}
     for run in recordings:
         old, new = _run(before, campaign, run), _run(after, campaign, run)
@@ -146,15 +149,19 @@ def free_runs(
         readings = without(grids, wrong)[run].readings
         first = readings - predict(old)
         then = None if new is None else readings - predict(new)
-        started = None if new is None or then is None else _started(after, new, then, white) / size
+        started = None if new is None or then is None else _started(after, new, then, white)
         last = with_noise(campaign, new or old) if noise.rough else new or old
+
+        def shown(left: Array) -> Array:
+            return (left / size)[:, mine]
+
         found[run] = FreeRuns(
-            first / size,
-            None if then is None else then / size,
-            noise_in_free_runs(last, noise, size),
-            size,
-            _unsure(new or old, size, known) if known else 0.0,
-            (_started(before, old, first, white) / size, started),
+            shown(first),
+            None if then is None else shown(then),
+            noise_in_free_runs(last, noise, size, mine),
+            size[mine],
+            _unsure(new or old, size, known, mine) if known else 0.0,
+            (shown(_started(before, old, first, white)), None if started is None else shown(started)),
         )
     return found
 
@@ -167,11 +174,14 @@ def _started(fit: Fit, run: Trajectory, left: Array, reading: Array) -> Array:
     return from_known_starts(run, left, np.array(fit.noise.white), known, fit.together, reading)
 
 
-def _unsure(trajectory: Trajectory, size: Array, known: Known) -> float:
-    """rms of the readings of a free run from the uncertainty of parameters, in units of a size (Y,)."""
+def _unsure(trajectory: Trajectory, size: Array, known: Known, only: Sequence[int]) -> float:
+    """rms of the readings of some outputs of a free run from the uncertainty of parameters, in units of a
+    size (Y,).
+    """
     moved = sensitivities(trajectory, known.names) / size[None, :, None]
     variance = np.einsum("ryp,pq,ryq->ry", moved, known.covariance, moved, optimize=True)
-    return float(np.sqrt(np.mean(variance[trajectory.system.grid.measured])))
+    mine = list(only)
+    return float(np.sqrt(np.mean(variance[:, mine][trajectory.system.grid.measured[:, mine]])))
 
 
 def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement:

@@ -15,7 +15,7 @@ from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score, Without, scan
 from discovery.evidence.events import place_events
-from discovery.evidence.settings import Setting
+from discovery.evidence.settings import AXES, Setting
 from discovery.evidence.signatures import signatures
 from discovery.fitting import Noise
 
@@ -84,7 +84,8 @@ def in_play(context: Context, current: Scored) -> list[Setting]:
     noise may have absorbed the missing physics.
     """
     best = current.settings[current.best]
-    other = context.settings.at((*best.place[:-3], 0, 0, 0))
+    kept = best.place[: AXES.index("share")]
+    other = context.settings.at((*kept, *(0 for _ in best.place[len(kept) :])))
     return [best] if other.place == best.place else [best, other]
 
 

@@ -243,6 +243,11 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     return _over_noise(context, bare, goal=inf if fit.ended_early else -inf)
 
 
+def under_noise_of(context: Context, one: Scored) -> Scored:
+    """The score of the same fit over the noise settings of another context."""
+    return _over_noise(context, one)
+
+
 def _over_noise(
     context: Context,
     bare: Scored,
@@ -326,7 +331,8 @@ def is_large(share: float) -> bool:
 
 def _off_by(setting: Setting) -> float:
     """Share of the flows by which a model is wrong: its laws, or its flows."""
-    return max(setting.noise.share, setting.noise.form)
+    own = (share for _, share in (setting.noise.force or {}).values())
+    return max(setting.noise.share, setting.noise.form, *own)
 
 
 def _unrecorded(setting: Setting) -> float:

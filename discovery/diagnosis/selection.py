@@ -109,17 +109,21 @@ class Search:
 
     def grow(self) -> Search:
         """Add effects to the most likely model that was tried, or to the baseline, and question none."""
+        self._grown(self.begun().best)
+        return self
+
+    def begun(self) -> Search:
+        """Score the model without any effect, if nothing was tried."""
         if not self.tried:
             first = score(self.context, (), self.context.usual)
             assert first is not None  # the context has fitted it
             self.keep(first)
-        self._grown(self.best)
         return self
 
     def under(self, context: Context) -> Search:
         """The search under another noise: the tried models that are not far below the best, scored again."""
         best = self.best.evidence
-        other = Search(context, self.tell, first=self.claims)
+        other = Search(context, self.tell, first=self.claims if self.scans else ())
         near = [one for one in self.tried.values() if not one.hypotheses or one.evidence > best - FAR]
 
         def under_it(one: Scored) -> Scored:

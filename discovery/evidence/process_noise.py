@@ -44,7 +44,7 @@ class UnknownHeat:
         """A noise setting with it. What is always there stays: less noise than usual is no unknown cause."""
         usual = (setting.noise.heat or {}).get(self.state, 0.0), setting.noise.share
         both = float(np.hypot(usual[0], self.heat)), float(np.hypot(usual[1], self.share))
-        noise = replace(setting.noise, force={self.state: both})
+        noise = replace(setting.noise, force={**(setting.noise.force or {}), self.state: both})
         return replace(setting, noise=noise, log_weight=setting.log_weight + self.log_weight)
 
 
@@ -227,9 +227,12 @@ def _white_with(
     return white, cost
 
 
-def noise_in_free_runs(trajectory: Trajectory, noise: Noise, size: Array) -> float:
+def noise_in_free_runs(
+    trajectory: Trajectory, noise: Noise, size: Array, only: Sequence[int] | None = None
+) -> float:
     """rms of the readings of a free run from reading noise, slow noise, process noise and inputs, in units of
-    a size (Y,).
+    a size (Y,); `only`: of these outputs.
     """
     variance = (np.array(noise.white) ** 2 + make_filter(trajectory).spread(noise)) / size**2
-    return float(np.sqrt(np.mean(variance[trajectory.system.grid.measured])))
+    mine = slice(None) if only is None else list(only)
+    return float(np.sqrt(np.mean(variance[:, mine][trajectory.system.grid.measured[:, mine]])))

@@ -12,6 +12,9 @@ import numpy as np
 
 from discovery.fitting import Noise
 
+# of a grid; one of each coarse state follows
+AXES = ("jitter", "rough", "slow", "level", "share", "form", "time")
+_SIZES = ("level", "share")  # that a coarse state has of its own
 JITTER = 12**-0.5  # of a logging interval: a switch that comes anywhere in it
 
 Place = tuple[int, ...]  # on the axes of a grid
@@ -38,7 +41,7 @@ class Setting:
     noise: Noise
     log_weight: float
     level: float  # of the heat that nobody records
-    place: Place  # on the grid of jitters, noisy inputs, slow noises, levels, shares, forms, times
+    place: Place  # on the grid of jitters, noisy inputs, slow noises, levels, shares, forms, times, coarser
 
     @property
     def is_plain(self) -> bool:
@@ -53,12 +56,15 @@ class Settings:
     Args:
         white: reading noise, and the longest time constants.
         floor: heat that nobody records of each state at level one, from `floors`.
-        axes: jitters, noisy inputs, slow noises, levels, shares, forms and times.
+        axes: jitters, noisy inputs, slow noises, levels, shares, forms and times; then, for each state
+            of `coarser`, the steps by which its level and its share are above those of the others.
+        coarser: states that may be off by more than the others.
     """
 
     white: Noise
     floor: Mapping[str, float]
     axes: tuple[Weighted, ...]
+    coarser: tuple[str, ...] = ()
 
     @property
     def usual(self) -> Setting:
@@ -70,11 +76,13 @@ class Settings:
 
     def at(self, place: Place) -> Setting:
         """The setting at a place."""
-        (jitter,), (rough,), (slow,), (level,), (share,), (form, edge), (part,) = (
+        (jitter,), (rough,), (slow,), (level,), (share,), (form, edge), (part,), *steps = (
             axis[k][0] for axis, k in zip(self.axes, place, strict=True)
         )
+        above = {s: int(n) for s, (n,) in zip(self.coarser, steps, strict=True) if n}
         noise = replace(
             with_levels(self.white, self.floor, level, share, slow),
+            force={s: self._above(place, s, n) for s, n in above.items()} or None,
             jitter=jitter,
             rough=rough,
             form=form,
@@ -85,12 +93,22 @@ class Settings:
         weights = (log(a[k][1] / sum(w for _, w in a)) for a, k in zip(self.axes, place, strict=True))
         return Setting(noise, sum(weights), level, place)
 
+    def _above(self, place: Place, state: str, steps: int) -> tuple[float, float]:
+        """Heat and share of a state that is coarser by some steps."""
+        (level,), (share,) = (
+            self.axes[axis][min(place[axis] + steps, len(self.axes[axis]) - 1)][0]
+            for axis in map(AXES.index, _SIZES)
+        )
+        return level * self.floor[state], share
+
     def near(self, place: Place) -> list[Place]:
-        """The places one step away."""
-        steps = [(axis, at + step) for axis, at in enumerate(place) for step in (-1, 1)]
-        return [
-            (*place[:axis], at, *place[axis + 1 :]) for axis, at in steps if 0 <= at < len(self.axes[axis])
-        ]
+        """The places one step away, and those where others have less of what a coarse state keeps."""
+        steps = [{axis: step} for axis in range(len(place)) for step in (-1, 1)]
+        for own in range(len(AXES), len(place)):
+            sizes = map(AXES.index, _SIZES)
+            steps += [{axis: -step, own: step} for axis in sizes for step in (-1, 1)]
+        found = [tuple(at + step.get(axis, 0) for axis, at in enumerate(place)) for step in steps]
+        return [one for one in found if all(0 <= at < len(a) for at, a in zip(one, self.axes, strict=True))]
 
     def closest(self, noise: Noise, allowed: Callable[[Setting], bool]) -> Place:
         """The place most alike to a noise among some, axis by axis: what is allowed, and what is alike, is so
@@ -104,7 +122,14 @@ class Settings:
         return place
 
 
-def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: bool, noisy: bool) -> Settings:
+def settings(
+    white: Noise,
+    floor: Mapping[str, float],
+    prior: Prior,
+    unsure: bool,
+    noisy: bool,
+    coarser: tuple[str, ...] = (),
+) -> Settings:
     """The grid of noise settings.
 
     Args:
@@ -112,16 +137,20 @@ def settings(white: Noise, floor: Mapping[str, float], prior: Prior, unsure: boo
         floor: of each state, from `floors`.
         unsure: inputs may be logged late, each switch by another time, or all by the same.
         noisy: inputs may be recorded with noise.
+        coarser: states that may be off by more than the others.
     """
     maybe = ((JITTER, unsure), (1.0, noisy))
     chances = [dict.fromkeys([0.0, size] if there else [0.0], 1.0) for size, there in maybe]
     single = [*chances, prior.slow, prior.levels, prior.shares]
+    # a body is coarser by a step as often as a model is, and it may be any body
+    steps = tuple(((float(k),), w / (len(floor) if k else 1)) for k, w in enumerate(prior.shares.values()))
     axes = [
         *(tuple(((value,), weight) for value, weight in table.items()) for table in single),
         tuple(prior.forms.items()),
         tuple(((part,), weight) for part, weight in prior.times.items()),
+        *(steps for _ in coarser),
     ]
-    return Settings(white, floor, tuple(axes))
+    return Settings(white, floor, tuple(axes), coarser)
 
 
 def only(noise: Noise) -> Settings:
@@ -146,5 +175,11 @@ def _distance(one: Noise, other: Noise) -> float:
     form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
     here, there = (sum((noise.heat or {}).values()) for noise in (one, other))
     heat = abs(here - there) / max(here + there, 1e-300)
+    alone = abs(_share_of_one(one) - _share_of_one(other))
     time = abs(log(one.heat_time / other.heat_time))
-    return slow + form + heat + time + abs(one.jitter - other.jitter) + abs(one.rough - other.rough)
+    return slow + form + alone + heat + time + abs(one.jitter - other.jitter) + abs(one.rough - other.rough)
+
+
+def _share_of_one(noise: Noise) -> float:
+    """Largest share of a state that has one of its own."""
+    return max((share for _, share in (noise.force or {}).values()), default=0.0)

@@ -17,6 +17,7 @@ from discovery.diagnosis.thresholds import SHORT
 from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.late import beside_switches, perhaps_late, sentences
+from discovery.fitting import Noise
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -110,7 +111,7 @@ def test_what_may_stand_for_an_unknown_cause_is_not_said(
     monkeypatch.setattr(module.noisy, "sentences", lambda *_: [])
     monkeypatch.setattr(module, "not_offered", lambda *_: [])
     context = SimpleNamespace(unused_readings=[], model=None, scene=None, outliers=())
-    answer = SimpleNamespace(fit=None, noise=None)
+    answer = SimpleNamespace(fit=None, noise=Noise(("T",), (0.1,)))
     assert module._reasons(context, SimpleNamespace(word=word, answer=answer), [], {}, [], []) == said
 
 

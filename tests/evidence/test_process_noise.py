@@ -107,6 +107,23 @@ def test_laws_that_are_off_for_minutes_are_no_event(monkeypatch: pytest.MonkeyPa
     assert best(1, 2).hypotheses != ()
 
 
+def test_a_coarse_body_has_steps_of_its_own() -> None:
+    """Next to a place lie those where the others lose a step of what the coarse body keeps."""
+    white = Noise(("T",), (0.1,))
+    grid = settings(white, {"coil": 1.0, "frame": 2.0}, process_prior(), False, False, ("coil",))
+    levels, shares = list(thresholds.LEVELS), list(thresholds.SHARES)
+    place = (0, 0, 0, 2, 2, 0, 0, 0)
+    assert grid.at(place).noise.force is None
+    near = [grid.at(one).noise for one in grid.near(place)]
+    assert {"coil": (levels[3], shares[2])} in [n.force for n in near if n.share == shares[1]]
+    above = grid.at((0, 0, 0, 1, 1, 0, 0, 2)).noise
+    assert (above.heat, above.share) == ({"coil": levels[1], "frame": 2.0 * levels[1]}, shares[1])
+    assert above.force == {"coil": (levels[3], shares[3])}
+    weights = [grid.at((*place[:-1], k)).log_weight for k in range(2)]
+    odds = list(thresholds.SHARES.values())
+    assert np.exp(weights[1] - weights[0]) == pytest.approx(odds[1] / odds[0] / 2)  # two bodies
+
+
 def test_slow_noise_may_be_as_fast_as_process_noise() -> None:
     """A sensor that is updated every few seconds shows stairs: noise of seconds, not of a whole test."""
     white = Noise(("T",), (0.1,), slow_time=7200.0, heat_time=10800.0)

@@ -1,0 +1,58 @@
+"""Bodies whose flows are wrong by more than those of the others.
+
+All bodies of a lumped model are off by about the same share of what flows through them. Where one body is
+modelled worse than the others, that share would make the flows of all of them uncertain, and hide what each
+other body lacks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from discovery.diagnosis.context import Context, with_coarser
+from discovery.diagnosis.scored import Scored, under_noise_of
+from discovery.effects.hypothesis import Hypothesis
+from discovery.terms import Name
+from discovery.terms.expression import names
+
+OPENED = 16.0  # log evidence from which a body is coarse by itself: each such body takes time
+
+
+def with_coarse_bodies(context: Context, model: Scored) -> Context:
+    """The context with each body that may be off by more than the others, where the readings show this.
+
+    Args:
+        model: what is known so far.
+    """
+    begin, chosen = model.evidence, context.settings.coarser
+    while len(chosen) + 1 < len(context.floor):
+        others = [with_coarser(context, (*chosen, s)) for s in context.floor if s not in chosen]
+        found = [(under_noise_of(other, model).evidence, k) for k, other in enumerate(others)]
+        best, k = max(found)
+        if best < begin + OPENED:
+            break
+        context, begin, chosen = others[k], best, others[k].settings.coarser
+    return context
+
+
+def judging(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> list[int]:
+    """Outputs by which effects are judged in free runs: what a coarse body shows says nothing of effects that
+    act elsewhere, as long as other outputs are read.
+    """
+    coarse = set(answer.noise.force or {})
+    every = list(range(len(context.outputs)))
+    if not chosen or any(coarse & set(h.states) for h in chosen):
+        return every
+    shown = [names(context.model.outputs.get(name, Name(name))) for name in context.outputs]
+    return [y for y in every if not coarse & shown[y]] or every
+
+
+def sentences(answer: Scored) -> list[str]:
+    """What is said of each body that is off by more than the others."""
+    noise = answer.noise
+    return [
+        f"the flows at {state} are wrong by about {100 * share:.0f} %, those elsewhere by "
+        f"{100 * noise.share:.0f} %: something acts at {state} that no effect explains"
+        for state, (_, share) in (noise.force or {}).items()
+        if share > noise.share
+    ]
