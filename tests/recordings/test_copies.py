@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from discovery.recordings.campaign import Channel
-from discovery.recordings.compare.leaks import near_copies
+from discovery.recordings.compare.leaks import copied_channels, near_copies
 from discovery.recordings.compare.seen import Seen
 
 Array = NDArray[np.float64]
@@ -42,3 +42,17 @@ def test_a_program_that_is_run_again_is_no_copy(own: float, copied: bool) -> Non
     second = noisy(warm, own, 3) if own else noisy(first, 0.01, 4)
     pairs = list(near_copies([seen("a", watts, first), seen("b", watts, second)], CHANNELS))
     assert pairs == ([("a", "b", "T")] if copied else [])
+
+
+@pytest.mark.parametrize(("apart", "copied"), [(True, False), (False, True)])
+def test_bodies_that_move_alike_on_one_day_are_no_copies(apart: bool, copied: bool) -> None:
+    """Two modules under one sun share each cloud. On another day snow lies on one of them."""
+    watts, warm = heated()
+    pair = {**CHANNELS, "U": CHANNELS["T"]}
+    days = []
+    for k, share in enumerate((1.0, 0.3 if apart else 1.0)):
+        other = 22.0 + share * (warm - 22.0) + (1 - share) * noisy(np.zeros(TIME.size), 5.0, 10 + k)
+        values = {"heater": watts, "T": warm, "U": noisy(other, 0.01, k)}
+        days.append(Seen(f"day{k}", Path(f"day{k}.csv"), TIME, values, np.arange(TIME.size)))
+    found = [f for f in copied_channels(days, pair) if "same readings" in f.what]
+    assert len(found) == (2 if copied else 0)

@@ -50,7 +50,9 @@ _POOR = (
 )
 _TWO_AGREES = 0.4  # of the movement itself
 _APART = 2.0  # times the usual movement: others do not know how what begins so far away goes on
-_SCALED = ("unit", "factor", "sign", "halfway")  # repairs that change every value, or all from an instant on
+_SCALED = ("unit", "factor", "sign", "halfway", "swap")  # repairs that change values from an instant on
+_MOST_OF = (0.05, 0.5, 0.95)  # of the values of an input: what lies there says where it is
+_CLEARLY = 0.1  # of the range of an input: by so much nearer to other recordings is no chance
 _BEGINS = 5.0  # K: by so much more a temperature begins elsewhere than in any other recording
 _FREE_AGREES = 0.3  # of the movement: a drift or an offset of any size fits a little of a poor prediction
 # how much larger the gain of a less usual damage must be to go before a usual one
@@ -132,7 +134,12 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
         # an offset of free size and place fits a little of anything: it has to explain the whole
         helps = agrees and (whole or (gain > least and repair.kind != "offset"))
         if helps and not any(_begins_apart(known, repair, y) for y in touched):
-            found.append((gain - 2 * _DOUBT[repair.kind], Disagreement(one.name, repair, b, a, limit, gain)))
+            found.append(
+                (
+                    gain - 2 * _DOUBT[repair.kind],
+                    Disagreement(one.name, repair, b, a, limit, gain, _comes_home(known, one, repair)),
+                )
+            )
     return found
 
 
@@ -151,25 +158,64 @@ def _begins_elsewhere(known: CrossPrediction, one: Seen, repair: Repair) -> bool
 
 
 def _goes_elsewhere(known: CrossPrediction, one: Seen, repair: Repair) -> bool:
-    """Return whether most of the values of an input that a repair changes lie where other recordings have
-    theirs, and would not after it.
+    """Return whether the inputs that a repair changes, or the time between two readings, lie where other
+    recordings have theirs, and would lie further away after it.
 
-    Their unit and sign are right then: programs use the same speeds and flows.
+    Their unit, sign and column are right then: programs use the same speeds and flows, loggers the same
+    interval. So is a temperature that goes on from one reading to the next, and would jump.
     """
-    for name in repair.channels if repair.kind in _SCALED else ():
-        if not known.channels[name].is_input:
-            continue
+    there, then = _places(known, one, repair, [n for n in repair.channels if known.channels[n].is_input])
+    return then - there > _CLEARLY or _jumps_then(known, one, repair)
+
+
+def _jumps_then(known: CrossPrediction, one: Seen, repair: Repair) -> bool:
+    """Return whether a temperature that a repair changes from an instant on would jump there: it does not."""
+    for name in repair.channels if repair.kind == "halfway" else ():
         now, then = one.values[name], repair.made.values[name]
-        others = [s.values[name] for s in known.recordings.values() if s.name != one.name]
-        there = np.concatenate([now[now == then], *others])  # what stays, too
-        there, changed = there[np.isfinite(there) & (there != 0)], np.isfinite(now) & (now != then)
-        if there.size and changed.any():
-            was, would = (
-                np.median((v >= there.min()) & (v <= there.max())) for v in (now[changed], then[changed])
-            )
-            if was > would:
-                return True
+        since = int(np.argmax(np.isfinite(now) & (now != then)))
+        if known.channels[name].unit == "degC" and since > 0:
+            return bool(abs(then[since] - now[since - 1]) > abs(now[since] - now[since - 1]))
     return False
+
+
+def _comes_home(known: CrossPrediction, one: Seen, repair: Repair) -> bool:
+    """Return whether what a repair changes lies nearer to the other recordings after it: the readings
+    themselves show the damage, not only how the machine answers.
+    """
+    there, then = _places(known, one, repair, repair.channels)
+    return there - then > _CLEARLY
+
+
+def _places(
+    known: CrossPrediction, one: Seen, repair: Repair, channels: Sequence[str]
+) -> tuple[float, float]:
+    """How far some channels, or the time between two readings, lie from the other recordings, without a
+    repair and after it.
+    """
+    others = [other for other in known.recordings.values() if other.name != one.name]
+    if repair.kind == "time":
+        usual = np.concatenate([np.diff(other.time) for other in others])
+        return _away(np.diff(one.time), usual), _away(np.diff(repair.made.time), usual)
+    there = then = 0.0
+    # two heaters of one unit may stand in for each other: a swap shows in other units alone
+    alike = repair.kind == "swap" and len({known.channels[n].unit for n in repair.channels}) == 1
+    for name in channels if repair.kind in _SCALED and not alike else ():
+        now, made = one.values[name], repair.made.values[name]
+        usual = np.concatenate([now[now == made], *(o.values[name] for o in others if name in o.values)])
+        there += _away(now[now != made], usual)
+        then += _away(made[now != made], usual)
+    return there, then
+
+
+def _away(values: Array, usual: Array) -> float:
+    """How far values lie from usual ones, from 0 to 1: where nearly all of them lie, and half of them. Zeros
+    do not count: they are the same in every unit.
+    """
+    values, usual = (v[np.isfinite(v) & (v != 0)] for v in (values, usual))
+    if not (values.size and usual.size):
+        return 0.0
+    here, there = np.quantile(values, _MOST_OF), np.quantile(usual, _MOST_OF)
+    return float(np.abs(here - there).mean() / max(np.ptp(np.concatenate([here, there])), 1e-300))
 
 
 def _begins_apart(known: CrossPrediction, repair: Repair, y: str) -> bool:

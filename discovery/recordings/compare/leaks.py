@@ -8,6 +8,7 @@ are read so seldom that second differences hold the response: so what inputs exp
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -24,31 +25,37 @@ _MEMORY = 12  # readings for which an input may act on second differences
 _TAIL = 3.0  # robust standard deviations beyond which a second difference is a jump, no noise
 
 
-def copied_channels(one: Seen, channels: Mapping[str, Channel]) -> Iterator[Finding]:
-    """Errors that stand once more among the inputs, and channels recorded twice."""
+def copied_channels(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -> Iterator[Finding]:
+    """Errors that stand once more among the inputs, and channels recorded twice. Two bodies under one sun may
+    move alike on some days: a channel that is recorded twice is so in every recording.
+    """
+    alike: dict[tuple[str, str], list[tuple[Seen, bool]]] = {}
+    for one in recordings:
+        for pair, found in _pairs(one, channels):
+            alike.setdefault(pair, []).append((one, found))
+    for (a, b), each in alike.items():
+        output, other = (a, b) if channels[a].measured else (b, a)
+        for one in [one for one, found in each if found]:
+            if channels[other].is_input:
+                what = f"the input '{other}' is a copy of '{output}'"
+                do = "take it out: a model would read its own answer"
+                yield Finding("error", one.file, None, what, do, "leak", other, 5.0)
+            elif channels[a].role == channels[b].role and all(found for _, found in each):
+                what, do = f"'{other}' and '{output}' are the same readings", "take one of the two out"
+                yield Finding("warning", one.file, None, what, do, "copy", other, 1.0)
+
+
+def _pairs(one: Seen, channels: Mapping[str, Channel]) -> Iterator[tuple[tuple[str, str], bool]]:
+    """Pairs of channels of a recording, one of them measured, and whether they share their noise."""
     names = [
         n
         for n, c in channels.items()
         if n in one.values and n not in one.constant and c.role != "applied correction"
     ]
-    for k, a in enumerate(names):
-        for b in names[k + 1 :]:
-            if not (channels[a].measured or channels[b].measured):
-                continue
-            both = np.isfinite(one.values[a]) & np.isfinite(one.values[b])
-            if both.sum() < _FEWEST:
-                continue
-            found = share_noise(one.values[a][both], one.values[b][both])
-            if not found:
-                continue
-            output, other = (a, b) if channels[a].measured else (b, a)
-            if channels[other].is_input:
-                what = f"the input '{other}' is a copy of '{output}'"
-                do = "take it out: a model would read its own answer"
-                yield Finding("error", one.file, None, what, do, "leak", other, 5.0)
-            elif channels[a].role == channels[b].role:
-                what, do = f"'{other}' and '{output}' are the same readings", "take one of the two out"
-                yield Finding("warning", one.file, None, what, do, "copy", other, 1.0)
+    for a, b in combinations(names, 2):
+        both = np.isfinite(one.values[a]) & np.isfinite(one.values[b])
+        if (channels[a].measured or channels[b].measured) and both.sum() >= _FEWEST:
+            yield (a, b), share_noise(one.values[a][both], one.values[b][both])
 
 
 def near_copies(
