@@ -1,6 +1,9 @@
-"""Numbers and counts as sentences print them."""
+"""Numbers, counts and recordings as sentences print them."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 
 def printed(value: float, digits: int = 3) -> str:
@@ -50,3 +53,12 @@ def undetermined(low: float | None, high: float | None) -> str:
     (', not determined', '')
     """
     return ", not determined" if low is not None and high is not None and low <= 0.0 <= high else ""
+
+
+def when(claim: Mapping[str, Any]) -> str:
+    """The recording in which an effect acts, or from which on it does.
+
+    >>> when({"recording": "monday"}), when({"recording": "monday", "lasts": True})
+    ('in monday', 'from monday on')
+    """
+    return f"from {claim['recording']} on" if claim.get("lasts") else f"in {claim['recording']}"

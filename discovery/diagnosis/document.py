@@ -50,6 +50,7 @@ class _Claimed(TypedDict):
     effect: str
     states: list[str]
     recording: str | None
+    lasts: bool
     channels: list[str]
 
 
@@ -107,6 +108,7 @@ def _claim(h: Hypothesis) -> _Claimed:
         "effect": h.effect.word,
         "states": list(h.places),
         "recording": h.recording,
+        "lasts": h.effect.acts == "from a recording on",
         "channels": list(h.follows),
     }
 

@@ -26,6 +26,7 @@ class Claim(Strict):
     effect: str
     states: list[str] = Field(description="states it enters; for a measurement fault the output or input")
     recording: str | None = Field(None, description="the one in which it acts, or begins to act")
+    lasts: bool = Field(default=False, description="whether it acts in all later recordings, too")
     channels: list[str] = Field(default_factory=list, description="inputs that it follows")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from discovery.diagnosis.thresholds import RIVAL
-from discovery.printed import printed, undetermined
+from discovery.printed import printed, undetermined, when
 from discovery.runfolder import read_diagnosis
 
 _NOISE = "reading noise and heat that nobody records explain"
@@ -105,7 +105,7 @@ def _place(claim: dict[str, Any]) -> str:
     states = claim.get("moved") or claim["states"]
     places = [f"at {', '.join(states)}"] if states else []
     places += [f"from {', '.join(claim['channels'])}"] if claim.get("channels") else []
-    return " ".join([*places, *([f"in {claim['recording']}"] if claim.get("recording") else [])])
+    return " ".join([*places, *([when(claim)] if claim.get("recording") else [])])
 
 
 def _is_known(q: dict[str, Any], claim: dict[str, Any]) -> bool:

@@ -215,11 +215,13 @@ def _between_two(effect: Effect, model: Model, spot: Spot, channels: tuple[str, 
     """The exchange of a body with what another thermometer reads, no faster than readings come: where most of
     a difference is gone at the next one, both read one body, and neither is known to heat the other.
     """
-    thermometer = any(ROLES[scene.channels[name].role].measured for name in channels)
-    if not thermometer or effect.amplitude.unit != "W/K" or len(spot.bodies) != 1 or not scene.spacing:
+    heats = [name for name in channels if ROLES[scene.channels[name].role].measured]
+    read = [name for name in (*spot.bodies, *heats) if name in {*scene.outputs, *heats} - {*model.outputs}]
+    if effect.amplitude.unit != "W/K" or len(read) < 2 or spot.each or not scene.spacing:
         return effect
-    capacity = model.states[spot.bodies[0]].capacity or TIME_UNITS[model.time_unit]
-    most = min(effect.amplitude.most, capacity / scene.spacing)
+    unit = TIME_UNITS[model.time_unit]
+    rate = sum(1 / (model.states[b].capacity or unit) for b in spot.bodies[: 1 if heats else None])
+    most = min(effect.amplitude.most, 1 / (rate * scene.spacing))
     return replace(effect, amplitude=replace(effect.amplitude, most=most))
 
 

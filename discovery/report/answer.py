@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from discovery.printed import counted
+from discovery.printed import counted, when
 from discovery.report.heat import diagnosed_key, subject
 from discovery.report.lead import Lead, lead_over
 from discovery.report.mismatch import NEAR, leads, sizes
@@ -259,7 +259,7 @@ def _grouped(found: Sequence[Mapping[str, Any]]) -> str:
 
 def _placed(one: Mapping[str, Any]) -> str:
     states = listed([str(state) for state in one.get("moved") or one.get("states", [])])
-    where = f" at {states}" if states else f" in {one['recording']}" if one.get("recording") else ""
+    where = f" at {states}" if states else f" {when(one)}" if one.get("recording") else ""
     follows = f" from {listed(one['channels'])}" if one.get("channels") else ""
     return f"{words(str(one.get('effect', 'unknown')))}{where}{follows}"
 

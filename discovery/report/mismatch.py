@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from discovery.printed import undetermined
+from discovery.printed import undetermined, when
 from discovery.report.heat import heat_charts, heat_unit, subject, unit_of
 from discovery.report.printed import Line, Printed
 from discovery.report.ranking import rms_unit
@@ -104,7 +104,7 @@ def _place(one: Mapping[str, Any]) -> str:
     parts = [
         places,
         f"from {listed(one['channels'])}" if one.get("channels") else "",
-        f"in {one['recording']}" if one.get("recording") else "",
+        when(one) if one.get("recording") else "",
         _hours(one),
     ]
     return " ".join(part for part in parts if part) or "all inputs"

@@ -56,3 +56,30 @@ def test_what_reads_the_same_body_does_not_heat_it(same: bool, cause: str) -> No
     )
     answer = document(diagnose(unheated, Campaign("body", channels, runs), ["a", "b"], (), ["body"]))
     assert [(p.effect, p.channels) for p in answer.physics] == [("input_heat", [cause])]
+
+
+def test_a_path_that_joins_two_readings_at_once_is_no_path() -> None:
+    """The model predicts both thermometers and heats the second one alone. Both read the same body: a path
+    without end between them explains the first as well as its heat does, and is no path.
+    """
+    first = np.repeat([0.0, 40.0, 10.0, 60.0, 0.0], 60)
+    second = np.repeat([20.0, 0.0, 50.0, 5.0, 30.0], 60)
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "air": Channel("air", "ambient temperature", "degC", None, "linear"),
+        "body": Channel("body", "temperature", "degC", NOISE[0], "linear"),
+        "other": Channel("other", "temperature", "degC", NOISE[1], "linear"),
+    }
+    runs = {"a": recording(first, 1, "a", same=True), "b": recording(second, 2, "b", same=True)}
+    states = {n: State(n, "degC", CAPACITY, parse("air"), scale=1.0 / CAPACITY) for n in ("body", "other")}
+    terms = (
+        Term("heat", "other", parse("P")),
+        Term("air at body", "body", parse("hA*(air - body)")),
+        Term("air at other", "other", parse("hB*(air - other)")),
+    )
+    sizes = {name: Parameter(EXCHANGE, "W/K", 0.0) for name in ("hA", "hB")}
+    answer = document(
+        diagnose(Model("two", sizes, states, terms, {}), Campaign("two", channels, runs), ["a", "b"])
+    )
+    assert {("input_heat", "body")} <= {(p.effect, *p.states) for p in answer.physics}
+    assert "conduction_path" not in {p.effect for p in answer.physics}
