@@ -91,6 +91,8 @@ def _by_noise(one: dict[str, Any], unit: str, noise: str = _NOISE) -> str:
         return f"{noise} all of it"
     expected = one.get("expected") or floor
     unsure = f", with what the fit leaves open {printed(expected)}{unit}" if expected > _OPEN * floor else ""
+    if expected > max(r or 0.0 for r in rms):
+        unsure = ", and the fit leaves open more than the rest" if unsure else ""
     return f"{noise} up to {printed(floor)}{unit}{unsure}"
 
 

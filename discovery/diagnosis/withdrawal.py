@@ -81,7 +81,7 @@ def unfinished(verdict: Verdict, fitting: Improvement, unit: str) -> Verdict:
     if not (verdict.named or verdict.word == NO_MISMATCH) or not _misses(fitting, rms, power=2):
         return verdict
     still = "still " if verdict.named else ""
-    missed = f"free runs on the fitted recordings {still}miss by {_size(fitting, rms)} {unit}"
+    missed = f"free runs on the fitted recordings {still}miss by {_size(fitting, rms, unit)}"
     only_laws = all(n.hypothesis.effect.is_law for n in verdict.named)
     if verdict.named and fitting.mostly and only_laws:
         reason = f"something else acts as well, or the named laws are not exact: {missed}"
@@ -108,8 +108,10 @@ def _misses(run: Improvement, rms: float, power: int = 1) -> bool:
     return rms**power > thresholds.MISSED * run.expected**power
 
 
-def _size(run: Improvement, rms: float) -> str:
-    return f"{printed(rms)} ({printed(run.expected)} expected)"
+def _size(run: Improvement, rms: float, unit: str) -> str:
+    """What a free run misses, with its unit, and what noise and the fit make likely."""
+    of = "" if unit == "1" else f" {unit}"
+    return f"{printed(rms)}{of} ({printed(run.expected)} expected)"
 
 
 def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) -> Verdict:
@@ -120,10 +122,10 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
     missed = [run for run, i in proof.items() if _misses(i, rms[run])]
     if not missed:
         return verdict
-    sizes = ", ".join(f"{_size(proof[r], rms[r])} on {r}" for r in missed)
+    sizes = ", ".join(f"{_size(proof[r], rms[r], unit)} on {r}" for r in missed)
     reason = (
         "from any start, free runs on held-out recordings miss more than noise and the fit explain: "
-        f"rms {sizes} {unit}; something acts there that the recordings to fit do not show"
+        f"rms {sizes}; something acts there that the recordings to fit do not show"
     )
     word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
     return replace(verdict, word=word, reasons=(*verdict.reasons, reason))

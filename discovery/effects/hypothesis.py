@@ -8,6 +8,7 @@ from math import inf
 
 from discovery.effects.form import Effect
 from discovery.models import Model, Parameter
+from discovery.printed import when
 from discovery.terms import Apply, Expression, Name, Term, names, substitute
 
 BEFORE = Name("what the output showed before")  # no channel has such a name
@@ -55,6 +56,13 @@ class Hypothesis:
         """The places, with the inputs that it follows, or the recording of what concerns all of it."""
         follows = f" from {', '.join(self.follows)}" if self.follows else ""
         return (", ".join(self.places) or self.recording or "all recordings") + follows
+
+    @property
+    def in_words(self) -> str:
+        """The effect, where it acts, and the recording of an event."""
+        run = {"recording": self.recording, "lasts": self.effect.acts == "from a recording on"}
+        event = f" {when(run)}" if self.recording and self.places else ""
+        return f"{self.effect.word} at {self.where}{event}"
 
     @property
     def follows(self) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from discovery.dynamics import Grid
 from discovery.dynamics.grid import MOVED
 from discovery.fitting import Fit, make_problem
 from discovery.fitting.noise import resolution, roughness
+from discovery.printed import printed
 from discovery.recordings import Campaign
 
 SAID = 3.0  # standard errors beyond which what was found is said
@@ -88,7 +89,8 @@ def sentences(fit: Fit) -> list[str]:
     found: dict[str, list[str]] = {}
     for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
         if u.is_late and u.prior and abs(value) > max(SAID * error, SMALL * u.prior[1]):
-            late = f"{abs(value):.0f} s {'late' if value > 0 else 'early'} in {u.recording}"
+            size = f"{abs(value):.0f}" if abs(value) >= 1 else printed(abs(value), 2)
+            late = f"{size} s {'late' if value > 0 else 'early'} in {u.recording}"
             found.setdefault(u.name, []).append(late)
     runs = len(fit.trajectories)
     return [

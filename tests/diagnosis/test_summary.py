@@ -119,7 +119,7 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
     improvement["fit"] = {**left, "expected": 9.87}
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
     (line,) = summary(tmp_path)[1:-1]
-    assert line.endswith("with what the fit leaves open 9.87 times the reading noise)")
+    assert line.endswith("4.6 times the reading noise, and the fit leaves open more than the rest)")
     (tmp_path / "diagnosis.json").write_text(json.dumps(document | {"verdict": "unexplained"}), "utf-8")
     (line,) = summary(tmp_path)[1:-1]
     assert "process noise as large as this model needs explain up to 4.6" in line

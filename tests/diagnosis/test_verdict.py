@@ -634,7 +634,7 @@ def test_what_only_unseen_recordings_show_is_unexplained() -> None:
     assert unforeseen(nothing, {"r3": near}, "um") is nothing
     other = unforeseen(nothing, {"r3": near, "r4": far}, "um")
     assert other.word == "unexplained"
-    assert "rms 2.1 (1 expected) on r4 um" in other.reasons[-1]
+    assert "rms 2.1 um (1 expected) on r4" in other.reasons[-1]
     better = Improvement(2.1, 0.5, 0.8, 0.0, 0.0, {}, unsure=0.6)  # a repair whose names were withdrawn
     assert unforeseen(nothing, {"r4": better}, "um").word == "unexplained"
     named = said(WET, {"fluid_convection": 0.9})
@@ -654,7 +654,7 @@ def test_names_that_leave_more_than_they_explain_are_withdrawn() -> None:
     )
     withdrawn = unfinished(named, poor, "um")
     assert (withdrawn.word, withdrawn.named, withdrawn.candidates) == ("unexplained", (), named.named)
-    assert "miss by 3.9 (1.6 expected) um" in withdrawn.reasons[0]
+    assert "miss by 3.9 um (1.6 expected)" in withdrawn.reasons[0]
     kept = unfinished(named, half, "um")
     assert kept.named == named.named
     assert kept.reasons[0].startswith("something else acts as well, or the named laws are not exact")
@@ -682,7 +682,7 @@ def test_a_model_that_misses_its_own_recordings_does_not_lack_nothing() -> None:
     far, near = (Improvement(rms, 0.5, 1.38, 0.0, 0.0, {}) for rms in (5.2, 1.9))
     other = unfinished(nothing, far, "K")
     assert (nothing.word, other.word) == ("no mismatch", "unexplained")
-    assert "free runs on the fitted recordings miss by 5.2 (1.38 expected) K" in other.reasons[0]
+    assert "free runs on the fitted recordings miss by 5.2 K (1.38 expected)" in other.reasons[0]
     assert unfinished(nothing, near, "K") is nothing
 
 
