@@ -42,7 +42,8 @@ class Sizes:
 
     def _of(self, h: Hypothesis) -> list[tuple[float, float, float]]:
         amplitude, count = h.effect.amplitude, len(h.amplitudes)
-        if amplitude.most < np.inf or (h.terms and not h.effect.is_physics):
+        is_share = amplitude.most < np.inf and amplitude.unit == "1"
+        if is_share or (h.terms and not h.effect.is_physics):
             return [(amplitude.plausible, thresholds.FACTOR, float(amplitude.sign))] * count
         if h.shown:
             return [
