@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from discovery.diagnosis.context import Context, with_coarser
-from discovery.diagnosis.scored import Scored, under_noise_of
+from discovery.diagnosis.scored import Scored, is_large, under_noise_of
 from discovery.effects.hypothesis import Hypothesis
 from discovery.terms import Name
 from discovery.terms.expression import names
@@ -36,15 +36,15 @@ def with_coarse_bodies(context: Context, model: Scored) -> Context:
 
 
 def judging(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> list[int]:
-    """Outputs by which effects are judged in free runs: what a coarse body shows says nothing of effects that
-    act elsewhere, as long as other outputs are read.
+    """Outputs by which effects are judged in free runs: what shows a coarse body alone says nothing of
+    effects that act elsewhere, as long as other outputs are read.
     """
     coarse = set(answer.noise.force or {})
     every = list(range(len(context.outputs)))
     if not chosen or any(coarse & set(h.states) for h in chosen):
         return every
     shown = [names(context.model.outputs.get(name, Name(name))) for name in context.outputs]
-    return [y for y in every if not coarse & shown[y]] or every
+    return [y for y in every if not shown[y] or not shown[y] <= coarse] or every
 
 
 def sentences(answer: Scored) -> list[str]:
@@ -54,5 +54,5 @@ def sentences(answer: Scored) -> list[str]:
         f"the flows at {state} are wrong by about {100 * share:.0f} %, those elsewhere by "
         f"{100 * noise.share:.0f} %: something acts at {state} that no effect explains"
         for state, (_, share) in (noise.force or {}).items()
-        if share > noise.share
+        if is_large(share) and share > noise.share
     ]
