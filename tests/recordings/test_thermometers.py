@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from discovery.recordings.campaign import Channel
+from discovery.recordings.compare.pairs import pair_findings
 from discovery.recordings.compare.seen import Seen
 from discovery.recordings.compare.temperatures import temperature_findings
 from tests.recordings.conftest import CAMPAIGN, Write, found
@@ -71,3 +72,20 @@ def test_a_body_that_warms_while_its_readings_are_missing_is_sound(write: Write)
     for k in range(146, 157):  # rows without a reading around the step
         lines[k] = lines[k].rsplit(",", 1)[0] + ","
     assert not [one for one in found(write(lines, BODY % ', between = "linear"')) if "jumps from" in one]
+
+
+@pytest.mark.parametrize("frozen", [True, False])
+def test_a_thermometer_that_stands_still_while_its_sibling_goes_on_is_frozen(frozen: bool) -> None:
+    """Two modules under one sun, read every 15 min; one keeps a reading for 6 h on the last day."""
+    rng, hours = np.random.default_rng(5), np.arange(0.0, 24.0, 0.25)
+    channels = {n: Channel(n, "temperature", "degC", None, "linear") for n in ("left", "right")}
+    days = []
+    for k, sun in enumerate((30.0, 20.0, 26.0)):
+        warm = sun * np.maximum(0.0, np.sin(np.pi * (hours - 6) / 12)) + rng.normal(0.0, 1.0, hours.size)
+        left, right = (5.0 + warm + rng.normal(0.0, 0.1, hours.size) for _ in range(2))
+        if frozen and k == 2:
+            left[28:53] = left[28]
+        values = {"left": left, "right": right}
+        days.append(Seen(f"day{k}", Path(f"day{k}.csv"), 3600.0 * hours, values, np.arange(hours.size)))
+    found = [f for f in pair_findings(days, channels) if f.kind == "stuck"]
+    assert [(f.file.name, f.channel) for f in found] == ([("day2.csv", "left")] if frozen else [])

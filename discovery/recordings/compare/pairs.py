@@ -1,4 +1,4 @@
-"""Two inputs that move together in the other recordings: exchanged, or one of them stands still."""
+"""Two channels that move together in the other recordings: exchanged, or one of them stands still."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ _APART = 2.0  # times the usual spread: another level
 _DIGITS = 2.0  # times its last digit: what an input should move by while it stays at one value
 _KEEPS = 0.8  # of the readings after one at that value have it, too
 _STILL, _LINE = 0.1, 0.8  # of the recording; correlation elsewhere
+_GOES_ON = 0.3  # of what the other one moves in all: it does not stand still, too
 _NEAR, _HELD = 0.02, 0.01  # of the range elsewhere; of the readings elsewhere: a value that was held there
 _RELATED = 0.5  # of what a channel moves: what a straight line of its sibling leaves
 
 
 def pair_findings(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -> Iterator[Finding]:
-    """Pairs of inputs of which one looks swapped, frozen, or at the end of its range."""
+    """Pairs of inputs of which one looks swapped; channels that look frozen, or at the end of their range."""
     inputs = [channel for channel in channels.values() if channel.is_input]
     yield from _exchanged(recordings, inputs)
-    yield from _stuck(recordings, inputs)
+    yield from _stuck(recordings, [c for c in channels.values() if c.is_input or c.measured])
 
 
 def _exchanged(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Finding]:
@@ -50,16 +51,17 @@ def _exchanged(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterato
                     )
 
 
-def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Finding]:
-    """An input that keeps one value while another one, with which it moves elsewhere, goes on: frozen or
-    full.
+def _stuck(recordings: Sequence[Seen], read: Sequence[Channel]) -> Iterator[Finding]:
+    """A channel that keeps one value while another one, with which it moves elsewhere, goes on: frozen or
+    full. The other one is an input next to an input, or has the same unit.
 
-    Only values of the other input that occur elsewhere count. Nothing says where an input stands at others: a
-    pump stays on while its flow is set to new rates.
+    Only values of the other channel that occur elsewhere count. Nothing says where an input stands at others:
+    a pump stays on while its flow is set to new rates.
     """
-    for b in inputs:
-        for a in inputs:
-            if a.name == b.name or (a.unit == "degC") != (b.unit == "degC"):
+    for b in read:
+        for a in read:
+            alike = a.unit == b.unit or (a.is_input and b.is_input and "degC" not in (a.unit, b.unit))
+            if a.name == b.name or not alike:
                 continue
             both = {
                 one.name: pair for one in recordings if (pair := _together(one, a.name, b.name)) is not None
@@ -79,7 +81,7 @@ def _stuck(recordings: Sequence[Seen], inputs: Sequence[Channel]) -> Iterator[Fi
                 digits = smallest_step(np.concatenate([o[1] for o in others]))
                 # what is set comes and goes, by steps of any size; a sensor moves by more than its digits
                 seen = b.between == "held" or (moves > _DIGITS * digits and _lasts(still))
-                if known.mean() > _STILL and goes_on > 0.4 and usual < 0.5 * goes_on and seen:
+                if known.mean() > _STILL and goes_on > _GOES_ON and usual < 0.5 * goes_on and seen:
                     what = (
                         f"'{b.name}' stays at {value:.4g} in {still.mean():.0%} of the recording "
                         f"while '{a.name}', with "
