@@ -39,7 +39,7 @@ def judging(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> l
     """Outputs by which effects are judged in free runs: what shows a coarse body alone says nothing of
     effects that act elsewhere, as long as other outputs are read.
     """
-    coarse = set(answer.noise.force or {})
+    coarse = set(_coarse(answer))
     every = list(range(len(context.outputs)))
     if not chosen or any(coarse & set(h.states) for h in chosen):
         return every
@@ -48,11 +48,16 @@ def judging(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> l
 
 
 def sentences(answer: Scored) -> list[str]:
-    """What is said of each body that is off by more than the others."""
-    noise = answer.noise
+    """What is said of each body that is off by more than the others, and than is usual."""
     return [
         f"the flows at {state} are wrong by about {100 * share:.0f} %, those elsewhere by "
-        f"{100 * noise.share:.0f} %: something acts at {state} that no effect explains"
-        for state, (_, share) in (noise.force or {}).items()
-        if is_large(share) and share > noise.share
+        f"{100 * answer.noise.share:.0f} %: something acts at {state} that no effect explains"
+        for state, share in _coarse(answer).items()
     ]
+
+
+def _coarse(answer: Scored) -> dict[str, float]:
+    """Share by which the flows of each such body are wrong."""
+    noise = answer.noise
+    each = {state: share for state, (_, share) in (noise.force or {}).items()}
+    return {state: share for state, share in each.items() if is_large(share) and share > noise.share}
