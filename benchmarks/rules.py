@@ -47,6 +47,7 @@ SHOWN = {  # what is shown with an answer, not the answer
     "diagnosis/document.py": "CONSIDERED WRONG_READINGS",
     "diagnosis/location.py": "*",
     "diagnosis/proof.py": "CLOSABLE",
+    "diagnosis/ratios.py": "*",
     "diagnosis/response.py": "*",
     "diagnosis/regime.py": "ACTS MOST HOLDS",
     "diagnosis/summary.py": "_OPEN",

@@ -25,10 +25,12 @@ from discovery.diagnosis.form import (
     ResponseDocument,
     ResponsePart,
     Size,
+    SizeRatio,
     Window,
     WrongReading,
 )
 from discovery.diagnosis.proof import Improvement, unit_of
+from discovery.diagnosis.ratios import known_ratio
 from discovery.diagnosis.response import Response
 from discovery.diagnosis.thresholds import RIVALS_SHOWN
 from discovery.diagnosis.verdict import FAULT, UNEXPLAINED, Named
@@ -37,6 +39,7 @@ from discovery.effects.catalogue import catalogue
 from discovery.effects.form import LEVEL
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.latent_force import alike, heat_over_time
+from discovery.printed import undetermined
 from discovery.terms import names, parse, text
 
 if TYPE_CHECKING:
@@ -143,6 +146,14 @@ def _stated_at(d: Diagnosis, h: Hypothesis) -> str | None:
     return f"{channel} = {d.context.scene.largest[channel]:.3g} {'' if unit == '1' else unit}".rstrip()
 
 
+def _ratio(d: Diagnosis, size: str) -> SizeRatio | None:
+    found = known_ratio(d.alone, size)
+    if found is None:
+        return None
+    value, low, high = (number(v) for v in (found.value, found.low, found.high))
+    return SizeRatio(to=found.to, value=value, low=low, high=high)
+
+
 def _physics(d: Diagnosis, n: Named) -> Physics:
     h, after = n.hypothesis, d.after
     assert after is not None
@@ -159,6 +170,7 @@ def _physics(d: Diagnosis, n: Named) -> Physics:
             unit=p.unit,
             at=_stated_at(d, h) if name in h.amplitudes else None,
             output=output.get(name),
+            ratio=_ratio(d, name) if undetermined(low, high) else None,
         )
     beyond = [s for s in sizes.values() if s.output and s.low is not None and s.high is not None]
     moved = [str(s.output) for s in beyond if not (s.low or 0.0) <= 0.0 <= (s.high or 0.0)]

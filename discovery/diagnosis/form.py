@@ -9,6 +9,15 @@ from discovery.schema import Strict
 Number = float | None
 
 
+class SizeRatio(Strict):
+    """The ratio of a size that is not determined to another parameter: it is known."""
+
+    to: str = Field(description="the other parameter")
+    value: Number
+    low: Number = Field(description="95 % interval")
+    high: Number
+
+
 class Size(Strict):
     """A parameter of an effect that was found."""
 
@@ -18,6 +27,7 @@ class Size(Strict):
     unit: str
     at: str | None = Field(None, description="speed, or value of an input, that it is a size at")
     output: str | None = Field(None, description="output that it is a size of, where each has its own")
+    ratio: SizeRatio | None = Field(None, description="what is known of a size that is not determined")
 
 
 class Claim(Strict):

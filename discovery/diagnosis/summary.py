@@ -124,4 +124,7 @@ def _size(name: str, q: dict[str, Any]) -> str:
     unit += f" at {q['at']}" if q.get("at") else ""
     ends = f"{printed(q['low'], 4)} to {printed(q['high'], 4)}"
     interval = f" ({ends}{undetermined(q['low'], q['high'])})" if q["low"] != q["high"] else ""
+    if known := q.get("ratio"):
+        ends = f"{printed(known['low'], 4)} to {printed(known['high'], 4)}"
+        interval = f" (not determined; {name}/{known['to']} = {printed(known['value'], 4)}, {ends})"
     return f"{name} = {printed(q['value'], 4)}{unit}{interval}"

@@ -87,11 +87,19 @@ def sizes(one: Mapping[str, Any]) -> list[str]:
     moved = one.get("moved") or one.get("states") or []
     return [
         f"{name} = {number(p.get('value'))} {pretty_unit(str(p.get('unit', '')))} {_speed(p)}"
-        f"(95 %: {number(p.get('low'))} to {number(p.get('high'))}"
-        f"{undetermined(p.get('low'), p.get('high'))})"
+        f"({_interval(name, p)})"
         for name, p in (one.get("parameters") or {}).items()
         if p.get("low") != p.get("high") and p.get("output") in (None, *moved)
     ]
+
+
+def _interval(name: str, size: Mapping[str, Any]) -> str:
+    """The interval of a size, or of its ratio to another parameter, where that alone is known."""
+    if known := size.get("ratio"):
+        ends = f"95 %: {number(known.get('low'))} to {number(known.get('high'))}"
+        return f"not determined; {name}/{known['to']} = {number(known.get('value'))}, {ends}"
+    low, high = size.get("low"), size.get("high")
+    return f"95 %: {number(low)} to {number(high)}{undetermined(low, high)}"
 
 
 def _speed(size: Mapping[str, Any]) -> str:
