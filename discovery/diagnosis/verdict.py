@@ -310,14 +310,14 @@ def _apart(found: Search, answer: Scored, rest: Sequence[Named], least: float) -
         sentence = _unsure(n, added, least)
         if n.rivals and n.rivals[0].below < added:
             other, below = n.rivals[0].hypothesis, n.rivals[0].below
-            sentence += f"; {other.in_words} instead has {below:.1f} less"
+            sentence += f"; {other.stated} instead has {below:.1f} less"
         sentences.append(sentence)
     return tuple(sentences)
 
 
 def _unsure(n: Named, added: float, least: float) -> str:
     """Why an effect of the answer has no name."""
-    name = n.hypothesis.in_words
+    name = n.hypothesis.stated
     chance = f"probability {_chance(n.probability)}"
     if added >= least and n.together >= thresholds.NAMED:
         return (

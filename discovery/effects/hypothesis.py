@@ -58,7 +58,7 @@ class Hypothesis:
         return (", ".join(self.places) or self.recording or "all recordings") + follows
 
     @property
-    def in_words(self) -> str:
+    def stated(self) -> str:
         """The effect, where it acts, and the recording of an event."""
         run = {"recording": self.recording, "lasts": self.effect.acts == "from a recording on"}
         event = f" {when(run)}" if self.recording and self.places else ""

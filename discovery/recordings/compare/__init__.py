@@ -16,7 +16,7 @@ from discovery.recordings.finding import Finding
 
 __all__ = ["Seen", "compare", "copies"]
 
-# what no fit survives keeps a recording from being used, if its readings show it, too
+# what no fit survives keeps a recording from being used; the rest is worth a look
 _ERRORS = ("unit", "time", "sign", "swap", "halfway")
 _WEIGHTS = {"unit": 9.0, "time": 8.0, "sign": 7.0, "swap": 7.0, "halfway": 6.0, "factor": 4.0, "shift": 3.0}
 
@@ -46,7 +46,7 @@ def compare(path: Path, recordings: Sequence[Seen], channels: Mapping[str, Chann
 
 def _disagreement(seen: Seen, one: Disagreement) -> Finding:
     repair = one.repair
-    severity: Literal["error", "warning"] = "error" if repair.kind in _ERRORS and one.shown else "warning"
+    severity: Literal["error", "warning"] = "error" if repair.kind in _ERRORS else "warning"
     proof = f"undone, it agrees with the other recordings: misfit {one.before:.0%} -> {one.after:.0%}"
     channel = repair.channels[0] if repair.channels else ""
     weight = _WEIGHTS.get(repair.kind, 2.0)

@@ -134,12 +134,7 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
         # an offset of free size and place fits a little of anything: it has to explain the whole
         helps = agrees and (whole or (gain > least and repair.kind != "offset"))
         if helps and not any(_begins_apart(known, repair, y) for y in touched):
-            found.append(
-                (
-                    gain - 2 * _DOUBT[repair.kind],
-                    Disagreement(one.name, repair, b, a, limit, gain, _comes_home(known, one, repair)),
-                )
-            )
+            found.append((gain - 2 * _DOUBT[repair.kind], Disagreement(one.name, repair, b, a, limit, gain)))
     return found
 
 
@@ -164,7 +159,7 @@ def _goes_elsewhere(known: CrossPrediction, one: Seen, repair: Repair) -> bool:
     Their unit, sign and column are right then: programs use the same speeds and flows, loggers the same
     interval. So is a temperature that goes on from one reading to the next, and would jump.
     """
-    there, then = _places(known, one, repair, [n for n in repair.channels if known.channels[n].is_input])
+    there, then = _places(known, one, repair)
     return then - there > _CLEARLY or _jumps_then(known, one, repair)
 
 
@@ -178,19 +173,9 @@ def _jumps_then(known: CrossPrediction, one: Seen, repair: Repair) -> bool:
     return False
 
 
-def _comes_home(known: CrossPrediction, one: Seen, repair: Repair) -> bool:
-    """Return whether what a repair changes lies nearer to the other recordings after it: the readings
-    themselves show the damage, not only how the machine answers.
-    """
-    there, then = _places(known, one, repair, repair.channels)
-    return there - then > _CLEARLY
-
-
-def _places(
-    known: CrossPrediction, one: Seen, repair: Repair, channels: Sequence[str]
-) -> tuple[float, float]:
-    """How far some channels, or the time between two readings, lie from the other recordings, without a
-    repair and after it.
+def _places(known: CrossPrediction, one: Seen, repair: Repair) -> tuple[float, float]:
+    """How far the inputs that a repair changes, or the time between two readings, lie from the other
+    recordings, without it and after it.
     """
     others = [other for other in known.recordings.values() if other.name != one.name]
     if repair.kind == "time":
@@ -199,7 +184,8 @@ def _places(
     there = then = 0.0
     # two heaters of one unit may stand in for each other: a swap shows in other units alone
     alike = repair.kind == "swap" and len({known.channels[n].unit for n in repair.channels}) == 1
-    for name in channels if repair.kind in _SCALED and not alike else ():
+    inputs = [name for name in repair.channels if known.channels[name].is_input]
+    for name in inputs if repair.kind in _SCALED and not alike else ():
         now, made = one.values[name], repair.made.values[name]
         usual = np.concatenate([now[now == made], *(o.values[name] for o in others if name in o.values)])
         there += _away(now[now != made], usual)

@@ -31,9 +31,7 @@ class Repair:
 
 @dataclass(frozen=True)
 class Disagreement:
-    """A repair that makes a recording agree: misfit before and after, in parts of the movement. `shown`: the
-    readings themselves lie where other recordings have theirs only after it.
-    """
+    """A repair that makes a recording agree: misfit before and after, in parts of the movement."""
 
     recording: str
     repair: Repair
@@ -41,7 +39,6 @@ class Disagreement:
     after: float
     usual: float
     gain: float
-    shown: bool = False
 
 
 _FACTORS: dict[str, tuple[tuple[float, str, str], ...]] = {
