@@ -196,7 +196,7 @@ def _identity(world: World, effect: Effect, at: Place, size: float, shapes: Shap
 
 
 def _two(rng: Draw, world: World) -> tuple[dict[str, Columns], Key]:
-    """Two effects of their own words and bodies, each well visible alone."""
+    """Two effects of their own words and bodies, each well visible next to what is there already."""
     possible = [
         e
         for e in EFFECTS.values()
@@ -207,9 +207,10 @@ def _two(rng: Draw, world: World) -> tuple[dict[str, Columns], Key]:
         taken = tuple(body for key in keys for body in (*key["states"], key.get("output", "")))
         machine, key = sized(rng, both, possible[int(k)], OF_TWO, taken)
         here = {*key["states"], key.get("output", "")}
-        if both.size(machine) < VISIBLE or here & set(taken):
+        size = both.size(machine)
+        if size < VISIBLE or here & set(taken):
             continue
-        both, keys = replace(both, machine=machine), [*keys, key]
+        both, keys = replace(both, machine=machine), [*keys, key | {"rms_over_noise": round(size, 3)}]
         if len(keys) == 2:
             break
     accepts = ["unexplained"] if any("unexplained" in key.get("accepts", ()) for key in keys) else []

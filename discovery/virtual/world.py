@@ -65,13 +65,20 @@ class World:
         }  # fmt: skip
 
     def change(self, machine: Machine) -> Array:
-        """Change (R,) of what the baseline leaves to fit, over noise, when the machine is this one.
+        """Change (R,) of what the baseline leaves, over noise, when the machine of this world is this one.
 
         The baseline runs on the inputs that this machine shows: a chiller that switches at other times, or a
         warmer sump, stands in the log.
         """
-        logs = self.logs(machine, FIT)
-        return self.fitted.residual - self.fitted.on(machine, logs)
+        return self.left - self.fitted.on(machine, self.logs(machine, FIT))
+
+    @cached_property
+    def left(self) -> Array:
+        """What the fitted baseline leaves (R,) of the machine of this world, over noise.
+
+        It is the residual of the fit, unless something is concealed in this machine already.
+        """
+        return self.fitted.on(self.machine, self.logs(self.machine, FIT))
 
     def size(self, machine: Machine) -> float:
         """Rms over noise that the first step of a refit leaves of a change."""

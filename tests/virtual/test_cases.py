@@ -159,6 +159,26 @@ def test_size_grows_with_the_effect_and_ignores_what_a_refit_absorbs(world: Worl
     assert world.size(absorbed) < 0.05 * moved  # and a refit follows
 
 
+def test_an_effect_next_to_another_is_as_large_as_asked_by_itself(world: World) -> None:
+    """What another one shows already is none of its size. Only free convection is not in proportion here."""
+    heat = EFFECTS["input_heat"]
+    small, large = (heat.conceal(world.machine, ("base",), w, Shapes()) for w in (2.0, 8.0))
+    there = replace(world, machine=large)
+    assert there.size(large) == 0.0
+    both = heat.conceal(large, ("base",), 2.0, Shapes())
+    assert there.size(both) == pytest.approx(world.size(small), rel=0.1)
+
+
+def test_each_of_two_effects_shows(world: World) -> None:
+    from discovery.virtual.cases import OF_TWO, VISIBLE, conceal
+
+    for seed in range(3):
+        _, key = conceal(np.random.default_rng(seed), world, Plan("two"))
+        own = [effect["rms_over_noise"] for effect in key["effects"]]
+        assert all(VISIBLE <= rms < 1.2 * OF_TWO[1] for rms in own)
+        assert key["rms_over_noise"] > VISIBLE
+
+
 def test_visible_is_what_a_nonlinear_refit_leaves(world: World) -> None:
     """Of an offset from half way on: a closed form, of which the refit takes its part."""
     clean = world.logs(world.machine, FIT)
