@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import permutations
 from math import inf
 
 from discovery.diagnosis.context import Context
@@ -146,9 +147,12 @@ class Search:
         return self.scans[one.keys]
 
     def _grown(self, current: Scored) -> Scored:
-        """Add the best candidate, or let an effect act at more places, as long as the posterior grows."""
+        """Add the best candidate, or let an effect act at more places or fewer, as long as the posterior
+        grows.
+        """
         while len(current.hypotheses) < MOST:
-            best = max(self._added(current), self._widened(current), key=lambda one: one.evidence)
+            ways = (self._added(current), self._widened(current), self._narrowed(current))
+            best = max(ways, key=lambda one: one.evidence)
             if best.evidence <= current.evidence:
                 break
             current = best
@@ -177,6 +181,20 @@ class Search:
             others = tuple(o for o in current.hypotheses if o.key != h.key)
             wider = [c for c in self.scanned(current).without[h.key] if c.hypothesis.widens(h)]
             best = max(best, self._refitted(current, others, wider), key=lambda one: one.evidence)
+        return best
+
+    def _narrowed(self, current: Scored) -> Scored:
+        """The best refit where a law at several bodies and the same law once more at some of them become one
+        at the others: what comes second may take back what the first one is too much. `current` if none is
+        better.
+        """
+        best = current
+        for h, again in permutations(current.hypotheses, 2):
+            fewer = h.without(again.states) if h.widens(again) else None
+            if fewer is not None:
+                others = tuple(o for o in current.hypotheses if o.key not in (h.key, again.key))
+                claim = _of_model(fewer, current)
+                best = max(best, self._refitted(current, others, [claim]), key=lambda one: one.evidence)
         return best
 
     def _questioned(self, current: Scored) -> Scored:
@@ -211,9 +229,7 @@ class Search:
                 continue
             if other.evidence - one.evidence < NEAR:
                 rival = next(o for o in one.hypotheses if o.key not in others)
-                values = one.fit.model.parameters
-                sizes = tuple(values[name].value for name in rival.amplitudes)
-                found[rival.key] = Score(rival, 0.0, 0.0, sizes, 1.0, 0)
+                found[rival.key] = _of_model(rival, one)
         return list(found.values())
 
     def _refitted(self, start: Scored, others: Sequence[Hypothesis], pool: Sequence[Score]) -> Scored:
@@ -243,6 +259,12 @@ class Search:
         """Cost of a fit from which it can be part of the answer, or `below` it in log evidence."""
         best = self.best.fit
         return FAR + below + cost_under(best.problem, best.theta, best.trajectories, noise)
+
+
+def _of_model(h: Hypothesis, one: Scored) -> Score:
+    """A claim to be refitted, which no scan has scored, with the sizes that a model has."""
+    values = one.fit.model.parameters
+    return Score(h, 0.0, 0.0, tuple(values[name].value for name in h.amplitudes), 1.0, 0)
 
 
 def _lighter(one: Scored) -> Scored:

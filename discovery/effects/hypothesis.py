@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from math import inf
+from math import inf, log
 
 from discovery.effects.form import Effect
 from discovery.models import Model, Parameter
@@ -80,6 +80,20 @@ class Hypothesis:
         """Whether it is the same law at the bodies of another one and more."""
         same = (self.effect, self.recording, self.channels) == (other.effect, other.recording, other.channels)
         return same and set(self.states) > set(other.states)
+
+    def without(self, bodies: Collection[str]) -> Hypothesis | None:
+        """The same law, of one size, at its bodies except some; None where fewer than two are left, or where
+        it is no law at each of several bodies.
+        """
+        left = tuple(b for b in self.states if b not in bodies)
+        of_each = tuple(t.into for t in self.terms if not t.source)
+        if len(left) < 2 or len(self.amplitudes) > 1 or len(of_each) < len(self.terms):
+            return None
+        if set(of_each) != set(self.states):
+            return None
+        terms = tuple(t for t in self.terms if t.into in left)
+        # any other choice of bodies was as likely before
+        return replace(self, states=left, terms=terms, log_odds=self.log_odds - log(len(self.states)))
 
     def acts_in(self, recording: str) -> bool:
         """Whether it acts in a recording."""

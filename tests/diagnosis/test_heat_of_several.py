@@ -1,4 +1,4 @@
-"""The sun on several bodies, or on one of them."""
+"""The sun on several bodies, on most of them, or on one."""
 
 from __future__ import annotations
 
@@ -27,9 +27,11 @@ def recording(name: str, seed: int, lit: int) -> Recording:
     return Recording(name, time, {"sun": sun, "air": np.full(len(sun), 20.0), **read})
 
 
-@pytest.mark.parametrize("lit", [4, 1])
-def test_an_input_heats_several_bodies_alike_or_one(lit: int) -> None:
-    """Of four rows of collectors one was heated, and the others by exchanges that follow the sun."""
+@pytest.mark.parametrize("lit", [4, 3, 1])
+def test_an_input_heats_several_bodies_alike_most_of_them_or_one(lit: int) -> None:
+    """Of four rows of collectors one was heated, and the others by exchanges that follow the sun; if one was
+    in the shade, all were heated, and an exchange that follows the sun cooled that one.
+    """
     channels = {
         "sun": Channel("sun", "other input", "W/m**2", None, "held"),
         "air": Channel("air", "ambient temperature", "degC", None, "linear"),

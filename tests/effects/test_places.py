@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import exp
+from math import exp, log
 from pathlib import Path
 
 import numpy as np
@@ -294,6 +294,24 @@ def test_one_law_on_a_group_of_bodies_has_one_size() -> None:
     assert set(both.states) == {"motor", "bed"}
     assert len(both.amplitudes) == 1
     assert {t.into for t in both.terms} == {"motor", "bed"}
+
+
+def test_a_law_on_a_group_may_leave_bodies_out() -> None:
+    """It keeps its size; of one body it is another candidate, and what enters two bodies has no parts."""
+    model, channels = sample()
+    air = (Term(f"air at {b}", b, parse(f"hA*(room - {b})")) for b in ("motor", "table"))
+    found = claims(replace(model, terms=(*model.terms, *air)), catalogue()["radiation"], channels)
+    every = next(h for h in found if len(h.states) == 3)
+    fewer = every.without(["bed"])
+    assert fewer is not None
+    assert set(fewer.states) == {"motor", "table"}
+    assert [t.into for t in fewer.terms] == [t.into for t in every.terms if t.into != "bed"]
+    assert fewer.amplitudes == every.amplitudes
+    assert fewer.log_odds == pytest.approx(every.log_odds - log(3.0))
+    assert every.widens(fewer)
+    assert every.without(["bed", "table"]) is None
+    path = claims(model, catalogue()["conduction_path"], channels)[0]
+    assert path.without([]) is None
 
 
 def test_a_jet_spreads_over_two_linked_bodies_with_a_size_at_each() -> None:
