@@ -35,7 +35,7 @@ RESOLUTION = {  # finer gives the same answer in more time
     "diagnosis/coarse_bodies.py": "OPENED",
     "diagnosis/proof.py": "DRAWS BLOCKS",
     "diagnosis/centred.py": "ROUNDS PARTS",
-    "diagnosis/refit.py": "ENOUGH ROUNDS",
+    "diagnosis/refit.py": "ENOUGH LONGEST ROUNDS",
     "diagnosis/scored.py": "KEPT MOVED",
     "diagnosis/selection.py": "MOST REFITS RIVALS HOPE HALF NEAR FAR",
     "diagnosis/tree.py": "_SAME",

@@ -16,6 +16,7 @@ from discovery.fitting import Fit, Noise, Prior, fit_model
 from discovery.models import Model
 
 ENOUGH = 1e-5  # relative change of the cost that ends a refit: far below one unit of log evidence
+LONGEST = 25  # rounds of a refit
 ROUNDS = 3  # of refits under a noise that is more likely
 
 
@@ -53,7 +54,7 @@ def refit(
         belief=context.belief,
         guess=sizes,
         begin=start or context.baseline,
-        max_rounds=25,
+        max_rounds=LONGEST,
         tolerance=ENOUGH,
         goal=goal,
     )

@@ -9,15 +9,18 @@ from math import inf
 import numpy as np
 
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.refit import score
-from discovery.diagnosis.scored import Scored, is_usual
+from discovery.diagnosis.refit import ENOUGH, LONGEST, score
+from discovery.diagnosis.scored import Scored, is_usual, whitened
 from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis, Key
+from discovery.errors import RunsAwayError
 from discovery.evidence.bayes import Score, Without, scan
 from discovery.evidence.events import place_events
 from discovery.evidence.settings import AXES, Setting
 from discovery.evidence.signatures import signatures
+from discovery.evidence.whitening import Whitened
 from discovery.fitting import Noise
+from discovery.fitting.solve import solve
 
 
 @dataclass(frozen=True)
@@ -25,12 +28,14 @@ class Scan:
     """Candidates scored on the residual of a model, best odds first, and on that without one effect.
 
     `quiet`: as if there were little process noise, where the most likely process noise is larger than usual:
-    it may have absorbed the missing physics, and leaves nothing to any candidate.
+    it may have absorbed the missing physics, and leaves nothing to any candidate. `inside`: likewise, with
+    parameters that press against a bound where their author believes them.
     """
 
     claims: tuple[Score, ...]
     without: Mapping[Key, tuple[Score, ...]]
     quiet: tuple[Score, ...] = ()
+    inside: tuple[Score, ...] = ()
 
 
 def scan_model(context: Context, current: Scored) -> Scan:
@@ -47,11 +52,42 @@ def scan_model(context: Context, current: Scored) -> Scan:
     found = scan(current.seen, settings, every, context.slab(every), own)
     by_effect = zip(current.hypotheses, found.without, strict=True)
     coarse = not is_usual(current.settings[current.best])
+    within = inside(context, current)
     return Scan(
         tuple(found.claims),
         {h.key: tuple(claims) for h, claims in by_effect},
         tuple(found.quiet) if coarse else (),
+        tuple(scan(within, settings[-1:], every, context.slab(every)).claims) if within else (),
     )
+
+
+def inside(context: Context, current: Scored) -> Whitened | None:
+    """A model with each parameter that presses against a bound held where its author believes it, the others
+    fitted; None where none presses.
+
+    A body that lacks heat fits best without any loss: it is cut off, and heat alone fits it no better. To
+    first order only a body that is alive shows that both are missing.
+    """
+    problem = current.fit.problem
+    held = {
+        k: u.start
+        for k, u in enumerate(problem.unknowns)
+        if k not in current.seen.moving and not u.is_nuisance and u.low < u.start < u.high
+    }
+    if not held:
+        return None
+    unknowns = [
+        replace(u, low=held[k], high=held[k]) if k in held else u for k, u in enumerate(problem.unknowns)
+    ]
+    theta = np.array([held.get(k, x) for k, x in enumerate(current.fit.theta)])
+    try:
+        found = solve(
+            replace(problem, unknowns=tuple(unknowns)), theta, context.usual, "linear", LONGEST, ENOUGH
+        )
+    except RunsAwayError:
+        return None
+    fit = replace(current.fit, theta=found.theta, trajectories=found.trajectories)
+    return whitened(context, current.hypotheses, fit)
 
 
 def _alike(h: Hypothesis, other: Hypothesis) -> bool:

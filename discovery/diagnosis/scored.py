@@ -214,13 +214,18 @@ class Scored:
         return float(np.sqrt(np.nanmean(z**2)))
 
 
-def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
-    """The score of a fit with a set of effects."""
+def whitened(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Whitened:
+    """A fit with a set of effects, with the form errors of the model and of the effects."""
     own = effect_form(fit.trajectories, chosen)
     extra = tuple(np.concatenate(parts, axis=2) for parts in zip(context.form, own, strict=True))
     spreads = 1.0, 1.0, thresholds.AIR, thresholds.FORM
     spread = np.repeat(spreads, [*context.kinds, own[0].shape[2]])
-    seen = Whitened(fit, context.blocks, extra, spread, context.kinds)
+    return Whitened(fit, context.blocks, extra, spread, context.kinds)
+
+
+def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
+    """The score of a fit with a set of effects."""
+    seen = whitened(context, chosen, fit)
     free = [h for h in chosen if h.effect.amplitude.fixed is None]
     place = {u.name: i for i, u in enumerate(fit.problem.unknowns) if not u.is_nuisance}
     index = np.array([place[name] for h in free for name in h.amplitudes], dtype=np.intp)

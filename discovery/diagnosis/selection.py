@@ -169,7 +169,8 @@ class Search:
             return [c for c in claims if own | {c.hypothesis.key} not in self.lost]
 
         while True:
-            pool = [*hopeful(left(scan.claims), REFITS), *hopeful(left(scan.quiet), RIVALS)]
+            further = (claim for other in (scan.quiet, scan.inside) for claim in hopeful(left(other), RIVALS))
+            pool = [*hopeful(left(scan.claims), REFITS), *further]
             before, best = len(self.lost), self._refitted(current, current.hypotheses, pool)
             if len(self.lost) == before:
                 return best
