@@ -19,8 +19,12 @@ from discovery.dynamics import Grid, predict
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
 from discovery.evaluation.crossvalidation import Fold, folds
-from discovery.fitting import fit_model, from_known_starts, predict_recording
-from discovery.fitting.kalman import innovations
+from discovery.fitting import (
+    fit_model,
+    from_known_starts,
+    innovations_from_known_starts,
+    predict_recording,
+)
 from discovery.recordings import Campaign
 from discovery.threads import side_by_side
 
@@ -32,23 +36,27 @@ Residuals = tuple[Array, Array]  # (R, Y) of a free run and of the filter
 class LeftOut:
     """What effects change of recordings that are left out of the fit.
 
-    `free`: rms of free runs in reading noises. `blocks`: of time, where the models with and without the
-    effects predict differently. `better`: those of them that the model with the effects predicts better.
+    `free`: rms of free runs in reading noises. `gains` (B,): by how much the model with the effects predicts
+    each block of time better, in squares of what a reading says beyond those before it.
     """
 
     free: Improvement
-    better: int
-    blocks: int
+    gains: Array
+
+    @property
+    def blocks(self) -> int:
+        """Blocks of time that the models with and without the effects predict differently."""
+        return int(np.count_nonzero(self.gains))
+
+    @property
+    def better(self) -> int:
+        """Those that the model with the effects predicts better."""
+        return int(np.count_nonzero(np.maximum(self.gains, 0.0)))
 
     @property
     def sure(self) -> bool:
-        """Whether more blocks are better than chance makes them.
-
-        >>> run = Improvement(1.0, 0.9, 0.5, 0.0, 0.0, {})
-        >>> LeftOut(run, 13, 16).sure, LeftOut(run, 12, 16).sure
-        (True, False)
-        """
-        return surely_better(self.better, self.blocks)
+        """Whether blocks get better by more than chance makes them."""
+        return surely_better(self.gains)
 
     @property
     def matters(self) -> bool:
@@ -156,8 +164,7 @@ def _compared(
             beyond[:, mine], beyond[:, mine] if after is None else after[:, mine], blocks
         )
         gains.append(old - new)
-    gain = np.concatenate(gains)
-    return LeftOut(improvement(runs, outputs), int(np.sum(gain > 0)), int(np.sum(gain != 0)))
+    return LeftOut(improvement(runs, outputs), np.concatenate(gains))
 
 
 def _residuals(
@@ -193,8 +200,8 @@ def _residuals(
                 context.grids[name],
             )
             left = run.system.grid.readings - predict(run)
-            left = from_known_starts(run, left, white, together=fit.together)
-            out[name] = left / white, innovations(run, answer.noise, left)
+            free = from_known_starts(run, left, white, together=fit.together)
+            out[name] = free / white, innovations_from_known_starts(run, left, answer.noise)
     except RunsAwayError:
         pass
     return out

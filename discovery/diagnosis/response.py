@@ -292,10 +292,9 @@ def _gains(x: Array, y: Array) -> Array:
 
 
 def _surely(before: Mapping[str, Array], after: Mapping[str, Array]) -> bool:
-    """Whether more blocks of time get better than chance makes them."""
+    """Whether blocks of time get better by more than chance makes them."""
     pairs = [block_sums(before[r][:, None], after[r][:, None]) for r in before]
-    better = np.concatenate([new < old for old, new, _ in pairs])
-    return surely_better(int(better.sum()), len(better))
+    return surely_better(np.concatenate([old - new for old, new, _ in pairs]))
 
 
 def _rms(parts: Sequence[Array]) -> float:

@@ -192,8 +192,8 @@ def _idle(h: Hypothesis, outside: LeftOut) -> str:
     if outside.matters:
         return (
             f"{h.effect.word} at {h.where} makes free runs better on recordings that are left out of the fit "
-            f"(rms over the reading noise: {rms}), but from one reading to the next it predicts only "
-            f"{outside.better} of {outside.blocks} blocks of time better, no more than by chance"
+            f"(rms over the reading noise: {rms}), but from one reading to the next it predicts "
+            f"{outside.better} of {outside.blocks} blocks of time better, and by no more than chance gives"
         )
     return (
         f"{h.effect.word} at {h.where} does not improve free runs enough on recordings that are left out of "

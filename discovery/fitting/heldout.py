@@ -21,6 +21,8 @@ from discovery.dynamics import (
     start_values,
 )
 from discovery.dynamics.system import evened, inputs_of, shifted, uncertain
+from discovery.fitting.kalman import innovations, whiten
+from discovery.fitting.noise import Noise
 from discovery.fitting.problem import read_spread
 from discovery.fitting.resolution import parts_needed
 from discovery.models import Model, State, expanded
@@ -110,6 +112,28 @@ def from_known_starts(
     return residual - moved @ shift
 
 
+def innovations_from_known_starts(run: Trajectory, residual: Array, noise: Noise) -> Array:
+    """What each reading (R, Y) says beyond those before it, in its standard deviations, from the starts that
+    make all readings most likely under a noise.
+
+    The starts of a free run are other ones: where a model misses for hours, they leave its first readings
+    for the hours that follow.
+
+    Args:
+        residual: readings minus model (R, Y), of the whole recording.
+    """
+    unsure = _unsure(run.system, np.array(noise.white), ())
+    if not any(unsure):
+        return innovations(run, noise, residual)
+    spread, moved = _moved(run, unsure)
+    rows = whiten(run, noise, np.concatenate([residual[:, :, None], moved], axis=2))
+    gram = rows[:, 1:].T @ rows[:, 1:] + np.diag(1 / spread**2)
+    out = np.full(residual.shape, np.nan)
+    shift = np.linalg.solve(gram, rows[:, 1:].T @ rows[:, 0])
+    out[run.system.grid.measured] = rows[:, 0] - rows[:, 1:] @ shift
+    return out
+
+
 class Unsure(NamedTuple):
     """What is not exactly known of a recording before its first reading, each with its spread."""
 
@@ -138,12 +162,18 @@ def _shift(
     and what the outputs answer to each, (N, Y, K).
     """
     seen = np.isfinite(residual)
-    spread = np.array([sd for part in unsure for sd in part.values()])
-    moved = sensitivities(run, [*unsure.inputs, *unsure.own], list(unsure.starts))[: len(residual)]
+    spread, moved = _moved(run, unsure)
+    moved = moved[: len(residual)]
     c = (moved / white[None, :, None])[seen]
     gram = c.T @ c / together + np.diag(1 / spread**2)
     shift = np.linalg.solve(gram, c.T @ (residual / white)[seen] / together)
     return np.asarray(shift), moved
+
+
+def _moved(run: Trajectory, unsure: Unsure) -> tuple[Array, Array]:
+    """Spread (K,) of what is not known, in its order, and what the outputs answer to each (R, Y, K)."""
+    spread = np.array([sd for part in unsure for sd in part.values()])
+    return spread, sensitivities(run, [*unsure.inputs, *unsure.own], list(unsure.starts))
 
 
 def _spread(system: System, state: State, white: Mapping[str, float]) -> float:
