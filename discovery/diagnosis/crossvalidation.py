@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from discovery.fitting import (
     innovations_from_known_starts,
     predict_recording,
 )
+from discovery.fitting.noise import readings_as_one
 from discovery.recordings import Campaign
 from discovery.threads import side_by_side
 
@@ -37,11 +38,13 @@ class LeftOut:
     """What effects change of recordings that are left out of the fit.
 
     `free`: rms of free runs in reading noises. `gains` (B,): by how much the model with the effects predicts
-    each block of time better, in squares of what a reading says beyond those before it.
+    each block of time better, in squares of what a reading says beyond those before it. `hours` (H,): the
+    same in squares of the free runs, in blocks so long that what they miss by says the same thing once.
     """
 
     free: Improvement
     gains: Array
+    hours: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def blocks(self) -> int:
@@ -55,8 +58,10 @@ class LeftOut:
 
     @property
     def sure(self) -> bool:
-        """Whether blocks get better by more than chance makes them."""
-        return surely_better(self.gains)
+        """Whether blocks get better by more than chance makes them: from one reading to the next, or, where
+        process noise hides a slow law there, in free runs.
+        """
+        return surely_better(self.gains) or surely_better(self.hours)
 
     @property
     def matters(self) -> bool:
@@ -156,15 +161,21 @@ def _compared(
     blocks: int,
 ) -> LeftOut:
     """Residuals of some outputs without and with effects, compared in so many blocks of each recording."""
-    one, runs, gains = np.ones(len(mine)), list[FreeRuns](), list[Array]()
+    one, runs, gains, hours = np.ones(len(mine)), list[FreeRuns](), list[Array](), list[Array]()
     for r in (r for r in recordings if r in without):
-        (free, beyond), (then, after) = without[r], with_it.get(r, (None, None))
-        runs.append(FreeRuns(free[:, mine], None if then is None else then[:, mine], 1.0, one))
-        old, new, _ = block_sums(
-            beyond[:, mine], beyond[:, mine] if after is None else after[:, mine], blocks
-        )
-        gains.append(old - new)
-    return LeftOut(improvement(runs, outputs), np.concatenate(gains))
+        free, beyond = (z[:, mine] for z in without[r])
+        then, after = (z[:, mine] for z in with_it[r]) if r in with_it else (None, None)
+        runs.append(FreeRuns(free, then, 1.0, one))
+        gains.append(_gains(beyond, after, blocks))
+        together = max(readings_as_one([z]) for z in (free, then) if z is not None)
+        hours.append(_gains(free, then, max(1, int(len(free) / together))))
+    return LeftOut(improvement(runs, outputs), np.concatenate(gains), np.concatenate(hours))
+
+
+def _gains(before: Array, after: Array | None, blocks: int) -> Array:
+    """What blocks of a recording lose of their sums of squares; nothing where a model runs away."""
+    old, new, _ = block_sums(before, before if after is None else after, blocks)
+    return np.asarray(old - new)
 
 
 def _residuals(

@@ -346,6 +346,27 @@ def test_hours_in_which_nothing_happens_do_not_outvote_those_in_which_heat_acts(
     assert LeftOut(Improvement(38.0, 9.3, 0.5, -1.0, 1.0, {}), gains).sure
 
 
+@pytest.mark.parametrize(("lasts", "sure"), [(10, True), (100, False)])
+def test_a_slow_law_shows_in_free_runs_that_miss_many_times(
+    lasts: int, sure: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Heat from one room to the next: under the process noise, no reading says more beyond those before it,
+    and free runs miss by a third. That is no chance if what they miss by is another thing many times.
+    """
+
+    def residuals(_: Context, answer: Scored, chosen: Sequence[Hypothesis], fold: Fold) -> Residuals:
+        rng, acts = np.random.default_rng(5), len(chosen) == len(answer.hypotheses)
+        hours = np.repeat(rng.normal(0.0, 30.0, (200 // lasts, 1)), lasts, axis=0)
+        return {name: (hours / 3 if acts else hours, np.ones((200, 1))) for name in fold.recordings}
+
+    monkeypatch.setattr(crossvalidation, "_residuals", residuals)
+    (h,) = wetted().hypotheses
+    found = left_out(replace(dry(), outputs=("E_Y",)), wetted(), [h])[h.key]
+    assert found is not None
+    assert found.blocks == 0
+    assert found.sure == sure
+
+
 def test_a_fit_settles_under_the_noise_that_it_makes_likely() -> None:
     """A single refit under the noise of the model that lacks the fluid does not reach the optimum."""
     coarse = max(dry().settings, key=lambda s: (s.noise.share, s.level)).noise
