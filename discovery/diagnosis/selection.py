@@ -78,7 +78,7 @@ class Search:
             coarse = not is_usual(self.best.settings[self.best.best])
             if coarse and not first.keys <= self.best.keys:
                 self._settled(first)
-        for one in self._by_itself():
+        for one in (*self._by_itself(), *self._for_several()):
             if one.evidence >= self.best.evidence:
                 self._settled(one)
         return self
@@ -101,6 +101,16 @@ class Search:
         goal = self.goal(answer.noise) if fresh else inf
         found = side_by_side(lambda own: score(self.context, own, answer.noise, answer.fit, goal=goal), fresh)
         return [self.keep(one) for one in found if one is not None]
+
+    def _for_several(self) -> list[Scored]:
+        """What looks like an effect of an answer of several, alone: a path between two bodies may stand as a
+        second mass at one of them and heat at the other. In the place of one of these it fits nothing.
+        """
+        answer = self.best.hypotheses
+        if len(answer) < 2:
+            return []
+        best = self._refitted(self.baseline, (), [c for h in answer for c in look_alikes(h, self.claims)])
+        return [best] if best.hypotheses else []
 
     def _as_likely(self) -> list[Scored]:
         """Models with a single effect that are about as likely as the best of them."""

@@ -30,6 +30,7 @@ from discovery.terms import (
 )
 
 MEDIA = ("fluid", "coolant")  # whose exchange an input changes; without one, it is that with the air
+GONE = 3.0  # time constants after which less than a twentieth of a difference is left
 
 
 @dataclass(frozen=True)
@@ -212,8 +213,9 @@ def _claim(
 
 
 def _between_two(effect: Effect, model: Model, spot: Spot, channels: tuple[str, ...], scene: Scene) -> Effect:
-    """The exchange of a body with what another thermometer reads, no faster than readings come: where most of
-    a difference is gone at the next one, both read one body, and neither is known to heat the other.
+    """The exchange of a body with what another thermometer reads, no faster than readings can tell: where
+    nothing of a difference is left at the next one, both read one body, and neither is known to heat the
+    other.
     """
     heats = [name for name in channels if ROLES[scene.channels[name].role].measured]
     read = [name for name in (*spot.bodies, *heats) if name in {*scene.outputs, *heats} - {*model.outputs}]
@@ -221,7 +223,7 @@ def _between_two(effect: Effect, model: Model, spot: Spot, channels: tuple[str, 
         return effect
     unit = TIME_UNITS[model.time_unit]
     rate = sum(1 / (model.states[b].capacity or unit) for b in spot.bodies[: 1 if heats else None])
-    most = min(effect.amplitude.most, 1 / (rate * scene.spacing))
+    most = min(effect.amplitude.most, GONE / (rate * scene.spacing))
     return replace(effect, amplitude=replace(effect.amplitude, most=most))
 
 

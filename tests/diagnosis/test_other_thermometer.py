@@ -83,3 +83,44 @@ def test_a_path_that_joins_two_readings_at_once_is_no_path() -> None:
     )
     assert {("input_heat", "body")} <= {(p.effect, *p.states) for p in answer.physics}
     assert "conduction_path" not in {p.effect for p in answer.physics}
+
+
+ROOMS, PATH, LOSS, GAINS = ("east", "west"), 2.6e-4, 1e-5, (1e-3, 2e-4)  # 1/s, 1/s, K/s
+
+
+def rooms(name: str, seed: int) -> Recording:
+    """Two rooms with a door between them, heated at other hours, read each hour for four days."""
+    rng, hours, fine = np.random.default_rng(seed), 96, 60
+    heats = np.repeat(rng.uniform(0.0, 1.0, (hours // 4, 2)), 4, axis=0)
+    out = 5.0 + 5.0 * np.sin(2 * np.pi * np.arange(hours) / 24.0 + seed)
+    warm, now = np.full((hours, 2), 20.0), np.full(2, 20.0)
+    for k in range(1, hours):
+        for part in range(fine):
+            outside = out[k - 1] + (out[k] - out[k - 1]) * part / fine
+            flows = GAINS * heats[k - 1] + LOSS * (outside - now) + PATH * (now[::-1] - now)
+            now = now + 3600.0 / fine * flows
+        warm[k] = now
+    read = np.round(warm + rng.normal(0.0, 0.05, warm.shape), 2)
+    data = {"out": out, **{f"P_{r}": heats[:, k] for k, r in enumerate(ROOMS)}}
+    data |= {r: read[:, k] for k, r in enumerate(ROOMS)}
+    return Recording(name, 3600.0 * np.arange(float(hours)), data)
+
+
+def test_a_path_may_be_about_as_fast_as_readings_come() -> None:
+    """Five sixths of a difference are gone at the next reading. A second mass at one room and heat in the
+    other, which follows the heater of the first, look the same to first order.
+    """
+    channels = {"out": Channel("out", "ambient temperature", "degC", None, "linear")}
+    channels |= {f"P_{r}": Channel(f"P_{r}", "heat load", "W", None, "held") for r in ROOMS}
+    channels |= {r: Channel(r, "temperature", "degC", None, "linear") for r in ROOMS}
+    heats = (Term(f"heat {r}", r, parse(f"p_{r}*P_{r}")) for r in ROOMS)
+    losses = (Term(f"loss {r}", r, parse(f"l_{r}*(out - {r})")) for r in ROOMS)
+    sizes = {f"p_{r}": Parameter(5e-4, "K/s", 0.0) for r in ROOMS}
+    sizes |= {f"l_{r}": Parameter(2e-5, "1/s", 0.0) for r in ROOMS}
+    states = {r: State(r, "degC", None, parse("out + 10")) for r in ROOMS}
+    model, runs = (
+        Model("rooms", sizes, states, (*heats, *losses), {}),
+        {n: rooms(n, k) for k, n in enumerate("ab")},
+    )
+    answer = document(diagnose(model, Campaign("rooms", channels, runs), list(runs)))
+    assert [(p.effect, set(p.states)) for p in answer.physics] == [("conduction_path", set(ROOMS))]

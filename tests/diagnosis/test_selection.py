@@ -142,6 +142,7 @@ def test_an_effect_of_an_answer_may_be_all_there_is(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(selection, "is_usual", lambda setting: not setting)
     monkeypatch.setattr(selection, "score", scored)
     monkeypatch.setattr(selection, "light", lambda one: one)
+    monkeypatch.setattr(Search, "_for_several", lambda _: [])
     found.run()
     assert asked == [*words]
     assert settled == ["heater+lag+mass", "lag"]
