@@ -49,10 +49,15 @@ def runs_away(verdict: Verdict) -> Verdict:
 
 def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     """The verdict with its names withdrawn where unseen recordings are predicted worse with them, on average
-    over the recordings (of the logarithm of the rms). An event of a recording to fit does not act there, but
-    parameters that are fitted beside one that is real predict better, not worse.
+    over the recordings (of the logarithm of the rms). An event of a recording to fit does not act there;
+    parameters that are fitted next to it speak against it if they miss by more than the fit leaves open.
     """
-    worse = [run for run, i in proof.items() if i.contradicts]
+
+    def open_to_it(run: str) -> bool:
+        acts = any(n.hypothesis.acts_in(run) for n in verdict.named)
+        return not acts and not _misses(proof[run], proof[run].judged[1])
+
+    worse = [run for run, i in proof.items() if i.contradicts and not open_to_it(run)]
     if not verdict.named or not worse:
         return verdict
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in verdict.named)

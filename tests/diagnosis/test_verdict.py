@@ -718,6 +718,16 @@ def test_an_event_that_makes_unseen_recordings_worse_stands_for_something_else()
     assert refuted(named, {"r3": improved(1.0, 1.0, -0.1, 0.1)}) is named
 
 
+def test_an_event_is_not_refuted_by_what_the_fit_leaves_open() -> None:
+    """A thermometer of a motor that jumped by 3 K in one recording to fit: an unseen one was missed by 2.5 K
+    with the spoiled parameters and by 2.8 K with the right ones, which the fit knows to 2 K.
+    """
+    named = said(Tried([Model((SUN,), 50.0), Model((), 0.0)]), {"unmeasured_heat": 0.9})
+    run = replace(improved(2.5, 2.8, -0.7, -0.1), unsure=1.9)
+    assert refuted(named, {"r3": run}) is named
+    assert refuted(said(WET, {"fluid_convection": 0.9}), {"r3": run}).named == ()
+
+
 def test_scores_are_no_part_of_these_tests() -> None:
     """What stands for a model here has what the verdict reads of a real one."""
     assert {"hypotheses", "fit", "forced"} <= set(Scored.__dataclass_fields__)
