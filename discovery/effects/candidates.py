@@ -215,7 +215,8 @@ def _claim(
 def _between_two(effect: Effect, model: Model, spot: Spot, channels: tuple[str, ...], scene: Scene) -> Effect:
     """The exchange of a body with what another thermometer reads, no faster than readings can tell: where
     nothing of a difference is left at the next one, both read one body, and neither is known to heat the
-    other.
+    other. Of a thermometer that no model predicts this is so where most of a difference is gone: the model
+    does not say why it is as warm.
     """
     heats = [name for name in channels if ROLES[scene.channels[name].role].measured]
     read = [name for name in (*spot.bodies, *heats) if name in {*scene.outputs, *heats} - {*model.outputs}]
@@ -223,7 +224,8 @@ def _between_two(effect: Effect, model: Model, spot: Spot, channels: tuple[str, 
         return effect
     unit = TIME_UNITS[model.time_unit]
     rate = sum(1 / (model.states[b].capacity or unit) for b in spot.bodies[: 1 if heats else None])
-    most = min(effect.amplitude.most, GONE / (rate * scene.spacing))
+    constants = 1.0 if heats else GONE
+    most = min(effect.amplitude.most, constants / (rate * scene.spacing))
     return replace(effect, amplitude=replace(effect.amplitude, most=most))
 
 
