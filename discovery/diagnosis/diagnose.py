@@ -207,20 +207,20 @@ def diagnose(
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     known = (alone if after else found.baseline).known().beside(context.thermometers, thresholds.AIR)
 
-    def proved(only: Sequence[int]) -> tuple[Improvement, dict[str, Improvement], list[Improvement]]:
+    def proved(only: Sequence[int]) -> tuple[Improvement, dict[str, Improvement], dict[str, Improvement]]:
         """Free runs of some outputs: on all fitted recordings, on each held-out one, and on each of all."""
         shown = [outputs[y] for y in only]
         runs = free_runs(campaign, fit, before, after or before, noise, only=only)
         runs |= free_runs(campaign, read, before, after or before, noise, known, only)
         each = {r: improvement([one], shown) for r, one in runs.items()}
         fitting = improvement([runs[r] for r in fit if r in runs], shown)
-        return fitting, {r: each[r] for r in read if r in each}, list(each.values())
+        return fitting, {r: each[r] for r in read if r in each}, each
 
     every, judged = list(range(len(outputs))), judging(context, verdict.answer, named)
     fitting, proof, each = proved(every)
     fitted_to, unseen, all_runs = (fitting, proof, each) if judged == every else proved(judged)
     unit = unit_of(campaign, outputs)
-    verdict = refuted(unfinished(idle(found, verdict, all_runs), fitted_to, unit), unseen)
+    verdict = refuted(unfinished(idle(found, verdict, all_runs, fit), fitted_to, unit), unseen)
     if not verdict.named and after is not None:
         after = None
     verdict = wrong_readings(unforeseen(verdict, unseen, unit), len(context.outliers))

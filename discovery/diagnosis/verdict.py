@@ -90,7 +90,7 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
 
     # what does not improve free runs outside the fit is not lacking either
     nothing = set(idle) if idle and not acts() else set[Key]()
-    reasons = [*refused.values(), *(text for key, text in idle.items() if key not in nothing)]
+    reasons = [*dict.fromkeys(refused.values()), *(text for key, text in idle.items() if key not in nothing)]
     # a law has no name: it matters only where a name may stand for it
     lacking = (found.baseline, answer) if named else ()
     laws = [law for m in lacking for law in with_law(context, m, found.goal(m.noise))]

@@ -13,16 +13,23 @@ from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict
 from discovery.printed import printed
 
 
-def idle(found: Search, verdict: Verdict, runs: Sequence[Improvement]) -> Verdict:
-    """No name where what was named does too little for free runs, on average over all recordings, fitted and
-    unseen. Logarithms of the rms are averaged: one recording of another machine does not drown the rest.
+def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement], fit: Sequence[str]) -> Verdict:
+    """No name where what was named does too little for free runs, on average over the recordings to fit, and
+    those unseen ones in which it may act. Logarithms of the rms are averaged: one recording of another
+    machine does not drown the rest.
     """
-    if not verdict.named or _lower(runs) >= 0.5 * thresholds.MATTERS**2:
+    lower = _lower(i for run, i in runs.items() if run in fit or _acts(verdict, run))
+    if not verdict.named or lower >= 0.5 * thresholds.MATTERS**2:
         return verdict
-    reason = f"the surest effects {_does(_lower(runs))}"
+    reason = f"the surest effects {_does(lower)}"
     word = UNEXPLAINED if coarse(found) else NO_MISMATCH
     reasons = (reason, *(coarse(found) or unrecorded(found)), *verdict.reasons)
     return replace(verdict, word=word, named=(), candidates=(), reasons=reasons)
+
+
+def _acts(verdict: Verdict, run: str) -> bool:
+    """Whether anything that is named may act in a recording."""
+    return any(n.hypothesis.acts_in(run) for n in verdict.named)
 
 
 def _does(lower: float) -> str:
@@ -52,12 +59,9 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     over the recordings (of the logarithm of the rms). An event of a recording to fit does not act there;
     parameters that are fitted next to it speak against it if they miss by more than the fit leaves open.
     """
-
-    def open_to_it(run: str) -> bool:
-        acts = any(n.hypothesis.acts_in(run) for n in verdict.named)
-        return not acts and not _misses(proof[run], proof[run].judged[1])
-
-    worse = [run for run, i in proof.items() if i.contradicts and not open_to_it(run)]
+    worse = [
+        run for run, i in proof.items() if i.contradicts and (_acts(verdict, run) or _misses(i, i.judged[1]))
+    ]
     if not verdict.named or not worse:
         return verdict
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in verdict.named)

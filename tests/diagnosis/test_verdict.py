@@ -600,20 +600,26 @@ def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
     named = said(WET, {"fluid_convection": 0.9})
     large, small = improved(2.0, 1.0, 0.1, 1.5), improved(2.0, 1.995, -0.1, 0.3)
     another_machine = improved(200.0, 260.0, -70.0, -50.0)
-    assert idle(cast(Any, WET), named, [large]) is named
-    withdrawn = idle(cast(Any, WET), named, [small, small])
+    assert idle(cast(Any, WET), named, {"r1": large}, ["r1", "r2", "r3"]) is named
+    withdrawn = idle(cast(Any, WET), named, {"r1": small, "r2": small}, ["r1", "r2", "r3"])
     assert (withdrawn.word, withdrawn.named) == ("no mismatch", ())
     assert "do too little for free runs (the rms changes by -0.25 % on average" in withdrawn.reasons[0]
-    tripled = idle(cast(Any, WET), named, [improved(1.0, 3.0, -2.5, -1.5)])
+    tripled = idle(cast(Any, WET), named, {"r1": improved(1.0, 3.0, -2.5, -1.5)}, ["r1", "r2", "r3"])
     assert tripled.reasons[0] == (
         "the surest effects do too little for free runs (the rms changes by +200 % on average over the "
         "recordings)"
     )
-    assert idle(cast(Any, WET), named, [large, large, another_machine]) is named
+    assert (
+        idle(cast(Any, WET), named, {"r1": large, "r2": large, "r3": another_machine}, ["r1", "r2", "r3"])
+        is named
+    )
     heated = Tried([Model((FLUID,), 50.0), Model((), 0.0, unrecorded=0.1)])
-    assert "about 10 % of what flows" in idle(cast(Any, heated), named, [small, small]).reasons[1]
+    assert (
+        "about 10 % of what flows"
+        in idle(cast(Any, heated), named, {"r1": small, "r2": small}, ["r1", "r2", "r3"]).reasons[1]
+    )
     far = Tried([Model((FLUID,), 50.0), Model((), 0.0, off=0.24)])
-    assert idle(cast(Any, far), named, [small, small]).word == "unexplained"
+    assert idle(cast(Any, far), named, {"r1": small, "r2": small}, ["r1", "r2", "r3"]).word == "unexplained"
 
 
 def test_unseen_recordings_withdraw_a_name_and_never_add_one() -> None:
@@ -716,6 +722,15 @@ def test_an_event_that_makes_unseen_recordings_worse_stands_for_something_else()
     refused = refuted(named, {"r3": improved(2.6, 3.0, -0.7, -0.1)})
     assert (refused.word, refused.named) == ("unexplained", ())
     assert refuted(named, {"r3": improved(1.0, 1.0, -0.1, 0.1)}) is named
+
+
+def test_an_event_is_judged_where_it_acts() -> None:
+    """A jump of 6 K in a recording to fit, which falls from 0.93 to 0.6 K; an unseen one rises to 1.9 K."""
+    event = said(Tried([Model((SUN,), 50.0), Model((), 0.0)]), {"unmeasured_heat": 0.9})
+    runs = {"r1": improved(0.93, 0.6, 0.1, 0.5), "r3": improved(1.0, 1.9, -0.9, -0.1)}
+    assert idle(cast(Any, WET), event, runs, ["r1"]) is event
+    law = said(WET, {"fluid_convection": 0.9})
+    assert idle(cast(Any, WET), law, runs, ["r1"]).named == ()
 
 
 def test_an_event_is_not_refuted_by_what_the_fit_leaves_open() -> None:
