@@ -38,13 +38,13 @@ class LeftOut:
     """What effects change of recordings that are left out of the fit.
 
     `free`: rms of free runs in reading noises. `gains` (B,): by how much the model with the effects predicts
-    each block of time better, in squares of what a reading says beyond those before it. `hours` (H,): the
-    same in squares of the free runs, in blocks so long that what they miss by says the same thing once.
+    each block of time better, in squares of what a reading says beyond those before it. `free_gains` (F,):
+    the same in squares of the free runs, in blocks as long as the residuals of these are correlated.
     """
 
     free: Improvement
     gains: Array
-    hours: Array = field(default_factory=lambda: np.zeros(0))
+    free_gains: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def blocks(self) -> int:
@@ -61,7 +61,7 @@ class LeftOut:
         """Whether blocks get better by more than chance makes them: from one reading to the next, or, where
         process noise hides a slow law there, in free runs.
         """
-        return surely_better(self.gains) or surely_better(self.hours)
+        return surely_better(self.gains) or surely_better(self.free_gains)
 
     @property
     def matters(self) -> bool:
@@ -161,19 +161,19 @@ def _compared(
     blocks: int,
 ) -> LeftOut:
     """Residuals of some outputs without and with effects, compared in so many blocks of each recording."""
-    one, runs, gains, hours = np.ones(len(mine)), list[FreeRuns](), list[Array](), list[Array]()
+    one, runs, gains, free_gains = np.ones(len(mine)), list[FreeRuns](), list[Array](), list[Array]()
     for r in (r for r in recordings if r in without):
         free, beyond = (z[:, mine] for z in without[r])
         then, after = (z[:, mine] for z in with_it[r]) if r in with_it else (None, None)
         runs.append(FreeRuns(free, then, 1.0, one))
         gains.append(_gains(beyond, after, blocks))
         together = max(readings_as_one([z]) for z in (free, then) if z is not None)
-        hours.append(_gains(free, then, max(1, int(len(free) / together))))
-    return LeftOut(improvement(runs, outputs), np.concatenate(gains), np.concatenate(hours))
+        free_gains.append(_gains(free, then, max(1, int(len(free) / together))))
+    return LeftOut(improvement(runs, outputs), np.concatenate(gains), np.concatenate(free_gains))
 
 
 def _gains(before: Array, after: Array | None, blocks: int) -> Array:
-    """What blocks of a recording lose of their sums of squares; nothing where a model runs away."""
+    """By how much the sum of squares of each block of a recording falls; zero where a model runs away."""
     old, new, _ = block_sums(before, before if after is None else after, blocks)
     return np.asarray(old - new)
 
