@@ -238,6 +238,8 @@ class Search:
             other = self.tried.get(others | {h.key})
             if other is None or len(keys) != len(others) + 1 or keys <= current.keys:
                 continue
+            if one.fit.ended_early or other.fit.ended_early:  # how likely they are was not found out
+                continue
             if other.evidence - one.evidence < NEAR:
                 rival = next(o for o in one.hypotheses if o.key not in others)
                 found[rival.key] = _of_model(rival, one)

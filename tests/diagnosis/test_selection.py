@@ -146,3 +146,24 @@ def test_an_effect_of_an_answer_may_be_all_there_is(monkeypatch: pytest.MonkeyPa
     found.run()
     assert asked == [*words]
     assert settled == ["heater+lag+mass", "lag"]
+
+
+@pytest.mark.parametrize(("ended_early", "asked"), [(False, ["mass"]), (True, [])])
+def test_a_fit_that_ended_early_says_nothing_of_what_is_as_likely(
+    ended_early: bool, asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Heat and a mass were about as likely alone, a thousand below the answer: neither fit was finished, and
+    so the mass is not tried next to the lag of the answer.
+    """
+
+    def model(evidence: float, *words: str, early: bool = False) -> Any:
+        claims = tuple(SimpleNamespace(key=word) for word in words)
+        fit = SimpleNamespace(ended_early=early)
+        return SimpleNamespace(hypotheses=claims, keys=frozenset(words), evidence=evidence, fit=fit)
+
+    answer = model(1000.0, "heat", "lag")
+    found = Search(dry())
+    for one in (answer, model(5.0, "heat", early=ended_early), model(3.0, "mass", early=ended_early)):
+        found.tried[one.keys] = one
+    monkeypatch.setattr(selection, "_of_model", lambda h, _: h)
+    assert [h.key for h in found._in_its_place(answer.hypotheses[0], answer)] == asked
