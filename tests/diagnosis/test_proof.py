@@ -8,8 +8,9 @@ from math import exp, inf, sqrt
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import binom
+from scipy.stats import binom, wilcoxon
 
+from discovery.diagnosis import thresholds
 from discovery.diagnosis.proof import (
     BLOCKS,
     MULTIPLES,
@@ -20,6 +21,7 @@ from discovery.diagnosis.proof import (
     free_runs,
     improvement,
     size_of,
+    surely_better,
     unit_of,
 )
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
@@ -213,3 +215,22 @@ def test_a_model_that_runs_away_on_other_inputs_is_told() -> None:
 @pytest.mark.parametrize(("before", "after", "found"), [(5.0, 4.0, 3.0), (4.0, 5.0, -3.0), (1.0, inf, -inf)])
 def test_what_a_repair_explains_is_what_squares_leave(before: float, after: float, found: float) -> None:
     assert improved(before, after).explained == pytest.approx(found)
+
+
+@pytest.mark.parametrize("count", [3, 6, 8, 20, 45])
+def test_signed_ranks_are_those_of_scipy(count: int) -> None:
+    rng = np.random.default_rng(count)
+    decided = set()
+    for shift in np.linspace(0.0, 2.0, 25):
+        gains = rng.standard_normal(count) + shift
+        chance = wilcoxon(gains, alternative="greater", method="exact").pvalue
+        assert surely_better(gains) == (chance <= 1.0 - thresholds.SUREST)
+        decided.add(surely_better(gains))
+    assert decided == ({False} if count < 6 else {False, True})  # of five, all are better with 3 %
+
+
+def test_blocks_that_are_no_other_count_neither_way() -> None:
+    gains = np.array([3.0, 0.0, 2.0, 0.0, 5.0, 1.0, 4.0, 6.0, 0.0])
+    assert surely_better(gains)
+    assert not surely_better(np.zeros(9))
+    assert not surely_better(np.zeros(0))

@@ -166,4 +166,4 @@ def test_a_fit_that_ended_early_says_nothing_of_what_is_as_likely(
     for one in (answer, model(5.0, "heat", early=ended_early), model(3.0, "mass", early=ended_early)):
         found.tried[one.keys] = one
     monkeypatch.setattr(selection, "_of_model", lambda h, _: h)
-    assert [h.key for h in found._in_its_place(answer.hypotheses[0], answer)] == asked
+    assert [cast(Any, h).key for h in found._in_its_place(answer.hypotheses[0], answer)] == asked
