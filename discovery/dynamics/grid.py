@@ -111,12 +111,12 @@ class Grid:
         return self._moved(self._once("ends", _at_ends, self.time, self.samples) | late)
 
     def logged_late(self, name: str, by: float) -> Array:
-        """A channel at the interval ends (2(T - 1),), logged seconds late; its mean over each interval where
-        it is held.
+        """A channel at the interval ends (2(T - 1),), logged seconds late: its mean over each interval
+        where it is held, else a curve without corners.
         """
         samples, time = self.samples[name], self.time + by
         if samples.linear:
-            return interleaved(samples.at(time[:-1]), samples.at(time[1:]))
+            return interleaved(samples.smooth(time[:-1]), samples.smooth(time[1:]))
         return np.repeat(samples.means(time), 2)
 
     @cached_property

@@ -247,7 +247,7 @@ def fit_model(
         together,
         solution.ended_early,
     )
-    finer = resolved(fit.trajectories, current.white) if grids is None else None
+    finer = resolved(fit.trajectories, current.white, model.free) if grids is None else None
     if finer is None:
         return fit
     options: dict[str, Any] = {"noise": noise, "loss": loss, "priors": priors, "belief": belief}

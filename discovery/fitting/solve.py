@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 
 _DAMPING = 1e-4  # of the first step, relative to the diagonal of the normal equations
-_EASE, _TIGHTEN = 0.1, 5.0  # factors of the damping after a step that is taken, or refused
+_EASE = 0.1  # factor of the damping after a step that is taken
+_TIGHTEN = 3.0  # ... after one that is refused; each further one counts so many times more
 _HOPELESS = 1e10  # damping at which no shorter step helps any more
 _STILL = 1e-11  # relative change of the unknowns below which the search has ended
 _SETTLED = 2  # steps after which the linear look says whether a search comes near its goal ...
@@ -113,7 +114,7 @@ def solve(
         late = taken >= _SETTLED and cost - _TIMES * promised > goal
         if done or late:
             break
-        found = None
+        found, tighten = None, _TIGHTEN
         while damping < _HOPELESS:
             moved = np.clip(x + _step(x, gram, gradient, damping, low, high), low, high)
             change = moved - x
@@ -130,7 +131,8 @@ def solve(
                 break
             if expected < tolerance * cost:
                 break
-            damping *= _TIGHTEN
+            damping *= tighten
+            tighten *= _TIGHTEN
         if found is None:
             done = True
             break
