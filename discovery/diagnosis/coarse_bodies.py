@@ -41,10 +41,11 @@ def judging(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> l
     """
     coarse = set(_coarse(answer))
     every = list(range(len(context.outputs)))
-    if not chosen or any(coarse & set(h.states) for h in chosen):
-        return every
     shown = [names(context.model.outputs.get(name, Name(name))) for name in context.outputs]
-    return [y for y in every if not shown[y] or not shown[y] <= coarse] or every
+    apart = {context.outputs[y] for y in every if shown[y] and shown[y] <= coarse}
+    if not chosen or any(coarse & set(h.states) or apart & set(h.shown) for h in chosen):
+        return every
+    return [y for y in every if context.outputs[y] not in apart] or every
 
 
 def sentences(answer: Scored) -> list[str]:

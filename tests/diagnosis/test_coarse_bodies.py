@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from discovery.diagnosis import diagnose
+from discovery.diagnosis.coarse_bodies import judging
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.diagnose import Diagnosis
 from discovery.diagnosis.scored import Scored
+from discovery.effects.hypothesis import Hypothesis
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -93,3 +97,17 @@ def test_with_one_share_for_all_bodies_it_is_hidden(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(sys.modules[Diagnosis.__module__], "with_coarse_bodies", alike)
     assert "input_heat" not in {n.hypothesis.effect.word for n in diagnosed().verdict.named}
+
+
+def test_a_lag_of_a_coarse_body_is_judged_by_what_it_shows() -> None:
+    """Its thermometer shows nothing else, and takes no part where a lag of the plate is judged."""
+    shown = {"motor": parse("motor"), "plate": parse("plate")}
+    context = cast(Context, SimpleNamespace(outputs=("motor", "plate"), model=SimpleNamespace(outputs=shown)))
+    noise = SimpleNamespace(share=0.02, force={"motor": (1.0, 0.25), "plate": (1.0, 0.02)})
+    answer = cast(Scored, SimpleNamespace(noise=noise))
+
+    def lag(output: str) -> Hypothesis:
+        return cast(Hypothesis, SimpleNamespace(states=(), shown={output: parse("0")}))
+
+    assert judging(context, answer, [lag("plate")]) == [1]
+    assert judging(context, answer, [lag("motor")]) == [0, 1]
