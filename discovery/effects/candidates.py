@@ -22,6 +22,7 @@ from discovery.terms import (
     Name,
     Number,
     Term,
+    degree,
     delays_at,
     names,
     parse,
@@ -133,6 +134,7 @@ def _choices(variable: str, effect: Effect, model: Model, scene: Scene) -> list[
         if n in scene.largest
         and (scene.channels[n].unit in TEMPERATURES) == is_temperature
         and scene.channels[n].role in effect.roles
+        and (not effect.inputs_in or same_dimension(scene.channels[n].unit, effect.inputs_in))
         and (
             effect.place.startswith("output")
             or scene.channels[n].role != "fluid flow"
@@ -154,12 +156,16 @@ def _is_second(name: str, scene: Scene) -> bool:
 
 
 def _stands(channel: str, spot: Spot, model: Model, effect: Effect) -> bool:
-    """Whether the model already has that input at that body, in proportion; then a refit would absorb it."""
-    exchanges = names(parse(effect.formula)) & {"other", "ambient", *MEDIA}
-    if spot.outputs or len(spot.bodies) != 1 or exchanges:
+    """Whether the model already has that input at that body, in the same form: in proportion, or with a curve;
+    then a refit would absorb it.
+    """
+    formula = parse(effect.formula)
+    if spot.outputs or len(spot.bodies) != 1 or names(formula) & {"other", "ambient", *MEDIA}:
         return False
     return any(
-        t.into == spot.bodies[0] and names(t.expression) - set(model.parameters) == {channel}
+        t.into == spot.bodies[0]
+        and names(t.expression) - set(model.parameters) == {channel}
+        and degree(t.expression, frozenset({channel})) == degree(formula, frozenset({INPUT, LEVEL}))
         for t in model.terms
         if not t.effect
     )

@@ -208,8 +208,8 @@ class Effect:
 
     `search`: how its instants are found, if it has any; `acts`: in all recordings, in one, or from one on.
     `shared`: also offered at all its places at once, with one size. `spreads`: also offered at two linked
-    bodies at once, with a size at each. `roles`: of the recorded inputs that its formula may follow;
-    `unless`: of a recorded input that would say that it acts, so that it is not offered where one moves.
+    bodies at once, with a size at each. `roles`: of the recorded inputs that its formula may follow, and
+    `inputs_in`: a unit like theirs, where it needs one; `unless`: of a recorded input that would say that it acts, so that it is not offered where one moves.
     """
 
     word: str
@@ -227,6 +227,7 @@ class Effect:
     shared: bool = False
     spreads: bool = False
     roles: tuple[str, ...] = ()
+    inputs_in: str = ""
     unless: tuple[str, ...] = ()
     examples: tuple[Example, ...] = field(default=())
 

@@ -241,10 +241,14 @@ def test_what_begins_acts_in_the_recordings_that_were_made_later() -> None:
 
 
 def test_every_recorded_input_may_be_heat_a_path_or_a_factor() -> None:
-    """Each input of a role at each place, not the first alone; what the model has already is not offered."""
+    """Each input of a role at each place, not the first alone; what the model has already is not offered: the
+    motor has heat by the square of its current, and may lack a share in proportion.
+    """
     heat = {(h.channels, h.states) for h in expand(catalogue()["input_heat"])}
     everywhere = {((name,), (body,)) for name in ("cut", "spray") for body in ("motor", "table", "bed")}
-    assert heat == everywhere | {(("servo",), ("table",)), (("servo",), ("bed",))}
+    assert heat == everywhere | {(("servo",), (body,)) for body in ("motor", "table", "bed")}
+    square = {(h.channels, h.states) for h in expand(catalogue()["input_heat_current"])}
+    assert square == {(("servo",), ("table",)), (("servo",), ("bed",))}
     path = {(h.channels, h.outputs) for h in expand(catalogue()["input_path"])}
     assert {c for (c,), _ in path} >= {"cut", "spray", "drive", "rpm", "pump"}
     assert {y for _, y in path} == {("E_Y",), ("E_Z",)}
