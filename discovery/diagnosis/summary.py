@@ -10,6 +10,8 @@ from discovery.printed import printed, undetermined, when
 from discovery.runfolder import read_diagnosis
 
 _NOISE = "reading noise and heat that nobody records explain"
+_OFF = "reading noise, heat that nobody records and flows that are off by {:.0f} % explain"
+_USUAL = 0.02  # share by which the flows of a good model are off
 _COARSE = "reading noise and process noise as large as this model needs explain"
 _OPEN = 1.5  # times the noise: from there on, the uncertainty of the parameters is said
 
@@ -35,16 +37,26 @@ def lines_of(d: dict[str, Any]) -> list[str]:
         what = f"the missing heat at {about['state']} follows {about['formula']}"
         lines.append(f"  {what} (a description, not a cause)")
     lines += [f"  {one['sentence']}" for one in d.get("responses") or ()]
-    worse, unit = d["improvement"]["contradicted_by"], _unit(d["improvement"])
+    worse, unit, noise = d["improvement"]["contradicted_by"], _unit(d["improvement"]), _noise(d)
     for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
         after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
-        rms = f"rms {printed(i['rms_before'])} -> {after}{unit} ({_by_noise(i, unit)})"
+        rms = f"rms {printed(i['rms_before'])} -> {after}{unit} ({_by_noise(i, unit, noise)})"
         rms += ", worse than without" if run in worse else _otherwise(i, unit)
         lines.append(f"  held-out recording {run}: {rms}")
     if not d["physics"]:
-        lines += _left(d["improvement"], _COARSE if d["verdict"] == "unexplained" else _NOISE)
+        lines += _left(d["improvement"], noise)
     lines.append(f"  next: {d['next_experiment']}")
     return lines
+
+
+def _noise(d: dict[str, Any]) -> str:
+    """What the noise of an answer is. Where nothing explains a mismatch, process noise stands for what the
+    model lacks: it is no heat.
+    """
+    if d["verdict"] == "unexplained":
+        return _COARSE
+    share = (d.get("detection") or {}).get("form_error") or 0.0
+    return _OFF.format(100 * share) if share > _USUAL else _NOISE
 
 
 def _otherwise(one: dict[str, Any], unit: str) -> str:
@@ -58,9 +70,7 @@ def _otherwise(one: dict[str, Any], unit: str) -> str:
 
 
 def _left(improvement: dict[str, Any], noise: str) -> list[str]:
-    """rms of free runs of the model, and the rms that noise explains. `noise`: what it is. Where nothing
-    explains a mismatch, process noise stands for what the model lacks: it is no heat.
-    """
+    """rms of free runs of the model, and the rms that noise explains. `noise`: what it is."""
     runs = {"recordings to fit": improvement["fit"]} | {
         f"held-out recording {run}": i for run, i in improvement["held_out"].items()
     }
@@ -82,7 +92,7 @@ def _by_start(one: dict[str, Any], unit: str) -> str:
     return f"; with start values from all readings, which decide, rms {printed(begun)}{unit}"
 
 
-def _by_noise(one: dict[str, Any], unit: str, noise: str = _NOISE) -> str:
+def _by_noise(one: dict[str, Any], unit: str, noise: str) -> str:
     """What noise explains of an rms, and the uncertainty of the parameters where it explains much more; where
     noise explains all of it, its size says nothing more.
     """

@@ -124,6 +124,11 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
     (line,) = summary(tmp_path)[1:-1]
     assert "process noise as large as this model needs explain up to 4.6" in line
     assert "nobody records" not in line
+    improvement["fit"] = left
+    document["detection"] = {"form_error": 0.08}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
+    (line,) = summary(tmp_path)[1:-1]
+    assert "reading noise, heat that nobody records and flows that are off by 8 % explain up to 4.6" in line
 
 
 @pytest.mark.parametrize(
