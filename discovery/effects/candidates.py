@@ -156,7 +156,7 @@ def _is_second(name: str, scene: Scene) -> bool:
 
 
 def _stands(channel: str, spot: Spot, model: Model, effect: Effect) -> bool:
-    """Whether the model already has that input at that body, in the same form: in proportion, or with a curve;
+    """Whether the model already has that input at that body, in proportion or with a curve as the effect has;
     then a refit would absorb it.
     """
     formula = parse(effect.formula)

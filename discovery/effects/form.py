@@ -209,7 +209,8 @@ class Effect:
     `search`: how its instants are found, if it has any; `acts`: in all recordings, in one, or from one on.
     `shared`: also offered at all its places at once, with one size. `spreads`: also offered at two linked
     bodies at once, with a size at each. `roles`: of the recorded inputs that its formula may follow, and
-    `inputs_in`: a unit like theirs, where it needs one; `unless`: of a recorded input that would say that it acts, so that it is not offered where one moves.
+    `inputs_in` a unit of theirs, where it needs one; `unless`: of a recorded input that would say that it
+    acts, so that it is not offered where one moves.
     """
 
     word: str
