@@ -87,7 +87,6 @@ DRIVING = (  # roles of the inputs that an error may follow by a law of its own
 )
 
 _PER_SPEED = r"(\bspeed\s*/\s*)(\d+(?:\.\d+)?)"  # at which speed the size of an effect counts
-_RATIO = 3.0  # between neighbouring values of a shape in a search: signatures of both are much alike
 _REACH = 2.0  # standard deviations of a prior that a search covers
 FARTHEST = 4.0  # ... and beyond which a law is another one, and a reading is wrong
 _SHIFTED = 1 / 8  # of the longest recording: usual shifts in time are no longer, however slow a machine is
@@ -140,6 +139,8 @@ class Shape:
     With `factor`: 68 % of values lie within this factor of `middle` (log-normal). With `spread`: normal
     around `middle`. Without a `middle` any time constant that the recordings can show is as likely as any
     other on a logarithmic scale. `instant`: a time in the recording, which is searched for by itself.
+    `apart`: ratio of neighbouring values in a search, whose signatures are much alike; those of a delay, which
+    smooths nothing, are so only close by.
     """
 
     name: str
@@ -149,6 +150,7 @@ class Shape:
     spread: float = 0.0
     instant: bool = False
     least: float = 0.0  # what the recordings can show of a time constant
+    apart: float = 3.0
 
     def within(self, shortest: float, longest: float) -> Shape:
         """The shape for recordings that show time constants from `shortest` to `longest` [s]."""
@@ -165,7 +167,7 @@ class Shape:
             return ((self.middle or 0.0, 0.0),)
         if not self.factor:
             return tuple((self.middle + self.spread * z, log(w)) for z, w in _AROUND_ZERO)
-        count = max(3, ceil(2 * _REACH * log(self.factor) / log(_RATIO)) + 1)
+        count = max(3, ceil(2 * _REACH * log(self.factor) / log(self.apart)) + 1)
         steps = [-_REACH + 2 * _REACH * k / (count - 1) for k in range(count)]
         weights = [exp(-0.5 * z * z) for z in steps]
         total = log(sum(weights))

@@ -205,11 +205,14 @@ def _between(parts: Layout, a: str, b: str) -> tuple[Term, ...]:
 
 
 def _of(effect: Effect, terms: tuple[Term, ...]) -> Iterator[Spot]:
-    """All of some terms, and, where a term itself is what changes, those of each body alone."""
+    """All of some terms, and those of each body alone, where a term itself is what changes, or what a coolant
+    is there: it flows through one body after the other, and a cutting fluid over all of them.
+    """
     bodies = tuple(dict.fromkeys(t.into for t in terms))
     if terms:
         yield Spot(bodies, terms)
-    if TERM in names(parse(effect.formula)) and len(bodies) > 1:
+    each = TERM in names(parse(effect.formula)) or effect.place == "coolant terms"
+    if each and len(bodies) > 1:
         yield from (Spot((b,), tuple(t for t in terms if t.into == b)) for b in bodies)
 
 
