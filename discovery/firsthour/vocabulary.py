@@ -244,6 +244,8 @@ _FORMS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     ("inlet", {"fluid": 6}, r"\b(hot|cold|water|steam|shell|tube|feed|primary|secondary) in(let)?\b"),
     ("disp", {"displacement": 4}, r"\b(d|delta) ?[xyz](?![^\W\d_])"),
     ("disp", {"displacement": 2, "position": 2}, r"\b[xyz](?![^\W\d_])"),
+    ("current", {"current": 5}, r"^i(?= [^\W\d_])"),  # the symbol with a word behind it: alone it counts rows
+    ("voltage", {"voltage": 5}, r"^u(?= [^\W\d_])"),
     ("nozzle height", {"nozzle height": 7}, r"\bnozzle.*height\b|\bh nozzle\b"),
     ("nozzle side", {"nozzle side": 7}, r"\bnozzle.*side\b|\bside.*nozzle\b"),
 )

@@ -33,6 +33,7 @@ CASES = [
     ("E_Z0T", "", np.linspace(0, 20, 50), "error", "um"),
     ("nozzle height", "mm", np.full(50, 50.0), "nozzle height", "mm"),
     ("Current", "", np.linspace(-130, 0, 50), "other input", "A"),
+    ("I_tec", "", np.linspace(4.6, 0.2, 50), "other input", "A"),
     ("current step", "", np.linspace(0, 7, 50), "other input", "A"),
     ("current temperature", "", np.linspace(20, 29, 50), "temperature", "degC"),
     ("Cell Voltage A1", "", np.linspace(3, 4, 50), "other input", "V"),

@@ -60,3 +60,18 @@ def test_only_one_other_temperature_agrees_with_nothing() -> None:
     found = list(starts([two("a", cold), two("b", cold), two("c", cold + 125.0)], CHANNELS[:2]))
     assert [f.channel for f in found] == ["bed"]
     assert "126 K above 'frame'" in found[0].what
+
+
+def test_the_air_around_a_machine_that_begins_hot_is_as_it_always_is() -> None:
+    """A cell was read from the end of another test on: the air, at 22.6 degC, started 21.9 K below both."""
+    air = Channel("air", "ambient temperature", "degC", None, "linear")
+
+    def cell(name: str, start: float, room: float) -> Seen:
+        body = start + 10.0 * TIME / 3600.0
+        series = {"air": room + 0.0 * TIME + np.sin(TIME / 500.0), "bed": body, "frame": body + 0.3}
+        return Seen(name, Path(f"{name}.csv"), TIME, series, np.arange(len(TIME)))
+
+    cold = [cell("a", 23.0, 22.0), cell("b", 24.0, 23.0)]
+    assert list(starts([*cold, cell("hot", 44.5, 22.6)], [*CHANNELS[:2], air])) == []
+    off = list(starts([*cold, cell("cold", 23.0, 1.1)], [*CHANNELS[:2], air]))
+    assert [f.channel for f in off] == ["air"]

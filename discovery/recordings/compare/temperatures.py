@@ -72,7 +72,8 @@ def starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Itera
     """Find a temperature that differs from the others at a cold start, and does not in other recordings.
 
     Where it starts as its siblings do, nothing is wrong with it, wherever it starts elsewhere: the other
-    recordings may have begun with a warm machine.
+    recordings may have begun with a warm machine. Nor is it where it starts as it does elsewhere: this one may
+    have.
     """
     away: dict[tuple[str, str], float] = {}
     agree: dict[str, float] = {}
@@ -82,9 +83,9 @@ def starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Itera
             if (
                 c.name in one.values
                 and c.name not in one.constant
-                and (read := one.known(c.name)[1]).size >= 3
+                and one.known(c.name)[1].size >= 3
             ):
-                first[c.name] = float(np.median(read[:5]))
+                first[c.name] = _first(one, c.name)
         if len(first) < 2:
             continue
         for name, value in first.items():
@@ -105,15 +106,15 @@ def starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Itera
                 odd = abs(here - middle) > usual and abs(here) > _START
                 odd = odd and agree[f"{one.name}|{c.name}"] < _START
                 odd = odd and (siblings > 1 or _stays_apart(one, c.name, recordings))
+                odd = odd and abs(_first(one, c.name) - _usual_start(one, c.name, recordings)) > _START
             else:
                 odd = siblings >= 5 and abs(here) > _ALONE and agree[f"{one.name}|{c.name}"] < _AGREE
             if odd and not (here > 0 and _was_hot(one, c.name, here, recordings)):
-                read = one.known(c.name)[1]
                 side = "above" if here > 0 else "below"
                 rest = [n for r, n in away if r == one.name and n != c.name]
                 alike = "the other temperatures, which agree" if siblings > 1 else f"'{rest[0]}'"
                 what = (
-                    f"'{c.name}' starts at {np.median(read[:5]):.3g} degC, {abs(here):.3g} K {side} {alike}"
+                    f"'{c.name}' starts at {_first(one, c.name):.3g} degC, {abs(here):.3g} K {side} {alike}"
                 )
                 yield warning(one, c, 0, what, "look at the sensor, its unit and its contact", "start", 2.0)
 
@@ -122,8 +123,7 @@ def _was_hot(one: Seen, name: str, above: float, recordings: Sequence[Seen]) -> 
     """Whether a recording began while a body was hot, by what it does then: it cools, or a controller holds
     it where other recordings hold it, too. A sensor with an offset does neither.
     """
-    read = one.known(name)[1]
-    start = float(np.median(read[:5]))
+    read, start = one.known(name)[1], _first(one, name)
     if start - np.percentile(read, 2) > above / 2:
         return True
     others = [float(np.median(r.known(name)[1])) for r in recordings if r is not one and name in r.values]
@@ -135,7 +135,16 @@ def _stays_apart(one: Seen, name: str, recordings: Sequence[Seen]) -> bool:
     """Whether, of two that differ, it is this one: it starts elsewhere than usual, and not from a warm
     machine, which would cool down.
     """
-    others = [r for r in recordings if r is not one and name in r.values]
-    starts = [float(np.median(r.known(name)[1][:5])) for r in others]
-    usual, read = float(np.median(starts)), one.known(name)[1]
-    return bool(np.percentile(read, 2) > usual + _START or np.median(read[:5]) < usual - _START)
+    usual, read = _usual_start(one, name, recordings), one.known(name)[1]
+    return bool(np.percentile(read, 2) > usual + _START or _first(one, name) < usual - _START)
+
+
+def _first(one: Seen, name: str) -> float:
+    """Where a temperature starts, by its first readings."""
+    return float(np.median(one.known(name)[1][:5]))
+
+
+def _usual_start(one: Seen, name: str, recordings: Sequence[Seen]) -> float:
+    """Where it starts in the other recordings."""
+    others = [r for r in recordings if r is not one and name in r.values and r.known(name)[1].size]
+    return float(np.median([_first(r, name) for r in others]))
