@@ -14,7 +14,7 @@ from discovery.dynamics.memory import Memory
 from discovery.models import Model, expanded
 from discovery.models.model import read_at_start
 from discovery.recordings import Campaign
-from discovery.terms import Dual, Expression, Name, Program, compiled, degree
+from discovery.terms import Dual, Expression, Name, Program, compiled, degree, mixed
 from discovery.terms.dual import Value
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ class System:
     model: Model  # expanded: no lag() left
     grid: Grid
     states: tuple[str, ...]
-    affine: bool
+    affine: bool  # in its states, with factors that stay what they are within a step
     into: NDArray[np.int64]  # (terms,) index of the state
     source: NDArray[np.int64]  # (terms,) index or -1
     scale: Array  # (states,)
@@ -101,11 +101,15 @@ def make_system(model: Model, grid: Grid) -> System:
     states = tuple(model.states)
     index = {name: i for i, name in enumerate(states)}
     variables = frozenset(states)
+    moving = frozenset({"time", *(name for name, one in grid.samples.items() if one.linear)})
     return System(
         model=model,
         grid=grid,
         states=states,
-        affine=all(degree(term.expression, variables) <= 1 for term in model.terms),
+        affine=all(
+            degree(term.expression, variables) <= 1 and not mixed(term.expression, variables, moving)
+            for term in model.terms
+        ),
         into=np.array([index[term.into] for term in model.terms], dtype=np.int64),
         source=np.array([index[term.source] if term.source else -1 for term in model.terms], dtype=np.int64),
         scale=np.array([model.states[name].scale for name in states]),

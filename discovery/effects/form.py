@@ -139,8 +139,8 @@ class Shape:
     With `factor`: 68 % of values lie within this factor of `middle` (log-normal). With `spread`: normal
     around `middle`. Without a `middle` any time constant that the recordings can show is as likely as any
     other on a logarithmic scale. `instant`: a time in the recording, which is searched for by itself.
-    `apart`: ratio of neighbouring values in a search, whose signatures are much alike; those of a delay, which
-    smooths nothing, are so only close by.
+    `apart`: ratio of neighbouring values in a search, whose signatures are much alike; those of a delay,
+    which smooths nothing, are so only close by.
     """
 
     name: str

@@ -2,7 +2,17 @@
 
 from discovery.terms.delays import delays_at
 from discovery.terms.dual import Dual, Program, compiled, evaluate, program_of
-from discovery.terms.expression import Apply, Expression, Name, Number, degree, names, rewrite, substitute
+from discovery.terms.expression import (
+    Apply,
+    Expression,
+    Name,
+    Number,
+    degree,
+    mixed,
+    names,
+    rewrite,
+    substitute,
+)
 from discovery.terms.parsing import parse
 from discovery.terms.printing import text
 from discovery.terms.term import Term
@@ -19,6 +29,7 @@ __all__ = [
     "degree",
     "delays_at",
     "evaluate",
+    "mixed",
     "names",
     "parse",
     "program_of",

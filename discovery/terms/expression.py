@@ -94,3 +94,22 @@ def degree(expression: Expression, variables: frozenset[str]) -> int:
             return 2
         case _:
             return 0
+
+
+def mixed(expression: Expression, some: frozenset[str], others: frozenset[str]) -> bool:
+    """Whether a factor with a name of `some` is multiplied by one with a name of `others`, or divided by it.
+
+    >>> from discovery.terms import parse
+    >>> [mixed(parse(t), frozenset({"a"}), frozenset({"b"})) for t in ("G*(b - a)", "b*(c - a)", "b*b + a")]
+    [False, True, False]
+    """
+    if not isinstance(expression, Apply):
+        return False
+    if any(mixed(argument, some, others) for argument in expression.arguments):
+        return True
+    if expression.function in ("+", "-", "neg"):
+        return False
+    held = [names(argument) for argument in expression.arguments]
+    return any(
+        held[i] & some and held[j] & others for i in range(len(held)) for j in range(len(held)) if i != j
+    )

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from discovery.dynamics import make_grid, make_system, predict, simulate
+from discovery.dynamics import System, make_grid, make_system, predict, simulate
 from discovery.models import Model, Parameter, State
 from discovery.models.thermobalance import thermobalance
 from discovery.recordings import Campaign, Channel, Recording
@@ -159,6 +159,46 @@ def test_first_order_is_exact_whatever_the_step(between: str) -> None:
         steady = u[k] - slope * tau
         expected.append((expected[-1] - steady) * math.exp(-h / tau) + steady + slope * h)
     assert np.allclose(predict(x)[:, 0], expected, rtol=0, atol=1e-12)
+
+
+def washed(step: float, inlet: float) -> tuple[System, Array, Array]:
+    """A body at the inlet temperature, washed by a flow that runs straight between its readings every 60 s;
+    and both.
+    """
+    time = np.arange(0.0, 3601.0, step)
+    flow = np.interp(time, np.arange(0.0, 3601.0, 60.0), np.random.default_rng(3).uniform(0.0, 2.0, 61))
+    source = f"k*u*({inlet} - y)"
+    model = Model(
+        "washed",
+        {"k": Parameter(0.01)},
+        {"y": State("y", "degC", None, Number(40.0), 0.0)},
+        (Term("t", "y", parse(source)),),
+        {},
+    )
+    grid = make_grid(one_channel(time, flow, "linear", np.zeros(len(time))), "r", ["u"], ["y"])
+    return make_system(model, grid), time, flow
+
+
+def test_a_body_as_warm_as_what_washes_it_stays_so() -> None:
+    """Whatever the zero of the scale is: with the mean of the flow in each step, it wandered by 1.5 K."""
+    system, _, _ = washed(60.0, 40.0)
+    assert simulate(system, system.model.values()).x[:, 0] == pytest.approx(40.0, abs=1e-9)
+
+
+def test_a_flow_that_runs_straight_converges_with_the_square_of_the_step() -> None:
+    errors = []
+    for step in (60.0, 30.0):
+        system, time, flow = washed(step, 20.0)
+
+        def exact(t: float, x: Array, time: Array = time, flow: Array = flow) -> Array:
+            return np.asarray(0.01 * np.interp(t, time, flow) * (20.0 - x))
+
+        at = np.arange(0.0, 601.0, 60.0)
+        solved = solve_ivp(exact, (0, 600.0), [40.0], "LSODA", at, rtol=1e-10, atol=1e-10, max_step=20.0)
+        x = simulate(system, system.model.values()).x[:: int(60 / step), 0]
+        errors.append(float(np.sqrt(np.mean((x[: len(at)] - solved.y[0]) ** 2))))
+    assert errors[0] < 0.3  # of 20 K
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
 
 
 def test_radiation_converges_with_the_square_of_the_step() -> None:

@@ -72,19 +72,15 @@ def starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Itera
     """Find a temperature that differs from the others at a cold start, and does not in other recordings.
 
     Where it starts as its siblings do, nothing is wrong with it, wherever it starts elsewhere: the other
-    recordings may have begun with a warm machine. Nor is it where it starts as it does elsewhere: this one may
-    have.
+    recordings may have begun with a warm machine. Nor is anything where it starts as it does elsewhere: this
+    recording may have begun so.
     """
     away: dict[tuple[str, str], float] = {}
     agree: dict[str, float] = {}
     for one in recordings:
         first = {}
         for c in temperatures:
-            if (
-                c.name in one.values
-                and c.name not in one.constant
-                and one.known(c.name)[1].size >= 3
-            ):
+            if c.name in one.values and c.name not in one.constant and one.known(c.name)[1].size >= 3:
                 first[c.name] = _first(one, c.name)
         if len(first) < 2:
             continue
