@@ -273,11 +273,12 @@ def surely_better(gains: Array) -> bool:
     False
     """
     gains = gains[gains != 0]
-    rank = 1 + np.argsort(np.argsort(np.abs(gains)))
+    _, place, count = np.unique(np.abs(gains), return_inverse=True, return_counts=True)
+    twice = (2 * np.cumsum(count) - count + 1)[place]  # the rank; of equal ones, the mean of theirs
     chance = np.ones(1)  # of each sum of ranks of better blocks, where a block is better or worse by chance
-    for k in range(1, len(gains) + 1):
-        chance = 0.5 * (np.pad(chance, (0, k)) + np.pad(chance, (k, 0)))
-    return bool(chance[rank[gains > 0].sum() :].sum() <= 1.0 - thresholds.SUREST)
+    for rank in twice:
+        chance = 0.5 * (np.pad(chance, (0, rank)) + np.pad(chance, (rank, 0)))
+    return bool(chance[twice[gains > 0].sum() :].sum() <= 1.0 - thresholds.SUREST)
 
 
 def block_sums(before: Array, after: Array, blocks: int = BLOCKS) -> tuple[Array, Array, Array]:

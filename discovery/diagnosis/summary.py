@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from discovery.diagnosis.thresholds import RIVAL
+from discovery.diagnosis.thresholds import RIVAL, SHARE
 from discovery.printed import printed, undetermined, when
 from discovery.runfolder import read_diagnosis
 
 _NOISE = "reading noise and heat that nobody records explain"
 _OFF = "reading noise, heat that nobody records and flows that are off by {:.0f} % explain"
-_USUAL = 0.02  # share by which the flows of a good model are off
 _COARSE = "reading noise and process noise as large as this model needs explain"
 _OPEN = 1.5  # times the noise: from there on, the uncertainty of the parameters is said
 
@@ -56,7 +55,7 @@ def _noise(d: dict[str, Any]) -> str:
     if d["verdict"] == "unexplained":
         return _COARSE
     share = (d.get("detection") or {}).get("form_error") or 0.0
-    return _OFF.format(100 * share) if share > _USUAL else _NOISE
+    return _OFF.format(100 * share) if share >= SHARE else _NOISE
 
 
 def _otherwise(one: dict[str, Any], unit: str) -> str:

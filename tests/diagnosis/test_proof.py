@@ -229,6 +229,15 @@ def test_signed_ranks_are_those_of_scipy(count: int) -> None:
     assert decided == ({False} if count < 6 else {False, True})  # of five, all are better with 3 %
 
 
+@pytest.mark.parametrize(("better", "sure"), [(12, False), (13, True)])
+def test_of_gains_that_are_alike_their_number_counts(better: int, sure: bool) -> None:
+    """The sign test: 12 or more of 16 are better by chance with 3.8 %, 13 or more with 1.1 %."""
+    gains = np.where(np.arange(16) < better, 0.3, -0.3)
+    assert surely_better(gains) is sure
+    assert surely_better(gains[::-1]) is sure
+    assert bool(binom.sf(better - 1, 16, 0.5) <= 1.0 - thresholds.SUREST) is sure
+
+
 def test_blocks_that_are_no_other_count_neither_way() -> None:
     gains = np.array([3.0, 0.0, 2.0, 0.0, 5.0, 1.0, 4.0, 6.0, 0.0])
     assert surely_better(gains)
