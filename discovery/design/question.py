@@ -38,9 +38,7 @@ def ask(context: Context, found: Search, verdict: Verdict) -> str:
     if verdict.word == NO_MISMATCH:
         return _smallest(found)
     if verdict.word == FAULT:
-        return (
-            "check the device and repeat the recording; a fault of the measuring chain needs no new physics"
-        )
+        return check_the_device(context, [n.hypothesis for n in verdict.named])
     if verdict.word == UNEXPLAINED and context.unused_readings:
         return READ.format(channels=" and ".join(context.unused_readings))
     shown = verdict.named or verdict.candidates
@@ -62,6 +60,24 @@ def ask(context: Context, found: Search, verdict: Verdict) -> str:
     noise = answer.noise
     other = rival or _without(answer)
     return f"{first}{next_experiment(context, answer.fit.model, other, noise, purpose, believed(context))}"
+
+
+def check_the_device(context: Context, named: Sequence[Hypothesis]) -> str:
+    """What to do about faults. What a device shows in every recording, the machine may do: a body that is
+    warmer inside than where its thermometer sits looks like a thermometer that is slow.
+    """
+    physics = {e.word for e in context.effects if e.is_physics}
+    lasting = [h for h in named if h.recording is None]
+    alike = dict.fromkeys(w for h in lasting for w in h.effect.confused_with if w in physics)
+    if not alike:
+        return (
+            "check the device and repeat the recording; a fault of the measuring chain needs no new physics"
+        )
+    where = " and ".join(dict.fromkeys(h.where for h in lasting))
+    return (
+        f"test the device of {where} apart from the machine: what it shows in every recording may also be "
+        f"the machine itself ({', '.join(alike)})"
+    )
 
 
 def _not_used(context: Context) -> str:

@@ -12,13 +12,23 @@ import pytest
 
 from discovery.design import question
 from discovery.design.next_experiment import STEPS, _designs, believed, next_experiment
-from discovery.design.question import APART, CONFIRM, NOTHING_CLOSE, _smallest, aim, ask, look_back
+from discovery.design.question import (
+    APART,
+    CONFIRM,
+    NOTHING_CLOSE,
+    _smallest,
+    aim,
+    ask,
+    check_the_device,
+    look_back,
+)
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.diagnose import diagnose
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import UNEXPLAINED, Verdict
 from discovery.dynamics import make_grid
+from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Score
 from discovery.fitting import Noise
@@ -322,3 +332,18 @@ def test_what_is_measured_already_is_asked_before_a_new_experiment() -> None:
     verdict = Verdict(UNEXPLAINED, cast(Scored, None), (), (), ())
     said = ask(where, cast(Search, None), verdict)
     assert said.startswith("add T_front and T_rear to the `outputs` of the experiment and diagnose again")
+
+
+def test_what_a_device_shows_in_every_recording_the_machine_may_do() -> None:
+    """A cell whose core is warmer than its skin has two thermometers with a lag of 40 s."""
+    context = cast(Context, SimpleNamespace(effects=tuple(catalogue().values())))
+
+    def fault(word: str, recording: str | None) -> Hypothesis:
+        found = SimpleNamespace(effect=catalogue()[word], recording=recording, where="T_minus")
+        return cast(Hypothesis, found)
+
+    once = check_the_device(context, [fault("sensor_drift", "monday")])
+    assert once.startswith("check the device and repeat the recording")
+    always = check_the_device(context, [fault("sensor_lag", None), fault("sensor_drift", "monday")])
+    assert always.startswith("test the device of T_minus apart from the machine")
+    assert always.endswith("the machine itself (second_thermal_mass, heater_mass)")
