@@ -6,7 +6,7 @@ seen, and if no law of physics forbids it. Held-out recordings may withdraw a na
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import inf, isfinite, sqrt
@@ -76,10 +76,13 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     def level(some: Sequence[Named], goal: float) -> float:
         return _alone(context, found, answer, some, found.best.evidence - goal)
 
-    sure = _needed([n for n in probable if n.hypothesis.key not in refused], least, level)
+    def needed(some: Sequence[Named], lost: Collection[Key]) -> list[Named]:
+        return _needed(some, least, level, lambda *those: _instead(found, lost, *those) - least)
+
+    sure = needed([n for n in probable if n.hypothesis.key not in refused], refused)
     proved, idle, proofs = _proved(context, found, answer, sure)
     # what is named must not owe its evidence to what is not
-    named = tuple(_needed(proved, least, level)) if idle else proved
+    named = tuple(needed(proved, {*refused, *idle})) if idle else proved
     sure = [n for n in sure if n in named or n.hypothesis.key in idle]
     others = [n.hypothesis for n in candidates if n not in named]
 
@@ -201,18 +204,41 @@ def _idle(h: Hypothesis, outside: LeftOut) -> str:
     )
 
 
+def _instead(found: Search, lost: Collection[Key], kept: Sequence[Named], n: Named, whole: float) -> float:
+    """What a model of some effects has to exceed where one of them may be another: the best model of as many
+    effects without it, and what unsure effects add, at most as much as a name needs. They add it to what was
+    left unexplained, and that may also decide between the two.
+
+    Args:
+        lost: effects that are no rivals.
+        whole: log evidence of the model.
+    """
+    none = {n.hypothesis.key, *lost}
+    few = [m for m in found.tried.values() if none.isdisjoint(m.keys) and len(m.keys) <= len(kept)]
+    return max(m.evidence for m in few) + min(found.best.evidence - whole, thresholds.SHORT)
+
+
 def _needed(
-    chosen: Sequence[Named], least: float, level: Callable[[Sequence[Named], float], float]
+    chosen: Sequence[Named],
+    least: float,
+    level: Callable[[Sequence[Named], float], float],
+    instead: Callable[[Sequence[Named], Named, float], float] = lambda _, __, ___: -inf,
 ) -> list[Named]:
     """Effects that are all needed: each adds at least so much evidence to a model of the others.
 
     Args:
         level: log evidence of a model with some effects; it need not be exact below its second argument.
+        instead: likewise, of what may be there in the place of one of them.
     """
     kept = list(chosen)
     while kept:
         whole = level(kept, -inf)
-        levels = {n.hypothesis.key: level([o for o in kept if o is not n], whole - least) for n in kept}
+        levels = {
+            n.hypothesis.key: max(
+                level([o for o in kept if o is not n], whole - least), instead(kept, n, whole)
+            )
+            for n in kept
+        }
         last = max(kept, key=lambda n: levels[n.hypothesis.key])
         if not whole - levels[last.hypothesis.key] < least:
             break
@@ -307,7 +333,7 @@ def _apart(found: Search, answer: Scored, rest: Sequence[Named], least: float) -
     sentences = []
     for n in rest:
         added = _added(found, answer, n.hypothesis)
-        sentence = _unsure(n, added, least)
+        sentence = _unsure(n, added, least, _alone_or_not(found, n.hypothesis))
         if n.rivals and n.rivals[0].below < added:
             other, below = n.rivals[0].hypothesis, n.rivals[0].below
             sentence += f"; {other.stated} instead has {below:.1f} less"
@@ -315,14 +341,25 @@ def _apart(found: Search, answer: Scored, rest: Sequence[Named], least: float) -
     return tuple(sentences)
 
 
-def _unsure(n: Named, added: float, least: float) -> str:
-    """Why an effect of the answer has no name."""
+def _alone_or_not(found: Search, h: Hypothesis) -> str:
+    """By how much an effect alone explains more than another one alone, if both were tried."""
+    alone = found.tried.get(frozenset((h.key,)))
+    single = [m for m in found.tried.values() if len(m.hypotheses) == 1 and h.key not in m.keys]
+    if alone is None or not single:
+        return ""
+    other = max(single, key=lambda m: m.evidence)
+    more = alone.evidence - other.evidence
+    return f" (alone it has {more:.0f} more than {other.hypotheses[0].stated})"
+
+
+def _unsure(n: Named, added: float, least: float, alone: str) -> str:
+    """Why an effect of the answer has no name. `alone`: how it compares with another one alone."""
     name = n.hypothesis.stated
     chance = f"probability {_chance(n.probability)}"
     if added >= least and n.together >= thresholds.NAMED:
         return (
             f"{name} is not named: its log evidence of {added:.0f} ({chance}) counts only next to effects "
-            "that are not named either"
+            f"that are not named either{alone}"
         )
     if n.together < thresholds.NAMED:
         chance += f" of the {thresholds.NAMED:g} that a name needs"

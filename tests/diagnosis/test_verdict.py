@@ -228,10 +228,30 @@ def test_evidence_that_needs_an_effect_without_a_name_is_said() -> None:
     assert found.named == ()
     assert (
         f"fluid_convection at {FLUID.where} is not named: its log evidence of 90 (probability 0.95) counts "
-        "only next to effects that are not named either"
+        "only next to effects that are not named either "
+        f"(alone it has -5 more than friction_speed at {FRICTION.where})"
     ) in found.reasons
     said_of = f"friction_speed at {FRICTION.where} is possible but not sure enough to be named"
     assert any(said_of in text for text in found.reasons)
+
+
+@pytest.mark.parametrize(
+    ("rival", "both", "named"),
+    [
+        (90.0, 100.0, True),  # nothing else acts: its rival has 10 less
+        (90.0, 109.0, True),  # what else acts adds 9
+        (90.0, 112.0, False),  # ... and 12: as much could decide between the two
+        (83.0, 180.0, True),  # no rival is as near as a name needs
+    ],
+)
+def test_what_else_acts_may_decide_between_rivals(rival: float, both: float, named: bool) -> None:
+    """A portal: a film on a column had 10 more than a second mass of the beam, which acted, and two effects
+    that were not sure added 14 to either.
+    """
+    mass = claim("second_thermal_mass", "bed")
+    models = (Model((FLUID,), 100.0), Model((mass,), rival), Model((FLUID, FRICTION), both), Model((), 0.0))
+    found = said(Tried(models), {"fluid_convection": 0.95, "friction_speed": 0.5})
+    assert [n.hypothesis for n in found.named] == ([FLUID] if named else [])
 
 
 def test_single_wrong_readings_are_all_that_is_wrong() -> None:
