@@ -204,25 +204,25 @@ def _idle(h: Hypothesis, outside: LeftOut) -> str:
     )
 
 
-def _instead(found: Search, lost: Collection[Key], kept: Sequence[Named], n: Named, whole: float) -> float:
-    """What a model of some effects has to exceed where one of them may be another: the best model of as many
-    effects without it, and what unsure effects add, at most as much as a name needs. They add it to what was
-    left unexplained, and that may also decide between the two.
+def _instead(found: Search, lost: Collection[Key], n: Named, whole: float) -> float:
+    """What a model of names has to exceed where one of them may be another effect: the best of all models
+    without it. Where effects that are not sure add more than a name needs, only a model counts that the best
+    one does not exceed by as much.
 
     Args:
         lost: effects that are no rivals.
         whole: log evidence of the model.
     """
     none = {n.hypothesis.key, *lost}
-    few = [m for m in found.tried.values() if none.isdisjoint(m.keys) and len(m.keys) <= len(kept)]
-    return max(m.evidence for m in few) + min(found.best.evidence - whole, thresholds.SHORT)
+    rest = max(m.evidence for m in found.tried.values() if none.isdisjoint(m.keys))
+    return rest - max(found.best.evidence - whole - thresholds.SHORT, 0.0)
 
 
 def _needed(
     chosen: Sequence[Named],
     least: float,
     level: Callable[[Sequence[Named], float], float],
-    instead: Callable[[Sequence[Named], Named, float], float] = lambda _, __, ___: -inf,
+    instead: Callable[[Named, float], float] = lambda _, __: -inf,
 ) -> list[Named]:
     """Effects that are all needed: each adds at least so much evidence to a model of the others.
 
@@ -234,9 +234,7 @@ def _needed(
     while kept:
         whole = level(kept, -inf)
         levels = {
-            n.hypothesis.key: max(
-                level([o for o in kept if o is not n], whole - least), instead(kept, n, whole)
-            )
+            n.hypothesis.key: max(level([o for o in kept if o is not n], whole - least), instead(n, whole))
             for n in kept
         }
         last = max(kept, key=lambda n: levels[n.hypothesis.key])

@@ -238,18 +238,22 @@ def test_evidence_that_needs_an_effect_without_a_name_is_said() -> None:
 @pytest.mark.parametrize(
     ("rival", "both", "named"),
     [
-        (90.0, 100.0, True),  # nothing else acts: its rival has 10 less
-        (90.0, 109.0, True),  # what else acts adds 9
-        (90.0, 112.0, False),  # ... and 12: as much could decide between the two
-        (83.0, 180.0, True),  # no rival is as near as a name needs
+        (99.0, 112.0, True),  # less than the name alone
+        (101.0, 112.0, False),
+        (101.0, 118.0, True),  # more, but the best model has more than a name needs above it
     ],
 )
 def test_what_else_acts_may_decide_between_rivals(rival: float, both: float, named: bool) -> None:
-    """A portal: a film on a column had 10 more than a second mass of the beam, which acted, and two effects
-    that were not sure added 14 to either.
+    """A portal: a film on a column had 31, and the second mass of a beam, which acted, with convection 36.
+    All three had 46, and neither of the two was sure.
     """
     mass = claim("second_thermal_mass", "bed")
-    models = (Model((FLUID,), 100.0), Model((mass,), rival), Model((FLUID, FRICTION), both), Model((), 0.0))
+    models = (
+        Model((FLUID,), 100.0),
+        Model((mass, FRICTION), rival),
+        Model((FLUID, FRICTION), both),
+        Model((), 0.0),
+    )
     found = said(Tried(models), {"fluid_convection": 0.95, "friction_speed": 0.5})
     assert [n.hypothesis for n in found.named] == ([FLUID] if named else [])
 
