@@ -47,6 +47,7 @@ class Named:
     probability: float
     together: float  # probability that it acts, or a rival that is nearly as likely
     rivals: tuple[Rival, ...]
+    near: frozenset[Key] = frozenset()  # those that are nearly as likely
 
 
 @dataclass(frozen=True)
@@ -206,14 +207,14 @@ def _idle(h: Hypothesis, outside: LeftOut) -> str:
 
 def _instead(found: Search, lost: Collection[Key], n: Named, whole: float) -> float:
     """What a model of names has to exceed where one of them may be another effect: the best of all models
-    without it. Where effects that are not sure add more than a name needs, only a model counts that the best
-    one does not exceed by as much.
+    without it, and without rivals that are named next to it as they are nearly as likely. Where effects that
+    are not sure add more than a name needs, only a model counts that the best one does not exceed by as much.
 
     Args:
         lost: effects that are no rivals.
         whole: log evidence of the model.
     """
-    none = {n.hypothesis.key, *lost}
+    none = {n.hypothesis.key, *n.near, *lost}
     rest = max(m.evidence for m in found.tried.values() if none.isdisjoint(m.keys))
     return rest - max(found.best.evidence - whole - thresholds.SHORT, 0.0)
 
@@ -395,4 +396,5 @@ def _named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis) -
     rivals = tuple(sorted(below.values(), key=lambda r: r.below))
     near = [r.hypothesis for r in rivals if r.below <= thresholds.RIVAL]
     own, together = posterior.of_claims([h]), posterior.of_claims([h, *near])
-    return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals)
+    keys = frozenset(rival.key for rival in near)
+    return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals, keys)

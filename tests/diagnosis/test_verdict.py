@@ -258,6 +258,23 @@ def test_what_else_acts_may_decide_between_rivals(rival: float, both: float, nam
     assert [n.hypothesis for n in found.named] == ([FLUID] if named else [])
 
 
+@pytest.mark.parametrize(("near", "named"), [(111.8, True), (108.0, False)])
+def test_a_rival_that_is_named_next_to_it_does_not_withdraw_a_name(near: float, named: bool) -> None:
+    """The lag of a thermometer, and a second mass with 0.2 less, next to convection that is not sure:
+    either of the two acts.
+    """
+    mass = claim("second_thermal_mass", "bed")
+    models = (
+        Model((FLUID,), 100.0),
+        Model((mass, FRICTION), near),
+        Model((FLUID, FRICTION), 112.0),
+        Model((), 0.0),
+    )
+    words = {"fluid_convection": 0.5, "second_thermal_mass": 0.45, "friction_speed": 0.5}
+    found = said(Tried(models), words)
+    assert [n.hypothesis for n in found.named] == ([FLUID] if named else [])
+
+
 def test_single_wrong_readings_are_all_that_is_wrong() -> None:
     dry = Tried([Model((FLUID,), 1.0), Model((), 0.0)])
     nothing = said(dry, {"fluid_convection": 0.1})
