@@ -133,8 +133,8 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
         return verdict
     sizes = ", ".join(f"{_size(proof[r], rms[r], unit)} on {r}" for r in missed)
     reason = (
-        "from any start, free runs on held-out recordings miss more than noise and the fit explain: "
-        f"rms {sizes}; something acts there that the recordings to fit do not show"
+        "free runs on held-out recordings miss more than noise and the fit explain, from each start within "
+        f"its spread: rms {sizes}; something acts there that the recordings to fit do not show"
     )
     word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
     return replace(verdict, word=word, reasons=(*verdict.reasons, reason))

@@ -109,14 +109,14 @@ def solve(
         if not (np.isfinite(gram).all() and np.isfinite(gradient).all()):  # no step from here
             done = True
             break
-        promised = _expected(_step(x, gram, gradient, 0.0, low, high), gram, gradient)
+        promised = _expected(bounded_step(x, gram, gradient, 0.0, low, high), gram, gradient)
         done = promised < _IDLE * tolerance * cost
         late = taken >= _SETTLED and cost - _TIMES * promised > goal
         if done or late:
             break
         found, tighten = None, _TIGHTEN
         while damping < _HOPELESS:
-            moved = np.clip(x + _step(x, gram, gradient, damping, low, high), low, high)
+            moved = np.clip(x + bounded_step(x, gram, gradient, damping, low, high), low, high)
             change = moved - x
             expected = _expected(change, gram, gradient)
             if np.all(np.abs(change) <= _STILL * (1.0 + np.abs(x))):
@@ -228,7 +228,7 @@ def _expected(change: Array, gram: Array, gradient: Array) -> float:
     return -float(gradient @ change) - 0.5 * float(change @ gram @ change)
 
 
-def _step(x: Array, gram: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
+def bounded_step(x: Array, gram: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
     """Damped step (U,); an unknown that would leave its range goes to the end of it, and the others are
     asked again.
     """

@@ -217,3 +217,28 @@ def test_a_start_that_was_read_is_known_within_the_reading_noise() -> None:
     left, misses = run.system.grid.readings - predict(run), np.array([5.0])
     assert np.abs(from_known_starts(run, left, misses)[1:]).max() < 1.0
     assert np.abs(from_known_starts(run, left, misses, reading=np.array([0.1]))[1:]).min() > 9.0
+
+
+def test_a_room_that_is_known_within_a_spread_does_not_explain_what_is_far_beyond_it() -> None:
+    """A probe was 17 K colder than its model; a room of -13 degC, known as 22 degC within 3 K, hid it."""
+    hour: Array = 20.0 * np.arange(181.0)
+    fall = 1.0 - np.exp(-hour / 1000.0)  # what a body that follows the room shows of a shift of it
+    model = Model(
+        "in a room",
+        {},
+        {"body": State("body", "degC")},
+        (Term("loss", "body", parse("(room - body)/1000")),),
+        {},
+    )
+    channels = {
+        "room": Channel("room", "ambient temperature", "degC", None, "linear", spread=3.0),
+        "body": Channel("body", "temperature", "degC", None, "linear"),
+    }
+    for colder, left in ((2.0, 0.0), (35.0, 35.0 - 9.0)):
+        body = 22.0 - colder * fall
+        readings = Recording("a", hour, {"room": np.full(181, 22.0), "body": body})
+        run = predict_recording(model, Campaign("one", channels, {"a": readings}), "a", ["body"], [0.1])
+        residual = body[:, None] - predict(run)
+        started = from_known_starts(run, residual, np.array([0.1]))
+        # the start gives way, too: by three times its noise of 0.1 K
+        assert started[:, 0] == pytest.approx(-left * fall, abs=0.35)
