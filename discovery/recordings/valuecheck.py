@@ -13,6 +13,9 @@ from discovery.recordings.roles import ROLES
 
 FEW = 20  # readings: fewer carry no model
 _STANDS = 5.0  # a sensor that stands still so many times longer than chance explains
+_CHANCE = 2.0  # times what chance explains, where a jump shows that the body went on
+_CAUGHT_UP = 4.0  # times the largest of the steps around: readings that come back from where they stood
+_AROUND = 10  # steps on each side
 _NEAR_ZERO = 0.05  # of the largest magnitude of a load or flow: so far below zero is noise
 # what a channel exceeds somewhere in any recording, and the unit that it has where it does not
 _SMALLEST = {
@@ -80,7 +83,8 @@ def frozen_findings(file: Path, lines: Lines, channel: Channel, column: Array) -
     """A sensor that repeats one value far longer than it does elsewhere in the recording.
 
     When a reading differs from the one before with probability p, the longest run of equal readings among n
-    is about ln(n)/p (Erdos and Renyi 1970); several times that is a sensor that stands still.
+    is about ln(n)/p (Erdos and Renyi 1970); several times that is a sensor that stands still. Less is enough
+    where the readings behind it go on far from where they stood, and as slowly as before.
     """
     known = np.flatnonzero(np.isfinite(column))
     if not channel.is_sensor or known.size < FEW:
@@ -96,15 +100,31 @@ def frozen_findings(file: Path, lines: Lines, channel: Channel, column: Array) -
     longest = int(np.argmax(lengths))
     others = known.size - lengths[longest]
     changes = (lengths.size - 1) / max(others, 1)
-    if lengths[longest] > _STANDS * np.log(known.size) / changes + FEW:
+    chance = np.log(known.size) / changes
+    stands = lengths[longest] > _STANDS * chance + FEW
+    if stands or (lengths[longest] > _CHANCE * chance and _catches_up(readings, ends, longest)):
         first, last = known[ends[longest] - lengths[longest] + 1], known[ends[longest]]
         what = (
             f"'{channel.name}' stays at {column[first]:g} for {lengths[longest]} readings,"
-            f" up to line {lines[last]}, and changes every {1 / changes:.2g} readings elsewhere"
+            f" up to line {lines[last]}, and changes {_every(1 / changes)} elsewhere"
         )
         yield Finding(
             "warning", file, int(lines[first]), what, "check the sensor; empty the cells if it hung"
         )
+
+
+def _every(readings: float) -> str:
+    """How often a sensor shows something new."""
+    return f"every {readings:.2g} readings" if readings >= 1.5 else "with nearly every reading"
+
+
+def _catches_up(readings: Array, ends: Lines, run: int) -> bool:
+    """Whether the readings (R,) jump behind a run of equal ones, and move far less before it and after."""
+    last = int(ends[run])
+    first = int(ends[run - 1]) + 1 if run else 0
+    steps = np.abs(np.diff(readings))
+    around = np.concatenate([steps[max(first - _AROUND, 0) : first], steps[last + 1 : last + 1 + _AROUND]])
+    return around.size >= _AROUND and bool(steps[last] > _CAUGHT_UP * around.max())
 
 
 def small_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:

@@ -61,6 +61,25 @@ def test_slow_quantised_and_switched_signals_are_no_frozen_sensors(write: Write)
     assert found(write(with_column(1, cells))) == []
 
 
+def test_a_sensor_that_hung_while_a_body_warmed_is_known_by_the_jump_behind_it(write: Write) -> None:
+    """A plate warmed by 0.35 K from one reading to the next; 22 equal readings, and 8 K more."""
+    random = np.random.default_rng(2)
+    warming = np.round(20.0 + 50.0 * (1.0 - np.exp(-np.arange(140) / 90.0)) + random.normal(0, 0.05, 140), 2)
+    assert found(write(with_column(1, [f"{value}" for value in warming]))) == []
+    warming[60:82] = warming[60]
+    [told] = found(write(with_column(1, [f"{value}" for value in warming])))
+    assert "line 62: 'T_env' stays at" in told
+    assert "for 22 readings, up to line 83" in told
+
+
+def test_a_body_that_stood_still_and_is_heated_is_no_frozen_sensor(write: Write) -> None:
+    """Readings to 0.1 K are equal as long as nothing happens; then the body warms, at first fastest."""
+    warming = np.r_[np.full(30, 20.0), 20.0 + 25.0 * (1.0 - np.exp(-np.arange(1, 171) / 10.0))]
+    random = np.random.default_rng(2)
+    warming[100:] += random.normal(0, 0.1, 100)
+    assert found(write(with_column(1, [f"{value:.1f}" for value in warming]))) == []
+
+
 @pytest.mark.parametrize(
     "cells",
     [

@@ -66,6 +66,22 @@ def test_a_body_that_warms_as_fast_as_it_cools_elsewhere_is_sound() -> None:
     assert [one.kind for one in temperature_findings(recordings, {"body": body})] == []
 
 
+@pytest.mark.parametrize(("reached", "said"), [(110.0, False), (180.0, True)])
+def test_a_climb_is_a_fault_only_where_it_leads_to_where_a_body_never_is(reached: float, said: bool) -> None:
+    """A lamp heated a plate from 41 to 110 degC; in the other recordings it stayed near 110 degC."""
+    time = np.linspace(0.0, 240.0, 120)
+    warms = 41.0 + (reached - 41.0) * (1.0 - np.exp(-time / 60.0)) / (1.0 - np.exp(-4.0))
+    stays = 110.0 + 2.0 * np.sin(time / 30.0)
+    recordings = [
+        Seen(name, Path(f"{name}.csv"), time, {"plate": values}, np.arange(120))
+        for name, values in (("a", stays), ("b", stays), ("c", warms))
+    ]
+    plate = Channel("plate", "temperature", "degC", None, "linear")
+    found = [one for one in temperature_findings(recordings, {"plate": plate}) if one.kind == "climbs"]
+    assert bool(found) == said
+    assert all("within 3.9 min" in one.what for one in found)  # no longer than the recording
+
+
 def test_a_body_that_warms_while_its_readings_are_missing_is_sound(write: Write) -> None:
     quick = WARM + 15.0 * (np.arange(WARM.size) > 150)
     lines = recorded(quick)

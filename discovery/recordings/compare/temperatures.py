@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from discovery.printed import lasting
 from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Array
 from discovery.recordings.compare.seen import Seen, warning
@@ -21,6 +22,8 @@ _SPREADS = 8.0  # times the usual spread of a start between recordings
 _FASTER = 8.0  # times the fastest that a temperature moves elsewhere
 _CLIMB = 8.0  # K within a few minutes, at least
 _MINUTES = 360.0  # s
+_NEAR = 0.2  # of a climb: so near to where it is elsewhere
+_WINDOWS = tuple(_MINUTES / 2**k for k in range(8))
 
 
 def temperature_findings(recordings: Sequence[Seen], channels: Mapping[str, Channel]) -> Iterator[Finding]:
@@ -37,35 +40,44 @@ def temperature_findings(recordings: Sequence[Seen], channels: Mapping[str, Chan
 
 def _climbs(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
     """A temperature that moves far faster than it does in any other recording, and not by a single
-    reading.
+    reading. Nothing is wrong where it goes to where it is in others: this one began with a cold machine.
     """
     fastest = {one.name: _fastest(*one.known(channel.name)) for one in recordings}
     for one in recordings:
-        others = [abs(v) for name, (v, _) in fastest.items() if name != one.name]
+        others = [abs(v) for name, (v, *_) in fastest.items() if name != one.name]
         if len(others) < 2:
             continue
-        change, row = fastest[one.name]
+        change, row, took = fastest[one.name]
         usual = max(others)
+        elsewhere = np.concatenate([o.known(channel.name)[1] for o in recordings if o.name != one.name])
+        reached = one.known(channel.name)[1][row] + change
+        margin = _NEAR * abs(change)
+        if elsewhere.min() - margin <= reached <= elsewhere.max() + margin:
+            continue
         if abs(change) > max(_CLIMB, _FASTER * usual):
             word = "climbs" if change > 0 else "falls"
             what = (
-                f"'{channel.name}' {word} by {abs(change):.3g} K within {_MINUTES / 60:.0f} min, "
-                f"elsewhere by at most {usual:.2g} K"
+                f"'{channel.name}' {word} by {abs(change):.3g} K within {lasting(took)}, "
+                f"elsewhere by at most {usual:.2g} K within {lasting(_MINUTES)}"
             )
             yield warning(one, channel, row, what, "look at the sensor and its contact", "climbs", 2.0)
 
 
-def _fastest(time: Array, read: Array) -> tuple[float, int]:
-    """Largest lasting change within a few minutes [K], and its first reading."""
+def _fastest(time: Array, read: Array) -> tuple[float, int, float]:
+    """Largest lasting change within a few minutes [K], its first reading, and how long it takes [s]."""
+    best = 0.0, 0, 0.0
     if read.size < _FEWEST:
-        return 0.0, 0
+        return best
     smooth = np.median(np.lib.stride_tricks.sliding_window_view(read, 5), axis=1)
-    stamps = time[2:-2]
-    ahead = np.minimum(np.searchsorted(stamps, stamps + _MINUTES), len(stamps) - 1)
-    ahead = np.maximum(ahead, np.minimum(np.arange(len(stamps)) + 1, len(stamps) - 1))
-    change = smooth[ahead] - smooth
-    row = int(np.argmax(np.abs(change)))
-    return float(change[row]), row + 2
+    stamps, last = time[2:-2], read.size - 5
+    for window in _WINDOWS:  # what comes and goes is seen by a short one
+        ahead = np.minimum(np.searchsorted(stamps, stamps + window), last)
+        ahead = np.maximum(ahead, np.minimum(np.arange(last + 1) + 1, last))
+        change = smooth[ahead] - smooth
+        row = int(np.argmax(np.abs(change)))
+        if abs(change[row]) > abs(best[0]):
+            best = float(change[row]), row + 2, float(stamps[ahead[row]] - stamps[row])
+    return best
 
 
 def starts(recordings: Sequence[Seen], temperatures: Sequence[Channel]) -> Iterator[Finding]:
