@@ -29,11 +29,12 @@ from discovery.diagnosis.form import (
     Window,
     WrongReading,
 )
+from discovery.diagnosis.named import Named
 from discovery.diagnosis.proof import Improvement, unit_of
 from discovery.diagnosis.ratios import known_ratio
 from discovery.diagnosis.response import Response
 from discovery.diagnosis.thresholds import RIVALS_SHOWN
-from discovery.diagnosis.verdict import FAULT, UNEXPLAINED, Named
+from discovery.diagnosis.verdict import FAULT, UNEXPLAINED
 from discovery.diagnosis.when import instants
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import LEVEL

@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import inf, isfinite, sqrt
+from math import inf, sqrt
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.crossvalidation import LeftOut, left_out, together_left_out
+from discovery.diagnosis.named import Named, added, one_named
 from discovery.diagnosis.posterior import Posterior
 from discovery.diagnosis.refit import score
 from discovery.diagnosis.scored import Scored, is_large, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.unknown_law import with_law
+from discovery.diagnosis.unsure import apart
 from discovery.diagnosis.vetoes import vetoed
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.printed import printed
@@ -29,25 +31,6 @@ NO_MISMATCH, MISSING, FAULT, UNEXPLAINED = (
     "measurement fault",
     "unexplained",
 )
-
-
-@dataclass(frozen=True)
-class Rival:
-    """Another answer to one part of the question."""
-
-    hypothesis: Hypothesis
-    below: float  # log evidence below the best
-
-
-@dataclass(frozen=True)
-class Named:
-    """One effect that the repaired model adds."""
-
-    hypothesis: Hypothesis
-    probability: float
-    together: float  # probability that it acts, or a rival that is nearly as likely
-    rivals: tuple[Rival, ...]
-    near: frozenset[Key] = frozenset()  # those that are nearly as likely
 
 
 @dataclass(frozen=True)
@@ -66,8 +49,8 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     answer = found.best
     candidates = tuple(
         sorted(
-            (_named(found, posterior, answer, h) for h in answer.hypotheses),
-            key=lambda n: -_added(found, answer, n.hypothesis),
+            (one_named(found, posterior, answer, h) for h in answer.hypotheses),
+            key=lambda n: -added(found, answer, n.hypothesis),
         )
     )
     probable = [n for n in candidates if n.together >= thresholds.NAMED]
@@ -134,7 +117,7 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
     further = (
         *(text for key, text in idle.items() if key in nothing),
-        *_apart(found, answer, unsure, least),
+        *apart(found, answer, unsure, least),
     )
     every = (*reasons, *further)
     if named:
@@ -321,80 +304,3 @@ def coarse(found: Search) -> tuple[str, ...]:
         f"the flows of the model are wrong by about {100 * found.baseline.off:.0f} %, more than is usual for "
         "a lumped model, and no effect explains it",
     )
-
-
-def _apart(found: Search, answer: Scored, rest: Sequence[Named], least: float) -> tuple[str, ...]:
-    """A sentence for each effect of the answer that is not sure enough to be named, with its rival.
-
-    Args:
-        least: log evidence that a name has to add.
-    """
-    sentences = []
-    for n in rest:
-        added = _added(found, answer, n.hypothesis)
-        sentence = _unsure(n, added, least, _alone_or_not(found, n.hypothesis))
-        if n.rivals and n.rivals[0].below < added:
-            other, below = n.rivals[0].hypothesis, n.rivals[0].below
-            sentence += f"; {other.stated} instead has {below:.1f} less"
-        sentences.append(sentence)
-    return tuple(sentences)
-
-
-def _alone_or_not(found: Search, h: Hypothesis) -> str:
-    """By how much an effect alone explains more than another one alone, if both were tried."""
-    alone = found.tried.get(frozenset((h.key,)))
-    single = [m for m in found.tried.values() if len(m.hypotheses) == 1 and h.key not in m.keys]
-    if alone is None or not single:
-        return ""
-    other = max(single, key=lambda m: m.evidence)
-    more = alone.evidence - other.evidence
-    return f" (alone it has {more:.0f} more than {other.hypotheses[0].stated})"
-
-
-def _unsure(n: Named, added: float, least: float, alone: str) -> str:
-    """Why an effect of the answer has no name. `alone`: how it compares with another one alone."""
-    name = n.hypothesis.stated
-    chance = f"probability {_chance(n.probability)}"
-    if added >= least and n.together >= thresholds.NAMED:
-        return (
-            f"{name} is not named: its log evidence of {added:.0f} ({chance}) counts only next to effects "
-            f"that are not named either{alone}"
-        )
-    if n.together < thresholds.NAMED:
-        chance += f" of the {thresholds.NAMED:g} that a name needs"
-    return f"{name} is possible but not sure enough to be named ({chance}, log evidence {_of(added, least)})"
-
-
-def _chance(probability: float) -> str:
-    return f"{probability:.2f}" if probability >= 0.005 else "below 0.01"
-
-
-def _of(added: float, least: float) -> str:
-    """Log evidence, and what a name needs where it is less."""
-    return f"{printed(added)} of the {printed(least)} that a name needs" if added < least else f"{added:.0f}"
-
-
-def _added(found: Search, answer: Scored, h: Hypothesis) -> float:
-    """Log evidence that goes with an effect: what the model without it lacks, or the one without any."""
-    without = found.tried.get(answer.keys - {h.key}, found.baseline)
-    return answer.evidence - max(without.evidence, found.baseline.evidence)
-
-
-def _named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis) -> Named:
-    others = answer.keys - {h.key}
-    below: dict[object, Rival] = {}
-    for one in found.tried.values():
-        if h.key in one.keys or not others <= one.keys or len(one.keys) != len(others) + 1:
-            continue
-        rival = next(o for o in one.hypotheses if o.key not in others)
-        gap = max(answer.evidence - one.evidence, 0.0)
-        label = (rival.effect.word, rival.places)
-        if not isfinite(gap):
-            continue
-        if label != (h.effect.word, h.places) and (label not in below or gap < below[label].below):
-            below[label] = Rival(rival, gap)
-    rivals = tuple(sorted(below.values(), key=lambda r: r.below))
-    near = [r.hypothesis for r in rivals if r.below <= thresholds.RIVAL]
-    own, together = posterior.of_claims([h]), posterior.of_claims([h, *near])
-    keys = frozenset(rival.key for rival in near)
-    return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals, keys)

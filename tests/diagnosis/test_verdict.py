@@ -229,7 +229,7 @@ def test_evidence_that_needs_an_effect_without_a_name_is_said() -> None:
     assert (
         f"fluid_convection at {FLUID.where} is not named: its log evidence of 90 (probability 0.95) counts "
         "only next to effects that are not named either "
-        f"(alone it has -5 more than friction_speed at {FRICTION.where})"
+        f"(alone it has 5 less than friction_speed at {FRICTION.where})"
     ) in found.reasons
     said_of = f"friction_speed at {FRICTION.where} is possible but not sure enough to be named"
     assert any(said_of in text for text in found.reasons)

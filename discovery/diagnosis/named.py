@@ -1,0 +1,58 @@
+"""Effects of the answer, each with its probability and its rivals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.posterior import Posterior
+from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.selection import Search
+from discovery.effects.hypothesis import Hypothesis, Key
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another answer to one part of the question."""
+
+    hypothesis: Hypothesis
+    below: float  # log evidence below the best
+
+
+@dataclass(frozen=True)
+class Named:
+    """One effect that the repaired model adds."""
+
+    hypothesis: Hypothesis
+    probability: float
+    together: float  # probability that it acts, or a rival that is nearly as likely
+    rivals: tuple[Rival, ...]
+    near: frozenset[Key] = frozenset()  # those that are nearly as likely
+
+
+def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis) -> Named:
+    """An effect of the answer; its rivals stand in its place next to the same others."""
+    others = answer.keys - {h.key}
+    below: dict[object, Rival] = {}
+    for one in found.tried.values():
+        if h.key in one.keys or not others <= one.keys or len(one.keys) != len(others) + 1:
+            continue
+        rival = next(o for o in one.hypotheses if o.key not in others)
+        gap = max(answer.evidence - one.evidence, 0.0)
+        label = (rival.effect.word, rival.places)
+        if not isfinite(gap):
+            continue
+        if label != (h.effect.word, h.places) and (label not in below or gap < below[label].below):
+            below[label] = Rival(rival, gap)
+    rivals = tuple(sorted(below.values(), key=lambda r: r.below))
+    near = [r.hypothesis for r in rivals if r.below <= thresholds.RIVAL]
+    own, together = posterior.of_claims([h]), posterior.of_claims([h, *near])
+    keys = frozenset(rival.key for rival in near)
+    return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals, keys)
+
+
+def added(found: Search, answer: Scored, h: Hypothesis) -> float:
+    """Log evidence that goes with an effect: what the model without it lacks, or the one without any."""
+    without = found.tried.get(answer.keys - {h.key}, found.baseline)
+    return answer.evidence - max(without.evidence, found.baseline.evidence)

@@ -1,0 +1,65 @@
+"""Sentences about effects of the answer that are not sure enough to be named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+
+from discovery.diagnosis import thresholds
+from discovery.diagnosis.named import Named, added
+from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.selection import Search
+from discovery.effects.hypothesis import Hypothesis
+from discovery.printed import printed
+
+
+def apart(found: Search, answer: Scored, rest: Sequence[Named], least: float) -> tuple[str, ...]:
+    """A sentence for each effect of the answer that is not sure enough to be named, with its rival.
+
+    Args:
+        least: log evidence that a name has to add.
+    """
+    sentences = []
+    for n in rest:
+        gain = added(found, answer, n.hypothesis)
+        sentence = _unsure(n, gain, least, _alone_or_not(found, n.hypothesis))
+        if n.rivals and n.rivals[0].below < gain:
+            other, below = n.rivals[0].hypothesis, n.rivals[0].below
+            sentence += f"; {other.stated} instead has {below:.1f} less"
+        sentences.append(sentence)
+    return tuple(sentences)
+
+
+def _alone_or_not(found: Search, h: Hypothesis) -> str:
+    """How an effect alone compares with the best other one alone, if both were tried and act."""
+    alone = found.tried.get(frozenset((h.key,)))
+    single = [m for m in found.tried.values() if len(m.hypotheses) == 1 and h.key not in m.keys]
+    other = max(single, key=lambda m: m.evidence, default=None)
+    if alone is None or other is None or not isfinite(alone.evidence - other.evidence):
+        return ""
+    more = alone.evidence - other.evidence
+    how = f"{abs(more):.0f} {'more' if more >= 0 else 'less'}"
+    return f" (alone it has {how} than {other.hypotheses[0].stated})"
+
+
+def _unsure(n: Named, added: float, least: float, alone: str) -> str:
+    """Why an effect of the answer has no name. `alone`: how it compares with another one alone."""
+    name = n.hypothesis.stated
+    chance = f"probability {_chance(n.probability)}"
+    if added >= least and n.together >= thresholds.NAMED:
+        return (
+            f"{name} is not named: its log evidence of {added:.0f} ({chance}) counts only next to effects "
+            f"that are not named either{alone}"
+        )
+    if n.together < thresholds.NAMED:
+        chance += f" of the {thresholds.NAMED:g} that a name needs"
+    return f"{name} is possible but not sure enough to be named ({chance}, log evidence {_of(added, least)})"
+
+
+def _chance(probability: float) -> str:
+    return f"{probability:.2f}" if probability >= 0.005 else "below 0.01"
+
+
+def _of(added: float, least: float) -> str:
+    """Log evidence, and what a name needs where it is less."""
+    return f"{printed(added)} of the {printed(least)} that a name needs" if added < least else f"{added:.0f}"
