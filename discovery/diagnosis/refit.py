@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -100,10 +101,26 @@ def score(
             other = scored(context, chosen, refit(context, chosen, noise, start, sizes, goal))
         except RunsAwayError:
             break
-        if one is not None and other.evidence <= one.evidence:
+        if one is not None and other.reached <= one.reached:
             break
         one = other
         if one.fit.ended_early or one.evidence == -inf or one.ahead < MOVED:
             break
         noise, start, sizes, goal = one.noise, one.fit, None, inf
-    return one
+    return one if one is None else _as_reached(one)
+
+
+def rescored(context: Context, one: Scored) -> Scored:
+    """The score of a fitted model in another context, refitted where it can become better there."""
+    there = scored(context, one.hypotheses, one.fit)
+    if there.evidence == -inf or there.ahead < MOVED:
+        return there
+    return score(context, one.hypotheses, there.noise, one.fit) or _as_reached(there)
+
+
+def _as_reached(one: Scored) -> Scored:
+    """The score of a model for which refits found nothing better: what a step from there still promises does
+    not count, for where process noise follows the flows a linear look reaches too far.
+    """
+    tried = one.evidence > -inf and not one.fit.ended_early
+    return replace(one, unmet=one.ahead) if tried and one.ahead >= MOVED else one

@@ -61,6 +61,7 @@ class Scored:
     forced: str = ""  # what of unknown cause acts, too
     forced_state: str = ""  # the state that it heats
     log_odds_force: float = 0.0
+    unmet: float = 0.0  # log evidence that a step from the fit promises, and refits did not find
 
     @property
     def keys(self) -> frozenset[Key]:
@@ -121,6 +122,11 @@ class Scored:
         return self.grams[self.best].without(self.seen.spread).ahead
 
     @property
+    def reached(self) -> float:
+        """Log marginal likelihood without what a step from the fit only promises."""
+        return self.evidence - self.ahead if self.evidence > -inf else -inf
+
+    @property
     def off(self) -> float:
         """Share of the flows by which the model is wrong under the most likely noise."""
         return _off_by(self.settings[self.best])
@@ -159,7 +165,7 @@ class Scored:
             every = self.slab.take(np.tile(np.arange(count), level.size))
             sizes = every.average(mean.ravel(), variance.ravel()).reshape(mean.shape)
             level = level + sizes.sum(axis=-1) + 0.5 * count * float(np.log(2 * np.pi))
-        return log_sum_exp(level) + self.settings[k].log_weight - float(np.log(len(forms)))
+        return log_sum_exp(level) + self.settings[k].log_weight - float(np.log(len(forms))) - self.unmet
 
     def beyond(self) -> tuple[float, float]:
         """Log-likelihood at the optimum under the most likely noise, form errors of the model integrated out,

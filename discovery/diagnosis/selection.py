@@ -7,14 +7,14 @@ a test. All refitted models are kept and take part in the posterior.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import permutations
 from math import inf
 
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.refit import score
+from discovery.diagnosis.refit import rescored, score
 from discovery.diagnosis.scan import Scan, attempt, scan_model
-from discovery.diagnosis.scored import Scored, is_usual, light, scored
+from discovery.diagnosis.scored import Scored, is_usual, light
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score
 from discovery.fitting import Noise
@@ -137,10 +137,7 @@ class Search:
         other = Search(context, self.tell, first=self.claims if self.scans else ())
         near = [one for one in self.tried.values() if not one.hypotheses or one.evidence > best - FAR]
 
-        def under_it(one: Scored) -> Scored:
-            return _lighter(scored(context, one.hypotheses, one.fit))
-
-        for one in side_by_side(under_it, near):
+        for one in side_by_side(lambda one: _lighter(rescored(context, one)), near):
             other.keep(one)
         return other
 
@@ -161,7 +158,8 @@ class Search:
         grows.
         """
         while len(current.hypotheses) < MOST:
-            ways = (self._added(current), self._widened(current), self._narrowed(current))
+            looks = (self._added, self._widened, self._narrowed, self._joined)
+            ways = [look(current) for look in looks]
             best = max(ways, key=lambda one: one.evidence)
             if best.evidence <= current.evidence:
                 break
@@ -206,6 +204,22 @@ class Search:
                 others = tuple(o for o in current.hypotheses if o.key not in (h.key, again.key))
                 claim = _of_model(fewer, current)
                 best = max(best, self._refitted(current, others, [claim]), key=lambda one: one.evidence)
+        return best
+
+    def _joined(self, current: Scored) -> Scored:
+        """The best refit where effects that are one law at one body each become this law at all of them, of
+        one size; `current` if none is better.
+        """
+        best = current
+        for claim in self.scanned(current).claims if len(current.hypotheses) > 1 else ():
+            h = claim.hypothesis
+            each = [o for o in current.hypotheses if h.widens(o)]
+            bodies = {state for o in each for state in o.states}
+            one = h if set(h.states) == bodies else h.without([b for b in h.states if b not in bodies])
+            if len(each) > 1 and one is not None:
+                others = tuple(o for o in current.hypotheses if o not in each)
+                begin = replace(claim, hypothesis=one, size=_of_model(each[0], current).size)
+                best = max(best, self._refitted(current, others, [begin]), key=lambda one: one.evidence)
         return best
 
     def _questioned(self, current: Scored) -> Scored:
@@ -265,8 +279,21 @@ class Search:
             if one is not None:
                 self.keep(one)
         self.lost |= {key for key, _ in fresh if key not in self.tried}
-        among = [self.tried[key] for key in keys if key in self.tried]
-        return max([start, *among], key=lambda one: one.evidence)
+        while True:
+            among = [self.tried[key] for key in keys if key in self.tried]
+            best = max([start, *among], key=lambda one: one.evidence)
+            if best is start or not best.fit.ended_early:
+                return best
+            self._ended(best)
+
+    def _ended(self, one: Scored) -> None:
+        """Fit a model to the end whose fit ended early, as it did not look likely enough."""
+        whole = score(self.context, one.hypotheses, one.noise, one.fit)
+        if whole is None or whole.evidence == -inf:
+            del self.tried[one.keys]
+            self.lost.add(one.keys)
+        else:
+            self.tried[one.keys] = _lighter(whole)
 
     def goal(self, noise: Noise, below: float = 0.0) -> float:
         """Cost of a fit from which it can be part of the answer, or `below` it in log evidence."""
