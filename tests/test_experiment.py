@@ -15,14 +15,15 @@ from typer.testing import CliRunner
 from discovery.cli import app
 from discovery.errors import RunsAwayError, UsageError, UserError
 from discovery.experiment import load_experiment, run
-from discovery.experiment.fitted import offset_notes
+from discovery.experiment.fitted import offset_notes, start_notes
 from discovery.experiment.summary import comparison, rms_table
-from discovery.fitting import Fit
-from discovery.models import read_model
-from discovery.recordings import Channel
+from discovery.fitting import Fit, fit_model
+from discovery.models import Model, Parameter, State, read_model
+from discovery.recordings import Campaign, Channel, Recording
 from discovery.report.compare import load_runs
 from discovery.report.ranking import ranked
 from discovery.report.run import load_run
+from discovery.terms import Term, parse
 from tests.small import CAMPAIGN, EXPERIMENT, MODEL, results_of, write_recording, write_small
 
 
@@ -68,6 +69,35 @@ def test_a_room_that_the_fit_moves_far_beyond_its_spread_is_told_so() -> None:
     said = "far beyond it: the model lacks something, or `spread` is too small"
     assert said in offset_notes(far, {"T_env": room})[0]
     assert said not in offset_notes(near, {"T_env": room})[0]
+
+
+@pytest.mark.parametrize(("begins", "start", "said"), [(41.0, None, 1), (95.0, None, 0), (41.0, "plate", 0)])
+def test_a_machine_that_was_just_switched_on_began_in_no_balance(
+    begins: float, start: str | None, said: int
+) -> None:
+    """An element of 95 degC in balance with its power, and a plate that follows it, cold or in balance."""
+    time = 2.0 * np.arange(120.0)
+    plate = 95.0 + (begins - 95.0) * np.exp(-time / 60.0) + np.sin(time / 40.0)
+    channels = {
+        "power": Channel("power", "heat load", "W", None, "held"),
+        "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+        "plate": Channel("plate", "temperature", "degC", None, "linear"),
+    }
+    inputs = {"power": np.full(120, 750.0), "room": np.full(120, 20.0)}
+    model = Model(
+        "lamp",
+        {"gain": Parameter(0.1, "K/W")},
+        {"element": State("element", start=parse(start) if start else None), "plate": State("plate")},
+        (
+            Term("power", "element", parse("(gain*power + room - element)/10")),
+            Term("contact", "plate", parse("(element - plate)/60")),
+        ),
+        {},
+    )
+    campaign = Campaign("lamp", channels, {"a": Recording("a", time, {**inputs, "plate": plate})})
+    found = start_notes(fit_model(model, campaign, ["a"], ["plate"]))
+    assert len(found) == said
+    assert all("'a' begins where plate is 5" in one and "element without a start" in one for one in found)
 
 
 def test_a_room_that_the_fit_leaves_where_it_was_is_no_note() -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.scored import Scored
 from discovery.effects.hypothesis import Hypothesis
+from discovery.printed import printed
 
 Veto = Callable[[Context, Scored, Hypothesis], str | None]
 
@@ -23,9 +24,11 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | No
     if h.recording is not None and not {o.recording for o in alike} >= set(context.recordings):
         return None
     if is_clock:
+        late = [(o.recording, answer.model.parameters[t].value) for o in alike for t in o.shapes]
+        by = ", ".join(f"{_late(seconds)}{f' in {run}' if run else ''}" for run, seconds in late)
         return (
-            "the clock of every recording would be shifted; a dead time between the inputs and the readings "
-            "explains this as well"
+            f"the clock of every recording would be shifted{by and f' (readings {by})'}; a dead time between "
+            "the inputs and the readings explains this as well"
         )
     if is_offset:
         return (
@@ -41,6 +44,10 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | No
         f"with a single recording to fit, {h.effect.word} at {h.where} cannot be distinguished from a law "
         "that differs a little from the model's; record the machine once more, or fit a held-out recording"
     )
+
+
+def _late(seconds: float) -> str:
+    return f"{printed(abs(seconds))} s {'late' if seconds >= 0 else 'early'}"
 
 
 def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis) -> str | None:

@@ -52,6 +52,11 @@ def start_values(
     return out
 
 
+def at_rest(system: System, values: Mapping[str, float]) -> Array:
+    """Where all states (n,) are in balance with the first inputs, those that are read, too."""
+    return _balanced(system, values, start_values(system, values), list(range(len(system.states))))
+
+
 def starts_follow(system: System) -> Array:
     """Shift of each start value (rows) when that of another state moves by one (columns), (n, n)."""
     found = np.eye(len(system.states))

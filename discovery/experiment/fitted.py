@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.dynamics import at_rest
 from discovery.dynamics import predict as model_outputs
 from discovery.errors import RunsAwayError
 from discovery.evaluation import evaluate
@@ -28,6 +29,7 @@ from discovery.recordings import Channel
 Array = NDArray[np.float64]
 _AT_BOUND = 1e-4  # share of a bound that counts as at it
 _NEGLIGIBLE = 0.01  # of the spread of an input: a smaller offset is not reported
+_UNREST = 0.5  # of what a state moves in all: so far from its balance it was in none
 _FAR = 3.0  # spreads of an input: a larger offset is told to be too large
 
 
@@ -108,6 +110,7 @@ def judged(
     notes += bound_notes(fit.model, remedy_of_limits(experiment, name))
     notes += (report or {}).get("binding", ())
     notes += offset_notes(fit, experiment.campaign.channels)
+    notes += start_notes(fit)
     notes += validity_of_model(fit.model, experiment.fitting, experiment.fit)
     return Fitted(name, kind, model, fit, predictions, validation, report or {}, tuple(notes), seconds)
 
@@ -188,6 +191,27 @@ def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
             "reading is used to estimate it"
         )
     return notes
+
+
+def start_notes(fit: Fit) -> list[str]:
+    """A sentence where states that nobody reads begin in balance with the first inputs of a recording, and a
+    state that is read there was in no balance: a machine that was just switched on.
+    """
+    for t in fit.trajectories:
+        grid, model = t.system.grid, t.system.model
+        unread = [n for n, s in model.states.items() if s.start is None and not s.memory]
+        for name, x in zip(t.system.states, at_rest(t.system, t.values), strict=True):
+            state = model.states[name]
+            shown = grid.readings[:, grid.outputs.index(state.read_as)] if state.read_as else np.zeros(0)
+            read = shown[np.isfinite(shown)]
+            if unread and len(read) and abs(x - read[0]) > _UNREST * np.ptp(read):
+                away = f"{abs(x - read[0]):.2g} {differences(state.unit)}"
+                return [
+                    f"'{grid.recording}' begins where {name} is {away} from its balance with the first "
+                    f"inputs, and {', '.join(unread)} without a start in that balance; if the machine was "
+                    f'just switched on, write how it began, as start = "{name}"'
+                ]
+    return []
 
 
 def predict(fit: Fit, experiment: Experiment, recording: str) -> Prediction:
