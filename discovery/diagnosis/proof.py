@@ -171,7 +171,9 @@ def _started(fit: Fit, run: Trajectory, left: Array, reading: Array) -> Array:
     A model that misses much is not less sure where a body began that was read.
     """
     known = fit.offset_in(run.system.grid.recording)
-    return from_known_starts(run, left, np.array(fit.noise.white), known, fit.together, reading)
+    return from_known_starts(
+        run, left, np.array(fit.noise.white), known, fit.together, reading, thresholds.MISSED
+    )
 
 
 def _unsure(trajectory: Trajectory, size: Array, known: Known, only: Sequence[int]) -> float:

@@ -111,11 +111,17 @@ def score(
 
 
 def rescored(context: Context, one: Scored) -> Scored:
-    """The score of a fitted model in another context, refitted where it can become better there."""
-    there = scored(context, one.hypotheses, one.fit)
-    if there.evidence == -inf or there.ahead < MOVED:
+    """The score of a fitted model in another context, refitted where it can become better there: where a step
+    promises it, and under little process noise, for much of it holds a fit where it is. What was read first
+    is known as well as that context says.
+    """
+    there = scored(context, one.hypotheses, replace(one.fit, problem=one.fit.problem.spread(context.white)))
+    if there.evidence == -inf:
         return there
-    return score(context, one.hypotheses, there.noise, one.fit) or _as_reached(there)
+    noises = [there.noise] if there.ahead >= MOVED else []
+    noises += [context.usual] if there.noise.share > context.usual.share else []
+    tried = [score(context, one.hypotheses, noise, one.fit) for noise in noises]
+    return max([_as_reached(there), *(other for other in tried if other)], key=lambda other: other.evidence)
 
 
 def _as_reached(one: Scored) -> Scored:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -30,8 +31,6 @@ from discovery.models import Model, State, expanded
 from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
-
-_FARTHEST = 3.0  # spreads by which a start or an input may be off: one in 370 is further
 
 
 def predict_recording(
@@ -95,6 +94,7 @@ def from_known_starts(
     known: Collection[str] = (),
     together: float = 1.0,
     reading: Array | None = None,
+    farthest: float = inf,
 ) -> Array:
     """Residuals (R, Y) of a free run as they would be from the starts that all its readings show.
 
@@ -107,11 +107,13 @@ def from_known_starts(
         known: inputs whose offsets are known in this recording.
         together: readings that count as one, as in the fit (`Fit.together`).
         reading: (Y,) reading noise, within which a start is known that was read; default `white`.
+        farthest: spreads by which a start or an input may be off. A room that is known within 3 K is not 35 K
+            colder, however much better a wrong model looks with it.
     """
     unsure = _unsure(run.system, white if reading is None else reading, known)
     if not any(unsure) or not len(residual):
         return residual
-    shift, moved = _shift(run, residual, white, unsure, together)
+    shift, moved = _shift(run, residual, white, unsure, together, farthest)
     return residual - moved @ shift
 
 
@@ -159,11 +161,15 @@ def _unsure(system: System, white: Array, known: Collection[str]) -> Unsure:
 
 
 def _shift(
-    run: Trajectory, residual: Array, white: Array, unsure: Unsure, together: float = 1.0
+    run: Trajectory,
+    residual: Array,
+    white: Array,
+    unsure: Unsure,
+    together: float = 1.0,
+    farthest: float = inf,
 ) -> tuple[Array, Array]:
     """Most likely shifts (K,) of what is not known, in its order, given the first rows of a residual (N, Y),
-    and what the outputs answer to each, (N, Y, K). None is further than its spread allows: a room that is
-    known within 3 K is not 35 K colder, however much better a wrong model looks with it.
+    and what the outputs answer to each, (N, Y, K). None is larger than so many spreads.
     """
     seen = np.isfinite(residual)
     spread, moved = _moved(run, unsure)
@@ -171,7 +177,7 @@ def _shift(
     c = (moved / white[None, :, None])[seen]
     gram = c.T @ c / together + np.diag(1 / spread**2)
     slope = -c.T @ (residual / white)[seen] / together
-    ends = _FARTHEST * spread
+    ends = farthest * spread
     return bounded_step(np.zeros(len(spread)), gram, slope, 0.0, -ends, ends), moved
 
 

@@ -15,6 +15,8 @@ from discovery.effects.catalogue import catalogue
 from discovery.evidence.bayes import Score
 from tests.diagnosis.parts import dry
 
+ENDED = SimpleNamespace(ended_early=False)  # a fit to the end
+
 
 def claim(*amplitudes: str) -> SimpleNamespace:
     return SimpleNamespace(hypothesis=SimpleNamespace(amplitudes=amplitudes))
@@ -65,7 +67,7 @@ def test_what_grew_is_questioned_under_another_noise(monkeypatch: pytest.MonkeyP
     kept = {key for key, one in grown.tried.items() if not key or one.evidence > grown.best.evidence - FAR}
     assert other.tried.keys() == kept
     assert other.best.noise.white == louder.white
-    assert other.best.fit is grown.tried[other.best.keys].fit  # not fitted again
+    assert other.best.fit.theta is grown.tried[other.best.keys].fit.theta  # not fitted again
     other.run()
     search, current = asked[0]
     assert search is other
@@ -81,7 +83,8 @@ def test_each_formula_of_an_effect_is_refitted(likely: str, monkeypatch: pytest.
     def refit(*arguments: object) -> Scored:
         claim = cast(Score, arguments[3])
         evidence = 100.0 if claim.hypothesis.amplitudes == (likely,) else 50.0
-        return cast(Scored, SimpleNamespace(keys=frozenset({"mass"}), evidence=evidence, hypotheses=()))
+        one = SimpleNamespace(keys=frozenset({"mass"}), evidence=evidence, hypotheses=(), fit=ENDED)
+        return cast(Scored, one)
 
     monkeypatch.setattr(selection, "attempt", refit)
     monkeypatch.setattr(selection, "light", lambda one: one)

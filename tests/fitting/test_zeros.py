@@ -239,6 +239,6 @@ def test_a_room_that_is_known_within_a_spread_does_not_explain_what_is_far_beyon
         readings = Recording("a", hour, {"room": np.full(181, 22.0), "body": body})
         run = predict_recording(model, Campaign("one", channels, {"a": readings}), "a", ["body"], [0.1])
         residual = body[:, None] - predict(run)
-        started = from_known_starts(run, residual, np.array([0.1]))
+        started = from_known_starts(run, residual, np.array([0.1]), farthest=3.0)
         # the start gives way, too: by three times its noise of 0.1 K
         assert started[:, 0] == pytest.approx(-left * fall, abs=0.35)
