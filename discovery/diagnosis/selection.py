@@ -147,6 +147,15 @@ class Search:
             self.tried[one.keys] = _lighter(one)
         return one
 
+    def finish(self, one: Scored) -> None:
+        """Fit a model to the end whose fit ended early, as it did not look likely enough."""
+        whole = score(self.context, one.hypotheses, one.noise, one.fit)
+        if whole is None or whole.evidence == -inf:
+            del self.tried[one.keys]
+            self.lost.add(one.keys)
+        else:
+            self.tried[one.keys] = _lighter(whole)
+
     def scanned(self, one: Scored) -> Scan:
         """The scan of a model."""
         if one.keys not in self.scans:
@@ -284,16 +293,7 @@ class Search:
             best = max([start, *among], key=lambda one: one.evidence)
             if best is start or not best.fit.ended_early:
                 return best
-            self._ended(best)
-
-    def _ended(self, one: Scored) -> None:
-        """Fit a model to the end whose fit ended early, as it did not look likely enough."""
-        whole = score(self.context, one.hypotheses, one.noise, one.fit)
-        if whole is None or whole.evidence == -inf:
-            del self.tried[one.keys]
-            self.lost.add(one.keys)
-        else:
-            self.tried[one.keys] = _lighter(whole)
+            self.finish(best)
 
     def goal(self, noise: Noise, below: float = 0.0) -> float:
         """Cost of a fit from which it can be part of the answer, or `below` it in log evidence."""

@@ -267,7 +267,10 @@ def _only(
     finite.
     """
     keys = frozenset(n.hypothesis.key for n in chosen)
-    if keys not in found.tried or (found.tried[keys].fit.ended_early and matters == inf):
+    known = found.tried.get(keys)
+    if known is not None and known.fit.ended_early and matters == inf:
+        found.finish(known)
+    elif known is None:
         goal = found.goal(answer.noise, matters)
         one = score(context, [n.hypothesis for n in chosen], answer.noise, answer.fit, goal=goal)
         if one is not None:
