@@ -123,6 +123,8 @@ def _catches_up(readings: Array, ends: Lines, run: int) -> bool:
     last = int(ends[run])
     first = int(ends[run - 1]) + 1 if run else 0
     steps = np.abs(np.diff(readings))
+    if last == steps.size:  # nothing was read behind it
+        return False
     around = np.concatenate([steps[max(first - _AROUND, 0) : first], steps[last + 1 : last + 1 + _AROUND]])
     return around.size >= _AROUND and bool(steps[last] > _CAUGHT_UP * around.max())
 

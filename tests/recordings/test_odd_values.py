@@ -72,6 +72,13 @@ def test_a_sensor_that_hung_while_a_body_warmed_is_known_by_the_jump_behind_it(w
     assert "for 22 readings, up to line 83" in told
 
 
+def test_a_sensor_that_hangs_until_the_end_of_a_short_recording_shows_no_jump(write: Write) -> None:
+    """Nothing is read behind its last 22 equal readings: they may be a body that stands still."""
+    warming = np.round(20.0 + np.cumsum(np.random.default_rng(2).normal(0.3, 0.05, 140)), 2)
+    warming[118:] = warming[118]
+    assert not any("stays at" in told for told in found(write(with_column(1, [f"{v}" for v in warming]))))
+
+
 def test_a_body_that_stood_still_and_is_heated_is_no_frozen_sensor(write: Write) -> None:
     """Readings to 0.1 K are equal as long as nothing happens; then the body warms, at first fastest."""
     warming = np.r_[np.full(30, 20.0), 20.0 + 25.0 * (1.0 - np.exp(-np.arange(1, 171) / 10.0))]
