@@ -100,6 +100,19 @@ def test_a_machine_that_was_just_switched_on_began_in_no_balance(
     assert all("'a' begins where plate is 5" in one and "element without a start" in one for one in found)
 
 
+def test_a_fit_whose_balance_is_not_finite_is_judged_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The root of a level that the balance puts below zero: the fit itself stays finite."""
+
+    def runs_away(*_: object) -> None:
+        raise RunsAwayError("no finite rate")
+
+    monkeypatch.setattr("discovery.experiment.fitted.at_rest", runs_away)
+    states = {"hidden": State("hidden")}
+    system = SimpleNamespace(grid=None, model=Model("m", {}, states, (), {}), states=("hidden",))
+    fit = cast("Fit", SimpleNamespace(trajectories=(SimpleNamespace(system=system, values={}),)))
+    assert start_notes(fit) == []
+
+
 def test_a_room_that_the_fit_leaves_where_it_was_is_no_note() -> None:
     room = Channel("T_env", "ambient temperature", "degC", None, "linear", spread=1.0)
     none = cast("Fit", SimpleNamespace(offsets={"T_env": {"a": (2.4e-12, 0.1), "b": (-3e-4, 0.1)}}))

@@ -200,11 +200,17 @@ def start_notes(fit: Fit) -> list[str]:
     for t in fit.trajectories:
         grid, model = t.system.grid, t.system.model
         unread = [n for n, s in model.states.items() if s.start is None and not s.memory]
-        for name, x in zip(t.system.states, at_rest(t.system, t.values), strict=True):
+        if not unread:
+            return []
+        try:
+            rest = at_rest(t.system, t.values)
+        except RunsAwayError:  # a model that is far from any balance has none to compare with
+            continue
+        for name, x in zip(t.system.states, rest, strict=True):
             state = model.states[name]
             shown = grid.readings[:, grid.outputs.index(state.read_as)] if state.read_as else np.zeros(0)
             read = shown[np.isfinite(shown)]
-            if unread and len(read) and abs(x - read[0]) > _UNREST * np.ptp(read):
+            if len(read) and abs(x - read[0]) > _UNREST * np.ptp(read):
                 away = f"{abs(x - read[0]):.2g} {differences(state.unit)}"
                 return [
                     f"'{grid.recording}' begins where {name} is {away} from its balance with the first "
