@@ -106,12 +106,14 @@ def places(key: Key) -> set[str]:
 def of_machine(key: Key, named: Answer) -> bool:
     """Whether a named effect acts at the machine in silence, and is not one of those that are concealed.
 
-    It may be named at several bodies at once. At most one of them may be a body where it does not act.
+    It may be named at several bodies at once. At most one of them may be a body where it does not act. What
+    shows only together, at several bodies, has to be named at all of them but one.
     """
     if any(named["effect"] in names(truth) for truth in truths(key)):
         return False
+    said = set(named.get("states", ()))
     own = [places(one) for one in key.get("also_true", ()) if named["effect"] in names(one)]
-    there, said = set().union(*own), set(named.get("states", ()))
+    there = set[str]().union(*(one for one in own if len(one - said) <= 1))
     return bool(said & there) and len(said - there) <= 1
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 
 from discovery.virtual.log import Chain, Columns, observe, reading_instants
-from discovery.virtual.machine import Machine
+from discovery.virtual.machine import Lack, Machine
 from discovery.virtual.masses import hidden_masses
 from discovery.virtual.network import Array, Inputs, heat
 from discovery.virtual.refit import Refit, refit
@@ -89,15 +89,26 @@ class World:
         """Effects that the baseline lacks in silence, each with its states and the rms over noise that a
         refit leaves of it: the laws of the plant, and bodies where the insides of others show as well.
 
-        Only those that the readings can tell: N readings hold at most N rms^2/2 of log evidence about a law.
+        Laws of one kind stand there together, too: five exchanges with the air can show where none of them
+        shows alone. Only what the readings can tell: N readings hold at most N rms^2/2 of log evidence.
         """
-        own = self.machine.lacks
-        laws = [(lack.effect, lack.states, self.size(self.machine.as_believed(lack))) for lack in own]
+        kinds: dict[str, list[Lack]] = {}
+        for lack in self.machine.lacks:
+            kinds.setdefault(lack.effect, []).append(lack)
+        groups = [[lack] for lack in self.machine.lacks]
+        groups += [group for effect, group in kinds.items() if len(group) > 1 and effect != MASS]
+        laws = [self._known(group) for group in groups]
         hidden = hidden_masses(self.machine, self.fitted, self.logs(self.machine, FIT))
         known = {states for effect, states, _ in laws if effect == MASS}
         others = [(MASS, (body,), rms) for body, rms in hidden.items() if (body,) not in known]
         every = [*laws, *others]
         return [one for one in every if len(self.fitted.residual) * one[2] ** 2 / 2.0 > APART]
+
+    def _known(self, group: list[Lack]) -> Known:
+        """Laws of one kind, all bodies where they act, and what a refit leaves of all of them."""
+        believed = reduce(Machine.as_believed, group, self.machine)
+        states = tuple(dict.fromkeys(state for lack in group for state in lack.states))
+        return group[0].effect, states, self.size(believed)
 
     def visible(self, logs: dict[str, Columns]) -> float:
         """Rms over noise by which the residual of a full refit differs with an effect and without it."""

@@ -26,6 +26,7 @@ OWN = {
         {"effect": "flooded_gap", "states": ["side"]},
     ]
 }
+AIR = {"also_true": [{"effect": "natural_convection", "states": ["top", "legs", "beam", "ram"]}]}
 TWO = {
     "effect": "two",
     "states": [],
@@ -115,6 +116,9 @@ UNKNOWN = {"verdict": "unexplained", "physics": [], "alternatives": []}
             -2.0,
             scoring.FALSE_ALARM,
         ),
+        # what shows at four bodies together has to be named at three of them, with one other body at most
+        (QUIET | AIR, said(named("natural_convection", "legs", "beam", "ram", "x")), 1.0, scoring.OF_MACHINE),
+        (QUIET | AIR, said(named("natural_convection", "legs", "beam")), -2.0, scoring.FALSE_ALARM),
         (GAP | OWN, said(named("natural_convection", "table")), 0.0, scoring.OF_MACHINE),  # the gap is missed
         (GAP | OWN, said(named("flooded_gap", "side")), 0.5, scoring.ELSEWHERE),
         (

@@ -6,7 +6,7 @@ import json
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -202,6 +202,21 @@ def test_a_key_lists_what_nature_has_and_the_baseline_has_not(world: World) -> N
     plain = world.machine.as_believed(linear)
     assert all(law.form == Form.LINK for law in plain.network.laws if law.name == "air base")
     assert found["natural_convection", "base"] == world.size(plain)
+    every = [lack for lack in world.machine.lacks if lack.effect == "natural_convection"]
+    together = found["natural_convection", *(body for lack in every for body in lack.states)]
+    assert len(every) > 1
+    assert together == world.size(reduce(Machine.as_believed, every, world.machine))
+
+
+def test_wear_of_a_nut_acts_on_the_screw_that_it_rubs_on() -> None:
+    """Its loss heats both; an answer that names both is right."""
+    machine = FAMILIES["linear_axis"](np.random.default_rng(0))
+    wear = EFFECTS["wear"]
+    nut = ("nut", "screw_1", "screw_2", "screw_3")
+    assert wear.places(machine) == [nut, ("bearing",)]
+    worn = wear.conceal(machine, nut, 0.3, Shapes())
+    new = {law.into for law in worn.network.laws if law.name == "wear of loss nut"}
+    assert {body for body, bar in machine.bodies.items() if set(bar.nodes) & new} == set(nut)
 
 
 def test_noise_is_what_the_key_says(world: World) -> None:

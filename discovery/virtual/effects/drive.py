@@ -117,6 +117,18 @@ def _dead_band(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
     return replace(m, network=m.network.changed(change))
 
 
+def _worn(m: Machine) -> list[Place]:
+    """Bodies that a recorded loss heats: a nut that rubs on a screw heats the screw as well."""
+    return [
+        (body, *(b for b in m.bodies if b != body and set(m.bodies[b].nodes) & _heated(m, f"loss {body}")))
+        for body in m.driven
+    ]
+
+
+def _heated(m: Machine, name: str) -> set[str]:
+    return {law.into for law in m.network.laws if law.name == name}
+
+
 def _wear(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
     """Less of the recorded loss reaches the body, by `age` of the recording; a run-in is fast at first."""
     run_in = shapes("recordings", 1.5, 1e6, 6.0)
@@ -125,7 +137,7 @@ def _wear(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
         age = u["age"]
         return np.asarray(-size * (run_in * (1.0 - np.exp(-age / run_in)) if run_in < 1e3 else age))
 
-    losses = [law for law in m.network.laws if law.name in {f"loss {b}" for b in at}]
+    losses = [law for law in m.network.laws if law.name == f"loss {at[0]}"]
     return m.plus(
         [
             replace(law, name=f"wear of {law.name}", gate=times(law.gate, change) if law.gate else change)
@@ -192,7 +204,7 @@ DRIVE = (
         "wear",
         "1",
         "the loss falls by size from one recording to the next",
-        lambda m: each(tuple(m.driven)),
+        _worn,
         number(0.4),
         _wear,
     ),
