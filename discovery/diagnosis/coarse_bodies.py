@@ -39,7 +39,7 @@ def judging(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> l
     """Outputs by which effects are judged in free runs: what shows a coarse body alone says nothing of
     effects that act elsewhere, as long as other outputs are read.
     """
-    coarse = set(_coarse(answer))
+    coarse = set(coarse_at(answer))
     every = list(range(len(context.outputs)))
     shown = [names(context.model.outputs.get(name, Name(name))) for name in context.outputs]
     apart = {context.outputs[y] for y in every if shown[y] and shown[y] <= coarse}
@@ -53,12 +53,12 @@ def sentences(answer: Scored) -> list[str]:
     return [
         f"the flows at {state} are wrong by about {100 * share:.0f} %, those elsewhere by "
         f"{100 * answer.noise.share:.0f} %: something acts at {state} that no effect explains"
-        for state, share in _coarse(answer).items()
+        for state, share in coarse_at(answer).items()
     ]
 
 
-def _coarse(answer: Scored) -> dict[str, float]:
-    """Share by which the flows of each such body are wrong."""
+def coarse_at(answer: Scored) -> dict[str, float]:
+    """Share by which the flows of each body are wrong that are wrong by more than those of the others."""
     noise = answer.noise
     each = {state: share for state, (_, share) in (noise.force or {}).items()}
     return {state: share for state, share in each.items() if is_large(share) and share > noise.share}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from discovery.diagnosis.coarse_bodies import coarse_at
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.scored import Scored
 from discovery.effects.hypothesis import Hypothesis
@@ -51,9 +52,17 @@ def _late(seconds: float) -> str:
 
 
 def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis) -> str | None:
-    """Events of one recording and faults of the measuring chain can only be recognised with a model that is
-    nearly right. One with events in the place of a law is not.
+    """An effect can only be recognised with a model that is nearly right. For a law, this is the model of the
+    bodies where it acts. For events of one recording and faults of the measuring chain, it is the whole
+    model, and one with events in the place of a law is not.
     """
+    wrong = coarse_at(answer)
+    if h.states and wrong.keys() >= set(h.states):
+        return (
+            f"{h.effect.word} at {h.where} is not named: with it, the flows there are still wrong by about "
+            f"{100 * max(wrong[state] for state in h.states):.0f} %, those elsewhere by "
+            f"{100 * answer.noise.share:.0f} %"
+        )
     if h.effect.is_law:
         return None
     law = next((o for o in answer.hypotheses if every_recording(context, answer, o)), None)
