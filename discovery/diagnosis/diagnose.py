@@ -17,6 +17,7 @@ from discovery.diagnosis.coarse_bodies import judging, sentences, with_coarse_bo
 from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
+from discovery.diagnosis.named import Named
 from discovery.diagnosis.own import Searched, searched
 from discovery.diagnosis.posterior import IN_PLAY, Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, unit_of
@@ -35,7 +36,8 @@ from discovery.effects.not_offered import not_offered
 from discovery.errors import RunsAwayError, UserError
 from discovery.evidence import late, noisy
 from discovery.evidence.latent_force import Force, latent_forces
-from discovery.fitting import Fit, fit_model
+from discovery.fitting import Fit, Prior, fit_model
+from discovery.fitting.covariance import Z95
 from discovery.models import Model
 from discovery.models.units import differences
 from discovery.recordings import Campaign
@@ -200,7 +202,7 @@ def diagnose(
     named = [n.hypothesis for n in verdict.named]
     keys = frozenset(h.key for h in named)
     alone = found.tried.get(keys, verdict.answer) if named else verdict.answer
-    after = _repaired(context, alone, named, model, seen)
+    after = _repaired(context, alone, verdict.named, model, seen)
     if named and after is None:
         verdict = runs_away(verdict)
     noise = verdict.answer.noise
@@ -298,17 +300,24 @@ def _unknown(context: Context, found: Search) -> list[Scored]:
 
 
 def _repaired(
-    context: Context, answer: Scored, chosen: Sequence[Hypothesis], model: Model, seen: Campaign
+    context: Context, answer: Scored, names: Sequence[Named], model: Model, seen: Campaign
 ) -> Fit | None:
     """The model with effects of an answer, fitted in the same way as the baseline of the proof; None without
     effects, or if it does not stay finite from the starts of free runs.
+
+    A jump that no flow makes keeps the size that the readings next to it show: a model that is far from the
+    machine would make up for its own error with it.
     """
-    if not chosen:
+    if not names:
         return None
+    chosen = [n.hypothesis for n in names]
     grown = with_effects(model, chosen)
     values = answer.fit.model.parameters
     start = {n: values[n].value for n in grown.free if n in values}
     priors = shape_priors(chosen)  # readings may leave the shape of an effect open
+    for name in (name for n in names if n.is_abrupt for name in n.hypothesis.amplitudes):
+        if (ends := answer.interval(name)) is not None:
+            priors[name] = Prior(values[name].value, (ends[1] - ends[0]) / (2 * Z95))
     try:
         return fit_model(
             grown,
@@ -357,7 +366,7 @@ def _reasons(
     said += sentences(verdict.answer)
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
-    if verdict.word == UNEXPLAINED:  # what a fit finds of its inputs may stand for the unknown cause
-        return said
     answer = verdict.answer
+    if verdict.word == UNEXPLAINED:  # what a fit finds of its inputs may stand for the unknown cause
+        return [*said, *late.sentences(answer.fit, is_right=False)]
     return [*said, *late.sentences(answer.fit), *noisy.sentences(answer.fit, answer.noise)]

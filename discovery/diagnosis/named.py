@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 from discovery.diagnosis import thresholds
+from discovery.diagnosis.abrupt import is_abrupt
 from discovery.diagnosis.posterior import Posterior
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
@@ -29,6 +30,14 @@ class Named:
     together: float  # probability that it acts, or a rival that is nearly as likely
     rivals: tuple[Rival, ...]
     near: frozenset[Key] = frozenset()  # those that are nearly as likely
+    is_abrupt: bool = False  # a jump of a sensor between two readings, which no flow makes
+
+    @property
+    def is_firm(self) -> bool:
+        """Whether it can be recognised next to something that no effect explains. Another event or fault may
+        make up for that.
+        """
+        return self.is_abrupt or self.hypothesis.effect.is_law
 
 
 def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis) -> Named:
@@ -49,7 +58,8 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
     near = [r.hypothesis for r in rivals if r.below <= thresholds.RIVAL]
     own, together = posterior.of_claims([h]), posterior.of_claims([h, *near])
     keys = frozenset(rival.key for rival in near)
-    return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals, keys)
+    abrupt = is_abrupt(answer, h, added(found, answer, h))
+    return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals, keys, abrupt)
 
 
 def added(found: Search, answer: Scored, h: Hypothesis) -> float:

@@ -54,7 +54,8 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
         )
     )
     probable = [n for n in candidates if n.together >= thresholds.NAMED]
-    refused = {n.hypothesis.key: text for n in probable if (text := vetoed(context, answer, n.hypothesis))}
+    unsure_of = [n for n in probable if not n.is_abrupt]  # a jump that no flow makes needs no good model
+    refused = {n.hypothesis.key: text for n in unsure_of if (text := vetoed(context, answer, n.hypothesis))}
     least = by_chance(found.gain)
 
     def level(some: Sequence[Named], goal: float) -> float:
@@ -85,11 +86,10 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     alone = _alone(context, found, answer, named)
     best, without = _unknown_cause(rest, alone, bool(named))
     # names hold next to effects that are not sure, and next to something that no effect explains if they are
-    # laws that explain more than they leave, and still add as much as a name needs
+    # jumps that no flow makes, or laws that explain more than they leave, and still add what a name needs
     if best.evidence - without > thresholds.SHORT and (best.forced or named or acts()):
-        laws_only = [n for n in named if n.hypothesis.effect.is_law]
-        mostly = [n for n in laws_only if (proof := proofs[n.hypothesis.key]) and proof.free.mostly]
-        faults = [n.hypothesis for n in named if not n.hypothesis.effect.is_law]
+        mostly = [n for n in named if n.is_firm and _stays(n, proofs[n.hypothesis.key])]
+        faults = [n.hypothesis for n in named if not n.is_firm]
         reasons += [
             f"{h.effect.word} at {h.where} is not named: something else acts as well, and an event or a "
             "fault can only be recognised with a model that is nearly right"
@@ -120,6 +120,8 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
         *apart(found, answer, unsure, least),
     )
     every = (*reasons, *further)
+    if named and all(n.is_abrupt for n in named):
+        every = (*every, *coarse(found))
     if named:
         kinds = {n.hypothesis.effect.is_physics for n in named}
         return Verdict(MISSING if True in kinds else FAULT, answer, named, (), every)
@@ -165,6 +167,11 @@ def _unknown_cause(rest: Sequence[Scored], alone: float, named: bool) -> tuple[S
         return max([m for m in rest if m.forced and not m.keys] or effects, key=lambda m: m.evidence), alone
     best = max(rest, key=lambda m: m.evidence - (thresholds.SHORT if m.forced else 0.0))
     return best, max(m.evidence for m in effects)
+
+
+def _stays(n: Named, outside: LeftOut | None) -> bool:
+    """Whether what is named explains more than it leaves, or is a jump that no flow makes."""
+    return n.is_abrupt or (outside is not None and outside.free.mostly)
 
 
 def _supports(outside: LeftOut | None) -> bool:

@@ -84,22 +84,22 @@ def unfinished(verdict: Verdict, fitting: Improvement, unit: str) -> Verdict:
     """The verdict where the model misses the recordings that it was fitted to by more than noise makes
     likely: something acts beside what is named, or where nothing is. Where it is more than the names
     explain, they are withdrawn: they may stand for it. So are events and faults, which can only be recognised
-    with a model that is nearly right.
+    with a model that is nearly right, but for jumps that no flow makes.
     """
     rms = fitting.judged[1 if verdict.named else 0]
     if not (verdict.named or verdict.word == NO_MISMATCH) or not _misses(fitting, rms, power=2):
         return verdict
     still = "still " if verdict.named else ""
     missed = f"free runs on the fitted recordings {still}miss by {_size(fitting, rms, unit)}"
-    only_laws = all(n.hypothesis.effect.is_law for n in verdict.named)
-    if verdict.named and fitting.mostly and only_laws:
+    firm = all(n.is_firm for n in verdict.named)
+    if verdict.named and firm and (fitting.mostly or all(n.is_abrupt for n in verdict.named)):
         reason = f"something else acts as well, or the named laws are not exact: {missed}"
         return replace(verdict, reasons=(reason, *verdict.reasons))
     reason = (
         f"no effect is sure, but {missed}"
         if not verdict.named
         else f"the effects that are sure enough leave more than they explain: {missed}"
-        if only_laws
+        if firm
         else f"an event or a fault can only be recognised with a model that is nearly right: {missed}"
     )
     return replace(

@@ -84,15 +84,27 @@ def _possible(grid: Grid) -> dict[str, float]:
     }
 
 
-def sentences(fit: Fit) -> list[str]:
-    """A sentence for each input that is logged late or early."""
+def sentences(fit: Fit, is_right: bool = True) -> list[str]:
+    """A sentence for each input that is logged late or early.
+
+    Args:
+        is_right: whether nothing else is missing. If something is, the shift may stand for it, and is said
+            only where it is more than a logger makes.
+    """
     found: dict[str, list[str]] = {}
     for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
-        if u.is_late and u.prior and abs(value) > max(SAID * error, SMALL * u.prior[1]):
+        least = (SMALL if is_right else 1.0) * u.prior[1] if u.is_late and u.prior else np.inf
+        if abs(value) > max(SAID * error, least):
             size = f"{abs(value):.0f}" if abs(value) >= 1 else printed(abs(value), 2)
             late = f"{size} s {'late' if value > 0 else 'early'} in {u.recording}"
             found.setdefault(u.name, []).append(late)
     runs = len(fit.trajectories)
+    if not is_right:
+        return [
+            f"in the fit, {name} is logged {', '.join(late)}: a dead time, or what the model leaves out, may "
+            "look like this"
+            for name, late in found.items()
+        ]
     return [
         f"{name} is logged {', '.join(late)}; the fit allows for it"
         + (", and a dead time looks the same" if 1 < runs == sum("early" in text for text in late) else "")

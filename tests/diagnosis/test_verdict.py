@@ -11,6 +11,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from discovery.diagnosis import named as module
 from discovery.diagnosis import thresholds, verdict
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.crossvalidation import LeftOut
@@ -51,6 +52,7 @@ class Model:
     off: float = thresholds.SHARE
     unrecorded: float = thresholds.FLOOR
     wrong: tuple[tuple[str, float], ...] = ()  # bodies whose flows are wrong by more than usual
+    abrupt: bool = False  # its faults are jumps that no flow makes
 
     @property
     def keys(self) -> frozenset[Key]:
@@ -67,6 +69,11 @@ class Model:
     @property
     def fit(self) -> Any:
         return SimpleNamespace(ended_early=False)
+
+
+@pytest.fixture(autouse=True)
+def jumps_as_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "is_abrupt", lambda model, h, _: model.abrupt and not h.effect.is_physics)
 
 
 @dataclass(frozen=True)
@@ -646,6 +653,33 @@ def test_a_veto_of_physics_stands_against_any_probability(
     found = said(Tried([*models, *single, Model((), 0.0)]), words, world)
     assert found.word == "unexplained"
     assert any(reason in text for text in found.reasons)
+
+
+def test_a_jump_that_no_flow_makes_needs_no_model_that_is_nearly_right() -> None:
+    """A jump of 0.6 K between two readings of a cell: "the flows are wrong by about 80 %, which may look the
+    same". They may not.
+    """
+    for abrupt, word in ((True, "measurement fault"), (False, "unexplained")):
+        far = Model((OFFSET,), 50.0, off=0.8, abrupt=abrupt)
+        found = said(Tried([far, Model((), 0.0, off=0.8)]), {"sensor_offset": 0.98})
+        assert found.word == word
+        assert any("flows of the model are wrong by about 80 %" in text for text in found.reasons)
+
+
+def test_a_jump_that_no_flow_makes_stands_next_to_what_no_effect_explains(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    what = "heat of unknown cause at bed"
+
+    def more(_: Context, models: Sequence[Model], __: float) -> list[Model]:
+        return [replace(m, evidence=m.evidence + 40.0) for m in models]
+
+    monkeypatch.setattr(verdict, "with_unknown", more)
+    for abrupt, word in ((True, "measurement fault"), (False, "unexplained")):
+        found = Tried([Model((OFFSET,), 50.0, abrupt=abrupt), Model((), 0.0)])
+        answer = said(found, {"sensor_offset": 0.98}, unknown=Model((OFFSET,), 90.0, forced=what))
+        assert answer.word == word
+        assert any(what in text for text in answer.reasons)
 
 
 def test_a_law_that_always_acts_needs_no_model_that_is_nearly_right() -> None:

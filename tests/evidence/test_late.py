@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from importlib import import_module
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -101,18 +102,37 @@ def test_switches_off_the_grid_of_the_logger_are_no_missing_physics(monkeypatch:
     assert found(seen) != ()
 
 
-@pytest.mark.parametrize(("word", "said"), [("missing physics", ["late"]), ("unexplained", [])])
-def test_what_may_stand_for_an_unknown_cause_is_not_said(
+@pytest.mark.parametrize(("word", "said"), [("missing physics", ["late"]), ("unexplained", ["unsure"])])
+def test_what_may_stand_for_an_unknown_cause_is_said_otherwise(
     word: str, said: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A resin that cures once gave "P_heater is logged 35 s early", which no clock was."""
     module = import_module("discovery.diagnosis.diagnose")
-    monkeypatch.setattr(module.late, "sentences", lambda _: ["late"])
+    monkeypatch.setattr(
+        module.late, "sentences", lambda _, is_right=True: ["late"] if is_right else ["unsure"]
+    )
     monkeypatch.setattr(module.noisy, "sentences", lambda *_: [])
     monkeypatch.setattr(module, "not_offered", lambda *_: [])
     context = SimpleNamespace(unused_readings=[], model=None, scene=None, outliers=())
     answer = SimpleNamespace(fit=None, noise=Noise(("T",), (0.1,)))
     assert module._reasons(context, SimpleNamespace(word=word, answer=answer), [], {}, [], []) == said
+
+
+def test_a_shift_by_more_than_a_logger_makes_may_be_a_dead_time() -> None:
+    """A gas furnace with a dead time of two intervals, which its model lacks, kept silent about it."""
+    prior = (0.0, 9.0)
+    late = [SimpleNamespace(name="gas", recording=r, is_late=True, prior=prior) for r in ("a", "b")]
+    problem = SimpleNamespace(unknowns=late)
+    fit: Any = SimpleNamespace(
+        problem=problem, theta=[-18.0, -8.0], standard_errors=[0.1, 0.1], trajectories=[None, None]
+    )
+    assert sentences(fit, is_right=False) == [
+        "in the fit, gas is logged 18 s early in a: a dead time, or what the model leaves out, may look like "
+        "this"
+    ]
+    assert sentences(fit) == [
+        "gas is logged 18 s early in a, 8 s early in b; the fit allows for it, and a dead time looks the same"
+    ]
 
 
 def heavy(seed: int) -> Recording:

@@ -1,0 +1,76 @@
+"""Jumps that can be recognised however wrong the flows of a model are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from discovery.diagnosis import Diagnosis, diagnose
+from discovery.diagnosis.abrupt import _hung
+from discovery.models import Model, Parameter, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
+
+CHANNELS = {
+    "P": Channel("P", "heat load", "W", None, "held"),
+    "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+    "T": Channel("T", "temperature", "degC", None, "linear"),
+}
+
+
+def lamp(seed: int, jump: float = 0.0) -> Recording:
+    """A lamp of 8 J/K over a plate that nobody reads, by small steps: heat follows the square of the drive,
+    and what the plate stores comes back. Its thermometer jumps at 300 s.
+    """
+    rng, time = np.random.default_rng(seed), np.arange(0.0, 601.0, 4.0)
+    power = np.repeat(rng.uniform(0.0, 40.0, 31), 5)[: time.size]
+    warm, plate, read = 21.0, 21.0, []
+    for watts in power:
+        read.append(warm)
+        for _ in range(8):
+            flow = 0.25 * (warm - plate)
+            warm += 0.5 * (0.03 * watts**2 - flow - 0.1 * (warm - 21.0)) / 8.0
+            plate += 0.5 * (flow - 0.05 * (plate - 21.0)) / 40.0
+    shown = np.array(read) + rng.normal(0.0, 0.1, time.size) + jump * (time >= 300.0)
+    return Recording(f"r{seed}", time, {"P": power, "room": np.full(time.size, 21.0), "T": shown})
+
+
+def found(*runs: Recording) -> Diagnosis:
+    """The diagnosis of a model whose heat follows the drive itself, and that has no plate."""
+    terms = (Term("power", "T", parse("k*P")), Term("air", "T", parse("hA*(room - T)")))
+    states = {"T": State("T", "degC", 8.0, parse("room"), None, 1 / 8.0)}
+    begun = {"hA": Parameter(0.2, "W/K", 0.0), "k": Parameter(1.0, "1", 0.0)}
+    seen = Campaign("lamps", CHANNELS, {r.name: r for r in runs})
+    return diagnose(Model("lamp", begun, states, terms, {}), seen, [r.name for r in runs], [], ["T"])
+
+
+def test_a_jump_is_named_where_the_flows_of_the_model_are_wrong() -> None:
+    answer = found(lamp(1), lamp(2, jump=6.0))
+    jumps = [n for n in answer.verdict.named if not n.hypothesis.effect.is_physics]
+    assert [(n.hypothesis.effect.word, n.hypothesis.recording, n.is_abrupt) for n in jumps] == [
+        ("sensor_offset", "r2", True)
+    ]
+    assert answer.after is not None
+    assert abs(answer.after.model.parameters["offset_T_r2"].value - 6.0) < 1.0
+    assert abs(answer.after.model.parameters["t_step_T_r2"].value - 300.0) <= 4.0
+
+
+def test_wrong_flows_alone_are_no_jump() -> None:
+    answer = found(lamp(1), lamp(2))
+    assert all(n.hypothesis.effect.is_physics for n in answer.verdict.named)
+
+
+@pytest.mark.parametrize(
+    ("readings", "at", "hung"),
+    [
+        ([20.0, 20.1, 20.3, 20.3, 20.3, 21.4, 21.5], 5, True),
+        ([20.0, 20.1, np.nan, 20.3, 20.3, np.nan, 21.4, 21.5], 6, True),
+        ([20.0, 20.1, 20.2, 20.3, 20.4, 21.4, 21.5], 5, False),
+        ([20.0, 20.0, 20.1, 20.1, 21.4, 21.4, 21.5], 4, False),  # a coarse logger shows all readings twice
+        ([20.0, 20.1, 20.3, 20.3, 20.3, 21.4, 21.5], 6, False),
+    ],
+)
+def test_a_sensor_that_hangs_jumps_when_it_shows_its_body_again(
+    readings: list[float], at: int, hung: bool
+) -> None:
+    assert _hung(np.array(readings), at) == hung
