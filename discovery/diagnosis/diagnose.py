@@ -24,6 +24,7 @@ from discovery.diagnosis.proof import Improvement, explained, free_runs, improve
 from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.repair import written
 from discovery.diagnosis.response import Response, responses
+from discovery.diagnosis.scan import in_play
 from discovery.diagnosis.scored import Scored, is_usual, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.unknown_law import instead
@@ -232,8 +233,8 @@ def diagnose(
     further += _reasons(context, verdict, read, proof, effects, mine)
     verdict = replace(verdict, reasons=(*verdict.reasons, *further))
     tell("locating")
-    setting = found.baseline.settings[found.baseline.best]
-    forces = latent_forces(found.baseline.seen, setting, context.floor)
+    # as if there were little process noise: where it is larger than usual, it has absorbed what is missing
+    forces = latent_forces(found.baseline.seen, in_play(context, found.baseline)[-1], context.floor)
     # what changes an output only has no curve of heat
     shown = [] if chances.best.forced and not chances.best.forced_state else forces
     unexplained = verdict.word == UNEXPLAINED and bool(shown)

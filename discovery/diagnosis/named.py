@@ -30,7 +30,7 @@ class Named:
     together: float  # probability that it acts, or a rival that is nearly as likely
     rivals: tuple[Rival, ...]
     near: frozenset[Key] = frozenset()  # those that are nearly as likely
-    is_abrupt: bool = False  # a jump of a sensor between two readings, which no flow makes
+    is_abrupt: bool = False  # a jump of a sensor that no flow makes, where those of the model are wrong
 
     @property
     def is_firm(self) -> bool:
@@ -58,7 +58,7 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
     near = [r.hypothesis for r in rivals if r.below <= thresholds.RIVAL]
     own, together = posterior.of_claims([h]), posterior.of_claims([h, *near])
     keys = frozenset(rival.key for rival in near)
-    abrupt = is_abrupt(answer, h, added(found, answer, h))
+    abrupt = answer.coarse and is_abrupt(answer, h, added(found, answer, h))
     return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals, keys, abrupt)
 
 

@@ -23,8 +23,8 @@ def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement], fit: 
         return verdict
     reason = f"the surest effects {_does(lower)}"
     word = UNEXPLAINED if coarse(found) else NO_MISMATCH
-    reasons = (reason, *(coarse(found) or unrecorded(found)), *verdict.reasons)
-    return replace(verdict, word=word, named=(), candidates=(), reasons=reasons)
+    reasons = dict.fromkeys((reason, *(coarse(found) or unrecorded(found)), *verdict.reasons))
+    return replace(verdict, word=word, named=(), candidates=(), reasons=tuple(reasons))
 
 
 def _acts(verdict: Verdict, run: str) -> bool:
