@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.diagnosis import thresholds
 from discovery.diagnosis.scored import Scored
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.signatures import signatures
@@ -16,15 +17,12 @@ from discovery.fitting.kalman import innovations
 Array = NDArray[np.float64]
 
 
-def is_abrupt(answer: Scored, h: Hypothesis, added: float) -> bool:
-    """Whether a fault is a jump that can be recognised however wrong the flows of the model are: more of its
-    log evidence comes from the readings at which it comes than from all others. Wrong flows are seen from
-    one reading to the next for a while, and hardly at a single one. What the worst other reading misses
-    counts against it: such readings come by themselves. A sensor that hangs jumps when it shows its body
-    again.
+def is_abrupt(answer: Scored, h: Hypothesis) -> bool:
+    """Whether a fault is a jump that can be recognised however wrong the flows of the model are: with flows
+    that are wrong by as much as any model's, the readings at which it comes make it more likely than not.
 
-    Args:
-        added: log evidence that goes with the fault.
+    What the worst other reading misses counts against it: such readings come by themselves. A sensor that
+    hangs jumps when it shows its body again.
     """
     if h.effect.search != "step" or h.effect.is_physics or h.recording is None:
         return False
@@ -34,16 +32,17 @@ def is_abrupt(answer: Scored, h: Hypothesis, added: float) -> bool:
     k = next(k for k, t in enumerate(answer.fit.trajectories) if t.system.grid.recording == h.recording)
     run, residual = answer.fit.trajectories[k], answer.seen.residuals[k]
     shown = signatures(run, [replace(h, shapes=shapes)]) @ amounts
-    left = np.nan_to_num(innovations(run, answer.noise, residual) ** 2)
-    gain = 0.5 * (np.nan_to_num(innovations(run, answer.noise, residual + shown) ** 2) - left)
-    time, measured = run.system.grid.time[run.system.grid.read], run.system.grid.measured
-    after = measured & (time >= min(shapes.values()))[:, None]
+    wrong = replace(answer.noise, share=max(thresholds.SHARES), force=None)
+    left = np.nan_to_num(innovations(run, wrong, residual) ** 2)
+    gain = 0.5 * (np.nan_to_num(innovations(run, wrong, residual + shown) ** 2) - left)
+    grid = run.system.grid
+    after = grid.measured & (grid.time[grid.read] >= min(shapes.values()))[:, None]
     moved = np.flatnonzero(after.any(axis=0) & shown.any(axis=0))
     first = after.argmax(axis=0)[moved]
-    if any(_hung(run.system.grid.readings[:, y], r) for r, y in zip(first, moved, strict=True)):
+    if any(_hung(grid.readings[:, y], r) for r, y in zip(first, moved, strict=True)):
         return False
     there = float(np.sum(gain[first, moved]) - 0.5 * left[:, moved].max(initial=0.0))
-    return there > added - there
+    return there + h.log_odds + h.log_weight > 0.0
 
 
 def _hung(readings: Array, at: int) -> bool:

@@ -58,7 +58,7 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
     near = [r.hypothesis for r in rivals if r.below <= thresholds.RIVAL]
     own, together = posterior.of_claims([h]), posterior.of_claims([h, *near])
     keys = frozenset(rival.key for rival in near)
-    abrupt = answer.coarse and is_abrupt(answer, h, added(found, answer, h))
+    abrupt = answer.coarse and is_abrupt(answer, h)
     return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals, keys, abrupt)
 
 

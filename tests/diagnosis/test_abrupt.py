@@ -19,7 +19,7 @@ CHANNELS = {
 
 
 def lamp(seed: int, jump: float = 0.0) -> Recording:
-    """A lamp of 8 J/K over a plate that nobody reads, by small steps: heat follows the square of the drive,
+    """A lamp of 80 J/K over a plate that nobody reads, by small steps: heat follows the square of the drive,
     and what the plate stores comes back. Its thermometer jumps at 300 s.
     """
     rng, time = np.random.default_rng(seed), np.arange(0.0, 601.0, 4.0)
@@ -29,8 +29,8 @@ def lamp(seed: int, jump: float = 0.0) -> Recording:
         read.append(warm)
         for _ in range(8):
             flow = 0.25 * (warm - plate)
-            warm += 0.5 * (0.03 * watts**2 - flow - 0.1 * (warm - 21.0)) / 8.0
-            plate += 0.5 * (flow - 0.05 * (plate - 21.0)) / 40.0
+            warm += 0.5 * (0.03 * watts**2 - flow - 0.1 * (warm - 21.0)) / 80.0
+            plate += 0.5 * (flow - 0.05 * (plate - 21.0)) / 400.0
     shown = np.array(read) + rng.normal(0.0, 0.1, time.size) + jump * (time >= 300.0)
     return Recording(f"r{seed}", time, {"P": power, "room": np.full(time.size, 21.0), "T": shown})
 
@@ -38,20 +38,20 @@ def lamp(seed: int, jump: float = 0.0) -> Recording:
 def found(*runs: Recording) -> Diagnosis:
     """The diagnosis of a model whose heat follows the drive itself, and that has no plate."""
     terms = (Term("power", "T", parse("k*P")), Term("air", "T", parse("hA*(room - T)")))
-    states = {"T": State("T", "degC", 8.0, parse("room"), None, 1 / 8.0)}
+    states = {"T": State("T", "degC", 80.0, parse("room"), None, 1 / 80.0)}
     begun = {"hA": Parameter(0.2, "W/K", 0.0), "k": Parameter(1.0, "1", 0.0)}
     seen = Campaign("lamps", CHANNELS, {r.name: r for r in runs})
     return diagnose(Model("lamp", begun, states, terms, {}), seen, [r.name for r in runs], [], ["T"])
 
 
 def test_a_jump_is_named_where_the_flows_of_the_model_are_wrong() -> None:
-    answer = found(lamp(1), lamp(2, jump=6.0))
+    answer = found(lamp(1), lamp(2, jump=12.0))
     jumps = [n for n in answer.verdict.named if not n.hypothesis.effect.is_physics]
     assert [(n.hypothesis.effect.word, n.hypothesis.recording, n.is_abrupt) for n in jumps] == [
         ("sensor_offset", "r2", True)
     ]
     assert answer.after is not None
-    assert abs(answer.after.model.parameters["offset_T_r2"].value - 6.0) < 1.0
+    assert abs(answer.after.model.parameters["offset_T_r2"].value - 12.0) < 1.0
     assert abs(answer.after.model.parameters["t_step_T_r2"].value - 300.0) <= 4.0
 
 

@@ -73,7 +73,7 @@ class Model:
 
 @pytest.fixture(autouse=True)
 def jumps_as_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "is_abrupt", lambda model, h, _: model.abrupt and not h.effect.is_physics)
+    monkeypatch.setattr(module, "is_abrupt", lambda model, h: model.abrupt and not h.effect.is_physics)
 
 
 @dataclass(frozen=True)
