@@ -676,7 +676,8 @@ def test_a_jump_that_no_flow_makes_stands_next_to_what_no_effect_explains(
 
     monkeypatch.setattr(verdict, "with_unknown", more)
     for abrupt, word in ((True, "measurement fault"), (False, "unexplained")):
-        found = Tried([Model((OFFSET,), 50.0, abrupt=abrupt), Model((), 0.0)])
+        far = Model((OFFSET,), 50.0, off=0.24 if abrupt else thresholds.SHARE, abrupt=abrupt)
+        found = Tried([far, Model((), 0.0)])
         answer = said(found, {"sensor_offset": 0.98}, unknown=Model((OFFSET,), 90.0, forced=what))
         assert answer.word == word
         assert any(what in text for text in answer.reasons)
