@@ -391,5 +391,10 @@ def _odds_of_force(context: Context) -> float:
 
 
 def light(one: Scored) -> Scored:
-    """The score without its sensitivities, which take memory and are not needed again."""
-    return replace(one, seen=replace(one.seen, last={}))
+    """The score without its sensitivities, which take memory and are not needed again, and of long recordings
+    with what is needed of their readings.
+    """
+    rows = {id(gram.rows): gram.rows for gram in one.grams}
+    kept = {key: each.lighter() for key, each in rows.items()}
+    grams = tuple(replace(gram, rows=kept[id(gram.rows)]) for gram in one.grams)
+    return replace(one, seen=replace(one.seen, last={}), grams=grams)

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.evidence.rows import Rows
 from discovery.fitting import Fit, Noise
 from discovery.fitting.kalman import Filter, make_filter
 
@@ -31,37 +32,6 @@ _UNSEEN = 1e-20  # of the largest entry of the normal equations
 _ROUNDING = 1e-10  # of the diagonal, added to it
 _TOGETHER = 16  # draws at a time: so many normal equations stay near the processor
 _REMEMBERED = 8  # rows under the last noises; they differ in form errors next, and are large
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Whitened rows (N, C) by recording, in the order of time, of the C columns of all `size` that act there;
-    `blocks`: where each block of time begins among them, and where the last one ends; `logdet` (B,) by block.
-    """
-
-    size: int
-    rows: tuple[Array, ...]
-    columns: tuple[Ints, ...]
-    blocks: tuple[Ints, ...]
-    logdet: Array
-
-    @cached_property
-    def sums(self) -> Array:
-        """The normal equations (size, size) of all rows."""
-        found = np.zeros((self.size, self.size))
-        for rows, columns in zip(self.rows, self.columns, strict=True):
-            found[np.ix_(columns, columns)] += rows.T @ rows
-        return found
-
-    def by_block(self) -> Array:
-        """The normal equations (B, size, size) of each block. They are large, and few noises need them."""
-        found = np.zeros((len(self.logdet), self.size, self.size))
-        pieces = iter(found)
-        for rows, columns, edges in zip(self.rows, self.columns, self.blocks, strict=True):
-            place = np.ix_(columns, columns)
-            for a, b in pairwise(edges.tolist()):
-                next(pieces)[place] = rows[a:b].T @ rows[a:b]
-        return found
 
 
 @dataclass(frozen=True)
