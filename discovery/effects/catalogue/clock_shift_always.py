@@ -10,10 +10,12 @@ own. Limits: as `clock_shift`.
 from dataclasses import replace
 
 from discovery.effects.catalogue import clock_shift
+from discovery.effects.form import Shape
 
 EFFECT = replace(
     clock_shift.EFFECT,
     title="Shifted clock or dead time in every recording",
     acts="always",
+    shapes=(Shape("t_shift", "s", 900.0, factor=2.2),),
     signature="every error of every recording is late by the same time",
 )
