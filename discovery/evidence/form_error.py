@@ -5,11 +5,12 @@
 for each flow of the model, and in the same way for each output. psi_m are the inputs, the body and the
 recording, each minus its mean and divided by its spread, scaled so that the total error of a flow is the
 share. The bodies of a lumped model also have no sharp edges, and are not equally warm everywhere: a share of
-each flow enters a neighbour of its body, and the place that an output sees answers to the flow before the
-whole body does, by a third of its Biot number (a plate that is heated on one side; Incropera, DeWitt, ch. 5:
-a body is one mass up to a Biot number of 0.1). The shares are unknown and grow together from an exact model
-to a coarse one. The part of the form error that changes with time is process noise (`process_noise.py`). This
-part does not average out over a long recording (Kennedy & O'Hagan, J. R. Stat. Soc. B 63, 2001).
+each flow enters a neighbour of its body, the inside of a body follows its surface, and the place that an
+output sees answers to the flow before the whole body does, by a third of its Biot number (a plate that is
+heated on one side; Incropera, DeWitt, ch. 5: a body is one mass up to a Biot number of 0.1). The shares are
+unknown and grow together from an exact model to a coarse one. The part of the form error that changes with
+time is process noise (`process_noise.py`). This part does not average out over a long recording (Kennedy &
+O'Hagan, J. R. Stat. Soc. B 63, 2001).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from discovery.dynamics.prediction import output_matrix
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.signatures import signatures
 from discovery.fitting import Fit
-from discovery.terms import Apply, Name, Number, Term, evaluate, names
+from discovery.terms import Apply, Expression, Name, Number, Term, evaluate, names
 
 Array = NDArray[np.float64]
 
@@ -88,9 +89,28 @@ def law_columns(
 
 def place_columns(run: Trajectory) -> Array:
     """What the readings show more (R, Y, M) where a flow does not act in a whole body: it enters a neighbour,
-    or the place that an output sees answers first.
+    the inside of the body follows late, or the place that an output sees answers first.
     """
-    return np.concatenate([edge_columns(run), inner_columns(run)], axis=2)
+    return np.concatenate([edge_columns(run), inside_columns(run), inner_columns(run)], axis=2)
+
+
+def inside_columns(run: Trajectory) -> Array:
+    """What the readings show more (R, Y, M) where the inside of a body follows its surface: the mean of the
+    body comes late by a third of its Biot number (of one) times its time constant, as with a mass C_m behind
+    the surface that follows within a part t_m of that time constant, C_m t_m = C t / 3:
+
+        q = C_m/t_m (lag(body, t_m) - body)
+    """
+    system, slow = run.system, _losses(run)
+    pieces: list[Column] = []
+    for i, name in enumerate(system.states):
+        if system.model.states[name].memory:
+            continue
+        for part in INNER:
+            behind = _late(run, Name(name), part / slow[i]) - run.at_ends()[name]
+            flow = DEPTH * slow[i] / (part**2 * system.scale[i]) * behind
+            pieces.append(Column(len(pieces), name, flow))
+    return sensitivities(run, (), (), pieces, count=len(pieces))
 
 
 def inner_columns(run: Trajectory) -> Array:
@@ -98,12 +118,10 @@ def inner_columns(run: Trajectory) -> Array:
     its body does: by a third of the rise that the flow makes in the body (a Biot number of one), within a
     part of the time constant of the body.
     """
-    system = run.system
+    system, slow = run.system, _losses(run)
     grid, nodes = system.grid, system.grid.looked_at
     levers = output_matrix(run, nodes)
     first = np.minimum(2 * nodes, 2 * len(grid.step) - 1)
-    losses = -np.median(np.diagonal(run.a, axis1=1, axis2=2), axis=0)  # 1 / time constant
-    slow = np.maximum(losses, 1.0 / float(grid.time[-1] - grid.time[0]))
     found = [np.zeros((len(nodes), len(grid.outputs), 0))]
     for term in _flows(run):
         for name, sign in ((term.into, 1.0), (term.source, -1.0)):
@@ -111,14 +129,25 @@ def inner_columns(run: Trajectory) -> Array:
                 continue
             i = system.states.index(name)
             for part in INNER:
-                lagged = Apply("lag", (term.expression, Number(part / slow[i])))
-                series = np.asarray(evaluate(lagged, run.at_ends(), memory=system.ends).value, dtype=float)
-                rise = (
-                    sign * DEPTH * system.scale[i] / slow[i] * np.broadcast_to(series, (2 * len(grid.step),))
-                )
+                late = _late(run, term.expression, part / slow[i])
+                rise = sign * DEPTH * system.scale[i] / slow[i] * late
                 seen = levers[:, :, i] * rise[first, None]
                 found += [_only(seen, y) for y in _outputs_of(run, name)]
     return grid.at_readings(np.concatenate(found, axis=2))
+
+
+def _losses(run: Trajectory) -> Array:
+    """Rates (S,) at which the bodies lose what they hold, 1/s: at least one over the recording."""
+    grid = run.system.grid
+    losses = -np.median(np.diagonal(run.a, axis1=1, axis2=2), axis=0)  # 1 / time constant
+    return np.maximum(losses, 1.0 / float(grid.time[-1] - grid.time[0]))
+
+
+def _late(run: Trajectory, expression: Expression, seconds: float) -> Array:
+    """An expression that comes late by a first-order lag, at the interval ends (2K,)."""
+    lag = Apply("lag", (expression, Number(seconds)))
+    series = np.asarray(evaluate(lag, run.at_ends(), memory=run.system.ends).value, dtype=float)
+    return np.broadcast_to(series, (2 * len(run.system.grid.step),))
 
 
 def _outputs_of(run: Trajectory, state: str) -> list[int]:

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from discovery.dynamics import Trajectory, make_grid, make_system, predict, simulate
+from discovery.dynamics import Trajectory, make_grid, make_system, predict, sensitivities, simulate
 from discovery.effects.catalogue import Effect, catalogue
-from discovery.evidence.form_error import INNER, effect_form, inner_columns, place_columns
+from discovery.evidence.form_error import INNER, effect_form, inner_columns, inside_columns, place_columns
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -56,6 +56,46 @@ def test_a_thermometer_sees_a_place_of_a_body_that_also_bends_the_machine() -> N
     alone = inner_columns(warmed(y="3*(T - 20)"))
     seen = [m for m in range(places.shape[2]) if places[:, 1, m].any()]
     assert 3 * places[:, 1, seen] == pytest.approx(alone[:, 0])
+
+
+def test_an_inside_follows_as_a_second_mass_does(run: Trajectory) -> None:
+    """`solve_ivp` with a millionth of the mass C_m behind the surface: t_m = part C/hA, C_m t_m = C t/3."""
+    found = inside_columns(run)[:, 0]
+    assert found.shape[1] == len(INNER)
+    for column, part in zip(found.T, INNER, strict=True):
+        late, share = part * C / HA, 1e-6
+        mass = share * C / (3 * part)
+
+        def rates(t: float, x: Array, late: float = late, mass: float = mass) -> Array:
+            behind = (x[1] - x[0]) / late
+            return np.array([(POWER * (t >= ON) + mass * behind - HA * x[0]) / C, -behind])
+
+        # the change by a step of heat, from the step on
+        since = TIME[TIME >= ON]
+        seen = solve_ivp(rates, (ON, since[-1]), [0.0, 0.0], t_eval=since, rtol=1e-11, atol=1e-11).y[0]
+        alone = POWER / HA * (1 - np.exp(-(since - ON) * HA / C))
+        expected = 3 * (seen - alone) / share
+        assert column[TIME >= ON] == pytest.approx(expected, abs=2e-3 * np.abs(expected).max())
+
+
+def test_an_inside_and_places_explain_a_bar_of_two_cells_that_a_thermometer_sees() -> None:
+    """The front cell is heated, and its thermometer alone is seen: no place of an output is left."""
+    run = warmed(sensor="T")
+    link = 160.0  # W/K, a Biot number of some 0.1
+
+    def rates(t: float, x: Array) -> Array:
+        along = link * (x[1] - x[0])
+        heat = POWER if t >= ON else 0.0
+        return np.array([(heat + along - HA / 2 * x[0]) / (C / 2), (-along - HA / 2 * x[1]) / (C / 2)])
+
+    bar = solve_ivp(rates, (0.0, TIME[-1]), [0.0, 0.0], t_eval=TIME, max_step=60.0, rtol=1e-8).y
+    fitted = sensitivities(run, ("hA",))[:, 0]
+    left = bar[0] - (predict(run)[:, 0] - 20)
+    left -= fitted @ np.linalg.lstsq(fitted, left, rcond=None)[0]
+    columns = np.concatenate([place_columns(run)[:, 0], fitted], axis=1)
+    rest = left - columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
+    assert np.std(left) > 0.05
+    assert np.std(rest) < 0.3 * np.std(left)
 
 
 def test_places_explain_what_lumping_a_bar_of_two_cells_leaves(run: Trajectory) -> None:
