@@ -62,6 +62,13 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
     return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals, keys, abrupt)
 
 
+def claims(one: Scored, h: Hypothesis) -> bool:
+    """Whether a model holds an effect, or one that is stated in the same words: by another input that no
+    report names, it is no other answer.
+    """
+    return any(o.stated == h.stated for o in one.hypotheses)
+
+
 def added(found: Search, answer: Scored, h: Hypothesis) -> float:
     """Log evidence that goes with an effect: what the model without it lacks, or the one without any."""
     without = found.tried.get(answer.keys - {h.key}, found.baseline)

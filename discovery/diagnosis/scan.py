@@ -27,8 +27,8 @@ from discovery.fitting.solve import solve
 class Scan:
     """Candidates scored on the residual of a model, best odds first, and on that without one effect.
 
-    `quiet`: as if there were little process noise, where the most likely process noise is larger than usual:
-    it may have absorbed the missing physics, and leaves nothing to any candidate. `inside`: likewise, with
+    `quiet`: as if there were little process noise and no form error, where the most likely ones are larger:
+    they may have absorbed the missing physics, and leave nothing to any candidate. `inside`: likewise, with
     parameters that press against a bound where their author believes them.
     """
 
@@ -51,12 +51,11 @@ def scan_model(context: Context, current: Scored) -> Scan:
     own = [_without(current, h) for h in current.hypotheses]
     found = scan(current.seen, settings, every, context.slab(every), own)
     by_effect = zip(current.hypotheses, found.without, strict=True)
-    coarse = not is_usual(current.settings[current.best])
     within = inside(context, current)
     return Scan(
         tuple(found.claims),
         {h.key: tuple(claims) for h, claims in by_effect},
-        tuple(found.quiet) if coarse else (),
+        tuple(found.quiet) if len(settings) > 1 else (),
         tuple(scan(within, settings[-1:], every, context.slab(every)).claims) if within else (),
     )
 
@@ -116,8 +115,8 @@ def _without(current: Scored, h: Hypothesis) -> Without:
 
 
 def in_play(context: Context, current: Scored) -> list[Setting]:
-    """Noise settings for the scan: the most likely one, and one with little process noise, because process
-    noise may have absorbed the missing physics.
+    """Noise settings for the scan: the most likely one, and one with little process noise and no form error,
+    because these may have absorbed the missing physics.
     """
     best = current.settings[current.best]
     kept = best.place[: AXES.index("share")]

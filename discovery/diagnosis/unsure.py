@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import isfinite
 
 from discovery.diagnosis import thresholds
-from discovery.diagnosis.named import Named, added
+from discovery.diagnosis.named import Named, added, claims
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.effects.hypothesis import Hypothesis
@@ -33,7 +33,7 @@ def apart(found: Search, answer: Scored, rest: Sequence[Named], least: float) ->
 def _alone_or_not(found: Search, h: Hypothesis) -> str:
     """How an effect alone compares with the best other one alone, if both were tried and act."""
     alone = found.tried.get(frozenset((h.key,)))
-    single = [m for m in found.tried.values() if len(m.hypotheses) == 1 and h.key not in m.keys]
+    single = [m for m in found.tried.values() if len(m.hypotheses) == 1 and not claims(m, h)]
     other = max(single, key=lambda m: m.evidence, default=None)
     if alone is None or other is None or not isfinite(alone.evidence - other.evidence):
         return ""

@@ -14,7 +14,7 @@ from math import inf, sqrt
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.crossvalidation import LeftOut, left_out, together_left_out
-from discovery.diagnosis.named import Named, added, one_named
+from discovery.diagnosis.named import Named, added, claims, one_named
 from discovery.diagnosis.posterior import Posterior
 from discovery.diagnosis.refit import score
 from discovery.diagnosis.scored import Scored, is_large, with_unknown
@@ -197,15 +197,17 @@ def _idle(h: Hypothesis, outside: LeftOut) -> str:
 
 def _instead(found: Search, lost: Collection[Key], n: Named, whole: float) -> float:
     """What a model of names has to exceed where one of them may be another effect: the best of all models
-    without it, and without rivals that are named next to it as they are nearly as likely. Where effects that
-    are not sure add more than a name needs, only a model counts that the best one does not exceed by as much.
+    without it, whatever input it follows, and without rivals that are named next to it as they are nearly as
+    likely. Where effects that are not sure add more than a name needs, only a model counts that the best one
+    does not exceed by as much.
 
     Args:
         lost: effects that are no rivals.
         whole: log evidence of the model.
     """
-    none = {n.hypothesis.key, *n.near, *lost}
-    rest = max(m.evidence for m in found.tried.values() if none.isdisjoint(m.keys))
+    none = {*n.near, *lost}
+    others = (m for m in found.tried.values() if none.isdisjoint(m.keys) and not claims(m, n.hypothesis))
+    rest = max(m.evidence for m in others)
     return rest - max(found.best.evidence - whole - thresholds.SHORT, 0.0)
 
 
