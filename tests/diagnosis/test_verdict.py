@@ -293,6 +293,23 @@ def test_what_else_acts_may_decide_between_rivals(rival: float, both: float, nam
     assert [n.hypothesis for n in found.named] == ([FLUID] if named else [])
 
 
+@pytest.mark.parametrize(("word", "named"), [("fluid_convection", True), ("rotating_air_convection", False)])
+def test_an_effect_by_another_of_its_inputs_is_no_rival(word: str, named: bool) -> None:
+    """The demonstration: the fluid at the table by the flow, and by the pump next to unsure friction."""
+    by_flow, by_pump = (
+        replace(claim(w, "table"), channels=(by,)) for w, by in ((FLUID.effect.word, "flow"), (word, "pump"))
+    )
+    assert (by_flow.stated == by_pump.stated) == named
+    models = (
+        Model((by_flow,), 100.0),
+        Model((by_pump, FRICTION), 101.0),
+        Model((by_flow, FRICTION), 112.0),
+        Model((), 0.0),
+    )
+    found = said(Tried(models), {"fluid_convection": 0.95, word: 0.95, "friction_speed": 0.5})
+    assert [n.hypothesis for n in found.named] == ([by_flow] if named else [])
+
+
 @pytest.mark.parametrize(("near", "named"), [(111.8, True), (108.0, False)])
 def test_a_rival_that_is_named_next_to_it_does_not_withdraw_a_name(near: float, named: bool) -> None:
     """The lag of a thermometer, and a second mass with 0.2 less, next to convection that is not sure:
