@@ -197,9 +197,9 @@ def _idle(h: Hypothesis, outside: LeftOut) -> str:
 
 def _instead(found: Search, lost: Collection[Key], n: Named, whole: float) -> float:
     """What a model of names has to exceed where one of them may be another effect: the best of all models
-    without it, whatever input it follows, and without rivals that are named next to it as they are nearly as
-    likely. Where effects that are not sure add more than a name needs, only a model counts that the best one
-    does not exceed by as much.
+    that do not claim it, and without rivals that are named next to it as they are nearly as likely. Where
+    effects that are not sure add more than a name needs, only a model counts that the best one does not
+    exceed by as much.
 
     Args:
         lost: effects that are no rivals.
