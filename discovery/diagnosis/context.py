@@ -178,10 +178,14 @@ def _thermometers(fit: Fit, campaign: Campaign) -> tuple[str, ...]:
 
 
 def with_noise_of(context: Context, fit: Fit) -> Context:
-    """The context with the reading noise of a better fit, if the campaign states none."""
+    """The context with the reading noise of a better fit, if the campaign states none, and with the form
+    errors where that fit is: without an effect, a fit may lie where its bodies are others.
+    """
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
     white = reading_noise(fit, stated, context.floor, process_prior())
-    return replace(context, settings=_settings(white, context.floor, context.grids, context.settings.coarser))
+    noises = _settings(white, context.floor, context.grids, context.settings.coarser)
+    form, kinds = model_form(fit, np.array(white.white), context.thermometers)
+    return replace(context, settings=noises, form=tuple(form), kinds=kinds)
 
 
 def with_coarser(context: Context, states: tuple[str, ...]) -> Context:
