@@ -36,11 +36,13 @@ from discovery.effects.hypothesis import Hypothesis
 from discovery.effects.not_offered import not_offered
 from discovery.errors import RunsAwayError, UserError
 from discovery.evidence import late, noisy
+from discovery.evidence.hung import Hung, without_hung
 from discovery.evidence.latent_force import Force, latent_forces
 from discovery.fitting import Fit, Prior, fit_model
 from discovery.fitting.covariance import Z95
 from discovery.models import Model
 from discovery.models.units import differences
+from discovery.printed import printed
 from discovery.recordings import Campaign
 from discovery.threads import one_thread
 
@@ -181,11 +183,13 @@ def diagnose(
         raise UserError(f"model '{model.name}' predicts no measured channel; name one under [outputs]")
     if what := campaign.unread(fit, outputs):
         raise UserError(what)
+    campaign, hung = without_hung(campaign, outputs)
     own = {e.word for e in effects}
     entries = [*(e for e in catalogue().values() if e.word not in own), *effects]
     seen = replace(campaign, recordings={r: campaign.recordings[r] for r in fit})  # nothing else can leak in
     tell("fitting the baseline and its noise")
-    before = fitted or fit_model(model, seen, fit, outputs, minima=True)
+    before = fitted if fitted and not any(h.recording in fit for h in hung) else None
+    before = before or fit_model(model, seen, fit, outputs, minima=True)
     context = make_context(seen, model, fit, outputs, entries, _after(campaign, fit), before)
     tell("scoring the catalogue")
     found = Search(context, lambda what: tell(f"found so far: {what}"))
@@ -229,10 +233,12 @@ def diagnose(
     verdict = refuted(unfinished(idle(found, verdict, all_runs, fit), fitted_to, unit), unseen)
     if not verdict.named and after is not None:
         after = None
-    verdict = wrong_readings(unforeseen(verdict, unseen, unit), len(context.outliers))
+    in_fit = [h for h in hung if h.recording in fit]
+    verdict = wrong_readings(unforeseen(verdict, unseen, unit), len(context.outliers), len(in_fit))
     law = instead(context, verdict.answer) if verdict.word == UNEXPLAINED else None
     mine = tuple(searched(found, verdict, effects))
     further = [law] if law else []
+    further += [_stood_still(h, campaign) for h in hung]
     further += _reasons(context, verdict, read, proof, effects, mine)
     verdict = replace(verdict, reasons=(*verdict.reasons, *further))
     tell("locating")
@@ -334,6 +340,16 @@ def _set_aside(context: Context) -> list[str]:
     if len(wrong) == 1:
         return [f"a single wrong reading is set aside: {what}"]
     return [f"{len(wrong)} single wrong readings are set aside; the worst: {what}"]
+
+
+def _stood_still(h: Hung, campaign: Campaign) -> str:
+    """A sentence on a sensor that hung."""
+    unit = campaign.channels[h.output].unit
+    of = "" if unit == "1" else f" {unit}"
+    return (
+        f"{h.output} hung in '{h.recording}': it stays at {printed(h.value)}{of} for {h.count} readings "
+        f"({h.start:.0f} to {h.end:.0f} s) and jumps behind them; all but the first of these are set aside"
+    )
 
 
 def _reasons(

@@ -140,10 +140,14 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
     return replace(verdict, word=word, reasons=(*verdict.reasons, reason))
 
 
-def wrong_readings(verdict: Verdict, count: int) -> Verdict:
-    """The verdict where nothing but single wrong readings was found."""
-    if verdict.word != NO_MISMATCH or not count:
+def wrong_readings(verdict: Verdict, single: int, hung: int = 0) -> Verdict:
+    """The verdict where nothing but wrong readings was found. `single`: readings that their neighbours
+    contradict; `hung`: sensors that hung.
+    """
+    if verdict.word != NO_MISMATCH or not single + hung:
         return verdict
-    what = "one single wrong reading was" if count == 1 else f"{count} single wrong readings were"
-    reason = f"only {what} found"
+    kinds = ((single, "single wrong reading", ""), (hung, "sensor", " that hung"))
+    found = [f"one {what}{how}" if n == 1 else f"{n} {what}s{how}" for n, what, how in kinds if n]
+    was = "was" if single + hung == 1 else "were"
+    reason = f"only {' and '.join(found)} {was} found"
     return replace(verdict, word=FAULT, candidates=(), reasons=(reason, *verdict.reasons))

@@ -10,12 +10,8 @@ from discovery.recordings.columns import Array, Lines
 from discovery.recordings.finding import Finding, more
 from discovery.recordings.oddvalues import impossible_readings
 from discovery.recordings.roles import ROLES
+from discovery.recordings.standing import FEW, longest_run
 
-FEW = 20  # readings: fewer carry no model
-_STANDS = 5.0  # a sensor that stands still so many times longer than chance explains
-_CHANCE = 2.0  # times what chance explains, where a jump shows that the body went on
-_CAUGHT_UP = 4.0  # times the largest of the steps around: readings that come back from where they stood
-_AROUND = 10  # steps on each side
 _NEAR_ZERO = 0.05  # of the largest magnitude of a load or flow: so far below zero is noise
 # what a channel exceeds somewhere in any recording, and the unit that it has where it does not
 _SMALLEST = {
@@ -80,33 +76,22 @@ def _outside(column: Array, limits: tuple[float, float]) -> Lines:
 
 
 def frozen_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:
-    """A sensor that repeats one value far longer than it does elsewhere in the recording.
-
-    When a reading differs from the one before with probability p, the longest run of equal readings among n
-    is about ln(n)/p (Erdos and Renyi 1970); several times that is a sensor that stands still. Less is enough
-    where the readings behind it go on far from where they stood, and as slowly as before.
-    """
+    """A sensor that repeats one value far longer than it does elsewhere in the recording (`standing.py`)."""
     known = np.flatnonzero(np.isfinite(column))
     if not channel.is_sensor or known.size < FEW:
         return
     readings = column[known]
-    ends = np.append(np.flatnonzero(np.diff(readings) != 0.0), known.size - 1)
-    lengths = np.diff(ends, prepend=-1)
-    if lengths.size == 1:
+    if np.ptp(readings) == 0.0:
         what = f"'{channel.name}' is {readings[0]:g} in all {known.size} readings"
         do = "check the sensor; if it is a constant, say so with set = { ... } in the campaign file"
         yield Finding("warning", file, int(lines[known[0]]), what, do)
         return
-    longest = int(np.argmax(lengths))
-    others = known.size - lengths[longest]
-    changes = (lengths.size - 1) / max(others, 1)
-    chance = np.log(known.size) / changes
-    stands = lengths[longest] > _STANDS * chance + FEW
-    if stands or (lengths[longest] > _CHANCE * chance and _catches_up(readings, ends, longest)):
-        first, last = known[ends[longest] - lengths[longest] + 1], known[ends[longest]]
+    run = longest_run(readings)
+    if run is not None and (run.stands or run.hung):
+        first, last = known[run.first], known[run.last]
         what = (
-            f"'{channel.name}' stays at {column[first]:g} for {lengths[longest]} readings,"
-            f" up to line {lines[last]}, and changes {_every(1 / changes)} elsewhere"
+            f"'{channel.name}' stays at {column[first]:g} for {run.count} readings,"
+            f" up to line {lines[last]}, and changes {_every(1 / run.changes)} elsewhere"
         )
         yield Finding(
             "warning", file, int(lines[first]), what, "check the sensor; empty the cells if it hung"
@@ -116,17 +101,6 @@ def frozen_findings(file: Path, lines: Lines, channel: Channel, column: Array) -
 def _every(readings: float) -> str:
     """How often a sensor shows something new."""
     return f"every {readings:.2g} readings" if readings >= 1.5 else "with nearly every reading"
-
-
-def _catches_up(readings: Array, ends: Lines, run: int) -> bool:
-    """Whether the readings (R,) jump behind a run of equal ones, and move far less before it and after."""
-    last = int(ends[run])
-    first = int(ends[run - 1]) + 1 if run else 0
-    steps = np.abs(np.diff(readings))
-    if last == steps.size:  # nothing was read behind it
-        return False
-    around = np.concatenate([steps[max(first - _AROUND, 0) : first], steps[last + 1 : last + 1 + _AROUND]])
-    return around.size >= _AROUND and bool(steps[last] > _CAUGHT_UP * around.max())
 
 
 def small_findings(file: Path, lines: Lines, channel: Channel, column: Array) -> Iterator[Finding]:

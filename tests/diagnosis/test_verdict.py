@@ -334,6 +334,9 @@ def test_single_wrong_readings_are_all_that_is_wrong() -> None:
     found = wrong_readings(nothing, 2)
     assert (nothing.word, found.word) == ("no mismatch", "measurement fault")
     assert found.reasons[0] == "only 2 single wrong readings were found"
+    assert wrong_readings(nothing, 0, 1).reasons[0] == "only one sensor that hung was found"
+    both = wrong_readings(nothing, 1, 2).reasons[0]
+    assert both == "only one single wrong reading and 2 sensors that hung were found"
 
 
 def test_wrong_readings_do_not_hide_what_only_unseen_recordings_show() -> None:
