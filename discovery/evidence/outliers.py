@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from discovery.dynamics import Grid, make_system
+from discovery.dynamics import Grid, make_system, predict
 from discovery.evidence.late import beside_switches
 from discovery.fitting import Fit
 
@@ -55,7 +56,8 @@ def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Out
             noise = max(float(white[y]), float(np.median(np.abs(steps - np.median(steps)))) / 0.954)
             limit = FAR * np.maximum(noise, scatter)
             alone = _returns(r, middle, limit)
-            alone &= ~switched[rows]  # a short pulse that is logged late shows in one reading
+            # a short pulse that is logged late shows in one reading, by what it makes of the readings around
+            alone &= ~switched[rows] | (np.abs(jump) > limit + _moved(predict(trajectory)[rows, y]))
             for k in np.flatnonzero(alone):
                 at = float(grid.time[grid.read[rows[k]]])
                 found.append(Outlier(name, grid.recording, at, float(jump[k]), noise))
@@ -89,6 +91,12 @@ def _around(r: Array) -> tuple[Array, Array]:
     window = np.where((rows >= 0) & (rows < len(r)), r[np.clip(rows, 0, len(r) - 1)], np.nan)
     middle = np.nanmedian(window, axis=1)
     return middle, np.nanmedian(np.abs(window - middle[:, None]), axis=1)
+
+
+def _moved(shown: Array) -> Array:
+    """By how much (N,) a prediction (N,) moves over the readings around each one."""
+    around = sliding_window_view(np.pad(shown, MOST, mode="edge"), 2 * MOST + 1)
+    return np.asarray(np.ptp(around, axis=1))
 
 
 def without(grids: Mapping[str, Grid], outliers: list[Outlier]) -> dict[str, Grid]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from discovery.dynamics import make_grid
@@ -59,6 +60,31 @@ def test_a_jump_a_slope_and_a_slow_start_are_no_wrong_readings() -> None:
 
 def test_noise_that_is_larger_than_believed_is_not_thrown_away() -> None:
     assert found(6.0 * noise(2000)) == []
+
+
+@pytest.mark.parametrize(("size", "rows"), [(12.0, [100]), (2.0, [])])
+def test_a_pulse_that_is_logged_late_makes_no_more_of_a_reading_than_of_those_around(
+    size: float, rows: list[int]
+) -> None:
+    """A chip that a pulse of load warms by 2.5 K for a few readings. The load is logged
+    with each reading: it may have come a reading earlier.
+    """
+    time = np.arange(200.0) * 2.0
+    load = np.where(np.arange(200) == 100, 0.2, 0.0)
+    channels = {
+        "T": Channel("T", "temperature", "K", 0.05, "linear"),
+        "P": Channel("P", "heat load", "W", None, "held"),
+    }
+    still = np.random.default_rng(3).normal(0.0, 0.05, 200)
+    still[101:] += 4.0 * (1 - np.exp(-1)) * np.exp(-np.arange(99.0))  # dx/dt = 2 K/s - x/2 s for 2 s
+    still[100] += size
+    campaign = Campaign("one", channels, {"a": Recording("a", time, {"T": still, "P": load})})
+    chip = State("x", "K", start=parse("0"), start_sd=0.0)
+    terms = (Term("load", "x", parse("10*P")), Term("loss", "x", parse("-0.5*x")))
+    fit = fit_model(Model("chip", {}, {"x": chip}, terms, {"T": parse("x")}), campaign, ["a"], ["T"])
+    grid = replace(make_grid(campaign, "a", ["P"], ["T"]), unsure={"P": 2.0})
+    wrong = find_outliers(fit, {"a": grid}, np.array([0.05]))
+    assert [round(o.time / 2.0) for o in wrong] == rows
 
 
 def test_sizes_carry_the_unit_of_the_place() -> None:
