@@ -140,7 +140,8 @@ class Shape:
     around `middle`. Without a `middle` any time constant that the recordings can show is as likely as any
     other on a logarithmic scale. `instant`: a time in the recording, which is searched for by itself.
     `apart`: ratio of neighbouring values in a search, whose signatures are much alike; those of a delay,
-    which smooths nothing, are so only close by.
+    which smooths nothing, are so only close by. `is_shift`: by how much something comes late, which a
+    recording shows only if it is far longer.
     """
 
     name: str
@@ -151,12 +152,14 @@ class Shape:
     instant: bool = False
     least: float = 0.0  # what the recordings can show of a time constant
     apart: float = 3.0
+    is_shift: bool = False
 
     def within(self, shortest: float, longest: float) -> Shape:
         """The shape for recordings that show time constants from `shortest` to `longest` [s]."""
         if self.middle is not None:
-            is_shift = self.unit == "s" and self.spread > 0
-            return replace(self, spread=min(self.spread, _SHIFTED * longest)) if is_shift else self
+            if self.unit == "s" and self.spread > 0:
+                return replace(self, spread=min(self.spread, _SHIFTED * longest))
+            return replace(self, middle=min(self.middle, _SHIFTED * longest)) if self.is_shift else self
         middle, factor = sqrt(shortest * longest), (longest / shortest) ** (0.5 / _REACH)
         return replace(self, middle=middle, factor=factor, least=middle * factor**-_REACH)
 

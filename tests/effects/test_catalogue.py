@@ -170,6 +170,10 @@ def test_a_clock_is_off_by_no_more_than_a_part_of_a_recording() -> None:
     shift = Shape("t_shift", "s", 0.0, spread=1800.0)
     assert shift.within(2.0, 480.0).spread == pytest.approx(60.0)
     assert shift.within(300.0, 259200.0) == shift
+    # readings of a computer in orbit, 720 s long, were said to come 900 s late
+    late = Shape("t_shift", "s", 900.0, factor=2.2, is_shift=True)
+    assert late.within(12.0, 720.0).middle == pytest.approx(90.0)
+    assert late.within(300.0, 259200.0) == late
     exponent = Shape("m", "1", 0.0, spread=0.5)
     assert exponent.within(2.0, 1.0) == exponent
 

@@ -16,6 +16,6 @@ EFFECT = replace(
     clock_shift.EFFECT,
     title="Shifted clock or dead time in every recording",
     acts="always",
-    shapes=(Shape("t_shift", "s", 900.0, factor=2.2),),
+    shapes=(Shape("t_shift", "s", 900.0, factor=2.2, is_shift=True),),
     signature="every error of every recording is late by the same time",
 )

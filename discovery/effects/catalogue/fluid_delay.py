@@ -15,7 +15,7 @@ EFFECT = Effect(
     place="fluid terms",
     formula="delay(fluid, t_delay)",
     amplitude=Amplitude("delayed", "1", 1.0, 1, 1.0),
-    shapes=(Shape("t_delay", "s", 900.0, factor=2.2, apart=1.5),),
+    shapes=(Shape("t_delay", "s", 900.0, factor=2.2, apart=1.5, is_shift=True),),
     signature="every wet body answers to the fluid temperature later than it is measured",
     confused_with=(
         "fluid_sump",

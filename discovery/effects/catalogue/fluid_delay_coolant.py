@@ -16,7 +16,7 @@ EFFECT = replace(
     title="Delay in the coolant circuit",
     place="coolant terms",
     formula="delay(coolant, t_delay)",
-    shapes=(Shape("t_delay", "s", 110.0, factor=3.3, apart=1.5),),
+    shapes=(Shape("t_delay", "s", 110.0, factor=3.3, apart=1.5, is_shift=True),),
     signature="every cooled body answers to the coolant temperature later than it is measured",
     source="plug flow through pipes and jackets",
     examples=(Example({"coolant": 26.0, "t_delay": 1200.0}, 22.0, {"coolant": 22.0}, 1000.0),),
