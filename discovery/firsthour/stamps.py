@@ -296,7 +296,7 @@ def _forward(
         return seconds[order] - seconds[order[0]], order, []
     back = np.flatnonzero(steps < 0)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    if back.size == 1 and abs(steps[back[0]] + _HOUR - usual) <= max(usual, 1.0):
+    if back.size == 1 and _moves_by(-_HOUR, steps, usual)[back[0]]:
         moved = seconds.copy()
         moved[back[0] + 1 :] += _HOUR
         return (
@@ -338,6 +338,13 @@ def repeated_rows(sheet: Sheet, seconds: Array) -> NDArray[np.bool_]:
     return found
 
 
+def _moves_by(seconds: float, steps: Array, usual: float) -> NDArray[np.bool_]:
+    """Which steps (N,) are a usual one and these seconds, but for a missing row: stamps once a day are
+    far apart without any clock that was moved.
+    """
+    return np.asarray(np.abs(steps - seconds - usual) <= max(min(usual, _HOUR / 2), 1.0))
+
+
 def _summer(seconds: Array, first: str) -> tuple[Array, list[str]]:
     """The time without the hour that a clock on a wall skips where summer time begins.
 
@@ -347,7 +354,7 @@ def _summer(seconds: Array, first: str) -> tuple[Array, list[str]]:
     steps = np.diff(seconds)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     begin = datetime.fromisoformat(first)
-    for row in np.flatnonzero(np.abs(steps - _HOUR - usual) <= max(usual, 1.0)).tolist():
+    for row in np.flatnonzero(_moves_by(_HOUR, steps, usual)).tolist():
         before, after = (begin + timedelta(seconds=float(seconds[k])) for k in (row, row + 1))
         if summer_time_begins(before, after):
             moved = seconds.copy()

@@ -50,7 +50,8 @@ def _unit_findings(file: Path, columns: Columns, usual: float) -> list[Finding]:
     length = float(np.max(columns.time) - np.min(columns.time))
     first = int(columns.lines[0])
     whole = abs(usual / 1000.0 - round(usual / 1000.0)) < 0.02 and usual > 500.0  # hourly stamps are not
-    if length > _LONG and (whole or usual > 10e3):
+    hours = abs(usual / 3600.0 - round(usual / 3600.0)) < 1e-6  # a gauge that is read once a day
+    if length > _LONG and (whole or usual > 10e3) and not hours:
         what = f"a stamp every {usual:g} s over {length / 86400:.3g} days: perhaps these are milliseconds"
         return [Finding("warning", file, first, what, "write the time in seconds: divide it by 1000")]
     if length < _SHORT or usual < 1e-3:

@@ -66,6 +66,17 @@ def test_the_hour_that_clocks_skip_in_spring(
     assert any("start of summer time" in note for note in table.notes) is (hours == 8.0)
 
 
+@pytest.mark.parametrize("hours", [6, 24])
+def test_stamps_that_are_hours_apart_show_no_clock_that_was_moved(tmp_path: Path, hours: int) -> None:
+    """A gauge of a river, read once a day: an hour was taken out at the first of all dates of a change."""
+    begin = datetime(2026, 3, 1)
+    lines = ["date;T1 [°C]"]
+    lines += [f"{begin + timedelta(hours=hours * k):%Y-%m-%dT%H:%M:%S};{20 + k % 7}" for k in range(60)]
+    table = read_own(write(tmp_path / "days.csv", *lines))
+    assert set(np.diff(table.time)) == {3600.0 * hours}
+    assert not any("clock was put" in note for note in table.notes)
+
+
 def test_rows_of_one_stamp_are_not_spread_over_a_pause() -> None:
     """Two rows in each minute, then a pause of an hour."""
     stamps = np.array([0.0, 0.0, 60.0, 60.0, 3660.0, 3660.0, 3720.0, 3720.0])

@@ -253,6 +253,7 @@ def test_a_clock_that_is_put_back(write: Write) -> None:
         ([45000 + k / 1440 for k in range(361)], "361 rows within 0.25 s: perhaps these are days"),
         ([k / 17280 for k in range(20000)], "20000 rows within 1.16 s: perhaps these are days"),
         ([3600.0 * k for k in range(3000)], ""),  # hourly for four months
+        ([86400.0 * k for k in range(120)], ""),  # a river gauge
         ([60.0 * k for k in range(4000)], ""),
         ([0.1 * k for k in range(361)], ""),
     ],
