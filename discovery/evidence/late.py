@@ -13,10 +13,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discovery.dynamics import Grid
-from discovery.dynamics.grid import MOVED
 from discovery.fitting import Fit, make_problem
 from discovery.fitting.noise import resolution, roughness
 from discovery.printed import printed
@@ -58,18 +56,6 @@ def perhaps_late(fit: Fit, campaign: Campaign, grids: Mapping[str, Grid], enough
                 if 0.5 * float(np.nansum((jacobian[..., k] * interval) ** 2)) > enough:
                     shown[name][u.name] = interval
     return {name: replace(grid, unsure=shown[name]) for name, grid in grids.items()}
-
-
-def beside_switches(grid: Grid) -> NDArray[np.bool_]:
-    """Which readings (R,) come within a logging interval of a switch of an input that may be logged late."""
-    read = grid.time[grid.read]
-    beside = np.zeros(len(read), dtype=bool)
-    for name, interval in grid.unsure.items():
-        samples = grid.samples[name]
-        switches = samples.time[1:][np.abs(np.diff(samples.value)) > MOVED * np.ptp(samples.value)]
-        before = np.searchsorted(switches, read - interval, side="left")
-        beside |= np.searchsorted(switches, read + interval, side="right") > before
-    return beside
 
 
 def _possible(grid: Grid) -> dict[str, float]:

@@ -10,7 +10,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, make_system, predict
-from discovery.evidence.late import beside_switches
 from discovery.fitting import Fit
 
 Array = NDArray[np.float64]
@@ -43,7 +42,7 @@ def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Out
     for grid in grids.values():
         trajectory = fit.problem.run(make_system(fit.problem.model, grid), fit.theta)
         residual = fit.problem.residual(trajectory)
-        switched = beside_switches(grid)
+        shown = predict(trajectory)
         for y, name in enumerate(grid.outputs):
             rows = np.flatnonzero(np.isfinite(residual[:, y]))
             r = residual[rows, y]
@@ -55,9 +54,8 @@ def find_outliers(fit: Fit, grids: Mapping[str, Grid], white: Array) -> list[Out
             steps = np.diff(r)
             noise = max(float(white[y]), float(np.median(np.abs(steps - np.median(steps)))) / 0.954)
             limit = FAR * np.maximum(noise, scatter)
-            alone = _returns(r, middle, limit)
-            # a short pulse that is logged late shows in one reading, by what it makes of the readings around
-            alone &= ~switched[rows] | (np.abs(jump) > limit + _moved(predict(trajectory)[rows, y]))
+            # what is logged a little late shows in one reading, by what it makes of those around
+            alone = _returns(r, middle, limit) & (np.abs(jump) > limit + _moved(shown[rows, y]))
             for k in np.flatnonzero(alone):
                 at = float(grid.time[grid.read[rows[k]]])
                 found.append(Outlier(name, grid.recording, at, float(jump[k]), noise))

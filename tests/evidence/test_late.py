@@ -17,7 +17,7 @@ from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import SHORT
 from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
-from discovery.evidence.late import beside_switches, perhaps_late, sentences
+from discovery.evidence.late import perhaps_late, sentences
 from discovery.fitting import Noise
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
@@ -243,12 +243,3 @@ def test_readings_that_are_averaged_by_the_program_still_show_a_shift() -> None:
     blocks = make_grid(seen, "r5", ["P", "room"], ["coil", "frame"], coarse=160, most=170)
     assert np.median(np.diff(blocks.time[blocks.read])) > 2 * INTERVAL
     assert perhaps_late(context.baseline, seen, {"r5": blocks}, SHORT)["r5"].unsure == {"P": INTERVAL}
-
-
-def test_readings_beside_a_switch_that_may_be_late() -> None:
-    grid = make_grid(campaign(light(6, 0.0)), "r6", ["P", "room"], ["coil", "frame"])
-    assert not beside_switches(grid).any()
-    beside = beside_switches(replace(grid, unsure={"P": INTERVAL}))
-    switched = np.diff(grid.samples["P"].value, prepend=grid.samples["P"].value[0]) != 0
-    near = switched | np.roll(switched, 1) | np.roll(switched, -1)
-    assert np.array_equal(beside, near)
