@@ -30,6 +30,7 @@ RESOLUTION = {  # finer gives the same answer in more time
     "evidence/settings.py": "JITTER",
     "evidence/whitening.py": "_AT_BOUND _UNSEEN _ROUNDING _REMEMBERED _TOGETHER",
     "diagnosis/context.py": "MOST_READINGS NODES",
+    "diagnosis/diagnose.py": "ANOTHER_NOISE",
     "diagnosis/posterior.py": "FAR MOST IN_PLAY SETTINGS",
     "diagnosis/coarse_bodies.py": "OPENED",
     "diagnosis/proof.py": "DRAWS BLOCKS",

@@ -18,7 +18,7 @@ from discovery.effects.candidates import Scene, candidates
 from discovery.effects.form import ROLE_OF, Effect
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Slab
-from discovery.evidence.form_error import model_form
+from discovery.evidence.form_error import are_others, model_form
 from discovery.evidence.late import perhaps_late
 from discovery.evidence.noisy import log_likelihood, perhaps_noisy, smoothed
 from discovery.evidence.outliers import Outlier, find_outliers, without
@@ -65,6 +65,7 @@ class Context:
     outliers: tuple[Outlier, ...]  # set aside
     form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
     kinds: tuple[int, int, int]  # of these: of laws, of places, of zeros of thermometers
+    formed: Fit  # where they are
     thermometers: tuple[str, ...]  # that the model uses or shows
     sizes: Sizes  # prior of amplitudes, along the baseline; the same under every reading noise
 
@@ -167,6 +168,7 @@ def make_context(
         tuple(outliers),
         tuple(form),
         kinds,
+        fit,
         thermometers,
         Sizes(model, fit.trajectories, noises.white),
     )
@@ -179,13 +181,16 @@ def _thermometers(fit: Fit, campaign: Campaign) -> tuple[str, ...]:
 
 def with_noise_of(context: Context, fit: Fit) -> Context:
     """The context with the reading noise of a better fit, if the campaign states none, and with the form
-    errors where that fit is: without an effect, a fit may lie where its bodies are others.
+    errors of its bodies, where they are others: a fit without an effect may link two bodies a thousand times
+    as well as they are.
     """
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
     white = reading_noise(fit, stated, context.floor, process_prior())
     noises = _settings(white, context.floor, context.grids, context.settings.coarser)
+    if not are_others(context.formed.trajectories, fit.trajectories):
+        return replace(context, settings=noises)
     form, kinds = model_form(fit, np.array(white.white), context.thermometers)
-    return replace(context, settings=noises, form=tuple(form), kinds=kinds)
+    return replace(context, settings=noises, form=tuple(form), kinds=kinds, formed=fit)
 
 
 def with_coarser(context: Context, states: tuple[str, ...]) -> Context:

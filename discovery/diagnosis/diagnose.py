@@ -52,6 +52,8 @@ if TYPE_CHECKING:
 
     from discovery.diagnosis.form import DiagnosisDocument
 
+ANOTHER_NOISE = 0.05  # relative change of a channel's reading noise that calls for another search
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -194,13 +196,8 @@ def diagnose(
     tell("scoring the catalogue")
     found = Search(context, lambda what: tell(f"found so far: {what}"))
     found = _with_coarse_bodies(found.begun()).grow()
-    under = found.baseline.keys
     for _ in range(2):  # each answer is questioned under the noise that it leaves
-        if found.best.keys != under:
-            under = found.best.keys
-            tell("repeating with the noise of the answer")
-            found = found.under(with_noise_of(found.context, found.best.fit))
-        found = _with_coarse_bodies(found)
+        found = _under_own_noise(found, tell)
         found.run()
     context = found.context
     tell("weighing the answers")
@@ -277,6 +274,21 @@ def _with_coarse_bodies(found: Search) -> Search:
         return found
     other = with_coarse_bodies(found.context, found.best)
     return found if other is found.context else found.under(other)
+
+
+def _under_own_noise(found: Search, tell: Callable[[str], None]) -> Search:
+    """The search under the reading noise that the best model leaves, with the form errors of its bodies, and
+    with those that it leaves coarse, where they are others.
+    """
+    found = _with_coarse_bodies(found)
+    before = found.context
+    other = with_noise_of(before, found.best.fit)
+    change = np.log(np.array(other.white.white) / np.array(before.white.white))
+    is_other = other.form is not before.form or np.max(np.abs(change)) > ANOTHER_NOISE
+    if not found.best.hypotheses or not is_other:
+        return found
+    tell("repeating with the noise of the answer")
+    return found.under(other)
 
 
 def _after(campaign: Campaign, fit: Sequence[str]) -> dict[str, tuple[str, ...]]:

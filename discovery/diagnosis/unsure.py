@@ -22,20 +22,25 @@ def apart(found: Search, answer: Scored, rest: Sequence[Named], least: float) ->
     sentences = []
     for n in rest:
         gain = added(found, answer, n.hypothesis)
-        sentence = _unsure(n, gain, least, _alone_or_not(found, n.hypothesis))
-        if n.rivals and n.rivals[0].below < gain:
-            other, below = n.rivals[0].hypothesis, n.rivals[0].below
-            sentence += f"; {other.stated} instead has {below:.1f} less"
+        rival = n.rivals[0] if n.rivals and n.rivals[0].below < gain else None
+        said = rival.hypothesis.stated if rival else ""
+        sentence = _unsure(n, gain, least, _alone_or_not(found, n.hypothesis, said))
+        if rival:
+            sentence += f"; {said} instead has {rival.below:.1f} less"
         sentences.append(sentence)
     return tuple(sentences)
 
 
-def _alone_or_not(found: Search, h: Hypothesis) -> str:
-    """How an effect alone compares with the best other one alone, if both were tried and act."""
+def _alone_or_not(found: Search, h: Hypothesis, rival: str) -> str:
+    """How an effect alone compares with the best other one alone, if both were tried and act, and the other
+    is not the rival that is stated anyhow.
+    """
     alone = found.tried.get(frozenset((h.key,)))
     single = [m for m in found.tried.values() if len(m.hypotheses) == 1 and not claims(m, h)]
     other = max(single, key=lambda m: m.evidence, default=None)
     if alone is None or other is None or not isfinite(alone.evidence - other.evidence):
+        return ""
+    if other.hypotheses[0].stated == rival:
         return ""
     more = alone.evidence - other.evidence
     how = f"{abs(more):.0f} {'more' if more >= 0 else 'less'}"

@@ -143,6 +143,21 @@ def _losses(run: Trajectory) -> Array:
     return np.maximum(losses, 1.0 / float(grid.time[-1] - grid.time[0]))
 
 
+def are_others(ones: Sequence[Trajectory], others: Sequence[Trajectory]) -> bool:
+    """Whether bodies of some runs are others in runs of another fit, so that form errors are, too: a time
+    constant differs by more than those of `INNER` next to each other, which span what lies between.
+
+    Args:
+        others: of the same recordings; their model may have more states.
+    """
+    for one, other in zip(ones, others, strict=True):
+        before, after = (dict(zip(run.system.states, _losses(run), strict=True)) for run in (one, other))
+        ratios = [after[name] / before[name] for name in before if name in after]
+        if max(abs(np.log(ratios))) > np.log(INNER[1] / INNER[0]):
+            return True
+    return False
+
+
 def _late(run: Trajectory, expression: Expression, seconds: float) -> Array:
     """An expression that comes late by a first-order lag, at the interval ends (2K,)."""
     lag = Apply("lag", (expression, Number(seconds)))
