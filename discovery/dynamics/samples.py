@@ -66,7 +66,11 @@ class Samples:
 
     def integral(self, time: Array) -> Array:
         """Integral of a channel from its first stamp."""
-        index = np.maximum(np.searchsorted(self.time, time, side="right") - 1, 0)
+        return self._integral(time, np.searchsorted(self.time, time, side="right"))
+
+    def _integral(self, time: Array, passed: NDArray[np.intp]) -> Array:
+        """`integral` at instants up to which so many stamps have passed."""
+        index = np.maximum(passed - 1, 0)
         last = 0.5 * (self.value[index] + self.at(time)) if self.linear else self.value[index]
         return np.asarray(self._sums[index] + last * (time - self.time[index]))
 
@@ -105,11 +109,13 @@ class Samples:
         recording is constant to the last bit and equal intervals share their transition matrices.
         """
         changes = self._changes
-        first = np.maximum(np.searchsorted(self.time, edges[:-1], side="right") - 1, 0)
+        passed = np.searchsorted(self.time, edges, side="right")
+        index = np.maximum(passed - 1, 0)
+        first, at_end = index[:-1], self.time[index[1:]] == edges[1:]
         # straight lines reach to the stamp behind the edge
-        last = np.searchsorted(self.time, edges[1:], side="left") - (0 if self.linear else 1)
+        last = passed[1:] - at_end - (0 if self.linear else 1)
         same = changes[first] == changes[np.clip(last, 0, len(changes) - 1)]
-        return np.where(same, self.value[first], np.diff(self.integral(edges)) / np.diff(edges))
+        return np.where(same, self.value[first], np.diff(self._integral(edges, passed)) / np.diff(edges))
 
 
 def read_samples(campaign: Campaign, recording: str, inputs: Iterable[str]) -> dict[str, Samples]:
