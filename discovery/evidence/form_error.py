@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 LAWS, PLACES = 36, 36  # directions in the readings in which form errors of laws and of places are kept
 DEPTH = 1 / 3  # of its Biot number: share of its rise by which a plate is warmer where it is heated
-INNER = (0.05, 0.2, 0.5)  # of the time constant of a body: how fast its inside, and a place, follow
+INNER = (0.05, 0.2)  # of the time constant of a body: how fast its inside, and the place that is seen, follow
 
 
 def model_form(fit: Fit, white: Array, sensors: Sequence[str]) -> tuple[list[Array], tuple[int, int, int]]:
