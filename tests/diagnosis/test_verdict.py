@@ -472,6 +472,15 @@ def test_something_acts_though_no_effect_is_sure() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("together", "word"), [(2 * SHORT - 1, "no mismatch"), (2 * SHORT + 1, "unexplained")]
+)
+def test_two_effects_that_each_may_come_by_chance_may_do_so_together(together: float, word: str) -> None:
+    """On an intact axis, free convection with 15.3 units and windage with 1.7 were a cause unknown."""
+    both = pair(FLUID, FRICTION, together, 0.5 * together, 0.5 * together)
+    assert said(both, {"fluid_convection": 0.5, "friction_speed": 0.5}).word == word
+
+
 def test_what_would_be_missed_most_is_named_first() -> None:
     both = pair(FRICTION, FLUID, 200.0, 50.0, 150.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
