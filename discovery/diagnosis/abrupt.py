@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.scored import Scored
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.signatures import signatures
 from discovery.fitting.kalman import innovations
-
-Array = NDArray[np.float64]
+from discovery.recordings.standing import stood_before
 
 
 def is_abrupt(answer: Scored, h: Hypothesis) -> bool:
@@ -39,17 +36,7 @@ def is_abrupt(answer: Scored, h: Hypothesis) -> bool:
     after = grid.measured & (grid.time[grid.read] >= min(shapes.values()))[:, None]
     moved = np.flatnonzero(after.any(axis=0) & shown.any(axis=0))
     first = after.argmax(axis=0)[moved]
-    if any(_hung(grid.readings[:, y], r) for r, y in zip(first, moved, strict=True)):
+    if any(stood_before(grid.readings[:, y], r) for r, y in zip(first, moved, strict=True)):
         return False
     there = float(np.sum(gain[first, moved]) - 0.5 * left[:, moved].max(initial=0.0))
     return there + h.log_odds + h.log_weight > 0.0
-
-
-def _hung(readings: Array, at: int) -> bool:
-    """Whether readings (R,) are equal for longer just before one of them than ever else."""
-    seen = np.flatnonzero(np.isfinite(readings))
-    shown, place = readings[seen], int(np.searchsorted(seen, at))
-    ends = [0, *(1 + np.flatnonzero(np.diff(shown) != 0)).tolist(), len(shown)]
-    runs = {end: end - start for start, end in pairwise(ends)}
-    before = runs.pop(place, 0)
-    return before > max(runs.values(), default=0)

@@ -77,6 +77,7 @@ class Diagnosis:
     question: str
     seconds: float
     own: tuple[Searched, ...] = ()  # effects of the experiment file
+    hung: tuple[Hung, ...] = ()  # sensors that hung, in any recording
 
     @property
     def repaired(self) -> Model | None:
@@ -263,6 +264,7 @@ def diagnose(
         question=ask(context, found, verdict),
         seconds=clock.perf_counter() - began,
         own=mine,
+        hung=hung,
     )
 
 

@@ -16,6 +16,7 @@ from discovery.diagnosis.form import (
     Detection,
     DiagnosisDocument,
     Gain,
+    HungSensor,
     ImprovementDocument,
     LocationDocument,
     MissingHeat,
@@ -87,6 +88,17 @@ def document(d: Diagnosis) -> DiagnosisDocument:
                 output=o.output, recording=o.recording, time_s=number(o.time, 7), size=number(o.size, 4)
             )
             for o in d.context.outliers
+        ],
+        hung=[
+            HungSensor(
+                output=h.output,
+                recording=h.recording,
+                start_s=number(h.start, 7),
+                end_s=number(h.end, 7),
+                value=number(h.value, 7),
+                readings=h.count,
+            )
+            for h in d.hung
         ],
         missing_heat=_missing_heat(d),
         description=DescriptionDocument(

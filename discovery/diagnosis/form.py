@@ -154,6 +154,17 @@ class WrongReading(Strict):
     size: Number
 
 
+class HungSensor(Strict):
+    """A sensor that hung: it repeats `value` for so many `readings`. All but the first are set aside."""
+
+    output: str
+    recording: str
+    start_s: Number
+    end_s: Number
+    value: Number
+    readings: int
+
+
 class Against(Strict):
     """Missing heat against one input or state."""
 
@@ -221,6 +232,7 @@ class DiagnosisDocument(Strict):
     )
     improvement: ImprovementDocument
     set_aside: list[WrongReading]
+    hung: list[HungSensor] = Field(default_factory=list, description="sensors that hung")
     missing_heat: MissingHeat | None
     description: DescriptionDocument | None
     responses: list[ResponseDocument] = Field(

@@ -86,10 +86,10 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     alone = _alone(context, found, answer, named)
     best, without = _unknown_cause(rest, alone, bool(named))
     # what may come by chance for each of several effects may come for all of them
-    by_luck = thresholds.SHORT * (1 if best.forced else max(len(best.keys), 1))
+    chance = thresholds.SHORT * (1 if best.forced else max(len(best.keys), 1))
     # names hold next to effects that are not sure, and next to something that no effect explains if they are
     # jumps that no flow makes, or laws that explain more than they leave, and still add what a name needs
-    if best.evidence - without > by_luck and (best.forced or named or acts()):
+    if best.evidence - without > chance and (best.forced or named or acts()):
         mostly = [n for n in named if n.is_firm and _stays(n, proofs[n.hypothesis.key])]
         faults = [n.hypothesis for n in named if not n.is_firm]
         reasons += [

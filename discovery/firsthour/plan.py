@@ -22,11 +22,11 @@ from discovery.firsthour.vocabulary import words_of
 from discovery.progress import Progress, silent
 from discovery.recordings import Campaign, load_campaign
 from discovery.recordings.campaignfile import CampaignForm, ChannelForm
+from discovery.recordings.columns import FEW
 from discovery.recordings.valuecheck import below_zero
 
 REFERENCES = ("discovered", "regression", "pysindy")  # every experiment compares with them
 HAND_BUILT = {"first_order": ("model.toml", 1), "two_masses": ("two_masses.toml", 2)}
-_FEW = 20  # readings of an output: fewer carry no model
 _QUIET = 3.0  # times its noise: an output that moves less says nothing
 
 
@@ -212,7 +212,7 @@ def missing(
     for name in outputs:
         known = np.concatenate([campaign.recordings[r].values[name] for r in fit])
         known = known[np.isfinite(known)]
-        if known.size < _FEW:
+        if known.size < FEW:
             found.append(f"'{name}' has {known.size} readings: record longer, or read it more often")
         elif np.std(known) < _QUIET * np.median(np.abs(np.diff(known))) / 0.954:
             found.append(f"'{name}' hardly moves above its noise: load the machine more, or longer")

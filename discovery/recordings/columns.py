@@ -10,6 +10,7 @@ Array = NDArray[np.float64]
 Lines = NDArray[np.int64]
 
 TIME = "time"
+FEW = 20  # readings of a channel: fewer carry no model
 EMPTY_CELLS = ("", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-")  # not measured
 
 

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from discovery.recordings.columns import Array, Lines
+from discovery.recordings.columns import FEW, Array, Lines
 from discovery.recordings.finding import Finding, more
 from discovery.recordings.roles import ROLES, SENSORS
 
 if TYPE_CHECKING:
     from discovery.recordings.campaign import Channel
 
-FEW = 20  # readings: fewer carry no model
 # what loggers write where they have nothing: limits of number formats, broken thermocouples, power-on values
 _WORDS = (
     -999.0,

@@ -8,13 +8,12 @@ the readings behind it go on far from where they stood, and as slowly as before:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from discovery.recordings.columns import FEW, Array
 
-FEW = 20  # readings: fewer carry no model
 _STANDS = 5.0  # a sensor that stands still so many times longer than chance explains
 _CHANCE = 2.0  # times what chance explains, where a jump shows that the body went on
 _CAUGHT_UP = 4.0  # times the largest of the steps around: readings that come back from where they stood
@@ -49,6 +48,16 @@ def longest_run(readings: Array) -> Run | None:
     chance = np.log(readings.size) / changes
     hung = count > _CHANCE * chance and _catches_up(readings, last - count + 1, last)
     return Run(last - count + 1, last, changes, count > _STANDS * chance + FEW, hung)
+
+
+def stood_before(readings: Array, at: int) -> bool:
+    """Whether readings (R,) are equal for longer just before one of them than ever else."""
+    seen = np.flatnonzero(np.isfinite(readings))
+    shown, place = readings[seen], int(np.searchsorted(seen, at))
+    ends = [0, *(1 + np.flatnonzero(np.diff(shown) != 0)).tolist(), len(shown)]
+    runs = {end: end - start for start, end in pairwise(ends)}
+    before = runs.pop(place, 0)
+    return before > max(runs.values(), default=0)
 
 
 def _catches_up(readings: Array, first: int, last: int) -> bool:

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from discovery.recordings.campaign import Channel
-from discovery.recordings.columns import Array, Lines
+from discovery.recordings.columns import FEW, Array, Lines
 from discovery.recordings.finding import Finding, more
 from discovery.recordings.oddvalues import impossible_readings
 from discovery.recordings.roles import ROLES
-from discovery.recordings.standing import FEW, longest_run
+from discovery.recordings.standing import longest_run
 
 _NEAR_ZERO = 0.05  # of the largest magnitude of a load or flow: so far below zero is noise
 # what a channel exceeds somewhere in any recording, and the unit that it has where it does not

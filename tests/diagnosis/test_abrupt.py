@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from discovery.diagnosis import Diagnosis, diagnose
-from discovery.diagnosis.abrupt import _hung
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -58,19 +56,3 @@ def test_a_jump_is_named_where_the_flows_of_the_model_are_wrong() -> None:
 def test_wrong_flows_alone_are_no_jump() -> None:
     answer = found(lamp(1), lamp(2))
     assert all(n.hypothesis.effect.is_physics for n in answer.verdict.named)
-
-
-@pytest.mark.parametrize(
-    ("readings", "at", "hung"),
-    [
-        ([20.0, 20.1, 20.3, 20.3, 20.3, 21.4, 21.5], 5, True),
-        ([20.0, 20.1, np.nan, 20.3, 20.3, np.nan, 21.4, 21.5], 6, True),
-        ([20.0, 20.1, 20.2, 20.3, 20.4, 21.4, 21.5], 5, False),
-        ([20.0, 20.0, 20.1, 20.1, 21.4, 21.4, 21.5], 4, False),  # a coarse logger shows all readings twice
-        ([20.0, 20.1, 20.3, 20.3, 20.3, 21.4, 21.5], 6, False),
-    ],
-)
-def test_a_sensor_that_hangs_jumps_when_it_shows_its_body_again(
-    readings: list[float], at: int, hung: bool
-) -> None:
-    assert _hung(np.array(readings), at) == hung
