@@ -24,6 +24,7 @@ MOST_NODES = 30_000  # of a recording; with more, it is coarsened
 COARSE_NODES = 8_000  # of a coarsened one, about; as many at most for its inputs' switches
 LONGEST_BLOCK = 120.0  # s, about; a recording of weeks has more nodes than these for its sake
 USUAL = 0.25  # of the time: it passes in steps up to the usual one
+LONGEST_STEP, STEPS = 600.0, 8  # s, and a share of the usual distance of stamps where that is longer
 LONG = 2.0  # times the usual step: a longer one is divided for laws that are not linear
 MOVED = 0.1  # of its span: a held input that moves so far within a block of a coarsened grid divides it
 
@@ -234,11 +235,12 @@ def make_grid(
     recording: str,
     inputs: Iterable[str],
     outputs: Iterable[str],
-    max_step: float = 600.0,
     coarse: int | None = None,
     most: int = MOST_NODES,
 ) -> Grid:
-    """Grid of a recording: every stamp of an input or a reading is a node, long intervals are divided.
+    """Grid of a recording: every stamp of an input or a reading is a node, long intervals are divided (linear
+    terms are exact however long they are): to 600 s, or to an eighth of the usual distance of stamps, for
+    what is read once a day shows nothing of minutes.
 
     With more than `most` nodes it is coarsened: a body of minutes or hours answers to the mean of what
     came within seconds. Stamps are taken together in blocks, which end where an input switches or jumps. All
@@ -248,7 +250,6 @@ def make_grid(
     Args:
         inputs: channels that the model uses.
         outputs: channels that were measured and are to be compared with the model.
-        max_step: longest interval [s]; linear terms are exact whatever it is.
         coarse: blocks, about, where there are more nodes than `most`; default COARSE_NODES, and as many as
             keep a block within LONGEST_BLOCK.
         most: nodes of a grid that is not coarsened.
@@ -276,6 +277,8 @@ def make_grid(
     logged = {n: float(np.median(np.diff(at))) for n, at in stamped_at.items() if len(at) > 1}
     spread = {name: s for name in (*samples, *outputs) if (s := campaign.channels[name].spread) > 0}
     read = np.flatnonzero(taken[rows])
+    usual = float(np.median(np.diff(data.time[rows]))) if len(rows) > 1 else 0.0
+    max_step = max(LONGEST_STEP, usual / STEPS)
     stamped = Grid(recording, data.time[rows], samples, outputs, read, table[taken], spread, logged=logged)
     if len(rows) > most:
         if coarse is None:
