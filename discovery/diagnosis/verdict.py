@@ -70,11 +70,15 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     named = tuple(needed(proved, {*refused, *idle})) if idle else proved
     sure = [n for n in sure if n in named or n.hypothesis.key in idle]
     others = [n.hypothesis for n in candidates if n not in named]
+    alone = _alone(context, found, answer, named)
 
     @cache
     def acts() -> bool:
-        """Whether the effects without a name improve free runs outside the fit, all together."""
-        return _supports(together_left_out(context, answer, others))
+        """Whether the effects without a name, all together, explain more than each of them may by chance, and
+        improve free runs outside the fit.
+        """
+        more = _is_more(answer.evidence - alone, len(others))
+        return more and _supports(together_left_out(context, answer, others))
 
     # what does not improve free runs outside the fit is not lacking either
     nothing = set(idle) if idle and not acts() else set[Key]()
@@ -83,13 +87,10 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     lacking = (found.baseline, answer) if named else ()
     laws = [law for m in lacking for law in with_law(context, m, found.goal(m.noise))]
     rest = [m for m in (*posterior.models, *found.tried.values(), *laws) if not m.keys & nothing]
-    alone = _alone(context, found, answer, named)
     best, without = _unknown_cause(rest, alone, bool(named))
-    # what may come by chance for each of several effects may come for all of them
-    chance = thresholds.SHORT * (1 if best.forced else max(len(best.keys), 1))
     # names hold next to effects that are not sure, and next to something that no effect explains if they are
     # jumps that no flow makes, or laws that explain more than they leave, and still add what a name needs
-    if best.evidence - without > chance and (best.forced or named or acts()):
+    if _is_more(best.evidence - without) and (best.forced or named or acts()):
         mostly = [n for n in named if n.is_firm and _stays(n, proofs[n.hypothesis.key])]
         faults = [n.hypothesis for n in named if not n.is_firm]
         reasons += [
@@ -169,6 +170,11 @@ def _unknown_cause(rest: Sequence[Scored], alone: float, named: bool) -> tuple[S
         return max([m for m in rest if m.forced and not m.keys] or effects, key=lambda m: m.evidence), alone
     best = max(rest, key=lambda m: m.evidence - (thresholds.SHORT if m.forced else 0.0))
     return best, max(m.evidence for m in effects)
+
+
+def _is_more(evidence: float, effects: int = 1) -> bool:
+    """Whether so much log evidence is more than may come by chance for each of so many effects."""
+    return evidence > thresholds.SHORT * max(effects, 1)
 
 
 def _stays(n: Named, outside: LeftOut | None) -> bool:

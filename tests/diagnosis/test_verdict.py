@@ -579,6 +579,22 @@ def test_what_improves_by_chance_is_not_lacking(monkeypatch: pytest.MonkeyPatch)
     assert [n.hypothesis for n in found.named] == [FLUID]
 
 
+@pytest.mark.parametrize(
+    ("together", "word"), [(2 * SHORT - 1, "no mismatch"), (2 * SHORT + 1, "unexplained")]
+)
+def test_a_refuted_effect_and_a_weak_one_may_come_by_chance(
+    monkeypatch: pytest.MonkeyPatch, together: float, word: str
+) -> None:
+    """On an intact portal, free convection of all bodies helped no free run, and two films with 7 units each
+    did so next to it.
+    """
+    idle = proof_of(1.0, 1.0, 8)
+    monkeypatch.setattr(verdict, "left_out", lambda _, __, chosen: {h.key: idle for h in chosen})
+    monkeypatch.setattr(verdict, "together_left_out", lambda *_: proof_of(1.0, 0.7, 16))
+    both = pair(FLUID, FRICTION, together, 18.0, 7.0)
+    assert said(both, {"fluid_convection": 0.98, "friction_speed": 0.5}).word == word
+
+
 def test_one_of_two_effects_that_stand_in_for_each_other_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """A second mass and a path of its own: next to the other one, neither improves enough blocks; without the
     one that explains less, the other one does.
