@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Trajectory, predict
+from discovery.dynamics import Grid, Trajectory, predict
 from discovery.dynamics.trajectory import answers, flows
 from discovery.effects.form import FARTHEST
 from discovery.evidence.settings import Prior, Setting, with_levels
@@ -128,14 +128,17 @@ def flows_at_least(trajectories: Sequence[Trajectory]) -> dict[str, float]:
             if not isinstance(shown, Name) or shown.id not in found or not system.grid.measured[:, y].any():
                 continue
             missed = float(np.sqrt(np.nanmean(left[:, y] ** 2)))
-            rate = missed / _process_time(float(system.grid.time[-1]))
+            rate = missed / _process_time(system.grid)
             found[shown.id] = max(found[shown.id], rate / system.model.states[shown.id].scale)
     return found
 
 
-def _process_time(duration: float) -> float:
-    """The longest time constant of process noise that is likely, in s as the duration of a recording."""
-    return min(10800.0, duration / 8)
+def _process_time(grid: Grid) -> float:
+    """The longest time constant of process noise that is likely [s]: what passes between a few readings
+    cannot be told from white noise, and what lasts as long as a recording not from an offset.
+    """
+    every = min((grid.logged[name] for name in grid.outputs if name in grid.logged), default=0.0)
+    return min(max(10800.0, 8 * every), float(grid.time[-1]) / 8)
 
 
 def neighbours(places: Sequence[tuple[int, ...]]) -> tuple[tuple[int, ...], ...]:
@@ -180,13 +183,13 @@ def reading_noise(
     any size.
 
     Process noise far above the usual is offered, so that a mismatch passes for that and not for reading
-    noise. Time constants are 2 h of slow noise and 3 h of process noise, or a share of shorter recordings.
+    noise. Time constants are 2 h of slow noise and 3 h of process noise, a share of shorter recordings, and
+    more where readings are rare.
     """
     outputs = fit.problem.outputs
     known = np.array([stated.get(name) is not None for name in outputs])
-    duration = max(float(t.system.grid.time[-1]) for t in fit.trajectories)
-    times = min(7200.0, duration / 12), _process_time(duration)
-    start = Noise(outputs, tuple(fit.noise.white), (), None, slow_time=times[0], heat_time=times[1])
+    longest = max(_process_time(t.system.grid) for t in fit.trajectories)
+    start = Noise(outputs, tuple(fit.noise.white), (), None, slow_time=longest / 1.5, heat_time=longest)
     best, lowest = np.array(fit.noise.white), np.inf
     if not known.all():
         seen, least = Whitened(fit, 1), np.array(resolution([s.grid.single for s in fit.problem.systems]))

@@ -115,6 +115,37 @@ class Experiment:
         return model
 
 
+def compared_on_all(experiment: Experiment, name: str) -> Experiment:
+    """The experiment in which model `name` is compared with everything measured that it gives, where it is a
+    file and nobody states outputs: what is read at its bodies tells causes apart that errors alone cannot.
+    Other models keep their outputs.
+
+    Raises UserError: the model cannot be read, or does not fit the campaign.
+    """
+    form, usual = experiment.form, list(experiment.outputs)
+    entry = form.models[name]
+    if form.outputs or entry.kind != "file" or entry.outputs:
+        return experiment
+    model, channels = experiment.model_file(name), experiment.campaign.channels
+    known = {*usual, *model.inputs}
+    more = [
+        given
+        for given in dict.fromkeys([*model.outputs, *model.states])
+        if given in channels and channels[given].measured and given not in known
+        if not experiment.campaign.unread(experiment.fit, [given])
+    ]
+    if not more:
+        return experiment
+    wanted = {one: usual for one, other in form.models.items() if not getattr(other, "outputs", None)}
+    wanted[name] = [*usual, *more]
+    models = {
+        one: other.model_copy(update={"outputs": wanted[one]}) if one in wanted else other
+        for one, other in form.models.items()
+    }
+    changed = form.model_copy(update={"models": models})
+    return replace(experiment, form=changed, outputs=(*usual, *more))
+
+
 def only(campaign: Campaign, names: Collection[str]) -> Campaign:
     """The campaign with the recordings of these names alone."""
     return replace(

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from discovery.errors import UserError
-from discovery.experiment.experiment import Experiment, load_experiment
+from discovery.experiment.experiment import Experiment, compared_on_all, load_experiment
 from discovery.experiment.fitted import Fitted, judged
 from discovery.experiment.form import (
     ExportForm,
@@ -68,6 +68,8 @@ def run(
     """
     began = clock.perf_counter()
     experiment, findings = _looked_at(path, progress, tell, force=force)
+    if experiment.form.mismatch:
+        experiment = compared_on_all(experiment, experiment.form.mismatch.model)
     folder = out or default_folder(experiment.name)
     if experiment.form.export:
         check_targets(experiment.form.export.to)
@@ -215,9 +217,11 @@ def diagnose(
     """
     began = clock.perf_counter()
     experiment, findings = _looked_at(path, progress, tell, force=force)
+    asked = experiment.form.mismatch or MismatchForm(model=next(iter(experiment.form.models)))
+    name = asked.model
+    experiment = compared_on_all(experiment, name)
     form = experiment.form
-    asked = form.mismatch or MismatchForm(model=next(iter(form.models)))
-    name, entry = asked.model, form.models[asked.model]
+    entry = form.models[name]
     alone = {"models": {name: entry}, "mismatch": asked, "cross_validate": False, "export": None}
     experiment = replace(experiment, form=form.model_copy(update=alone))
     folder = out or default_folder(experiment.name)
