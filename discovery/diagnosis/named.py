@@ -41,9 +41,13 @@ class Named:
 
 
 def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis) -> Named:
-    """An effect of the answer; its rivals stand in its place next to the same others."""
+    """An effect of the answer; its rivals stand in its place next to the same others.
+
+    The same effect there in every recording and in one of them is one claim, not two that compete.
+    """
     others = answer.keys - {h.key}
     below: dict[object, Rival] = {}
+    same = list[Hypothesis]()
     for one in found.tried.values():
         if h.key in one.keys or not others <= one.keys or len(one.keys) != len(others) + 1:
             continue
@@ -52,12 +56,15 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
         label = (rival.effect.word, rival.places)
         if not isfinite(gap):
             continue
-        if label != (h.effect.word, h.places) and (label not in below or gap < below[label].below):
-            below[label] = Rival(rival, gap)
+        if label != (h.effect.word, h.places):
+            if label not in below or gap < below[label].below:
+                below[label] = Rival(rival, gap)
+        elif gap <= thresholds.RIVAL and None in (h.recording, rival.recording):
+            same.append(rival)
     rivals = tuple(sorted(below.values(), key=lambda r: r.below))
     near = [r.hypothesis for r in rivals if r.below <= thresholds.RIVAL]
-    own, together = posterior.of_claims([h]), posterior.of_claims([h, *near])
-    keys = frozenset(rival.key for rival in near)
+    own, together = posterior.of_claims([h, *same]), posterior.of_claims([h, *same, *near])
+    keys = frozenset(rival.key for rival in (*near, *same))
     abrupt = answer.coarse and is_abrupt(answer, h)
     return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals, keys, abrupt)
 

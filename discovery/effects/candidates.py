@@ -58,9 +58,13 @@ class Scene:
 def candidates(model: Model, effects: Sequence[Effect], scene: Scene) -> list[Hypothesis]:
     """Every effect at every place where it can act, with prior odds and the middle values of its shapes.
 
-    An effect has the same odds whatever the number of places at which it could act.
+    An effect has the same odds whatever the number of places at which it could act. What a single recording
+    shows is claimed of that recording, and not of every recording as well.
     """
     found = [h for effect in effects for h in _claims(effect, model, scene)]
+    if len(scene.recordings) == 1:
+        known = {_what(h) for h in found if h.recording}
+        found = [h for h in found if h.recording or _what(h) not in known]
     places = Counter((h.effect.word, h.recording if h.effect.is_event else None) for h in found)
     return [
         replace(
@@ -70,6 +74,11 @@ def candidates(model: Model, effects: Sequence[Effect], scene: Scene) -> list[Hy
         )
         for h in found
     ]
+
+
+def _what(h: Hypothesis) -> tuple[object, ...]:
+    """The law and where it acts, without the recording."""
+    return h.effect.word, h.effect.formula, h.states, h.outputs, h.channels
 
 
 def with_shapes(h: Hypothesis) -> list[Hypothesis]:

@@ -200,7 +200,7 @@ def test_a_name_needs_its_probability(probability: float, word: str) -> None:
     assert found.word == word
     if word == "unexplained":
         assert found.candidates[0].hypothesis is FLUID
-        chance = "(probability 0.69 of the 0.7 that a name needs, log evidence 100)"
+        chance = "(probability 0.69 of the 0.7 that a name needs)"
         assert any(f"is possible but not sure enough to be named {chance}" in text for text in found.reasons)
     else:
         assert found.named[0].probability == pytest.approx(min(probability, 0.98))
@@ -249,7 +249,7 @@ def test_a_name_needs_evidence_of_its_own() -> None:
     assert [n.hypothesis for n in found.named] == [FLUID]
     assert found.reasons == (
         f"friction_speed at {FRICTION.where} is possible but not sure enough to be named "
-        "(probability 0.95, log evidence 23.5 of the 23.6 that a name needs)",
+        "(log evidence 23.5 of the 23.6 that a name needs)",
     )
     both = pair(FLUID, FRICTION, 123.7, 100.0, 30.0)
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.95})
@@ -479,6 +479,24 @@ def test_two_effects_that_each_may_come_by_chance_may_do_so_together(together: f
     """On an intact axis, free convection with 15.3 units and windage with 1.7 were a cause unknown."""
     both = pair(FLUID, FRICTION, together, 0.5 * together, 0.5 * together)
     assert said(both, {"fluid_convection": 0.5, "friction_speed": 0.5}).word == word
+
+
+@dataclass(frozen=True)
+class ByRecording(Believed):
+    """Each word has its probability once for every recording of which it is claimed."""
+
+    def of_claims(self, several: Sequence[Hypothesis]) -> float:
+        return sum(self.words[word] for word, _ in {(h.effect.word, h.recording) for h in several})
+
+
+@pytest.mark.parametrize(("other", "named"), [(None, True), ("r2", False)], ids=["every", "another one"])
+def test_an_effect_of_one_recording_and_of_every_one_is_one_claim(other: str | None, named: bool) -> None:
+    """A rod whose sensor drifted: 0.47 for the drift in its recording, 0.47 for the same in every one."""
+    one, twin = (claim("sensor_drift", "E_Y", recording=run) for run in ("r1", other))
+    found = Tried([Model((one,), 48.0), Model((twin,), 47.0), Model((), 0.0)])
+    chances = ByRecording({"sensor_drift": 0.47}, found.models)
+    answer = decide(cast(Context, World()), cast(Search, found), cast(Posterior, chances))
+    assert [n.hypothesis for n in answer.named] == ([one] if named else [])
 
 
 def test_what_would_be_missed_most_is_named_first() -> None:

@@ -240,6 +240,18 @@ def test_what_begins_acts_in_the_recordings_that_were_made_later() -> None:
     assert [switch.at(run) for run in ("a", "b", "c", "earlier")] == [1.0, 1.0, 1.0, 0.0]
 
 
+@pytest.mark.parametrize(
+    ("recordings", "claimed"), [(("a",), {"a"}), (("a", "b"), {"a", "b", None})], ids=["one", "two"]
+)
+def test_what_a_single_recording_shows_is_claimed_of_that_recording(
+    recordings: tuple[str, ...], claimed: set[str | None]
+) -> None:
+    model, channels = sample()
+    drifts = [e for e in catalogue().values() if e.word == "sensor_drift"]
+    found = candidates(model, drifts, replace(scene(model, channels), recordings=recordings))
+    assert {h.recording for h in found} == claimed
+
+
 def test_every_recorded_input_may_be_heat_a_path_or_a_factor() -> None:
     """Each input of a role at each place, not the first alone; what the model has already is not offered: the
     motor has heat by the square of its current, and may lack a share in proportion.
