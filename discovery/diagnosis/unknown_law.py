@@ -62,17 +62,17 @@ def with_law(context: Context, one: Scored, goal: float = inf) -> list[Scored]:
 
 def instead(context: Context, one: Scored) -> str | None:
     """A law of two inputs that a model lacks whose flows are wrong by more than usual, in words: with it they
-    are not, and recordings that are left out are predicted better. None if there is none.
+    are not, and recordings that are left out are predicted far better. None if there is none.
     """
     made = _made_usual(context, one)
     if made is None:
         return None
     found, h = made
     outside = left_out(context, found, [h])[h.key]
-    if outside is None or not outside.improves:
+    if outside is None or not outside.improves or not outside.free.mostly:
         return None
     old, new = (printed(rms) for rms in outside.free.judged)
-    beside = " and ".join(f"{o.effect.word} at {o.where}" for o in one.hypotheses)
+    beside = " and ".join(o.stated for o in one.hypotheses)
     return (
         f"{_law(h)} is a law to look for: with it{f', next to {beside}' if beside else ''}, the flows of the "
         f"model are wrong by {printed(100 * found.off)} %, not {printed(100 * one.off)} %, and it misses "

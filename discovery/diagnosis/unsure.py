@@ -56,15 +56,12 @@ def _unsure(n: Named, added: float, least: float, alone: str) -> str:
             f"{name} is not named: its log evidence of {added:.0f} ({chance}) counts only next to effects "
             f"that are not named either{alone}"
         )
+    # both next to each other look as if they contradict each other: what is short is said
+    short = [f"log evidence {printed(added)} of the {printed(least)}"] if added < least else []
     if n.together < thresholds.NAMED:
-        chance += f" of the {thresholds.NAMED:g} that a name needs"
-    return f"{name} is possible but not sure enough to be named ({chance}, log evidence {_of(added, least)})"
+        short.insert(0, f"{chance} of the {thresholds.NAMED:g}")
+    return f"{name} is possible but not sure enough to be named ({' and '.join(short)} that a name needs)"
 
 
 def _chance(probability: float) -> str:
     return f"{probability:.2f}" if probability >= 0.005 else "below 0.01"
-
-
-def _of(added: float, least: float) -> str:
-    """Log evidence, and what a name needs where it is less."""
-    return f"{printed(added)} of the {printed(least)} that a name needs" if added < least else f"{added:.0f}"

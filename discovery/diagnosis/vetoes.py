@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from discovery.diagnosis.coarse_bodies import coarse_at
 from discovery.diagnosis.context import Context
@@ -25,11 +25,12 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | No
     if h.recording is not None and not {o.recording for o in alike} >= set(context.recordings):
         return None
     if is_clock:
-        late = [(o.recording, answer.model.parameters[t].value) for o in alike for t in o.shapes]
-        by = ", ".join(f"{_late(seconds)}{f' in {run}' if run else ''}" for run, seconds in late)
+        late = {run: _shift(answer, alike, run) for run in context.recordings}
+        each = [f"{_late(seconds)} in {run}" for run, seconds in late.items()]
+        by = _late(max(late.values())) if len(set(late.values())) == 1 else ", ".join(each)
         return (
-            f"the clock of every recording would be shifted{by and f' (readings {by})'}; a dead time between "
-            "the inputs and the readings explains this as well"
+            f"the clock of every recording would be shifted (readings {by}); a dead time between the inputs "
+            "and the readings explains this as well"
         )
     if is_offset:
         return (
@@ -45,6 +46,12 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | No
         f"with a single recording to fit, {h.effect.word} at {h.where} cannot be distinguished from a law "
         "that differs a little from the model's; record the machine once more, or fit a held-out recording"
     )
+
+
+def _shift(answer: Scored, clocks: Sequence[Hypothesis], run: str) -> float:
+    """By how much the clocks are shifted in a recording, all together, s."""
+    mine = [o for o in clocks if o.recording in (None, run)]
+    return sum(answer.model.parameters[t].value for o in mine for t in o.shapes)
 
 
 def _late(seconds: float) -> str:

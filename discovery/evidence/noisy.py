@@ -110,8 +110,8 @@ def spectral(samples: Samples, stated: float | None = None) -> Samples:
 
 
 def _medians(values: Array) -> Array:
-    """Median of the values (N,) near each one; at both ends, the last one counts for those behind it."""
-    near = sliding_window_view(np.pad(values, NEAR // 2, mode="edge"), NEAR)
+    """Median of the values (N,) near each one, mirrored at both ends: one switch there is no noise."""
+    near = sliding_window_view(np.pad(values, NEAR // 2, mode="reflect"), NEAR)
     parts = np.array_split(near, len(near) // _TOGETHER + 1)  # a long recording does not fit into memory
     return np.concatenate([np.median(part, axis=1) for part in parts])
 

@@ -80,6 +80,11 @@ def test_noise_is_found_near_each_sample_at_any_level() -> None:
     assert stated.value == pytest.approx(0.3)
 
 
+def test_one_switch_at_either_end_is_no_noise() -> None:
+    for step in ([0.0, *[10.0] * 44], [*[10.0] * 44, 0.0]):
+        assert not spectral(Samples(np.arange(0.0, 450.0, 10.0), np.array(step), False)).value.any()
+
+
 def test_the_variance_of_free_runs_is_that_of_many_simulated_ones() -> None:
     """Of a body under a steady load: sd^2 D / (2 tau) (1 - exp(-2 t / tau)) / hA^2 for t far above D."""
     seen = campaign(recorded(1, SHARE))
