@@ -311,8 +311,9 @@ def unrecorded(found: Search) -> tuple[str, ...]:
     if not is_large(found.baseline.unrecorded):
         return ()
     return (
-        f"heat that nobody records is about {100 * found.baseline.unrecorded:.0f} % of what flows, more than "
-        "in most machines: it follows no input that is recorded, so log what else warms or cools the machine",
+        f"heat that the model does not give is about {100 * found.baseline.unrecorded:.0f} % of what flows, "
+        "more than in most machines: log what else warms or cools the machine, and ask which exchange "
+        "between its bodies the model has not",
     )
 
 

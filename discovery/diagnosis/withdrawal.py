@@ -69,9 +69,12 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
         shown, check = "", "whether the machine was the same there, and how it began"
         if all(proof[run].only_from_its_first_reading for run in worse):
             shown, check = " from its first reading alone", "how it began, and the inputs that are not sure"
+        better = "better over all held-out recordings"
+        if len(worse) == len(proof):  # each of them is better from other starts
+            better = "better from each start within its spread (rms "
+            better += ", ".join("{} -> {}".format(*map(printed, proof[run].judged)) for run in worse) + ")"
         reason = (
-            f"with {names}, free runs are better over all held-out recordings, but worse on "
-            f"{', '.join(worse)}{shown}: check {check}"
+            f"with {names}, free runs are {better}, but worse on {', '.join(worse)}{shown}: check {check}"
         )
         return replace(verdict, reasons=(*verdict.reasons, reason))
     reason = f"with {names}, free runs on {', '.join(worse)} are worse than without"
