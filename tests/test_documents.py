@@ -129,6 +129,7 @@ def test_the_numbers_of_the_diagnosis_are_those_that_decide() -> None:
         f"{numbers(t.UNKNOWN_HEAT)} times the usual unrecorded heat",
         f"off by {numbers(100 * s for s in t.UNKNOWN_SHARES)} %",
         f"differs by {t.AIR} K from the air that is measured",
+        f"than what is measured, all the time, by {t.LAYERS:.1f} K",
         f"within {t.RIVAL:g} they are not excluded",
     ):
         assert said in text, said

@@ -66,7 +66,7 @@ class Problem:
         residuals = [fit.problem.residual(t) for t in fit.trajectories]
         noise = white_noise(context.outputs, stated, residuals)
         exact = tuple(columns[:, :, :0] for columns in context.form)  # laws of the right form
-        return replace(context, settings=only(noise), form=exact, kinds=(0, 0, 0))
+        return replace(context, settings=only(noise), form=exact, kinds=(0, 0, 0, 0))
 
     def improvement(self, repaired: Fit | None, chosen: Sequence[Hypothesis]) -> Answer:
         """`improvement` of diagnosis.json for a repaired model with `chosen` in it; nothing without one.

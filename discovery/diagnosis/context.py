@@ -64,7 +64,7 @@ class Context:
     belief: float | None
     outliers: tuple[Outlier, ...]  # set aside
     form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
-    kinds: tuple[int, int, int]  # of these: of laws, of places, of zeros of thermometers
+    kinds: tuple[int, int, int, int]  # of these: of laws, places, zeros of thermometers, air at bodies
     formed: Fit  # where they are
     thermometers: tuple[str, ...]  # that the model uses or shows
     sizes: Sizes  # prior of amplitudes, along the baseline; the same under every reading noise
@@ -133,7 +133,7 @@ def make_context(
     if any(g.unsure for g in whole.values()):
         grids = thinned(whole)
         fit = fitted(grids, fit)
-    ambient = [n for n, channel in campaign.channels.items() if channel.role == "ambient temperature"]
+    ambient = ambient_of(campaign)
     floor = floors(fit, thresholds.FLOOR, ambient, thresholds.AIR)
     white = reading_noise(fit, stated, floor, process_prior())
     outliers = find_outliers(fit, whole, np.array(white.white))
@@ -147,7 +147,7 @@ def make_context(
         both = [(fitted(one, fit), one) for one in (grids, smoothed(grids))]
         fit, grids = max(both, key=lambda one: log_likelihood(one[0], plain))
     thermometers = _thermometers(fit, campaign)
-    form, kinds = model_form(fit, np.array(white.white), thermometers)
+    form, kinds = model_form(fit, np.array(white.white), thermometers, ambient)
     spreads = fit.problem.start_spreads()
     own = {n: replace(s, start_sd=spreads.get(n, s.start_sd)) for n, s in model.states.items()}
     scene = replace(make_scene(campaign, model, recordings, outputs, after), spacing=_spacing(grids))
@@ -174,6 +174,11 @@ def make_context(
     )
 
 
+def ambient_of(campaign: Campaign) -> list[str]:
+    """Channels of the temperature of the air."""
+    return [n for n, channel in campaign.channels.items() if channel.role == "ambient temperature"]
+
+
 def _thermometers(fit: Fit, campaign: Campaign) -> tuple[str, ...]:
     used = dict.fromkeys([*sorted({*fit.model.inputs, *fit.model.start_names}), *fit.problem.outputs])
     return tuple(n for n in used if n in campaign.channels and campaign.channels[n].unit == "degC")
@@ -189,7 +194,7 @@ def with_noise_of(context: Context, fit: Fit) -> Context:
     noises = _settings(white, context.floor, context.grids, context.settings.coarser)
     if not are_others(context.formed.trajectories, fit.trajectories):
         return replace(context, settings=noises)
-    form, kinds = model_form(fit, np.array(white.white), context.thermometers)
+    form, kinds = model_form(fit, np.array(white.white), context.thermometers, ambient_of(context.campaign))
     return replace(context, settings=noises, form=tuple(form), kinds=kinds, formed=fit)
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 # --- process noise: what a lumped model misses everywhere -------------------------------------------------
 FLOOR = 0.02  # of the mean of the flows of a body and of the busiest, rms, at level one: unrecorded heat
 AIR = 0.1  # K: the air at a body differs from what is measured, at level one; zeros of thermometers are off
+LAYERS = 3 * AIR  # K: how much warmer than measured the air at a body may be all the time
 LEVELS = {0.1: 0.15, 0.3: 0.35, 1.0: 0.3, 2.0: 0.12, 5.0: 0.06, 10.0: 0.02}  # of this heat, with weights
 SHARES = {0.02: 0.5, 0.08: 0.35, 0.25: 0.12, 0.8: 0.03}  # of what flows through a body, off from hour to hour
 SHARE = max(share for share, weight in SHARES.items() if weight > 1 / len(SHARES))  # off by more: coarse

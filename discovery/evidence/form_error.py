@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, predict, sensitivities
 from discovery.dynamics.prediction import output_matrix
+from discovery.dynamics.sensitivity import moved_terms
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.signatures import signatures
 from discovery.fitting import Fit
@@ -35,15 +36,19 @@ DEPTH = 1 / 3  # of its Biot number: share of its rise by which a plate is warme
 INNER = (0.05, 0.2)  # of the time constant of a body: how fast its inside, and the place that is seen, follow
 
 
-def model_form(fit: Fit, white: Array, sensors: Sequence[str]) -> tuple[list[Array], tuple[int, int, int]]:
+def model_form(
+    fit: Fit, white: Array, sensors: Sequence[str], air: Sequence[str]
+) -> tuple[list[Array], tuple[int, int, int, int]]:
     """By recording, what the readings (R, Y, M) show more for form errors of the whole model of a share of
     one: the directions, each as likely as any other (unit normal), that hold nearly all of what the
     parameters of the fit do not absorb. After them, what they show more for each sensor whose zero is off by
-    one in all recordings. The numbers of those that are laws, places, and zeros.
+    one in all recordings, and for each body whose air is warmer by one than what is measured. The numbers of
+    those that are laws, places, zeros, and airs.
 
     Args:
         white: (Y,) reading noise, in which directions are compared.
         sensors: channels that the model uses or shows.
+        air: ambient temperatures.
     """
     runs = fit.trajectories
     own = _stacked(runs, [fit.problem.jacobian(t) for t in runs], white)
@@ -53,8 +58,9 @@ def model_form(fit: Fit, white: Array, sensors: Sequence[str]) -> tuple[list[Arr
         for columns, most in ((_laws(runs), LAWS), ([place_columns(run) for run in runs], PLACES))
     ]
     kept.append([sensitivities(run, sensors) for run in runs])
-    laws, places, zeros = (columns[0].shape[2] for columns in kept)
-    return [np.concatenate(one, axis=2) for one in zip(*kept, strict=True)], (laws, places, zeros)
+    kept.append([air_columns(run, air) for run in runs])
+    laws, places, zeros, airs = (columns[0].shape[2] for columns in kept)
+    return [np.concatenate(one, axis=2) for one in zip(*kept, strict=True)], (laws, places, zeros, airs)
 
 
 def _laws(runs: Sequence[Trajectory]) -> list[Array]:
@@ -92,6 +98,16 @@ def place_columns(run: Trajectory) -> Array:
     the inside of the body follows late, or the place that an output sees answers first.
     """
     return np.concatenate([edge_columns(run), inside_columns(run), inner_columns(run)], axis=2)
+
+
+def air_columns(run: Trajectory, air: Sequence[str]) -> Array:
+    """What the readings show more (R, Y, M) where the air at a body is warmer by one, all the time, than an
+    ambient temperature of the model: a hall is warmer under its roof, a corner next to a motor.
+    """
+    moved = moved_terms(run, [name for name in air if name in run.system.grid.samples])
+    owners = {key: k for k, key in enumerate(dict.fromkeys((c.owner, c.into) for c in moved))}
+    pieces = [replace(c, owner=owners[c.owner, c.into]) for c in moved]
+    return sensitivities(run, (), (), pieces, count=len(owners))
 
 
 def inside_columns(run: Trajectory) -> Array:

@@ -49,7 +49,7 @@ def test_form_errors_are_those_where_the_fit_is(factor: float, least: float, mos
     fit = moved(wetted().fit, "G_mt", factor)
     context = with_noise_of(dry(), fit)
     assert (context.formed is fit) == (factor > 4)  # the parts of time constants that form errors know
-    laws, places, _ = context.kinds
+    laws, places, *_ = context.kinds
     early = [np.zeros(f.shape[:2]) for f in context.form]
     for k, column in enumerate(early):
         column[:, list(SEEN).index("E_Y")] = seen_early(context, k)

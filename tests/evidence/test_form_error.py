@@ -9,7 +9,14 @@ from scipy.integrate import solve_ivp
 
 from discovery.dynamics import Trajectory, make_grid, make_system, predict, sensitivities, simulate
 from discovery.effects.catalogue import Effect, catalogue
-from discovery.evidence.form_error import INNER, effect_form, inner_columns, inside_columns, place_columns
+from discovery.evidence.form_error import (
+    INNER,
+    air_columns,
+    effect_form,
+    inner_columns,
+    inside_columns,
+    place_columns,
+)
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -38,6 +45,25 @@ def warmed(**shown: str) -> Trajectory:
     model = Model("one", {"hA": Parameter(HA)}, {"T": state}, terms, outputs)
     campaign = Campaign("c", channels, {"r": Recording("r", TIME, values)})
     return simulate(make_system(model, make_grid(campaign, "r", ["u"], tuple(shown))), model.values())
+
+
+def test_warmer_air_at_one_body_warms_it_alone() -> None:
+    """Closed form: 1 - exp(-t hA/C) where the air is warmer by one than measured, and nothing elsewhere."""
+    losses = {"roof": 10.0, "floor": 4.0}
+    errors = {f"E_{name}": Channel(f"E_{name}", "error", "um", None, "linear") for name in losses}
+    channels = {**errors, "room": Channel("room", "ambient temperature", "degC", None, "linear")}
+    values = dict.fromkeys(errors, np.zeros(len(TIME))) | {"room": 20.0 + np.sin(TIME / 5000.0)}
+    states = {name: State(name, "degC", C, parse("20"), 0.0, 1 / C) for name in losses}
+    terms = tuple(Term("air", name, parse(f"h_{name}*(room - {name})")) for name in losses)
+    outputs = {f"E_{name}": parse(name) for name in losses}
+    model = Model("hall", {f"h_{n}": Parameter(h) for n, h in losses.items()}, states, terms, outputs)
+    campaign = Campaign("c", channels, {"r": Recording("r", TIME, values)})
+    run = simulate(make_system(model, make_grid(campaign, "r", ["room"], tuple(errors))), model.values())
+    found = air_columns(run, ["room", "a hall that the model does not know"])
+    assert found.shape == (len(TIME), 2, 2)
+    for k, loss in enumerate(losses.values()):
+        assert found[:, k, k] == pytest.approx(1 - np.exp(-TIME * loss / C), abs=1e-9)
+        assert not found[:, 1 - k, k].any()
 
 
 def test_a_place_rises_as_much_as_its_body_in_a_part_of_its_time(run: Trajectory) -> None:
