@@ -1,4 +1,4 @@
-"""A model that is diagnosed is compared with everything measured that it gives."""
+"""A model file is compared with everything measured that it gives."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def changed(path: Path, old: str, new: str) -> None:
 def test_a_model_file_is_compared_with_the_thermometers_that_it_gives(folder: Path) -> None:
     experiment = load_experiment(folder / "experiment.toml")
     assert list(experiment.outputs) == ERRORS
-    on_all = compared_on_all(experiment, "one_body")
+    on_all = compared_on_all(experiment)
     models = on_all.form.models
     assert list(on_all.outputs) == [*ERRORS, "T_body"]
     assert on_all.outputs_of(models["one_body"]) == [*ERRORS, "T_body"]
@@ -53,12 +53,23 @@ def test_a_model_file_is_compared_with_the_thermometers_that_it_gives(folder: Pa
 def test_stated_outputs_stay(folder: Path) -> None:
     changed(folder / "experiment.toml", "fit = [", f"outputs = {ERRORS}\nfit = [")
     experiment = load_experiment(folder / "experiment.toml")
-    assert compared_on_all(experiment, "one_body") is experiment
+    assert compared_on_all(experiment) is experiment
 
 
-def test_built_models_stay_as_they_are(folder: Path) -> None:
+def test_a_model_with_outputs_of_its_own_keeps_them(folder: Path) -> None:
+    changed(folder / "experiment.toml", '"model.toml"', '"model.toml", outputs = ["E_Y0C"]')
     experiment = load_experiment(folder / "experiment.toml")
-    assert compared_on_all(experiment, "reduced") is experiment
+    assert compared_on_all(experiment) is experiment
+
+
+def test_a_diagnosis_joins_a_run_without_one(folder: Path) -> None:
+    changed(folder / "experiment.toml", 'mismatch = { model = "one_body" }', "")
+    out = run(folder / "experiment.toml", folder / "out")
+    changed(folder / "experiment.toml", "[models]", 'mismatch = { model = "one_body" }\n\n[models]')
+    diagnose(folder / "experiment.toml", out)
+    assert {"reduced", "superposition", "one_body"} <= set(
+        json.loads((out / "results.json").read_text())["models"]
+    )
 
 
 def test_table_and_diagnosis_show_the_thermometer(folder: Path) -> None:

@@ -115,35 +115,39 @@ class Experiment:
         return model
 
 
-def compared_on_all(experiment: Experiment, name: str) -> Experiment:
-    """The experiment in which model `name` is compared with everything measured that it gives, where it is a
-    file and nobody states outputs: what is read at its bodies tells causes apart that errors alone cannot.
-    Other models keep their outputs.
+def compared_on_all(experiment: Experiment) -> Experiment:
+    """The experiment in which each model file is compared with everything measured that it gives, where
+    nobody states outputs: what is read at its bodies tells causes apart that errors alone cannot. Models that
+    the program builds keep their outputs.
 
-    Raises UserError: the model cannot be read, or does not fit the campaign.
+    Raises UserError: a model cannot be read, or does not fit the campaign.
     """
     form, usual = experiment.form, list(experiment.outputs)
-    entry = form.models[name]
-    if form.outputs or entry.kind != "file" or entry.outputs:
+    if form.outputs:
         return experiment
-    model, channels = experiment.model_file(name), experiment.campaign.channels
-    known = {*usual, *model.inputs}
-    more = [
-        given
-        for given in dict.fromkeys([*model.outputs, *model.states])
-        if given in channels and channels[given].measured and given not in known
-        if not experiment.campaign.unread(experiment.fit, [given])
-    ]
+    given = {name: _given(experiment, name) for name, e in form.models.items() if e.kind == "file"}
+    more = list(dict.fromkeys(output for every in given.values() for output in every))
     if not more:
         return experiment
-    wanted = {one: usual for one, other in form.models.items() if not getattr(other, "outputs", None)}
-    wanted[name] = [*usual, *more]
     models = {
-        one: other.model_copy(update={"outputs": wanted[one]}) if one in wanted else other
-        for one, other in form.models.items()
+        name: entry.model_copy(update={"outputs": [*usual, *given.get(name, [])]})
+        if not getattr(entry, "outputs", None)
+        else entry
+        for name, entry in form.models.items()
     }
-    changed = form.model_copy(update={"models": models})
-    return replace(experiment, form=changed, outputs=(*usual, *more))
+    return replace(experiment, form=form.model_copy(update={"models": models}), outputs=(*usual, *more))
+
+
+def _given(experiment: Experiment, name: str) -> list[str]:
+    """What is measured in the recordings to fit and a model file gives, beside the outputs; nothing where the
+    experiment states the outputs of the model.
+    """
+    if getattr(experiment.form.models[name], "outputs", None):
+        return []
+    model, channels = experiment.model_file(name), experiment.campaign.channels
+    known = {*experiment.outputs, *model.inputs}
+    there = [n for n in dict.fromkeys([*model.outputs, *model.states]) if n in channels and n not in known]
+    return [n for n in there if channels[n].measured and not experiment.campaign.unread(experiment.fit, [n])]
 
 
 def only(campaign: Campaign, names: Collection[str]) -> Campaign:

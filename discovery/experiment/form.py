@@ -207,8 +207,8 @@ class ExperimentForm(Strict):
     outputs: list[str] | None = Field(
         None,
         min_length=1,
-        description="default: every channel of role error, else of role temperature; where a model file is "
-        "diagnosed, also what else is measured that it gives",
+        description="default: every channel of role error, else of role temperature; for a model file, also "
+        "what else is measured that it gives",
     )
     fit: list[str] = Field(min_length=1, description="recordings that fits may see")
     held_out: list[str] = Field([], description="held-out recordings, which no fit and no choice uses")

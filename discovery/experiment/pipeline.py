@@ -68,8 +68,6 @@ def run(
     """
     began = clock.perf_counter()
     experiment, findings = _looked_at(path, progress, tell, force=force)
-    if experiment.form.mismatch:
-        experiment = compared_on_all(experiment, experiment.form.mismatch.model)
     folder = out or default_folder(experiment.name)
     if experiment.form.export:
         check_targets(experiment.form.export.to)
@@ -102,7 +100,7 @@ def _looked_at(
 ) -> tuple[Experiment, list[Finding]]:
     """Return an experiment and the findings in its recordings. They are printed before any fit."""
     progress("reading the recordings")
-    experiment = load_experiment(path)
+    experiment = compared_on_all(load_experiment(path))
     progress("comparing the recordings with each other")
     findings = quality(experiment)
     if not force:
@@ -217,11 +215,9 @@ def diagnose(
     """
     began = clock.perf_counter()
     experiment, findings = _looked_at(path, progress, tell, force=force)
-    asked = experiment.form.mismatch or MismatchForm(model=next(iter(experiment.form.models)))
-    name = asked.model
-    experiment = compared_on_all(experiment, name)
     form = experiment.form
-    entry = form.models[name]
+    asked = form.mismatch or MismatchForm(model=next(iter(form.models)))
+    name, entry = asked.model, form.models[asked.model]
     alone = {"models": {name: entry}, "mismatch": asked, "cross_validate": False, "export": None}
     experiment = replace(experiment, form=form.model_copy(update=alone))
     folder = out or default_folder(experiment.name)
