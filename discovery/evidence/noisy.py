@@ -110,8 +110,8 @@ def spectral(samples: Samples, stated: float | None = None) -> Samples:
 
 
 def _medians(values: Array) -> Array:
-    """Median of the values (N,) near each one, mirrored at both ends: one switch there is no noise."""
-    near = sliding_window_view(np.pad(values, NEAR // 2, mode="reflect"), NEAR)
+    """Median of the values (N,) near each one; at both ends, the last one counts for those behind it."""
+    near = sliding_window_view(np.pad(values, NEAR // 2, mode="edge"), NEAR)
     parts = np.array_split(near, len(near) // _TOGETHER + 1)  # a long recording does not fit into memory
     return np.concatenate([np.median(part, axis=1) for part in parts])
 
@@ -127,7 +127,9 @@ def _noisy(campaign: Campaign, grid: Grid) -> dict[str, Samples]:
     often = [n for n in grid.samples if grid.logged.get(n, np.inf) <= spacing]
     samples = read_samples(campaign, grid.recording, often)
     noise = {n: spectral(s, campaign.channels[n].noise) for n, s in samples.items()}
-    return {n: one for n, one in noise.items() if one.value.any()}
+    # at an end, the median is that of fewer samples: what is rough there alone is a switch
+    inside = {n: one.value[NEAR // 2 : -(NEAR // 2)] for n, one in noise.items()}
+    return {n: one for n, one in noise.items() if (inside[n] if inside[n].size else one.value).any()}
 
 
 def _only(run: Trajectory, channels: Collection[str]) -> Trajectory:

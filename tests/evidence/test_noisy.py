@@ -81,8 +81,12 @@ def test_noise_is_found_near_each_sample_at_any_level() -> None:
 
 
 def test_one_switch_at_either_end_is_no_noise() -> None:
-    for step in ([0.0, *[10.0] * 44], [*[10.0] * 44, 0.0]):
-        assert not spectral(Samples(np.arange(0.0, 450.0, 10.0), np.array(step), False)).value.any()
+    for first, last in ((0.0, 60.0), (60.0, 0.0)):
+        quiet = recorded(1, 0.0)
+        power = np.full(len(quiet.time), 60.0)
+        power[0], power[-1] = first, last
+        seen = campaign(replace(quiet, values={**quiet.values, "P": power}))
+        assert "P" not in runs(seen)[0].system.grid.noisy
 
 
 def test_the_variance_of_free_runs_is_that_of_many_simulated_ones() -> None:
