@@ -18,11 +18,7 @@ LAYERS = 3 * AIR  # K: how much warmer than measured the air at a body may be al
 LEVELS = {0.1: 0.15, 0.3: 0.35, 1.0: 0.3, 2.0: 0.12, 5.0: 0.06, 10.0: 0.02}  # of this heat, with weights
 SHARES = {0.02: 0.5, 0.08: 0.35, 0.25: 0.12, 0.8: 0.03}  # of what flows through a body, off from hour to hour
 SHARE = max(share for share, weight in SHARES.items() if weight > 1 / len(SHARES))  # off by more: coarse
-TIMES = {
-    1.0: 0.5,
-    0.3: 0.3,
-    0.1: 0.2,
-}  # its time constant, over 3 h, or `_process_time`
+TIMES = {1.0: 0.5, 0.3: 0.3, 0.1: 0.2}  # its time constant, over the longest (3 h, where readings are usual)
 FORMS = {(0.0, 0.0): 0.25, (0.0, 0.1): 0.25, (0.025, 0.1): 0.25, (0.08, 0.1): 0.15, (0.25, 0.25): 0.1}
 # shares by which laws are off at an operating point, and of flows that enter the neighbours of a body
 SLOW = {0.0: 0.35, 0.3: 0.35, 1.0: 0.2, 3.0: 0.08, 10.0: 0.02}  # slow noise of outputs, in reading noises
