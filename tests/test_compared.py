@@ -50,6 +50,13 @@ def test_a_model_file_is_compared_with_the_thermometers_that_it_gives(folder: Pa
     assert on_all.outputs_of(models["reduced"]) == ERRORS
 
 
+def test_a_model_file_may_give_some_of_the_errors_only(folder: Path) -> None:
+    changed(folder / "model.toml", 'E_R0T = "2*(body - 22)"', "")
+    results = json.loads((run(folder / "experiment.toml", folder / "out") / "results.json").read_text())
+    assert list(results["models"]["one_body"]["recordings"]["c"]) == ["E_Y0C", "T_body"]
+    assert any("gives no E_R0T" in note for note in results["models"]["one_body"]["notes"])
+
+
 def test_stated_outputs_stay(folder: Path) -> None:
     changed(folder / "experiment.toml", "fit = [", f"outputs = {ERRORS}\nfit = [")
     experiment = load_experiment(folder / "experiment.toml")

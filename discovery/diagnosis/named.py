@@ -59,7 +59,7 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
         if label != (h.effect.word, h.places):
             if label not in below or gap < below[label].below:
                 below[label] = Rival(rival, gap)
-        elif gap <= thresholds.RIVAL and None in (h.recording, rival.recording):
+        elif gap <= thresholds.RIVAL and rival.law == h.law and None in (h.recording, rival.recording):
             same.append(rival)
     rivals = tuple(sorted(below.values(), key=lambda r: r.below))
     near = [r.hypothesis for r in rivals if r.below <= thresholds.RIVAL]

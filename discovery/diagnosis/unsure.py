@@ -56,7 +56,7 @@ def _unsure(n: Named, added: float, least: float, alone: str) -> str:
             f"{name} is not named: its log evidence of {added:.0f} ({chance}) counts only next to effects "
             f"that are not named either{alone}"
         )
-    # both next to each other look as if they contradict each other: what is short is said
+    # a high probability next to too little evidence reads like a contradiction: only what is short is said
     short = [f"log evidence {printed(added)} of the {printed(least)}"] if added < least else []
     if n.together < thresholds.NAMED:
         short.insert(0, f"{chance} of the {thresholds.NAMED:g}")

@@ -63,8 +63,8 @@ def candidates(model: Model, effects: Sequence[Effect], scene: Scene) -> list[Hy
     """
     found = [h for effect in effects for h in _claims(effect, model, scene)]
     if len(scene.recordings) == 1:
-        known = {_what(h) for h in found if h.recording}
-        found = [h for h in found if h.recording or _what(h) not in known]
+        known = {h.law for h in found if h.recording}
+        found = [h for h in found if h.recording or h.law not in known]
     places = Counter((h.effect.word, h.recording if h.effect.is_event else None) for h in found)
     return [
         replace(
@@ -74,11 +74,6 @@ def candidates(model: Model, effects: Sequence[Effect], scene: Scene) -> list[Hy
         )
         for h in found
     ]
-
-
-def _what(h: Hypothesis) -> tuple[object, ...]:
-    """The law and where it acts, without the recording."""
-    return h.effect.word, h.effect.formula, h.states, h.outputs, h.channels
 
 
 def with_shapes(h: Hypothesis) -> list[Hypothesis]:

@@ -72,6 +72,11 @@ class Hypothesis:
         return tuple(n for n in self.channels if n not in self.places) if self.effect.roles else ()
 
     @property
+    def law(self) -> tuple[object, ...]:
+        """What acts, and where, in whatever recordings."""
+        return self.effect.word, self.effect.formula, self.states, self.outputs, self.channels
+
+    @property
     def shifts_the_zero(self) -> bool:
         """Whether outputs are shifted by something that does not depend on what they showed before."""
         return any(BEFORE.id not in names(change) for change in self.shown.values()) and not self.states

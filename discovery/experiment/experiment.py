@@ -125,25 +125,18 @@ def compared_on_all(experiment: Experiment) -> Experiment:
     form, usual = experiment.form, list(experiment.outputs)
     if form.outputs:
         return experiment
-    given = {name: _given(experiment, name) for name, e in form.models.items() if e.kind == "file"}
-    more = list(dict.fromkeys(output for every in given.values() for output in every))
+    open_ones = {name: entry for name, entry in form.models.items() if not getattr(entry, "outputs", None)}
+    files = [name for name, entry in open_ones.items() if entry.kind == "file"]
+    more = list(dict.fromkeys(output for name in files for output in _given(experiment, name)))
     if not more:
         return experiment
-    models = {
-        name: entry.model_copy(update={"outputs": [*usual, *given.get(name, [])]})
-        if not getattr(entry, "outputs", None)
-        else entry
-        for name, entry in form.models.items()
-    }
+    built = {n: e.model_copy(update={"outputs": usual}) for n, e in open_ones.items() if n not in files}
+    models = {name: built.get(name, entry) for name, entry in form.models.items()}
     return replace(experiment, form=form.model_copy(update={"models": models}), outputs=(*usual, *more))
 
 
 def _given(experiment: Experiment, name: str) -> list[str]:
-    """What is measured in the recordings to fit and a model file gives, beside the outputs; nothing where the
-    experiment states the outputs of the model.
-    """
-    if getattr(experiment.form.models[name], "outputs", None):
-        return []
+    """What a model file gives and the recordings to fit measure, but for the outputs."""
     model, channels = experiment.model_file(name), experiment.campaign.channels
     known = {*experiment.outputs, *model.inputs}
     there = [n for n in dict.fromkeys([*model.outputs, *model.states]) if n in channels and n not in known]
