@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import inf
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.proof import Known
+from discovery.diagnosis.walk import Node, walked
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import effect_form
@@ -24,7 +25,7 @@ from discovery.evidence.process_noise import (
     unknown_change,
     unknown_heat,
 )
-from discovery.evidence.settings import Place, Setting
+from discovery.evidence.settings import Setting
 from discovery.evidence.whitening import Grams, Whitened, log_sum_exp
 from discovery.fitting import Fit, Noise
 from discovery.fitting.covariance import Z95
@@ -32,11 +33,9 @@ from discovery.models import Model
 from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
-Node = tuple[Place, int]  # a noise setting, and something of unknown cause
 
 _ERRORS = slice(2, 6)  # of the place of a setting: slow noise, unrecorded heat, errors of flows and of laws
 MOVED = 1.0  # log-likelihood that calls for another look
-KEPT = 4  # noise settings of a model, the most likely ones
 # what something of unknown cause changes of a score
 _OF_FORCE = ("settings", "grams", "forced", "forced_state", "log_odds_force")
 
@@ -265,8 +264,8 @@ def _over_noise(
     forces: Sequence[UnknownHeat | UnknownChange] = (),
     goal: float = -inf,
 ) -> Scored:
-    """The score over the noise settings that matter, from the one of the fit on: a setting is asked for its
-    neighbours until those that are kept have all been asked.
+    """The score over the noise settings that matter, from the one of the fit on. A node is the place of a
+    setting, and which of what something of unknown cause may be like.
 
     Args:
         forces: what something of unknown cause may be like; all of it is integrated over, too.
@@ -279,55 +278,27 @@ def _over_noise(
         return not forces or is_usual(setting)
 
     def near(less: bool, node: Node) -> list[Node]:
-        place, j = node
-        there = [(place, other) for other in other_forces[j]] if forces else []
-        here = [o for o in grid.near(place) if not less or o[_ERRORS] < place[_ERRORS]]
-        return [*((o, j) for o in here if allowed(grid.at(o))), *there]
+        *place, j = node
+        there = [(*place, other) for other in other_forces[j]] if forces else []
+        here = [o for o in grid.near(tuple(place)) if not less or o[_ERRORS] < node[_ERRORS]]
+        return [*((*o, j) for o in here if allowed(grid.at(o))), *there]
 
     def tried(node: Node) -> Scored:
-        setting = grid.at(node[0])
-        setting = forces[node[1]].on_top_of(setting) if forces else setting
+        setting = grid.at(node[:-1])
+        setting = forces[node[-1]].on_top_of(setting) if forces else setting
         return replace(bare, settings=(setting,), grams=(bare.seen.grams(setting.noise),))
 
     begin = bare.noise if bare.settings else bare.fit.noise
-    start = grid.closest(begin, allowed), 0
-    kept = {start: tried(start)}
     # something of unknown cause leaves less to what is always there: if that does not reach the goal, the
     # other neighbours are not asked
     rounds = (True, False) if forces else (False,)
-    for less in rounds if bare.acts else ():  # what does not act is so under every noise
-        kept = _walked(kept, partial(near, less), tried, goal)
-        if max(float(one.evidence) for one in kept.values()) < goal:
-            break
+    ways = [partial(near, less) for less in rounds if bare.acts]  # what does not act is so under every noise
+    kept = walked((*grid.closest(begin, allowed), 0), ways, tried, goal)
     return replace(
         bare,
-        settings=tuple(one.settings[0] for one in kept.values()),
-        grams=tuple(one.grams[0] for one in kept.values()),
+        settings=tuple(one.settings[0] for one in kept),
+        grams=tuple(one.grams[0] for one in kept),
     )
-
-
-def _walked(
-    kept: dict[Node, Scored],
-    near: Callable[[Node], list[Node]],
-    tried: Callable[[Node], Scored],
-    goal: float,
-) -> dict[Node, Scored]:
-    """The most likely nodes: each is asked for its neighbours until those that are kept have all been asked,
-    or the best has been, and is below a goal.
-    """
-    known, asked = set(kept), set[Node]()
-    while open_ends := [node for node in kept if node not in asked]:
-        here = max(open_ends, key=lambda node: float(kept[node].levels[0]))
-        top = max(kept, key=lambda node: float(kept[node].levels[0]))
-        if top in asked and kept[top].evidence < goal:
-            break
-        asked.add(here)
-        fresh = [node for node in near(here) if node not in known]
-        known.update(fresh)
-        kept = kept | {node: tried(node) for node in fresh}
-        order = sorted(kept, key=lambda node: -float(kept[node].levels[0]))
-        kept = {node: kept[node] for node in order[:KEPT]}  # normal equations are large
-    return kept
 
 
 def is_usual(setting: Setting) -> bool:
