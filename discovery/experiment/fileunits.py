@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from math import isclose
+from math import isclose, log
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discovery.errors import RunsAwayError
 from discovery.fitting import Fit
@@ -16,7 +17,8 @@ from discovery.recordings import Channel
 from discovery.terms import Apply, Number
 
 MISSED = 0.5  # share of the spread of readings that a model with the right unit leaves at most
-ASTRAY = 30.0  # times its start: a parameter that a fit moves farther means another unit
+ASTRAY = 1.0  # log of the factor by which a fit moves a parameter at most if the unit is right
+LESS = 0.85  # of the rms, over all outputs: what is left once a formula has the right unit
 
 
 def in_file_units(
@@ -25,22 +27,28 @@ def in_file_units(
     """A model and its fit, formulas of outputs converted where they are in the unit of the file.
 
     A displacement in mm is converted to um. A formula that still gives mm is 1000 times too small: the model
-    misses the readings, or its parameters leave all reason, and a diagnosis would look for the physics that
-    is missing. A formula is converted if the fit fails so as it stands, and not with the formula converted.
+    misses the readings, or its parameters are far from what their author believes, and a diagnosis would look
+    for the physics that is missing. An author who forgets the unit does so in all formulas of one unit, or in
+    a single one. They are converted if the fit then leaves less, and its parameters stay near their starts
+    or are nearer than before.
 
     Args:
         model: as the fit began from.
         fitted: fits another model to the same recordings.
     """
-    for y, output in enumerate(fit.problem.outputs):
-        factor = channels[output].factor
-        if output not in model.outputs or isclose(factor, 1.0) or _explains(fit, y):
+    mine = [y for y in fit.problem.outputs if y in model.outputs and not isclose(channels[y].factor, 1.0)]
+    unit, written = {y: (channels[y].unit, channels[y].factor) for y in mine}, model.outputs
+    together = [tuple(y for y in mine if unit[y] == one) for one in dict.fromkeys(unit.values())]
+    for some in dict.fromkeys([*together, *((y,) for y in mine)]):
+        left = [y for y in some if model.outputs[y] == written[y]]
+        if all(_explains(fit, y) for y in left):
             continue
-        formula = Apply("*", (Number(factor), model.outputs[output]))
-        other = replace(model, outputs={**model.outputs, output: formula})
+        formulas = {y: Apply("*", (Number(channels[y].factor), written[y])) for y in left}
+        other = replace(model, outputs={**model.outputs, **formulas})
         with suppress(RunsAwayError):
             again = fitted(other)
-            model, fit = (other, again) if _explains(again, y) else (model, fit)
+            if _strayed(again) < max(_strayed(fit), ASTRAY) and _left(again, fit) < LESS:
+                model, fit = other, again
     return model, fit
 
 
@@ -60,11 +68,26 @@ def converted_notes(written: Model, model: Model, channels: Mapping[str, Channel
             )
 
 
-def _explains(fit: Fit, y: int) -> bool:
-    """Whether a fit explains output number `y`, with parameters that stay near their starts."""
-    left = np.concatenate([one[:, y] for one in fit.residuals().values()])
+def _explains(fit: Fit, output: str) -> bool:
+    """Whether a fit explains an output, with parameters that stay near their starts."""
+    y = fit.problem.outputs.index(output)
     readings = np.concatenate([t.system.grid.readings[:, y] for t in fit.trajectories])
+    return _strayed(fit) < ASTRAY and bool(_rms(fit)[y] < MISSED * np.nanstd(readings))
+
+
+def _strayed(fit: Fit) -> float:
+    """Log of the largest factor by which a fit moves a parameter."""
     before, after = fit.problem.model.values(), fit.model.values()
     moved = [after[n] / before[n] for n in fit.problem.model.free if before[n]]
-    near = all(1 / ASTRAY < change < ASTRAY for change in moved if change > 0)
-    return near and bool(np.nanstd(left) < MISSED * np.nanstd(readings))
+    return max((abs(log(change)) for change in moved if change > 0), default=0.0)
+
+
+def _left(fit: Fit, other: Fit) -> float:
+    """rms of a fit over that of another one, the geometric mean over the outputs."""
+    return float(np.exp(np.mean(np.log(_rms(fit) / _rms(other)))))
+
+
+def _rms(fit: Fit) -> NDArray[np.float64]:
+    """Standard deviation (Y,) of what a fit leaves of each output."""
+    left = np.concatenate(list(fit.residuals().values()))
+    return np.asarray(np.maximum(np.nanstd(left, axis=0), 1e-300))
