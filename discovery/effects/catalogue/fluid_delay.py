@@ -2,8 +2,9 @@
 
     T_fluid(t) in every wet term of the model becomes T_fluid(t - t_delay)
 
-t_delay in s: 5 to 50 s for the hose alone (not visible), 5 min to 1 h where a tank and channels lie
-between. Source: plug flow. Limits: the same for all bodies; mixing on the way is `fluid_sump`.
+t_delay in s: 5 to 50 s for the hose alone, minutes where the fluid reaches the bodies through channels,
+5 min to 1 h where a tank lies between. Source: plug flow. Limits: the same for all bodies; mixing on the way
+is `fluid_sump`.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape
@@ -15,7 +16,7 @@ EFFECT = Effect(
     place="fluid terms",
     formula="delay(fluid, t_delay)",
     amplitude=Amplitude("delayed", "1", 1.0, 1, 1.0),
-    shapes=(Shape("t_delay", "s", 900.0, factor=2.2, apart=1.5, is_shift=True),),
+    shapes=(Shape("t_delay", "s", 300.0, factor=3.0, apart=1.5, is_shift=True),),
     signature="every wet body answers to the fluid temperature later than it is measured",
     confused_with=(
         "fluid_sump",
