@@ -15,13 +15,14 @@ _SPELLED = {
     "degF": "°f f degf fahrenheit deg.f °fahrenheit 華氏",
     "K": "k kelvin °k",
     "delta_degC": "deltak dk",
-    "percent": "% pct percent prozent proz. パーセント %pwm %rh %r.h. %rf vh",
+    "percent": "% pct perc percent prozent proz. パーセント %pwm %rh %r.h. %rf vh",
     "rpm": "rpm 1/min u/min u/min. umin upm r/min rev/min min-1 min^-1 min⁻¹ /min tr/min giri/min "
     "ob/min obr/min ot/min varv/min omw/min o/min 回転/分 r.p.m.",
     "1/s": "1/s s-1 s^-1 s⁻¹ rps rev/s",
     "W": "w watt watts ワット",
     "kW": "kw kilowatt",
     "mW": "mw",
+    "W/m**2": "wm2 wm-2",
     "hp": "hp ps cv",
     "um": "um µm μm micron microns micrometer mikrometer mkm ミクロン マイクロメートル",
     "mm": "mm millimeter millimetre ミリ",
@@ -144,6 +145,8 @@ def unit_in(header: str) -> tuple[str, str] | None:
     (('oil', 'C'), None, None)
     >>> unit_in("oil_in"), unit_in("T_in"), unit_in("Disp X in"), unit_in("x [in]")
     (None, None, ('Disp X', 'in'), ('x', 'in'))
+    >>> unit_in("solarrad_Wm2"), unit_in("relhum_perc")
+    (('solarrad', 'Wm2'), ('relhum', 'perc'))
     >>> unit_in("CPU_Power_W_Actual"), unit_in("speed_rpm_set"), unit_in("axis_C_motor")
     (('CPU_Power_Actual', 'W'), ('speed_set', 'rpm'), None)
     """

@@ -193,7 +193,8 @@ _ROWS: tuple[tuple[str, Mapping[str, float], str], ...] = (
     (
         "air",
         {"air": 7.5, "temperature": 1.5},
-        "air hall ~halle ~hallen ~luft shop workshop nave taller ~verkstad ~車間 ~车间 ~工場",
+        "air airtemp airtemperature hall ~halle ~hallen ~luft shop workshop nave taller ~verkstad "
+        "~車間 ~车间 ~工場",
     ),
     (
         "room",
