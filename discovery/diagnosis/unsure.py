@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
+from math import floor, isfinite
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.named import Named, added, claims
@@ -57,7 +57,8 @@ def _unsure(n: Named, added: float, least: float, alone: str) -> str:
             f"that are not named either{alone}"
         )
     # a high probability next to too little evidence reads like a contradiction: only what is short is said
-    short = [f"log evidence {printed(added)} of the {printed(least)}"] if added < least else []
+    below = floor(10 * added) / 10  # 15.96 is not 16
+    short = [f"log evidence {printed(below)} of the {printed(least)}"] if added < least else []
     if n.together < thresholds.NAMED:
         short.insert(0, f"{chance} of the {thresholds.NAMED:g}")
     return f"{name} is possible but not sure enough to be named ({' and '.join(short)} that a name needs)"
