@@ -29,7 +29,7 @@ from discovery.diagnosis.scored import Scored, is_usual, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.unknown_law import instead
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
-from discovery.diagnosis.withdrawal import idle, refuted, runs_away, unfinished, unforeseen, wrong_readings
+from discovery.diagnosis.withdrawal import idle, refuted, unfinished, unfit, unforeseen, wrong_readings
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis
@@ -209,8 +209,8 @@ def diagnose(
     keys = frozenset(h.key for h in named)
     alone = found.tried.get(keys, verdict.answer) if named else verdict.answer
     after = _repaired(context, alone, verdict.named, model, seen)
-    if named and after is None:
-        verdict = runs_away(verdict)
+    verdict = unfit(verdict, after)
+    after = after if verdict.named else None
     noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     known = (alone if after else found.baseline).known().beside(context.thermometers, thresholds.AIR)

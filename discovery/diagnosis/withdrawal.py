@@ -10,6 +10,9 @@ from discovery.diagnosis import thresholds
 from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, coarse, unrecorded
+from discovery.effects.hypothesis import Hypothesis
+from discovery.evidence.whitening import moving
+from discovery.fitting import Fit
 from discovery.printed import printed
 
 
@@ -21,7 +24,8 @@ def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement], fit: 
     lower = _lower(i for run, i in runs.items() if run in fit or _acts(verdict, run))
     if not verdict.named or lower >= 0.5 * thresholds.MATTERS**2:
         return verdict
-    reason = f"the surest effects {_does(lower)}"
+    names = " and ".join(n.hypothesis.stated for n in verdict.named)
+    reason = f"{names}: {_does(lower)}"
     word = UNEXPLAINED if coarse(found) else NO_MISMATCH
     reasons = dict.fromkeys((reason, *(coarse(found) or unrecorded(found)), *verdict.reasons))
     return replace(verdict, word=word, named=(), candidates=(), reasons=tuple(reasons))
@@ -35,9 +39,10 @@ def _acts(verdict: Verdict, run: str) -> bool:
 def _does(lower: float) -> str:
     """What effects do to free runs. `lower`: the logarithm by which the rms falls."""
     if not isfinite(lower):
-        return "make free runs run away"
-    change = f"{round(100 * expm1(-lower), 2):+g} %"
-    return f"do too little for free runs (the rms changes by {change} on average over the recordings)"
+        return "free runs run away with it"
+    change = 100 * expm1(-lower)
+    way = f"{'rises' if change == abs(change) else 'falls'} by {round(abs(change), 2):g} %"
+    return f"too little for free runs (their rms {way} on average over the recordings)"
 
 
 def _lower(runs: Iterable[Improvement]) -> float:
@@ -47,11 +52,28 @@ def _lower(runs: Iterable[Improvement]) -> float:
     return sum(logs) / max(len(logs), 1)
 
 
-def runs_away(verdict: Verdict) -> Verdict:
-    """The verdict with its names withdrawn, because the repaired model does not stay finite in free runs."""
+def unfit(verdict: Verdict, repaired: Fit | None) -> Verdict:
+    """The verdict with its names withdrawn, because the repaired model does not stay finite in free runs, or
+    fits them only at the end of the range of an effect: there another law acts.
+    """
+    at_end = [name for n in verdict.named for name in _at_end(n.hypothesis, repaired)] if repaired else []
+    if not verdict.named or (repaired and not at_end):
+        return verdict
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in verdict.named)
-    reasons = (f"with {names}, free runs of the model do not stay finite", *verdict.reasons)
+    what = (
+        f"free runs fit best at the end of the range of {', '.join(at_end)}: another law acts"
+        if at_end
+        else "free runs of the model do not stay finite"
+    )
+    reasons = (f"with {names}, {what}", *verdict.reasons)
     return replace(verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=reasons)
+
+
+def _at_end(h: Hypothesis, fit: Fit) -> list[str]:
+    """Shape parameters of an effect that a fit takes to the end of their range."""
+    inside = {fit.problem.unknowns[i].name for i in moving(fit)}
+    shapes = zip(h.shapes, h.effect.shapes, strict=True)
+    return [name for name, shape in shapes if not shape.instant and name not in inside]
 
 
 def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:

@@ -198,10 +198,7 @@ class Whitened:
     @cached_property
     def moving(self) -> Ints:
         """Unknowns that are not at a bound."""
-        low, high = self.fit.problem.bounds
-        theta = self.fit.theta
-        scale = _AT_BOUND * np.maximum(1.0, np.abs(theta))
-        return np.flatnonzero((theta > low + scale) & (theta < high - scale))
+        return moving(self.fit)
 
     @cached_property
     def block(self) -> Ints:
@@ -318,6 +315,13 @@ class Whitened:
         ]
         size = self.jacobians[0].shape[2] + 1
         return Rows(size, tuple(rows for rows, _ in parts), tuple(self.acting), tuple(edges), np.array(dets))
+
+
+def moving(fit: Fit) -> Ints:
+    """Unknowns of a fit that are not at a bound."""
+    low, high = fit.problem.bounds
+    scale = _AT_BOUND * np.maximum(1.0, np.abs(fit.theta))
+    return np.flatnonzero((fit.theta > low + scale) & (fit.theta < high - scale))
 
 
 @dataclass(frozen=True)

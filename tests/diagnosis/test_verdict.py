@@ -21,9 +21,17 @@ from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import SHORT
 from discovery.diagnosis.verdict import Verdict, decide
-from discovery.diagnosis.withdrawal import idle, refuted, runs_away, unfinished, unforeseen, wrong_readings
+from discovery.diagnosis.withdrawal import (
+    idle,
+    refuted,
+    unfinished,
+    unfit,
+    unforeseen,
+    wrong_readings,
+)
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis, Key
+from discovery.fitting import Fit
 
 
 def claim(word: str, *places: str, recording: str | None = None) -> Hypothesis:
@@ -770,10 +778,11 @@ def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
     assert idle(cast(Any, WET), named, {"r1": large}, ["r1", "r2", "r3"]) is named
     withdrawn = idle(cast(Any, WET), named, {"r1": small, "r2": small}, ["r1", "r2", "r3"])
     assert (withdrawn.word, withdrawn.named) == ("no mismatch", ())
-    assert "do too little for free runs (the rms changes by -0.25 % on average" in withdrawn.reasons[0]
+    assert withdrawn.reasons[0].startswith("fluid_convection at table: too little for free runs")
+    assert "(their rms falls by 0.25 % on average" in withdrawn.reasons[0]
     tripled = idle(cast(Any, WET), named, {"r1": improved(1.0, 3.0, -2.5, -1.5)}, ["r1", "r2", "r3"])
     assert tripled.reasons[0] == (
-        "the surest effects do too little for free runs (the rms changes by +200 % on average over the "
+        "fluid_convection at table: too little for free runs (their rms rises by 200 % on average over the "
         "recordings)"
     )
     assert (
@@ -919,6 +928,25 @@ def test_scores_are_no_part_of_these_tests() -> None:
 
 def test_a_repair_that_cannot_run_has_no_name() -> None:
     named = said(WET, {"fluid_convection": 0.9})
-    withdrawn = runs_away(named)
+    withdrawn = unfit(named, None)
     assert (withdrawn.word, withdrawn.named, withdrawn.candidates) == ("unexplained", (), named.named)
     assert withdrawn.reasons[0] == "with fluid_convection at table, free runs of the model do not stay finite"
+
+
+@pytest.mark.parametrize(("time", "is_named"), [(7.8e5, False), (2e5, True)])
+def test_a_repair_at_the_end_of_a_range_has_no_name(time: float, is_named: bool) -> None:
+    """A fan that a thermostat switches, in 12 h of a hexapod: the fit made constant heat of the memory of a
+    bed, 218 h long in place of the usual 33 h.
+    """
+    bed = replace(claim("bed_memory", "motor"), shapes={"t_bed_motor": 1.2e5})
+    named = said(Tried([Model((bed,), 100.0), Model((), 0.0)]), {"bed_memory": 0.9})
+    name = "t_bed_motor"
+    bounds = np.array([1.8e4]), np.array([7.8e5])
+    problem = SimpleNamespace(unknowns=[SimpleNamespace(name=name)], bounds=bounds)
+    left = unfit(named, cast(Fit, SimpleNamespace(problem=problem, theta=np.array([time]))))
+    if is_named:
+        assert left is named
+        return
+    assert (left.word, left.named, left.candidates) == ("unexplained", (), named.named)
+    what = "free runs fit best at the end of the range of t_bed_motor: another law acts"
+    assert left.reasons[0] == f"with bed_memory at motor, {what}"
