@@ -17,29 +17,32 @@ from discovery.diagnosis.coarse_bodies import judging, sentences, with_coarse_bo
 from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
-from discovery.diagnosis.named import Named
 from discovery.diagnosis.own import Searched, searched
 from discovery.diagnosis.posterior import IN_PLAY, Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, unit_of
-from discovery.diagnosis.refit import shape_priors, with_effects
-from discovery.diagnosis.repair import written
+from discovery.diagnosis.repair import with_repair, written
 from discovery.diagnosis.response import Response, responses
 from discovery.diagnosis.scan import in_play
 from discovery.diagnosis.scored import Scored, is_usual, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.unknown_law import instead
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
-from discovery.diagnosis.withdrawal import idle, refuted, unfinished, unfit, unforeseen, wrong_readings
+from discovery.diagnosis.withdrawal import (
+    idle,
+    refuted,
+    unfinished,
+    unforeseen,
+    wrong_readings,
+)
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis
 from discovery.effects.not_offered import not_offered
-from discovery.errors import RunsAwayError, UserError
+from discovery.errors import UserError
 from discovery.evidence import late, noisy
 from discovery.evidence.hung import Hung, without_hung
 from discovery.evidence.latent_force import Force, latent_forces
-from discovery.fitting import Fit, Prior, fit_model
-from discovery.fitting.covariance import Z95
+from discovery.fitting import Fit, fit_model
 from discovery.models import Model
 from discovery.models.units import differences
 from discovery.printed import printed
@@ -205,12 +208,8 @@ def diagnose(
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
     tell("proving in free runs")
     verdict = decide(context, found, chances)
+    verdict, alone, after = with_repair(context, found, verdict, model, seen)
     named = [n.hypothesis for n in verdict.named]
-    keys = frozenset(h.key for h in named)
-    alone = found.tried.get(keys, verdict.answer) if named else verdict.answer
-    after = _repaired(context, alone, verdict.named, model, seen)
-    verdict = unfit(verdict, after)
-    after = after if verdict.named else None
     noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     known = (alone if after else found.baseline).known().beside(context.thermometers, thresholds.AIR)
@@ -308,40 +307,6 @@ def _unknown(context: Context, found: Search) -> list[Scored]:
     """The baseline and the best answer with something of unknown cause."""
     models = list({one.keys: one for one in (found.baseline, found.best)}.values())
     return with_unknown(context, models, found.best.evidence - IN_PLAY)
-
-
-def _repaired(
-    context: Context, answer: Scored, names: Sequence[Named], model: Model, seen: Campaign
-) -> Fit | None:
-    """The model with effects of an answer, fitted in the same way as the baseline of the proof; None without
-    effects, or if it does not stay finite from the starts of free runs.
-
-    A jump that no flow makes keeps the size that the readings next to it show: a model that is far from the
-    machine would make up for its own error with it.
-    """
-    if not names:
-        return None
-    chosen = [n.hypothesis for n in names]
-    grown = with_effects(model, chosen)
-    values = answer.fit.model.parameters
-    start = {n: values[n].value for n in grown.free if n in values}
-    priors = shape_priors(chosen)  # readings may leave the shape of an effect open
-    for name in (name for n in names if n.is_abrupt for name in n.hypothesis.amplitudes):
-        if (ends := answer.interval(name)) is not None:
-            priors[name] = Prior(values[name].value, (ends[1] - ends[0]) / (2 * Z95))
-    try:
-        return fit_model(
-            grown,
-            seen,
-            context.recordings,
-            context.outputs,
-            priors=priors,
-            guess=start,
-            begin=answer.fit,
-            max_rounds=25,
-        )
-    except RunsAwayError:
-        return None
 
 
 def _set_aside(context: Context) -> list[str]:

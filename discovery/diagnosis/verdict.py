@@ -126,11 +126,18 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     if named and all(n.is_abrupt for n in named):
         every = (*every, *coarse(found))
     if named:
-        kinds = {n.hypothesis.effect.is_physics for n in named}
-        return Verdict(MISSING if True in kinds else FAULT, answer, named, (), every)
+        surest_first = sorted(named, key=lambda n: -round(n.probability, 2))
+        return Verdict(word_of(named), answer, tuple(surest_first), (), every)
     if reasons:
         return Verdict(UNEXPLAINED, answer, (), candidates, every)
     return _nothing(found, answer, candidates, further)
+
+
+def word_of(named: Sequence[Named]) -> str:
+    """The verdict with some names, where something acts."""
+    if not named:
+        return UNEXPLAINED
+    return MISSING if any(n.hypothesis.effect.is_physics for n in named) else FAULT
 
 
 def _proved(

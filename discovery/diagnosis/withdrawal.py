@@ -9,7 +9,7 @@ from math import expm1, inf, isfinite, log
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.selection import Search
-from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, coarse, unrecorded
+from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, coarse, unrecorded, word_of
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.whitening import moving
 from discovery.fitting import Fit
@@ -52,21 +52,34 @@ def _lower(runs: Iterable[Improvement]) -> float:
     return sum(logs) / max(len(logs), 1)
 
 
-def unfit(verdict: Verdict, repaired: Fit | None) -> Verdict:
-    """The verdict with its names withdrawn, because the repaired model does not stay finite in free runs, or
-    fits them only at the end of the range of an effect: there another law acts.
-    """
-    at_end = [name for n in verdict.named for name in _at_end(n.hypothesis, repaired)] if repaired else []
-    if not verdict.named or (repaired and not at_end):
-        return verdict
+def runs_away(verdict: Verdict) -> Verdict:
+    """The verdict with its names withdrawn, because the repaired model does not stay finite in free runs."""
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in verdict.named)
-    what = (
-        f"free runs fit best at the end of the range of {', '.join(at_end)}: another law acts"
-        if at_end
-        else "free runs of the model do not stay finite"
-    )
-    reasons = (f"with {names}, {what}", *verdict.reasons)
+    reasons = (f"with {names}, free runs of the model do not stay finite", *verdict.reasons)
     return replace(verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=reasons)
+
+
+def beyond_range(verdict: Verdict, repaired: Fit) -> Verdict:
+    """The verdict without names that the repaired model fits only at the end of their range: there another
+    law acts.
+    """
+    ends = {n.hypothesis.key: _at_end(n.hypothesis, repaired) for n in verdict.named}
+    lost = [n.hypothesis for n in verdict.named if ends[n.hypothesis.key]]
+    if not lost:
+        return verdict
+    kept = tuple(n for n in verdict.named if not ends[n.hypothesis.key])
+    reasons = (
+        f"{h.stated} is not named: free runs fit best at the end of the range of {', '.join(ends[h.key])}, "
+        "where another law acts"
+        for h in lost
+    )
+    return replace(
+        verdict,
+        word=word_of(kept),
+        named=kept,
+        candidates=() if kept else verdict.named,
+        reasons=(*reasons, *verdict.reasons),
+    )
 
 
 def _at_end(h: Hypothesis, fit: Fit) -> list[str]:
