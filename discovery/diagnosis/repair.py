@@ -93,14 +93,12 @@ def with_repair(
 def _repaired(
     context: Context, answer: Scored, names: Sequence[Named], model: Model, seen: Campaign
 ) -> Fit | None:
-    """The model with effects of an answer, fitted in the same way as the baseline of the proof; None without
-    effects, or if it does not stay finite from the starts of free runs.
+    """The model with effects of an answer, fitted in the same way as the baseline of the proof; None if it
+    does not stay finite from the starts of free runs.
 
     A jump that no flow makes keeps the size that the readings next to it show: a model that is far from the
     machine would make up for its own error with it.
     """
-    if not names:
-        return None
     chosen = [n.hypothesis for n in names]
     grown = with_effects(model, chosen)
     values = answer.fit.model.parameters

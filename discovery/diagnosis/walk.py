@@ -49,8 +49,11 @@ def walked(start: Node, ways: Sequence[Near], tried: Callable[[Node], S], goal: 
         if levels[top] < goal:
             break
         asked = {top}
-        while open_ends := [node for node in best if node not in asked and level(node) > levels[top] - SMALL]:
-            here = max(open_ends, key=level)
+        while True:
+            least = max(levels.values()) - SMALL
+            here = max((n for n in best if n not in asked and levels[n] > least), key=level, default=None)
+            if here is None:
+                break
             asked.add(here)
             for node in near(here):
                 level(node)
