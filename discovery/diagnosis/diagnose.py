@@ -227,7 +227,7 @@ def diagnose(
     fitting, proof, each = proved(every)
     fitted_to, unseen, all_runs = (fitting, proof, each) if judged == every else proved(judged)
     unit = unit_of(campaign, outputs)
-    verdict = refuted(unfinished(idle(found, verdict, all_runs, fit), fitted_to, unit), unseen)
+    verdict = refuted(unfinished(idle(found, verdict, all_runs), fitted_to, unit), unseen)
     if not verdict.named and after is not None:
         after = None
     in_fit = [h for h in hung if h.recording in fit]

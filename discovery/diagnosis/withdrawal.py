@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from math import expm1, inf, isfinite, log
 
@@ -16,12 +16,12 @@ from discovery.fitting import Fit
 from discovery.printed import printed
 
 
-def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement], fit: Sequence[str]) -> Verdict:
-    """No name where what was named does too little for free runs, on average over the recordings to fit, and
-    those unseen ones in which it may act. Logarithms of the rms are averaged: one recording of another
-    machine does not drown the rest.
+def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement]) -> Verdict:
+    """No name where what was named does too little for free runs, on average over the recordings in which it
+    may act: two hours of heat do nothing for the others. Logarithms of the rms are averaged: one recording of
+    another machine does not drown the rest.
     """
-    lower = _lower(i for run, i in runs.items() if run in fit or _acts(verdict, run))
+    lower = _lower(i for run, i in runs.items() if _acts(verdict, run))
     if not verdict.named or lower >= 0.5 * thresholds.MATTERS**2:
         return verdict
     names = " and ".join(n.hypothesis.stated for n in verdict.named)
