@@ -99,6 +99,7 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
             for h in faults
         ]
         by_law = any(best is one for one in laws)
+        few = "the effects that are sure enough explain too little" if named else "no effect is sure enough"
         named = tuple(
             _needed(
                 mostly, least, lambda some, goal: _unknown_beside(context, found, answer, some, goal, by_law)
@@ -114,8 +115,8 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
             does = "explains more than effects do" if best.evidence > most else "or unsure effects act"
             reasons += [f"{best.forced} {does}"] if best.forced else []
             reasons.append(
-                "the effects that are sure enough explain too little: the best model of all has "
-                f"{max(m.evidence for m in rest) - alone:.0f} more log evidence"
+                f"{few}: the best model of all has {max(m.evidence for m in rest) - alone:.0f} more log "
+                "evidence"
             )
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
     further = (
