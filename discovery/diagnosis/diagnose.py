@@ -27,13 +27,7 @@ from discovery.diagnosis.scored import Scored, is_usual, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.unknown_law import instead
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
-from discovery.diagnosis.withdrawal import (
-    idle,
-    refuted,
-    unfinished,
-    unforeseen,
-    wrong_readings,
-)
+from discovery.diagnosis.withdrawal import idle, refuted, unfinished, unforeseen, wrong_readings
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis

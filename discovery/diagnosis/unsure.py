@@ -57,8 +57,9 @@ def _unsure(n: Named, added: float, least: float, alone: str) -> str:
             f"that are not named either{alone}"
         )
     # a high probability next to too little evidence reads like a contradiction: only what is short is said
-    below = floor(10 * added) / 10  # 15.96 is not 16
-    short = [f"log evidence {printed(below)} of the {printed(least)}"] if added < least else []
+    short = []
+    if added < least:  # 15.96 is not shown as 16
+        short.append(f"log evidence {printed(floor(10 * added) / 10)} of the {printed(least)}")
     if n.together < thresholds.NAMED:
         short.insert(0, f"{chance} of the {thresholds.NAMED:g}")
     return f"{name} is possible but not sure enough to be named ({' and '.join(short)} that a name needs)"
