@@ -49,3 +49,23 @@ def test_a_formula_in_um_is_taken_as_it_stands(folder: Path, formula: str) -> No
     found = results_of(folder / "out")["models"]["one_body"]
     assert not any("unit of the file" in note for note in found["notes"])
     assert (found["recordings"]["c"]["E_Y0C"]["rms"] < 0.5) == (formula == "-5*")
+
+
+@pytest.mark.parametrize("sister", ["2*", "4.84814*2*"])  # in the unit of the file as well; converted by hand
+def test_formulas_of_one_unit_are_judged_together_and_alone(tmp_path: Path, sister: str) -> None:
+    """Of two formulas in arcsec one was converted, and the other one was not: a factor of 4.85 passed for
+    physics. A fit of the wrong unit explains much, with a loss 4.85 times as large as its author believes.
+    """
+    write_small(tmp_path)
+    text = CAMPAIGN.replace('"um", noise = 0.3', '"arcsec", noise = 0.3')
+    (tmp_path / "campaign.toml").write_text(text)
+    (tmp_path / "model.toml").write_text(MODEL.replace('"2*', f'"{sister}'))
+    run(tmp_path / "experiment.toml", tmp_path / "out")
+    found = results_of(tmp_path / "out")["models"]["one_body"]
+    said = [note for note in found["notes"] if "unit of the file" in note]
+    assert [("E_Y0C" in note, "E_R0T" in note) for note in said] == (
+        [(True, False), (False, True)] if sister == "2*" else [(True, False)]
+    )
+    assert found["values"]["loss"]["value"] == pytest.approx(0.4, rel=0.02)
+    noise = 0.3 * 4.84814
+    assert all(one["rms"] < 1.2 * noise for one in found["recordings"]["c"].values())
