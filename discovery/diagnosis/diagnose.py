@@ -20,7 +20,7 @@ from discovery.diagnosis.location import Location, locate
 from discovery.diagnosis.own import Searched, searched
 from discovery.diagnosis.posterior import IN_PLAY, Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, unit_of
-from discovery.diagnosis.repair import with_repair, written
+from discovery.diagnosis.repair import with_repair
 from discovery.diagnosis.response import Response, responses
 from discovery.diagnosis.scan import in_play
 from discovery.diagnosis.scored import Scored, is_usual, with_unknown
@@ -28,6 +28,7 @@ from discovery.diagnosis.selection import Search
 from discovery.diagnosis.unknown_law import instead
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
 from discovery.diagnosis.withdrawal import idle, refuted, unfinished, unforeseen, wrong_readings
+from discovery.diagnosis.written import written
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis

@@ -26,7 +26,7 @@ from discovery.evidence.process_noise import (
     unknown_heat,
 )
 from discovery.evidence.settings import Setting
-from discovery.evidence.whitening import Grams, Whitened, log_sum_exp
+from discovery.evidence.whitening import Grams, Whitened, log_sum_exp, moving
 from discovery.fitting import Fit, Noise
 from discovery.fitting.covariance import Z95
 from discovery.models import Model
@@ -234,10 +234,7 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
     free = [h for h in chosen if h.effect.amplitude.fixed is None]
     place = {u.name: i for i, u in enumerate(fit.problem.unknowns) if not u.is_nuisance}
     index = np.array([place[name] for h in free for name in h.amplitudes], dtype=np.intp)
-    moving = {int(i): k for k, i in enumerate(seen.moving)}
-    shapes = [
-        name for h in chosen for name, s in zip(h.shapes, h.effect.shapes, strict=True) if not s.instant
-    ]
+    moves = {int(i): k for k, i in enumerate(seen.moving)}
     bare = Scored(
         tuple(chosen),
         fit,
@@ -245,12 +242,19 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
         (),
         (),
         context.slab(free) if free else Slab(np.zeros(0), np.zeros(0), np.zeros(0)),
-        np.array([moving.get(int(i), -1) for i in index], dtype=np.intp),
+        np.array([moves.get(int(i), -1) for i in index], dtype=np.intp),
         fit.theta[index],
-        any(place[name] not in moving for name in shapes),
+        bool(shapes_at_end(chosen, fit)),
     )
     # a fit that ended early is no part of the answer: its most likely noise says enough
     return _over_noise(context, bare, goal=inf if fit.ended_early else -inf)
+
+
+def shapes_at_end(chosen: Sequence[Hypothesis], fit: Fit) -> list[str]:
+    """Shape parameters of effects that a fit takes to the end of their range, where another law acts."""
+    inside = {fit.problem.unknowns[i].name for i in moving(fit)}
+    shapes = [pair for h in chosen for pair in zip(h.shapes, h.effect.shapes, strict=True)]
+    return [name for name, shape in shapes if not shape.instant and name not in inside]
 
 
 def under_noise_of(context: Context, one: Scored) -> Scored:

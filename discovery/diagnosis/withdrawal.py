@@ -8,10 +8,9 @@ from math import expm1, inf, isfinite, log
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.proof import Improvement
+from discovery.diagnosis.scored import shapes_at_end
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, coarse, unrecorded, word_of
-from discovery.effects.hypothesis import Hypothesis
-from discovery.evidence.whitening import moving
 from discovery.fitting import Fit
 from discovery.printed import printed
 
@@ -63,7 +62,7 @@ def beyond_range(verdict: Verdict, repaired: Fit) -> Verdict:
     """The verdict without names that the repaired model fits only at the end of their range: there another
     law acts.
     """
-    ends = {n.hypothesis.key: _at_end(n.hypothesis, repaired) for n in verdict.named}
+    ends = {n.hypothesis.key: shapes_at_end([n.hypothesis], repaired) for n in verdict.named}
     lost = [n.hypothesis for n in verdict.named if ends[n.hypothesis.key]]
     if not lost:
         return verdict
@@ -80,13 +79,6 @@ def beyond_range(verdict: Verdict, repaired: Fit) -> Verdict:
         candidates=() if kept else verdict.named,
         reasons=(*reasons, *verdict.reasons),
     )
-
-
-def _at_end(h: Hypothesis, fit: Fit) -> list[str]:
-    """Shape parameters of an effect that a fit takes to the end of their range."""
-    inside = {fit.problem.unknowns[i].name for i in moving(fit)}
-    shapes = zip(h.shapes, h.effect.shapes, strict=True)
-    return [name for name, shape in shapes if not shape.instant and name not in inside]
 
 
 def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:

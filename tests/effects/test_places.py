@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from discovery.diagnosis.repair import written
+from discovery.diagnosis.written import written
 from discovery.dynamics import predict
 from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import catalogue
